@@ -1,0 +1,1 @@
+//! Pictures: accumulation, files, tone curves, error metrics.

@@ -1,0 +1,395 @@
+//! The scene on the CPU: what the readers produce and everything above consumes.
+//!
+//! Units are metres, radians and W·m⁻²·sr⁻¹ (radiance), W·sr⁻¹ (point and spot intensity), W·m⁻² (directional irradiance). World space is
+//! right-handed with +Y up, as in glTF 2.0; a camera looks along its local −Z.
+
+use glam::{DAffine3, Vec2, Vec3, Vec4};
+
+/// A scene as described, before anything is uploaded.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// Short name, used for output files.
+    pub name: String,
+    /// The file or `builtin:` address that it came from.
+    pub source: String,
+    /// Triangle meshes in their own space.
+    pub meshes: Vec<Mesh>,
+    /// Placements of meshes in the world.
+    pub instances: Vec<Instance>,
+    /// Materials; a mesh without one uses [`Material::default`].
+    pub materials: Vec<Material>,
+    /// Decoded images that textures refer to.
+    pub images: Vec<Image>,
+    /// Point, spot and directional lights in world space. Area lights are emissive materials.
+    pub lights: Vec<Light>,
+    /// Radiance arriving from infinity; black without one.
+    pub environment: Option<Environment>,
+    /// Cameras in world space; the first is the default.
+    pub cameras: Vec<Camera>,
+    /// What the scene file asks of a render.
+    pub defaults: RenderDefaults,
+    /// What the reader met and could not carry over, by name.
+    pub notes: Vec<Note>,
+}
+
+/// Something a reader met and did not model: always reported, never dropped in silence.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Note {
+    /// The extension or feature by its name.
+    pub feature: String,
+    /// Where it was met.
+    pub at: String,
+    /// What the reader does instead.
+    pub instead: String,
+}
+
+/// An indexed triangle mesh (one glTF primitive). Optional attributes are empty or as long as `positions`.
+#[derive(Debug, Clone, Default)]
+pub struct Mesh {
+    /// Name from the file, or made up.
+    pub name: String,
+    /// Positions, metres.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals; empty means flat shading.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents, w = ±1 bitangent sign; present when the material has a normal map.
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinates, set 0.
+    pub uv0: Vec<Vec2>,
+    /// Texture coordinates, set 1.
+    pub uv1: Vec<Vec2>,
+    /// Linear vertex colours, multiplied onto base colour and alpha.
+    pub colors: Vec<Vec4>,
+    /// Three vertex indices a triangle, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into [`Scene::materials`].
+    pub material: Option<u32>,
+}
+
+/// A mesh placed in the world.
+#[derive(Debug, Clone)]
+pub struct Instance {
+    /// Index into [`Scene::meshes`].
+    pub mesh: u32,
+    /// Mesh space to world space; a negative determinant flips the winding.
+    pub transform: DAffine3,
+    /// Name of the node it came from.
+    pub name: String,
+}
+
+/// How alpha decides whether a surface is there (glTF 2.0 §3.9.4).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// There where alpha ≥ the cutoff.
+    Mask {
+        /// The cutoff.
+        cutoff: f32,
+    },
+    /// There with probability alpha.
+    Blend,
+}
+
+/// The exact complex index of refraction of a metal, per RGB band.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ConductorIor {
+    /// Real part.
+    pub eta: Vec3,
+    /// Extinction coefficient.
+    pub k: Vec3,
+}
+
+/// A surface material: glTF 2.0 metallic-roughness with its `KHR_materials_*` extensions, and measured metals.
+#[derive(Debug, Clone)]
+pub struct Material {
+    /// Name from the file.
+    pub name: String,
+    /// Linear base colour factor and alpha.
+    pub base_color: Vec4,
+    /// sRGB base colour texture with alpha.
+    pub base_color_texture: Option<Texture>,
+    /// Metalness factor in [0, 1].
+    pub metallic: f32,
+    /// Perceptual roughness factor in [0, 1]; the GGX α is its square.
+    pub roughness: f32,
+    /// Linear texture: roughness in G, metalness in B.
+    pub metallic_roughness_texture: Option<Texture>,
+    /// Emitted radiance factor × `KHR_materials_emissive_strength`, W·m⁻²·sr⁻¹.
+    pub emission: Vec3,
+    /// sRGB emission texture.
+    pub emission_texture: Option<Texture>,
+    /// Tangent-space normal map.
+    pub normal_texture: Option<Texture>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Index of refraction of the dielectric base (`KHR_materials_ior`); 0 stands for infinite (unit Fresnel).
+    pub ior: f32,
+    /// `KHR_materials_specular` strength.
+    pub specular: f32,
+    /// `KHR_materials_specular` strength texture (A).
+    pub specular_texture: Option<Texture>,
+    /// `KHR_materials_specular` F0 colour.
+    pub specular_color: Vec3,
+    /// `KHR_materials_specular` sRGB colour texture.
+    pub specular_color_texture: Option<Texture>,
+    /// `KHR_materials_transmission` factor.
+    pub transmission: f32,
+    /// `KHR_materials_transmission` texture (R).
+    pub transmission_texture: Option<Texture>,
+    /// `KHR_materials_volume` thickness: > 0 bounds a solid body, 0 is a thin wall.
+    pub thickness: f32,
+    /// Beer–Lambert attenuation colour after `attenuation_distance`.
+    pub attenuation_color: Vec3,
+    /// Metres; infinite means clear.
+    pub attenuation_distance: f32,
+    /// Exact conductor that replaces the metallic lobe's Schlick Fresnel (sidecar only).
+    pub conductor: Option<ConductorIor>,
+    /// Alpha mode.
+    pub alpha_mode: AlphaMode,
+    /// Lit and emitting on both sides.
+    pub double_sided: bool,
+    /// `KHR_materials_unlit`: shows base colour as emitted radiance, reflects nothing.
+    pub unlit: bool,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: Vec4::ONE,
+            base_color_texture: None,
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            emission: Vec3::ZERO,
+            emission_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: Vec3::ONE,
+            specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            thickness: 0.0,
+            attenuation_color: Vec3::ONE,
+            attenuation_distance: f32::INFINITY,
+            conductor: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            unlit: false,
+        }
+    }
+}
+
+impl Material {
+    /// An ideally diffuse, one-coloured material: Lambert reflectance `reflectance`, no specular coat.
+    pub fn lambert(name: impl Into<String>, reflectance: Vec3) -> Self {
+        Self {
+            name: name.into(),
+            base_color: reflectance.extend(1.0),
+            metallic: 0.0,
+            specular: 0.0,
+            double_sided: true,
+            ..Self::default()
+        }
+    }
+}
+
+/// A use of an image by a material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Texture {
+    /// Index into [`Scene::images`].
+    pub image: u32,
+    /// Texture coordinate set, 0 or 1.
+    pub uv_set: u32,
+    /// Wrap mode along u and v.
+    pub wrap: [Wrap; 2],
+    /// Magnification filter; mip levels are not used by the path tracer.
+    pub filter: Filter,
+    /// `KHR_texture_transform` as rows of a 2×3 matrix: uv' = M · (u, v, 1).
+    pub transform: [[f32; 3]; 2],
+}
+
+/// Texture wrap mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Wrap {
+    /// Repeats.
+    #[default]
+    Repeat,
+    /// Repeats, every second time mirrored.
+    MirroredRepeat,
+    /// The edge texel goes on for ever.
+    ClampToEdge,
+}
+
+/// Texture filter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Filter {
+    /// Bilinear.
+    #[default]
+    Linear,
+    /// Nearest texel.
+    Nearest,
+}
+
+/// A decoded 8-bit RGBA image, top row first. Whether it is sRGB or linear is the texture slot's matter.
+#[derive(Debug, Clone, Default)]
+pub struct Image {
+    /// Name or path.
+    pub name: String,
+    /// Texels across.
+    pub width: u32,
+    /// Texels down.
+    pub height: u32,
+    /// `width × height` RGBA texels.
+    pub texels: Vec<[u8; 4]>,
+}
+
+/// A light without area, in world space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Light {
+    /// Name from the file.
+    pub name: String,
+    /// Its kind, place and strength.
+    pub kind: LightKind,
+}
+
+/// Kinds of lights without area (`KHR_lights_punctual`; candela are taken 1:1 as W·sr⁻¹, lux as W·m⁻²).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightKind {
+    /// Radiates equally in all directions.
+    Point {
+        /// Metres.
+        position: Vec3,
+        /// W·sr⁻¹.
+        intensity: Vec3,
+    },
+    /// Radiates into a cone.
+    Spot {
+        /// Metres.
+        position: Vec3,
+        /// Unit axis of the cone, away from the light.
+        direction: Vec3,
+        /// W·sr⁻¹ on the axis.
+        intensity: Vec3,
+        /// Half angle where the falloff begins, radians.
+        inner: f32,
+        /// Half angle where it ends, radians.
+        outer: f32,
+    },
+    /// Parallel light from infinity.
+    Directional {
+        /// Unit direction in which light travels.
+        direction: Vec3,
+        /// W·m⁻² on a surface facing it.
+        irradiance: Vec3,
+    },
+}
+
+/// Radiance from infinity as a latitude–longitude map: u = atan2(x, −z)/2π + ½, v = acos(y)/π, in the environment's own frame.
+#[derive(Debug, Clone)]
+pub struct Environment {
+    /// Name or path.
+    pub name: String,
+    /// Texels across.
+    pub width: u32,
+    /// Texels down.
+    pub height: u32,
+    /// Linear RGB radiance, `width × height`, top row (+Y) first.
+    pub radiance: Vec<Vec3>,
+    /// Environment frame to world frame.
+    pub rotation: glam::Quat,
+    /// Multiplies `radiance`.
+    pub strength: f32,
+}
+
+impl Environment {
+    /// The same radiance from everywhere.
+    pub fn uniform(radiance: Vec3) -> Self {
+        Self {
+            name: "uniform".into(),
+            width: 1,
+            height: 1,
+            radiance: vec![radiance],
+            rotation: glam::Quat::IDENTITY,
+            strength: 1.0,
+        }
+    }
+}
+
+/// A camera in world space.
+#[derive(Debug, Clone)]
+pub struct Camera {
+    /// Name from the file, or made up.
+    pub name: String,
+    /// Camera space (looking along −Z, +Y up) to world space, without scale.
+    pub transform: DAffine3,
+    /// How it projects.
+    pub projection: Projection,
+    /// Thin-lens radius, metres; 0 is a pinhole.
+    pub lens_radius: f32,
+    /// Distance of the plane in focus along −Z, metres.
+    pub focus_distance: f32,
+}
+
+/// Camera projections. The picture's own width/height ratio decides the horizontal extent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Perspective.
+    Perspective {
+        /// Full vertical field of view, radians.
+        fov_y: f32,
+    },
+    /// Orthographic.
+    Orthographic {
+        /// Half the height seen, metres.
+        half_height: f32,
+    },
+}
+
+impl Camera {
+    /// A pinhole camera at `eye` that looks at `target`.
+    pub fn look_at(
+        name: impl Into<String>,
+        eye: glam::DVec3,
+        target: glam::DVec3,
+        up: glam::DVec3,
+        fov_y: f32,
+    ) -> Self {
+        let back = (eye - target).normalize();
+        let right = up.cross(back).normalize();
+        let matrix = glam::DMat3::from_cols(right, back.cross(right), back);
+        Self {
+            name: name.into(),
+            transform: DAffine3::from_mat3_translation(matrix, eye),
+            projection: Projection::Perspective { fov_y },
+            lens_radius: 0.0,
+            focus_distance: 1.0,
+        }
+    }
+}
+
+/// What a scene file asks of a render; a command line or host overrides it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderDefaults {
+    /// Exposure in stops, for tone mapping only.
+    pub exposure: f32,
+    /// Technique id.
+    pub technique: Option<String>,
+    /// Width ÷ height that the scene was composed for.
+    pub aspect: Option<f32>,
+}
+
+impl Default for RenderDefaults {
+    fn default() -> Self {
+        Self {
+            exposure: 0.0,
+            technique: None,
+            aspect: None,
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! What light does: reflectance, Fresnel, samplers, path sets, the reference path tracer.

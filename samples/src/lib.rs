@@ -1,0 +1,1 @@
+//! Small programs that each show one use of the Clerestory rendering engine.
