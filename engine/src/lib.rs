@@ -3,6 +3,7 @@
 pub mod accel;
 pub mod error;
 pub mod film;
+pub mod gpu;
 pub mod scene;
 pub mod transport;
 

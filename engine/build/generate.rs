@@ -1,0 +1,402 @@
+//! Writes the Rust side of the shader interfaces.
+//!
+//! One module a shader, nested as the folders are; structs that blocks are made of go to `types`, and descriptor sets that a GLSL
+//! include names (`// descriptor set 2: SceneSet`) go to `sets`, once, and must be the same in every shader that uses them.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use crate::compile::Shader;
+use crate::reflect::{Binding, Interface, Member, Resource, Struct, Type, snake_case};
+
+const SET_MARK: &str = "// descriptor set ";
+
+/// A node of the module tree.
+#[derive(Default)]
+struct Folder {
+    folders: BTreeMap<String, Folder>,
+    shaders: String,
+}
+
+/// The text of `shaders.rs`.
+pub fn generate(shaders: &[Shader], interfaces: &[Interface]) -> Result<String, String> {
+    let mut types = BTreeMap::new();
+    let mut sets: BTreeMap<String, (String, Vec<Binding>)> = BTreeMap::new();
+    let mut root = Folder::default();
+    let mut all = String::new();
+    for (shader, interface) in shaders.iter().zip(interfaces) {
+        let named = named_sets(shader)?;
+        for (set, name) in &named {
+            let bindings: Vec<_> = interface.bindings.iter().filter(|b| b.set == *set).cloned().collect();
+            if let Some((other, earlier)) = sets.get(name) {
+                if *earlier != bindings {
+                    return Err(format!(
+                        "descriptor set {name} differs between {other} and {}",
+                        shader.name
+                    ));
+                }
+            } else if !bindings.is_empty() {
+                sets.insert(name.clone(), (shader.name.clone(), bindings));
+            }
+        }
+        collect_types(interface, &mut types).map_err(|message| format!("{}: {message}", shader.name))?;
+        let (path, file) = shader.name.rsplit_once('/').unwrap_or(("", &shader.name));
+        let mut folder = &mut root;
+        for part in path.split('/').filter(|part| !part.is_empty()) {
+            folder = folder.folders.entry(part.to_owned()).or_default();
+        }
+        let module = module_name(file);
+        let _ = writeln!(
+            all,
+            "    &{}::INFO,",
+            [&path.replace('/', "::"), &module]
+                .map(String::as_str)
+                .join("::")
+                .trim_start_matches(':')
+        );
+        folder.shaders += &shader_module(shader, interface, &module, &named);
+    }
+    let mut text =
+        String::from("/// Structs that shader blocks are made of, with the device's offsets.\npub mod types {\n");
+    for layout in types.values() {
+        text += &rust_struct(layout, &format!("`{}` as in GLSL.", layout.name));
+    }
+    text += "}\n/// Descriptor sets that several shaders share.\npub mod sets {\n";
+    if !sets.is_empty() {
+        text += "use crate::gpu::interface::*;\n";
+    }
+    for (name, (_, bindings)) in &sets {
+        text += &rust_set(name, bindings[0].set, bindings);
+    }
+    text += "}\n";
+    write_folder(&root, &mut text);
+    let _ = write!(
+        text,
+        "/// Every shader of the engine.\npub static ALL: &[&crate::gpu::interface::ShaderInfo] = &[\n{all}];\n"
+    );
+    Ok(text)
+}
+
+fn write_folder(folder: &Folder, text: &mut String) {
+    *text += &folder.shaders;
+    for (name, inner) in &folder.folders {
+        let _ = writeln!(text, "/// Shaders of `shaders/…/{name}/`.\npub mod {name} {{");
+        write_folder(inner, text);
+        *text += "}\n";
+    }
+}
+
+/// `trace_closest.comp` → `trace_closest`; graphics stages keep their stage as a suffix.
+fn module_name(file: &str) -> String {
+    let (stem, stage) = file.rsplit_once('.').unwrap_or((file, ""));
+    if stage == "comp" {
+        stem.to_owned()
+    } else {
+        format!("{stem}_{stage}")
+    }
+}
+
+/// Sets that the shader's sources give a name to.
+fn named_sets(shader: &Shader) -> Result<BTreeMap<u32, String>, String> {
+    let mut named = BTreeMap::new();
+    for path in &shader.sources {
+        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        for mark in text.lines().filter_map(|line| line.strip_prefix(SET_MARK)) {
+            let (number, name) = mark
+                .split_once(": ")
+                .ok_or_else(|| format!("{}: {mark}", path.display()))?;
+            let number = number.parse().map_err(|_| format!("{}: {mark}", path.display()))?;
+            let name = name
+                .split_whitespace()
+                .next()
+                .unwrap_or_default()
+                .trim_end_matches(['.', ','])
+                .to_owned();
+            named.insert(number, name);
+        }
+    }
+    Ok(named)
+}
+
+type Types = BTreeMap<String, Struct>;
+
+fn collect_types(interface: &Interface, types: &mut Types) -> Result<(), String> {
+    for binding in &interface.bindings {
+        if let Resource::Storage { block, .. } | Resource::Uniform { block } = &binding.resource {
+            block
+                .members
+                .iter()
+                .try_for_each(|member| collect_type(&member.kind, types))?;
+        }
+    }
+    interface
+        .push
+        .iter()
+        .flat_map(|push| &push.members)
+        .try_for_each(|member| collect_type(&member.kind, types))
+}
+
+fn collect_type(kind: &Type, types: &mut Types) -> Result<(), String> {
+    match kind {
+        Type::Scalar(..) => Ok(()),
+        Type::Array(element, ..) | Type::Runtime(element, _) => collect_type(element, types),
+        Type::Struct(layout) => {
+            layout
+                .members
+                .iter()
+                .try_for_each(|member| collect_type(&member.kind, types))?;
+            match types.get(&layout.name) {
+                Some(earlier) if earlier.members != layout.members || earlier.size() != layout.size() => {
+                    Err(format!("struct {} has another layout in another shader", layout.name))
+                }
+                Some(_) => Ok(()),
+                None => {
+                    types.insert(layout.name.clone(), layout.clone());
+                    Ok(())
+                }
+            }
+        }
+    }
+}
+
+fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &BTreeMap<u32, String>) -> String {
+    let mut text = String::new();
+    for line in &shader.head {
+        let _ = writeln!(text, "/// {line}");
+    }
+    let _ = writeln!(text, "pub mod {module} {{\nuse crate::gpu::interface::*;");
+    let embedded = shader.embedded.display().to_string();
+    let local_size = interface.local_size.map(|size| match size {
+        Ok(fixed) => format!("LocalSize::Fixed({fixed})"),
+        Err(id) => format!("LocalSize::Spec({id})"),
+    });
+    let push_bytes = interface.push.as_ref().map_or(0, Struct::size);
+    let _ = writeln!(
+        text,
+        "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
+         spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    local_size: [{}],\n    \
+         bindings: &[",
+        shader.name,
+        interface.stage,
+        local_size.join(", "),
+    );
+    for binding in &interface.bindings {
+        let kind = match &binding.resource {
+            Resource::Storage { .. } => "StorageBuffer",
+            Resource::Uniform { .. } => "UniformBuffer",
+            Resource::StorageImage { .. } => "StorageImage",
+            Resource::SampledImage => "SampledImage",
+        };
+        let (reads, writes) = access(&binding.resource);
+        let _ = writeln!(
+            text,
+            "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes} }},",
+            binding.set, binding.binding, binding.name
+        );
+    }
+    text += "    ],\n    spec_constants: &[\n";
+    for constant in &interface.spec {
+        let _ = writeln!(
+            text,
+            "        SpecInfo {{ id: {}, name: {:?}, default: {} }},",
+            constant.id, constant.name, constant.default
+        );
+    }
+    text += "    ],\n};\n";
+    if let Some(push) = &interface.push {
+        let renamed = Struct {
+            name: "Push".into(),
+            ..push.clone()
+        };
+        text += &rust_struct(&renamed, "Push constants.");
+        text += "impl PushConstants for Push {\n    fn bytes(&self) -> &[u8] {\n        bytemuck::bytes_of(self)\n    }\n}\n";
+    }
+    text += &rust_spec(interface);
+    let sets: std::collections::BTreeSet<u32> = interface.bindings.iter().map(|b| b.set).collect();
+    for set in sets {
+        let bindings: Vec<_> = interface.bindings.iter().filter(|b| b.set == set).cloned().collect();
+        match named.get(&set) {
+            Some(name) => {
+                let _ = writeln!(text, "pub use crate::gpu::shaders::sets::{name};");
+            }
+            None => text += &rust_set(&format!("Set{set}"), set, &bindings),
+        }
+        for binding in &bindings {
+            text += &block_header(binding);
+        }
+    }
+    let push = if interface.push.is_some() { "Push" } else { "()" };
+    if interface.stage == "Compute" {
+        let _ = writeln!(
+            text,
+            "/// The kernel as a type: its push constants and specialization constants.\n#[derive(Debug)]\npub enum Kernel {{}}\n\
+             impl ComputeShader for Kernel {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}"
+        );
+    }
+    text += "}\n";
+    text
+}
+
+fn access(resource: &Resource) -> (bool, bool) {
+    match resource {
+        Resource::Storage { reads, writes, .. } | Resource::StorageImage { reads, writes } => (*reads, *writes),
+        _ => (true, false),
+    }
+}
+
+/// The fixed part of a block: the whole block when it has no runtime array.
+fn block_header(binding: &Binding) -> String {
+    let (Resource::Storage { block, .. } | Resource::Uniform { block }) = &binding.resource else {
+        return String::new();
+    };
+    let fixed: Vec<Member> = block
+        .members
+        .iter()
+        .filter(|m| !matches!(m.kind, Type::Runtime(..)))
+        .cloned()
+        .collect();
+    if fixed.is_empty() {
+        return String::new();
+    }
+    let layout = Struct {
+        name: block.name.clone(),
+        members: fixed,
+        stride: None,
+    };
+    rust_struct(&layout, &format!("Fixed part of block `{}`.", block.name))
+}
+
+fn rust_spec(interface: &Interface) -> String {
+    if interface.spec.is_empty() {
+        return "/// Specialization constants: none.\npub type Spec = ();\n".into();
+    }
+    let mut text = String::from(
+        "/// Specialization constants; the default is the shader's own.\n#[derive(Debug, Clone, Copy, PartialEq)]\npub struct Spec {\n",
+    );
+    for constant in &interface.spec {
+        let _ = writeln!(
+            text,
+            "    /// `constant_id = {}`.\n    pub {}: {},",
+            constant.id, constant.name, constant.kind
+        );
+    }
+    text += "}\nimpl Default for Spec {\n    fn default() -> Self {\n        Self {\n";
+    for constant in &interface.spec {
+        let value = match constant.kind {
+            "bool" => (constant.default != 0).to_string(),
+            "f32" => format!("f32::from_bits({})", constant.default),
+            "i32" => format!("{}", constant.default as i32),
+            _ => constant.default.to_string(),
+        };
+        let _ = writeln!(text, "            {}: {value},", constant.name);
+    }
+    text += "        }\n    }\n}\nimpl SpecConstants for Spec {\n    fn values(&self) -> Vec<(u32, u32)> {\n        vec![\n";
+    for constant in &interface.spec {
+        let bits = match constant.kind {
+            "bool" | "i32" => format!("self.{} as u32", constant.name),
+            "f32" => format!("self.{}.to_bits()", constant.name),
+            _ => format!("self.{}", constant.name),
+        };
+        let _ = writeln!(text, "            ({}, {bits}),", constant.id);
+    }
+    text += "        ]\n    }\n}\n";
+    text
+}
+
+fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {
+    let mut text = format!("/// Descriptor set {set}.\n#[derive(Debug, Clone, Copy)]\npub struct {name}<'a> {{\n");
+    for binding in bindings {
+        let (kind, what) = match &binding.resource {
+            Resource::Storage { block, .. } => ("BufferView<'a>", element_name(block)),
+            Resource::Uniform { block } => ("BufferView<'a>", block.name.clone()),
+            Resource::StorageImage { .. } => ("&'a Image", "storage image".into()),
+            Resource::SampledImage => ("SampledView<'a>", "sampled image".into()),
+        };
+        let mode = match access(&binding.resource) {
+            (true, false) => "read",
+            (false, true) => "written",
+            _ => "read and written",
+        };
+        let _ = writeln!(
+            text,
+            "    /// Binding {}, {mode}: `{what}`.\n    pub {}: {kind},",
+            binding.binding, binding.name
+        );
+    }
+    let _ = write!(
+        text,
+        "}}\nimpl<'a> BindingSet<'a> for {name}<'a> {{\n    fn set(&self) -> u32 {{\n        {set}\n    }}\n    \
+         fn resources(&self) -> Vec<(u32, BoundResource<'a>)> {{\n        vec![\n"
+    );
+    for binding in bindings {
+        let variant = match &binding.resource {
+            Resource::Storage { .. } | Resource::Uniform { .. } => "Buffer",
+            Resource::StorageImage { .. } => "StorageImage",
+            Resource::SampledImage => "Sampled",
+        };
+        let _ = writeln!(
+            text,
+            "            ({}, BoundResource::{variant}(self.{})),",
+            binding.binding, binding.name
+        );
+    }
+    text += "        ]\n    }\n}\n";
+    text
+}
+
+/// `Ray[]` for a block that ends in a runtime array, else the block's name.
+fn element_name(block: &Struct) -> String {
+    match block.members.last().map(|m| &m.kind) {
+        Some(Type::Runtime(element, _)) => format!("{}[]", rust_type(element).rsplit("::").next().unwrap_or_default()),
+        _ => block.name.clone(),
+    }
+}
+
+fn rust_struct(layout: &Struct, doc: &str) -> String {
+    let mut text = format!(
+        "/// {doc} {} bytes.\n#[repr(C)]\n#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\npub struct {} {{\n",
+        layout.size(),
+        layout.name
+    );
+    let mut end = 0;
+    let mut checks = String::new();
+    let pad = |text: &mut String, from: u32, to: u32| {
+        if to > from {
+            let _ = writeln!(text, "    /// Padding.\n    pub _pad_{from}: [u8; {}],", to - from);
+        }
+    };
+    for member in &layout.members {
+        pad(&mut text, end, member.offset);
+        let name = snake_case(&member.name);
+        let _ = writeln!(
+            text,
+            "    /// Offset {}.\n    pub {name}: {},",
+            member.offset,
+            rust_type(&member.kind)
+        );
+        let _ = writeln!(
+            checks,
+            "    assert!(std::mem::offset_of!({}, {name}) == {});",
+            layout.name, member.offset
+        );
+        end = member.offset + member.kind.size();
+    }
+    pad(&mut text, end, layout.size());
+    let _ = write!(
+        text,
+        "}}\nconst _: () = {{\n{checks}    assert!(size_of::<{0}>() == {1});\n}};\nimpl Default for {0} {{\n    fn default() -> Self {{\n        \
+         bytemuck::Zeroable::zeroed()\n    }}\n}}\n",
+        layout.name,
+        layout.size()
+    );
+    text
+}
+
+fn rust_type(kind: &Type) -> String {
+    match kind {
+        Type::Scalar(name, _) => (*name).to_owned(),
+        Type::Array(element, count, _) => format!("[{}; {count}]", rust_type(element)),
+        Type::Runtime(element, _) => format!("[{}]", rust_type(element)),
+        Type::Struct(layout) => format!("crate::gpu::shaders::types::{}", layout.name),
+    }
+}

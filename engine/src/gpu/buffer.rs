@@ -1,0 +1,268 @@
+//! Buffers: named, counted, checked against the device's limits.
+
+use std::sync::Arc;
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::Allocation;
+
+use super::device::{Gpu, Inner};
+use super::memory::Category;
+use crate::{Error, Result};
+
+/// Where a buffer lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Residency {
+    /// Device memory; filled and read by copies.
+    Device,
+    /// Mapped, written by the host.
+    Upload,
+    /// Mapped and cached, read by the host.
+    Readback,
+}
+
+/// What to allocate.
+#[derive(Debug, Clone, Copy)]
+pub struct BufferDesc<'a> {
+    /// Shown by debuggers, validation messages and memory reports.
+    pub name: &'a str,
+    /// Size; 0 is rounded up, since Vulkan has no empty buffers.
+    pub bytes: u64,
+    /// Where it lives.
+    pub residency: Residency,
+    /// What it is counted as.
+    pub category: Category,
+    /// How it is used.
+    pub usage: vk::BufferUsageFlags,
+}
+
+impl<'a> BufferDesc<'a> {
+    /// A storage buffer in device memory that can also be copied, filled and hold indirect arguments.
+    pub fn storage(name: &'a str, bytes: u64, category: Category) -> Self {
+        Self {
+            name,
+            bytes,
+            residency: Residency::Device,
+            category,
+            usage: vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::INDIRECT_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST,
+        }
+    }
+
+    /// A mapped buffer for copies to the device.
+    pub fn upload(name: &'a str, bytes: u64) -> Self {
+        let usage = vk::BufferUsageFlags::TRANSFER_SRC;
+        Self {
+            name,
+            bytes,
+            residency: Residency::Upload,
+            category: Category::Staging,
+            usage,
+        }
+    }
+
+    /// A mapped buffer for copies from the device.
+    pub fn readback(name: &'a str, bytes: u64) -> Self {
+        let usage = vk::BufferUsageFlags::TRANSFER_DST;
+        Self {
+            name,
+            bytes,
+            residency: Residency::Readback,
+            category: Category::Staging,
+            usage,
+        }
+    }
+}
+
+/// A device buffer. Cloning shares it; the memory goes back when the last clone and the last submission that uses it are gone.
+#[derive(Clone)]
+pub struct Buffer {
+    pub(super) inner: Arc<BufferInner>,
+}
+
+impl std::fmt::Debug for Buffer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Buffer")
+            .field("name", &self.inner.name)
+            .field("bytes", &self.inner.bytes)
+            .finish()
+    }
+}
+
+pub(super) struct BufferInner {
+    gpu: Arc<Inner>,
+    pub raw: vk::Buffer,
+    pub id: u64,
+    pub name: String,
+    pub bytes: u64,
+    allocated: u64,
+    category: Category,
+    /// `None` only while dropping.
+    allocation: Option<Allocation>,
+}
+
+impl Gpu {
+    /// Allocates a buffer.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] past `maxStorageBufferRange` (storage) or `maxMemoryAllocationSize`, [`Error::OutOfMemory`].
+    pub fn buffer(&self, desc: &BufferDesc<'_>) -> Result<Buffer> {
+        let caps = self.caps();
+        let bytes = desc.bytes.max(16).next_multiple_of(4);
+        let limit = |limit_name, limit| Error::LimitExceeded {
+            name: desc.name.into(),
+            bytes,
+            limit_name,
+            limit,
+        };
+        if desc.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER) && bytes > caps.max_storage_buffer_range {
+            return Err(limit("maxStorageBufferRange", caps.max_storage_buffer_range));
+        }
+        if bytes > caps.max_allocation_size {
+            return Err(limit("maxMemoryAllocationSize", caps.max_allocation_size));
+        }
+        let gpu = &self.inner;
+        gpu.check_alive()?;
+        let info = vk::BufferCreateInfo::default()
+            .size(bytes)
+            .usage(desc.usage)
+            .sharing_mode(vk::SharingMode::EXCLUSIVE);
+        // SAFETY: `info` is complete; the buffer is destroyed in `BufferInner::drop`.
+        let raw =
+            unsafe { gpu.device.create_buffer(&info, None) }.map_err(|result| gpu.error("vkCreateBuffer", result))?;
+        // SAFETY: `raw` was just created.
+        let requirements = unsafe { gpu.device.get_buffer_memory_requirements(raw) };
+        let location = match desc.residency {
+            Residency::Device => MemoryLocation::GpuOnly,
+            Residency::Upload => MemoryLocation::CpuToGpu,
+            Residency::Readback => MemoryLocation::GpuToCpu,
+        };
+        let mut inner = BufferInner {
+            gpu: Arc::clone(gpu),
+            raw,
+            id: gpu.next_id(),
+            name: desc.name.into(),
+            bytes,
+            allocated: requirements.size,
+            category: desc.category,
+            allocation: None,
+        };
+        let allocation = gpu
+            .memory
+            .allocate(desc.name, desc.category, requirements, location, true)?;
+        // SAFETY: the allocation satisfies the requirements and is not bound to anything else.
+        let bound = unsafe {
+            gpu.device
+                .bind_buffer_memory(raw, allocation.memory(), allocation.offset())
+        };
+        inner.allocation = Some(allocation);
+        bound.map_err(|result| gpu.error("vkBindBufferMemory", result))?;
+        gpu.name(raw, desc.name);
+        Ok(Buffer { inner: Arc::new(inner) })
+    }
+}
+
+impl Buffer {
+    /// Its size in bytes, as allocated (rounded up to 4, at least 16).
+    pub fn bytes(&self) -> u64 {
+        self.inner.bytes
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.inner.name
+    }
+
+    /// The Vulkan handle.
+    pub fn raw(&self) -> vk::Buffer {
+        self.inner.raw
+    }
+
+    /// All of it.
+    pub fn view(&self) -> BufferView<'_> {
+        BufferView {
+            buffer: self,
+            offset: 0,
+            bytes: self.inner.bytes,
+        }
+    }
+
+    /// A part of it. Storage bindings want `offset` aligned to `minStorageBufferOffsetAlignment` (256 always is).
+    pub fn slice(&self, offset: u64, bytes: u64) -> BufferView<'_> {
+        BufferView {
+            buffer: self,
+            offset,
+            bytes,
+        }
+    }
+
+    /// Writes a mapped buffer. The device must not be using that part.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when `data` does not fit or the buffer is not mapped.
+    pub fn write<T: bytemuck::NoUninit>(&self, offset: u64, data: &[T]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let pointer = self.mapped(offset, bytes.len() as u64)?;
+        // SAFETY: `mapped` checked that the range lies inside the mapping; the source cannot overlap device memory.
+        unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), pointer, bytes.len()) };
+        Ok(())
+    }
+
+    /// Reads a mapped buffer. The device must have finished writing that part.
+    ///
+    /// # Errors
+    /// As [`Buffer::write`].
+    pub fn read<T: bytemuck::Pod>(&self, offset: u64, count: usize) -> Result<Vec<T>> {
+        let mut data = vec![T::zeroed(); count];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
+        let pointer = self.mapped(offset, bytes.len() as u64)?;
+        // SAFETY: as in `write`.
+        unsafe { std::ptr::copy_nonoverlapping(pointer, bytes.as_mut_ptr(), bytes.len()) };
+        Ok(data)
+    }
+
+    fn mapped(&self, offset: u64, bytes: u64) -> Result<*mut u8> {
+        let error = |limit_name, limit| Error::LimitExceeded {
+            name: self.inner.name.clone(),
+            bytes: offset + bytes,
+            limit_name,
+            limit,
+        };
+        if offset + bytes > self.inner.bytes {
+            return Err(error("size", self.inner.bytes));
+        }
+        let pointer = self.inner.allocation.as_ref().and_then(Allocation::mapped_ptr);
+        let pointer = pointer.ok_or_else(|| error("mapped size", 0))?;
+        // SAFETY: the offset lies inside the mapping.
+        Ok(unsafe { pointer.as_ptr().cast::<u8>().add(offset as usize) })
+    }
+}
+
+impl Drop for BufferInner {
+    fn drop(&mut self) {
+        // SAFETY: the last owner is gone, and submissions own what they use.
+        unsafe { self.gpu.device.destroy_buffer(self.raw, None) };
+        if let Some(allocation) = self.allocation.take() {
+            self.gpu.memory.free(self.category, self.allocated, allocation);
+        }
+    }
+}
+
+/// A range of a buffer.
+#[derive(Debug, Clone, Copy)]
+pub struct BufferView<'a> {
+    /// The buffer.
+    pub buffer: &'a Buffer,
+    /// First byte.
+    pub offset: u64,
+    /// Length in bytes.
+    pub bytes: u64,
+}
+
+impl<'a> From<&'a Buffer> for BufferView<'a> {
+    fn from(buffer: &'a Buffer) -> Self {
+        buffer.view()
+    }
+}

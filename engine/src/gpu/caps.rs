@@ -1,0 +1,155 @@
+//! What a device can do, as typed values.
+
+use ash::vk;
+
+/// Capabilities and limits of a device, as far as techniques and kernels ask.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Caps {
+    /// Device name.
+    pub device: String,
+    /// Driver name and version.
+    pub driver: String,
+    /// Vulkan version as `major.minor.patch`.
+    pub api: String,
+    /// `cpu`, `integrated`, `discrete`, `virtual` or `other`.
+    pub kind: &'static str,
+    /// Lanes of a subgroup.
+    pub subgroup_size: u32,
+    /// Subgroup operations usable in compute shaders.
+    pub subgroup: SubgroupOperations,
+    /// `geometryShader`.
+    pub geometry_shader: bool,
+    /// `shaderInt64`.
+    pub int64: bool,
+    /// `shaderFloat64`.
+    pub float64: bool,
+    /// `shaderBufferInt64Atomics`.
+    pub int64_atomics: bool,
+    /// `robustBufferAccess`, enabled on every device that has it.
+    pub robust_buffer_access: bool,
+    /// `pipelineStatisticsQuery`.
+    pub pipeline_statistics: bool,
+    /// `VK_KHR_ray_query` is offered.
+    pub ray_query: bool,
+    /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing` are offered.
+    pub descriptor_indexing: bool,
+    /// Nanoseconds a timestamp tick; 0 when the queue has no timestamps.
+    pub timestamp_period: f32,
+    /// `maxStorageBufferRange`, bytes.
+    pub max_storage_buffer_range: u64,
+    /// `maxMemoryAllocationSize`, bytes.
+    pub max_allocation_size: u64,
+    /// Size of the largest device-local heap, bytes.
+    pub device_heap: u64,
+    /// `maxComputeSharedMemorySize`, bytes.
+    pub max_shared_memory: u32,
+    /// `maxComputeWorkGroupInvocations`.
+    pub max_workgroup_invocations: u32,
+    /// `maxComputeWorkGroupCount[0]`.
+    pub max_workgroups: u32,
+    /// `maxPushConstantsSize`, bytes.
+    pub max_push_constants: u32,
+    /// Vendor id, device id and pipeline cache UUID: the key of the pipeline cache.
+    #[serde(skip)]
+    pub cache_key: String,
+}
+
+/// Subgroup operation classes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct SubgroupOperations {
+    /// `subgroupElect` and the like.
+    pub basic: bool,
+    /// Any, all, equal.
+    pub vote: bool,
+    /// Reductions and scans.
+    pub arithmetic: bool,
+    /// Ballot and its bit counts.
+    pub ballot: bool,
+    /// Shuffle and shuffle xor.
+    pub shuffle: bool,
+}
+
+impl Caps {
+    /// Reads the capabilities of a physical device.
+    pub(super) fn read(instance: &super::instance::Instance, device: vk::PhysicalDevice, queue_family: u32) -> Self {
+        let summary = instance.summary(0, device);
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut subgroup)
+            .push_next(&mut maintenance);
+        let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan12);
+        // SAFETY: the physical device belongs to the instance, and the chained structs live on this stack.
+        let (memory, families, extensions) = unsafe {
+            instance.raw.get_physical_device_properties2(device, &mut properties);
+            instance.raw.get_physical_device_features2(device, &mut features);
+            (
+                instance.raw.get_physical_device_memory_properties(device),
+                instance.raw.get_physical_device_queue_family_properties(device),
+                instance
+                    .raw
+                    .enumerate_device_extension_properties(device)
+                    .unwrap_or_default(),
+            )
+        };
+        let (properties, features) = (properties.properties, features.features);
+        let limits = properties.limits;
+        let operations = if subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE) {
+            subgroup.supported_operations
+        } else {
+            vk::SubgroupFeatureFlags::empty()
+        };
+        let timestamps = families
+            .get(queue_family as usize)
+            .is_some_and(|family| family.timestamp_valid_bits > 0);
+        let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
+        let uuid: String = properties
+            .pipeline_cache_uuid
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        Self {
+            device: summary.name,
+            driver: summary.driver,
+            api: summary.api,
+            kind: summary.kind,
+            subgroup_size: subgroup.subgroup_size,
+            subgroup: SubgroupOperations {
+                basic: operations.contains(vk::SubgroupFeatureFlags::BASIC),
+                vote: operations.contains(vk::SubgroupFeatureFlags::VOTE),
+                arithmetic: operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC),
+                ballot: operations.contains(vk::SubgroupFeatureFlags::BALLOT),
+                shuffle: operations.contains(vk::SubgroupFeatureFlags::SHUFFLE),
+            },
+            geometry_shader: features.geometry_shader != 0,
+            int64: features.shader_int64 != 0,
+            float64: features.shader_float64 != 0,
+            int64_atomics: vulkan12.shader_buffer_int64_atomics != 0,
+            robust_buffer_access: features.robust_buffer_access != 0,
+            pipeline_statistics: features.pipeline_statistics_query != 0,
+            ray_query: extensions
+                .iter()
+                .any(|e| e.extension_name_as_c_str() == Ok(ash::khr::ray_query::NAME)),
+            descriptor_indexing: vulkan12.runtime_descriptor_array != 0
+                && vulkan12.shader_sampled_image_array_non_uniform_indexing != 0,
+            timestamp_period: if timestamps { limits.timestamp_period } else { 0.0 },
+            max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
+            max_allocation_size: maintenance.max_memory_allocation_size,
+            device_heap: heaps
+                .iter()
+                .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+                .map(|heap| heap.size)
+                .max()
+                .unwrap_or(0),
+            max_shared_memory: limits.max_compute_shared_memory_size,
+            max_workgroup_invocations: limits.max_compute_work_group_invocations,
+            max_workgroups: limits.max_compute_work_group_count[0],
+            max_push_constants: limits.max_push_constants_size,
+            cache_key: format!(
+                "{:04x}-{:04x}-{:08x}-{uuid}",
+                properties.vendor_id, properties.device_id, properties.driver_version
+            ),
+        }
+    }
+}

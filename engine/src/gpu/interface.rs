@@ -1,0 +1,147 @@
+//! What the build generates for each shader is written in these terms.
+
+pub use crate::gpu::{BufferView, Image, Sampler};
+
+/// A shader module with its reflected interface.
+#[derive(Debug)]
+pub struct ShaderInfo {
+    /// Path below `shaders/`.
+    pub name: &'static str,
+    /// Pipeline stage.
+    pub stage: Stage,
+    /// The module, little-endian words.
+    pub spirv: &'static [u8],
+    /// Size of the push-constant block.
+    pub push_constant_bytes: u32,
+    /// Workgroup size (compute).
+    pub local_size: [LocalSize; 3],
+    /// Bindings by set and number.
+    pub bindings: &'static [BindingInfo],
+    /// Specialization constants by id.
+    pub spec_constants: &'static [SpecInfo],
+}
+
+/// A pipeline stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Compute.
+    Compute,
+    /// Vertex.
+    Vertex,
+    /// Geometry.
+    Geometry,
+    /// Fragment.
+    Fragment,
+}
+
+/// One axis of a workgroup's size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LocalSize {
+    /// Written in the shader.
+    Fixed(u32),
+    /// Set by the specialization constant of this id.
+    Spec(u32),
+}
+
+/// One binding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BindingInfo {
+    /// Descriptor set.
+    pub set: u32,
+    /// Binding number.
+    pub binding: u32,
+    /// Instance name, or the block's name in snake case.
+    pub name: &'static str,
+    /// Descriptor type.
+    pub kind: BindingKind,
+    /// Not declared `writeonly`.
+    pub reads: bool,
+    /// Not declared `readonly`.
+    pub writes: bool,
+}
+
+/// Descriptor types in use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BindingKind {
+    /// Storage buffer.
+    StorageBuffer,
+    /// Uniform buffer.
+    UniformBuffer,
+    /// Storage image.
+    StorageImage,
+    /// Combined image and sampler.
+    SampledImage,
+}
+
+/// One specialization constant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SpecInfo {
+    /// `constant_id`.
+    pub id: u32,
+    /// Lower-case name.
+    pub name: &'static str,
+    /// Default value as bits.
+    pub default: u32,
+}
+
+/// The values of a shader's specialization constants.
+pub trait SpecConstants: Default {
+    /// Pairs of `constant_id` and value as bits.
+    fn values(&self) -> Vec<(u32, u32)>;
+}
+
+impl SpecConstants for () {
+    fn values(&self) -> Vec<(u32, u32)> {
+        Vec::new()
+    }
+}
+
+/// A compute shader as a type; implemented by the generated modules.
+pub trait ComputeShader {
+    /// Push constants, `()` for none.
+    type Push: PushConstants;
+    /// Specialization constants, `()` for none.
+    type Spec: SpecConstants;
+    /// The reflected interface.
+    fn info() -> &'static ShaderInfo;
+}
+
+/// A push-constant block.
+pub trait PushConstants {
+    /// The bytes to push.
+    fn bytes(&self) -> &[u8];
+}
+
+impl PushConstants for () {
+    fn bytes(&self) -> &[u8] {
+        &[]
+    }
+}
+
+/// A descriptor set's worth of resources; implemented by the generated modules.
+pub trait BindingSet<'a> {
+    /// Descriptor set number.
+    fn set(&self) -> u32;
+    /// Binding numbers and what they hold.
+    fn resources(&self) -> Vec<(u32, BoundResource<'a>)>;
+}
+
+/// A resource at a binding.
+#[derive(Debug, Clone, Copy)]
+pub enum BoundResource<'a> {
+    /// Storage or uniform buffer.
+    Buffer(BufferView<'a>),
+    /// Storage image, in `GENERAL` layout.
+    StorageImage(&'a Image),
+    /// Combined image and sampler, in `SHADER_READ_ONLY_OPTIMAL` layout.
+    Sampled(SampledView<'a>),
+}
+
+/// An image with the sampler to read it by.
+#[derive(Debug, Clone, Copy)]
+pub struct SampledView<'a> {
+    /// The image.
+    pub image: &'a Image,
+    /// The sampler.
+    pub sampler: &'a Sampler,
+}

@@ -1,0 +1,172 @@
+//! Device memory: named allocations, counted by category.
+
+use std::sync::Mutex;
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
+
+use crate::{Error, Result};
+
+/// What an allocation is for; bytes are counted by it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Category {
+    /// Triangles and vertex attributes.
+    Geometry,
+    /// Spatial indexes.
+    Index,
+    /// Materials and textures.
+    Material,
+    /// Lights and environment.
+    Light,
+    /// Path states, queues and other working memory.
+    Work,
+    /// Accumulated pictures.
+    Film,
+    /// Upload, readback and bookkeeping.
+    Staging,
+}
+
+const CATEGORIES: [Category; 7] = [
+    Category::Geometry,
+    Category::Index,
+    Category::Material,
+    Category::Light,
+    Category::Work,
+    Category::Film,
+    Category::Staging,
+];
+
+/// Bytes in use, by category, in the order of the enum; empty categories are left out.
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize)]
+pub struct MemoryReport {
+    /// Category and bytes.
+    pub bytes: Vec<(Category, u64)>,
+    /// Number of live allocations.
+    pub allocations: u64,
+}
+
+impl MemoryReport {
+    /// Bytes in one category.
+    pub fn of(&self, category: Category) -> u64 {
+        self.bytes
+            .iter()
+            .find(|(c, _)| *c == category)
+            .map_or(0, |(_, bytes)| *bytes)
+    }
+
+    /// Bytes in all categories.
+    pub fn total(&self) -> u64 {
+        self.bytes.iter().map(|(_, bytes)| bytes).sum()
+    }
+}
+
+/// The device's memory.
+pub(super) struct Memory {
+    state: Mutex<State>,
+}
+
+struct State {
+    /// `None` only while the owner drops.
+    allocator: Option<Allocator>,
+    bytes: [u64; CATEGORIES.len()],
+    allocations: u64,
+}
+
+impl Memory {
+    pub fn new(instance: &ash::Instance, device: &ash::Device, physical_device: vk::PhysicalDevice) -> Result<Self> {
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.clone(),
+            device: device.clone(),
+            physical_device,
+            debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
+            buffer_device_address: false,
+            allocation_sizes: gpu_allocator::AllocationSizes::default(),
+        })
+        .map_err(|error| out_of_memory("allocator", 0, &error))?;
+        Ok(Self {
+            state: Mutex::new(State {
+                allocator: Some(allocator),
+                bytes: [0; CATEGORIES.len()],
+                allocations: 0,
+            }),
+        })
+    }
+
+    /// Allocates; the caller binds.
+    pub fn allocate(
+        &self,
+        name: &str,
+        category: Category,
+        requirements: vk::MemoryRequirements,
+        location: MemoryLocation,
+        linear: bool,
+    ) -> Result<Allocation> {
+        let mut state = self.lock();
+        let Some(allocator) = state.allocator.as_mut() else {
+            return Err(Error::OutOfMemory {
+                memory: "device",
+                name: name.into(),
+                bytes: requirements.size,
+                cause: "the device is being destroyed".into(),
+            });
+        };
+        let allocation = allocator
+            .allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location,
+                linear,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|error| out_of_memory(name, requirements.size, &error))?;
+        state.bytes[category as usize] += requirements.size;
+        state.allocations += 1;
+        Ok(allocation)
+    }
+
+    /// Gives an allocation back. `bytes` is the size that was required.
+    pub fn free(&self, category: Category, bytes: u64, allocation: Allocation) {
+        let mut state = self.lock();
+        if let Some(allocator) = state.allocator.as_mut()
+            && let Err(error) = allocator.free(allocation)
+        {
+            tracing::error!("freeing device memory: {error}");
+        }
+        state.bytes[category as usize] -= bytes;
+        state.allocations -= 1;
+    }
+
+    /// Bytes in use now.
+    pub fn report(&self) -> MemoryReport {
+        let state = self.lock();
+        MemoryReport {
+            bytes: CATEGORIES
+                .into_iter()
+                .zip(state.bytes)
+                .filter(|(_, bytes)| *bytes > 0)
+                .collect(),
+            allocations: state.allocations,
+        }
+    }
+
+    /// Frees the allocator's blocks; must come before the device is destroyed.
+    pub fn shut_down(&self) {
+        drop(self.lock().allocator.take());
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, State> {
+        // A panic while the lock was held leaves counters that are at worst stale.
+        self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+fn out_of_memory(name: &str, bytes: u64, error: &gpu_allocator::AllocationError) -> Error {
+    Error::OutOfMemory {
+        memory: "device",
+        name: name.into(),
+        bytes,
+        cause: error.to_string(),
+    }
+}

@@ -1,0 +1,45 @@
+//! Floor 1: Vulkan, thin. Everything a kernel needs and nothing that decides for it.
+//!
+//! A [`Gpu`] is a device with one queue. Work is recorded by hand into a [`Recorder`], pass by pass, with explicit barriers, and submitted
+//! on a timeline. All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].
+//!
+//! `unsafe` lives in this folder and at the FFI edge only.
+#![allow(unsafe_code)]
+
+mod barrier;
+mod buffer;
+mod caps;
+mod device;
+pub mod fault;
+mod host;
+mod image;
+mod instance;
+pub mod interface;
+mod marker;
+mod memory;
+mod pipeline;
+mod pipeline_cache;
+mod recorder;
+mod resources;
+pub mod shaders;
+mod submission;
+mod timing;
+mod tracker;
+mod transfer;
+
+pub use ash;
+pub use barrier::{
+    Access, BufferBarrier, ImageBarrier, compute_to_indirect, compute_to_transfer, rw_compute_to_compute,
+    transfer_to_compute,
+};
+pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
+pub use caps::{Caps, SubgroupOperations};
+pub use device::{DeviceSelection, Gpu, GpuOptions, Validation};
+pub use host::{EnabledFeatures, HostDevice};
+pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
+pub use instance::{DeviceSummary, ValidationMessage};
+pub use memory::{Category, MemoryReport};
+pub use pipeline::{ComputePipeline, PipelineInfo};
+pub use recorder::{Pass, Recorder};
+pub use submission::Submission;
+pub use timing::{PassTiming, Timings};

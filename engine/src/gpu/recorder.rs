@@ -1,0 +1,693 @@
+//! Recording: labelled, timed passes and explicit barriers into one command buffer.
+
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::barrier::{Access, BufferBarrier, ImageBarrier};
+use super::buffer::{Buffer, BufferDesc, BufferView, Residency};
+use super::device::Gpu;
+use super::image::{Image, aspect};
+use super::interface::{BindingKind, BindingSet, BoundResource, ComputeShader, PushConstants, ShaderInfo};
+use super::marker::BEGUN;
+use super::memory::Category;
+use super::pipeline::{ComputePipeline, descriptor_type};
+use super::resources::FrameResources;
+use super::submission::Submission;
+use super::tracker::Tracker;
+use crate::{Error, Result};
+
+/// Passes that one recorder can hold.
+pub(super) const MAX_PASSES: usize = 1024;
+
+/// Something that a command buffer uses, kept alive until the device is done.
+pub(super) type Kept = BTreeMap<usize, Arc<dyn Any + Send + Sync>>;
+
+/// One command buffer under construction.
+///
+/// It starts with a barrier over everything, so that a submission may rely on all earlier ones of the same queue. Between its own passes
+/// every barrier is the author's; debug builds check that none is missing.
+pub struct Recorder {
+    gpu: Gpu,
+    name: String,
+    resources: Option<FrameResources>,
+    markers: Option<Buffer>,
+    passes: Vec<String>,
+    kept: Kept,
+    tracker: Option<Tracker>,
+    statistics: bool,
+}
+
+/// One pass: what is recorded between two timestamps.
+pub struct Pass<'a> {
+    recorder: &'a mut Recorder,
+    command_buffer: vk::CommandBuffer,
+    name: &'a str,
+}
+
+impl Gpu {
+    /// Begins a command buffer.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn recorder(&self, name: &str) -> Result<Recorder> {
+        self.inner.check_alive()?;
+        let markers = if self.inner.crash_markers {
+            Some(self.buffer(&BufferDesc {
+                name: "crash markers",
+                bytes: MAX_PASSES as u64 * 4,
+                residency: Residency::Readback,
+                category: Category::Staging,
+                usage: vk::BufferUsageFlags::TRANSFER_DST,
+            })?)
+        } else {
+            None
+        };
+        if let Some(markers) = &markers {
+            markers.write(0, &[0u32; MAX_PASSES])?;
+        }
+        let recorder = Recorder {
+            gpu: self.clone(),
+            name: name.into(),
+            resources: Some(FrameResources::take(self)?),
+            markers,
+            passes: Vec::new(),
+            kept: Kept::new(),
+            tracker: cfg!(debug_assertions).then(Tracker::default),
+            statistics: false,
+        };
+        recorder.begin()?;
+        Ok(recorder)
+    }
+}
+
+impl Recorder {
+    /// Counts the shader invocations of every compute pass from here on, where the device can.
+    pub fn count_invocations(&mut self) {
+        self.statistics = self.gpu.caps().pipeline_statistics;
+    }
+
+    /// Records a pass: a debug label, a timestamp pair and a crash marker around what `record` does.
+    ///
+    /// # Errors
+    /// Whatever `record` returns; [`Error::LimitExceeded`] past 1024 passes.
+    pub fn pass<R>(&mut self, name: &str, record: impl FnOnce(&mut Pass<'_>) -> Result<R>) -> Result<R> {
+        let index = self.passes.len();
+        if index == MAX_PASSES {
+            return Err(Error::LimitExceeded {
+                name: self.name.clone(),
+                bytes: index as u64 + 1,
+                limit_name: "passes of a recorder",
+                limit: MAX_PASSES as u64,
+            });
+        }
+        self.passes.push(name.into());
+        let inner = Arc::clone(&self.gpu.inner);
+        let (command_buffer, timestamps, statistics) = {
+            let resources = self.resources();
+            (resources.command_buffer, resources.timestamps, resources.statistics)
+        };
+        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let (device, counted) = (&inner.device, self.statistics);
+        // SAFETY (both blocks): the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
+        unsafe {
+            if let Some(debug) = &inner.debug {
+                let label = std::ffi::CString::new(name).unwrap_or_default();
+                debug
+                    .cmd_begin_debug_utils_label(command_buffer, &vk::DebugUtilsLabelEXT::default().label_name(&label));
+            }
+            if let Some(markers) = &self.markers {
+                device.cmd_fill_buffer(command_buffer, markers.raw(), index as u64 * 4, 4, BEGUN);
+            }
+            if timestamps != vk::QueryPool::null() {
+                device.cmd_write_timestamp2(command_buffer, stage, timestamps, 2 * index as u32);
+            }
+            if counted {
+                device.cmd_begin_query(command_buffer, statistics, index as u32, vk::QueryControlFlags::empty());
+            }
+        }
+        let result = record(&mut Pass {
+            recorder: self,
+            command_buffer,
+            name,
+        });
+        // SAFETY: as above.
+        unsafe {
+            if counted {
+                device.cmd_end_query(command_buffer, statistics, index as u32);
+            }
+            if timestamps != vk::QueryPool::null() {
+                device.cmd_write_timestamp2(command_buffer, stage, timestamps, 2 * index as u32 + 1);
+            }
+            if let Some(debug) = &inner.debug {
+                debug.cmd_end_debug_utils_label(command_buffer);
+            }
+        }
+        result
+    }
+
+    /// Ends the command buffer and hands it to the queue.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn submit(self) -> Result<Submission> {
+        self.submit_with(&[], &[])
+    }
+
+    /// As [`Recorder::submit`], waiting for and signalling binary semaphores (those of a swapchain).
+    ///
+    /// # Errors
+    /// As [`Recorder::submit`].
+    pub fn submit_with(mut self, wait: &[vk::Semaphore], signal: &[vk::Semaphore]) -> Result<Submission> {
+        let inner = Arc::clone(&self.gpu.inner);
+        inner.check_alive()?;
+        let command_buffer = self.resources().command_buffer;
+        let host = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
+            .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+        // SAFETY: the command buffer is recording.
+        unsafe {
+            inner
+                .device
+                .cmd_pipeline_barrier2(command_buffer, &vk::DependencyInfo::default().memory_barriers(&host));
+            inner
+                .device
+                .end_command_buffer(command_buffer)
+                .map_err(|r| inner.error("vkEndCommandBuffer", r))?;
+        }
+        let mut queue = inner.lock_queue();
+        let value = queue.last_value + 1;
+        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let semaphore = |raw: &vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(*raw).stage_mask(all);
+        let waits: Vec<_> = wait.iter().map(semaphore).collect();
+        let mut signals: Vec<_> = signal.iter().map(semaphore).collect();
+        signals.push(
+            vk::SemaphoreSubmitInfo::default()
+                .semaphore(inner.timeline)
+                .value(value)
+                .stage_mask(all),
+        );
+        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(command_buffer)];
+        let info = vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waits)
+            .command_buffer_infos(&buffers)
+            .signal_semaphore_infos(&signals);
+        // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
+        unsafe { inner.device.queue_submit2(queue.raw, &[info], vk::Fence::null()) }
+            .map_err(|result| inner.error("vkQueueSubmit2", result))?;
+        queue.last_value = value;
+        drop(queue);
+        Ok(Submission::new(
+            self.gpu.clone(),
+            std::mem::take(&mut self.name),
+            value,
+            self.resources.take(),
+            self.markers.take(),
+            std::mem::take(&mut self.passes),
+            std::mem::take(&mut self.kept),
+            self.statistics,
+        ))
+    }
+
+    fn begin(&self) -> Result<()> {
+        let inner = &self.gpu.inner;
+        let Some(resources) = &self.resources else {
+            return Ok(());
+        };
+        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        let all = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
+        // SAFETY: the command buffer is fresh or reset, the pools are idle, and hostQueryReset is enabled.
+        unsafe {
+            if resources.timestamps != vk::QueryPool::null() {
+                inner
+                    .device
+                    .reset_query_pool(resources.timestamps, 0, 2 * MAX_PASSES as u32);
+            }
+            if resources.statistics != vk::QueryPool::null() {
+                inner
+                    .device
+                    .reset_query_pool(resources.statistics, 0, MAX_PASSES as u32);
+            }
+            inner
+                .device
+                .begin_command_buffer(resources.command_buffer, &info)
+                .map_err(|r| inner.error("vkBeginCommandBuffer", r))?;
+            inner.device.cmd_pipeline_barrier2(
+                resources.command_buffer,
+                &vk::DependencyInfo::default().memory_barriers(&all),
+            );
+        }
+        Ok(())
+    }
+
+    fn resources(&mut self) -> &mut FrameResources {
+        self.resources
+            .as_mut()
+            .expect("a recorder holds its resources until it is submitted")
+    }
+
+    pub(super) fn keep<T: Any + Send + Sync>(&mut self, item: &Arc<T>) {
+        let key = Arc::as_ptr(item).cast::<()>() as usize;
+        self.kept
+            .entry(key)
+            .or_insert_with(|| Arc::clone(item) as Arc<dyn Any + Send + Sync>);
+    }
+
+    fn touch(&mut self, pass: &str, buffer: &Buffer, access: Access) -> Result<()> {
+        self.keep(&buffer.inner);
+        self.tracker
+            .as_mut()
+            .map_or(Ok(()), |tracker| tracker.touch(pass, buffer, access))
+    }
+
+    fn next_command(&mut self) {
+        if let Some(tracker) = &mut self.tracker {
+            tracker.next_command();
+        }
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if let Some(mut resources) = self.resources.take() {
+            // Recording was given up: the command buffer was never submitted, so all of it can be used again.
+            match resources.reset(&self.gpu.inner) {
+                Ok(()) => self
+                    .gpu
+                    .inner
+                    .recycled
+                    .lock()
+                    .unwrap_or_else(std::sync::PoisonError::into_inner)
+                    .push(resources),
+                // SAFETY: the device never saw the command buffer.
+                Err(_) => unsafe { resources.destroy(&self.gpu.inner.device) },
+            }
+        }
+    }
+}
+
+impl Pass<'_> {
+    /// Dispatches workgroups of a kernel with its descriptor sets and push constants. State bound before is lost.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] past `maxComputeWorkGroupCount`, [`Error::Shader`] when the sets do not cover the shader's bindings,
+    /// [`Error::MissingBarrier`] in debug builds.
+    pub fn dispatch<K: ComputeShader>(
+        &mut self,
+        pipeline: &ComputePipeline<K>,
+        sets: &[&dyn BindingSet<'_>],
+        push: &K::Push,
+        groups: [u32; 3],
+    ) -> Result<()> {
+        let limit = self.recorder.gpu.caps().max_workgroups;
+        if let Some(count) = groups.iter().find(|count| **count > limit) {
+            return Err(Error::LimitExceeded {
+                name: pipeline.inner.info.name.into(),
+                bytes: u64::from(*count),
+                limit_name: "maxComputeWorkGroupCount",
+                limit: u64::from(limit),
+            });
+        }
+        self.recorder.next_command();
+        self.bind(pipeline, sets, push)?;
+        let [x, y, z] = groups;
+        // SAFETY: pipeline, sets and push constants are bound, and the count was checked.
+        unsafe {
+            self.recorder
+                .gpu
+                .inner
+                .device
+                .cmd_dispatch(self.command_buffer, x, y, z)
+        };
+        Ok(())
+    }
+
+    /// As [`Pass::dispatch`], with the workgroup counts (three words) read from a buffer.
+    ///
+    /// # Errors
+    /// As [`Pass::dispatch`].
+    pub fn dispatch_indirect<K: ComputeShader>(
+        &mut self,
+        pipeline: &ComputePipeline<K>,
+        sets: &[&dyn BindingSet<'_>],
+        push: &K::Push,
+        arguments: BufferView<'_>,
+    ) -> Result<()> {
+        self.recorder.next_command();
+        self.recorder
+            .touch(self.name, arguments.buffer, Access::INDIRECT_READ)?;
+        self.bind(pipeline, sets, push)?;
+        // SAFETY: as in `dispatch`; the arguments are kept alive.
+        unsafe {
+            self.recorder.gpu.inner.device.cmd_dispatch_indirect(
+                self.command_buffer,
+                arguments.buffer.raw(),
+                arguments.offset,
+            );
+        }
+        Ok(())
+    }
+
+    /// Records buffer barriers.
+    pub fn barrier(&mut self, barriers: &[BufferBarrier<'_>]) {
+        let raw: Vec<_> = barriers
+            .iter()
+            .map(|barrier| {
+                if let Some(tracker) = &mut self.recorder.tracker {
+                    tracker.barrier(barrier.buffer, barrier.from, barrier.to);
+                }
+                vk::BufferMemoryBarrier2::default()
+                    .buffer(barrier.buffer.raw())
+                    .size(vk::WHOLE_SIZE)
+                    .src_stage_mask(barrier.from.stages())
+                    .src_access_mask(barrier.from.writes().kinds())
+                    .dst_stage_mask(barrier.to.stages())
+                    .dst_access_mask(barrier.to.kinds())
+                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            })
+            .collect();
+        for barrier in barriers {
+            self.recorder.keep(&barrier.buffer.inner);
+        }
+        self.pipeline_barrier(&vk::DependencyInfo::default().buffer_memory_barriers(&raw));
+    }
+
+    /// Records one barrier over all memory: cheaper to write than a long list, and no slower on most devices.
+    pub fn memory_barrier(&mut self, from: Access, to: Access) {
+        if let Some(tracker) = &mut self.recorder.tracker {
+            tracker.barrier_all(from, to);
+        }
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(from.stages())
+            .src_access_mask(from.writes().kinds())
+            .dst_stage_mask(to.stages())
+            .dst_access_mask(to.kinds())];
+        self.pipeline_barrier(&vk::DependencyInfo::default().memory_barriers(&barrier));
+    }
+
+    /// Records image barriers and layout transitions.
+    pub fn image_barrier(&mut self, barriers: &[ImageBarrier<'_>]) {
+        let raw: Vec<_> = barriers
+            .iter()
+            .map(|barrier| {
+                vk::ImageMemoryBarrier2::default()
+                    .image(barrier.image.raw())
+                    .subresource_range(vk::ImageSubresourceRange {
+                        aspect_mask: aspect(barrier.image.format()),
+                        level_count: vk::REMAINING_MIP_LEVELS,
+                        layer_count: vk::REMAINING_ARRAY_LAYERS,
+                        ..Default::default()
+                    })
+                    .src_stage_mask(barrier.from.stages())
+                    .src_access_mask(barrier.from.writes().kinds())
+                    .dst_stage_mask(barrier.to.stages())
+                    .dst_access_mask(barrier.to.kinds())
+                    .old_layout(barrier.old_layout)
+                    .new_layout(barrier.new_layout)
+                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            })
+            .collect();
+        for barrier in barriers {
+            self.recorder.keep(&barrier.image.inner);
+        }
+        self.pipeline_barrier(&vk::DependencyInfo::default().image_memory_barriers(&raw));
+    }
+
+    /// Fills a buffer with a word.
+    ///
+    /// # Errors
+    /// [`Error::MissingBarrier`] in debug builds.
+    pub fn fill(&mut self, view: BufferView<'_>, word: u32) -> Result<()> {
+        self.recorder.next_command();
+        self.recorder.touch(self.name, view.buffer, Access::TRANSFER_WRITE)?;
+        // SAFETY: the range lies in the buffer (sizes are multiples of 4), which is kept alive.
+        unsafe {
+            self.recorder.gpu.inner.device.cmd_fill_buffer(
+                self.command_buffer,
+                view.buffer.raw(),
+                view.offset,
+                view.bytes,
+                word,
+            );
+        }
+        Ok(())
+    }
+
+    /// Copies `from` to the start of `to`.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when it does not fit, [`Error::MissingBarrier`] in debug builds.
+    pub fn copy(&mut self, from: BufferView<'_>, to: BufferView<'_>) -> Result<()> {
+        if from.bytes > to.bytes {
+            return Err(Error::LimitExceeded {
+                name: to.buffer.name().into(),
+                bytes: from.bytes,
+                limit_name: "size",
+                limit: to.bytes,
+            });
+        }
+        self.recorder.next_command();
+        self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
+        self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
+        let region = vk::BufferCopy {
+            src_offset: from.offset,
+            dst_offset: to.offset,
+            size: from.bytes,
+        };
+        // SAFETY: both ranges lie in their buffers, which are kept alive.
+        unsafe {
+            self.recorder.gpu.inner.device.cmd_copy_buffer(
+                self.command_buffer,
+                from.buffer.raw(),
+                to.buffer.raw(),
+                &[region],
+            );
+        }
+        Ok(())
+    }
+
+    /// Copies a whole image of one layer, in layout `TRANSFER_SRC_OPTIMAL`, to a buffer, rows packed.
+    ///
+    /// # Errors
+    /// [`Error::MissingBarrier`] in debug builds.
+    pub fn copy_image_to_buffer(&mut self, from: &Image, to: BufferView<'_>) -> Result<()> {
+        self.recorder.keep(&from.inner);
+        self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
+        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        // SAFETY: both are kept alive; the author put the image into the layout.
+        unsafe {
+            self.recorder.gpu.inner.device.cmd_copy_image_to_buffer(
+                self.command_buffer,
+                from.raw(),
+                layout,
+                to.buffer.raw(),
+                &[whole_image(from, to.offset)],
+            );
+        }
+        Ok(())
+    }
+
+    /// Copies packed rows to a whole image of one layer, in layout `TRANSFER_DST_OPTIMAL`.
+    ///
+    /// # Errors
+    /// [`Error::MissingBarrier`] in debug builds.
+    pub fn copy_buffer_to_image(&mut self, from: BufferView<'_>, to: &Image) -> Result<()> {
+        self.recorder.keep(&to.inner);
+        self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
+        let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        // SAFETY: as in `copy_image_to_buffer`.
+        unsafe {
+            self.recorder.gpu.inner.device.cmd_copy_buffer_to_image(
+                self.command_buffer,
+                from.buffer.raw(),
+                to.raw(),
+                layout,
+                &[whole_image(to, from.offset)],
+            );
+        }
+        Ok(())
+    }
+
+    /// The Vulkan command buffer, for commands that have no method here. What they touch is the caller's to keep alive and to
+    /// synchronize.
+    pub fn raw(&self) -> vk::CommandBuffer {
+        self.command_buffer
+    }
+
+    pub(super) fn recorder(&mut self) -> &mut Recorder {
+        self.recorder
+    }
+
+    fn pipeline_barrier(&self, info: &vk::DependencyInfo<'_>) {
+        // SAFETY: the command buffer is recording, outside of rendering.
+        unsafe {
+            self.recorder
+                .gpu
+                .inner
+                .device
+                .cmd_pipeline_barrier2(self.command_buffer, info)
+        };
+    }
+
+    fn bind<K: ComputeShader>(
+        &mut self,
+        pipeline: &ComputePipeline<K>,
+        sets: &[&dyn BindingSet<'_>],
+        push: &K::Push,
+    ) -> Result<()> {
+        let inner = Arc::clone(&self.recorder.gpu.inner);
+        let info = pipeline.inner.info;
+        self.recorder.keep(&pipeline.inner);
+        let point = vk::PipelineBindPoint::COMPUTE;
+        // SAFETY (all blocks): pipeline, layout and sets are alive and come from one reflection.
+        unsafe {
+            inner
+                .device
+                .cmd_bind_pipeline(self.command_buffer, point, pipeline.inner.raw)
+        };
+        self.bind_sets(info, point, pipeline.inner.layout, &pipeline.inner.set_layouts, sets)?;
+        let bytes = push.bytes();
+        if !bytes.is_empty() {
+            let stages = vk::ShaderStageFlags::COMPUTE;
+            // SAFETY: the generated struct has the size of the block.
+            unsafe {
+                inner
+                    .device
+                    .cmd_push_constants(self.command_buffer, pipeline.inner.layout, stages, 0, bytes)
+            };
+        }
+        Ok(())
+    }
+
+    /// Allocates, writes and binds the descriptor sets of one shader.
+    pub(super) fn bind_sets(
+        &mut self,
+        info: &'static ShaderInfo,
+        point: vk::PipelineBindPoint,
+        layout: vk::PipelineLayout,
+        set_layouts: &[vk::DescriptorSetLayout],
+        sets: &[&dyn BindingSet<'_>],
+    ) -> Result<()> {
+        let inner = Arc::clone(&self.recorder.gpu.inner);
+        let uncovered = info
+            .bindings
+            .iter()
+            .find(|binding| !sets.iter().any(|set| set.set() == binding.set));
+        if let Some(binding) = uncovered {
+            return Err(Error::Shader {
+                name: info.name.into(),
+                message: format!("descriptor set {} was not given", binding.set),
+            });
+        }
+        for set in sets {
+            let Some(set_layout) = set_layouts.get(set.set() as usize) else {
+                continue;
+            };
+            let raw = self.recorder.resources().descriptor_set(&inner, *set_layout)?;
+            for (number, resource) in set.resources() {
+                let Some(binding) = info.bindings.iter().find(|b| b.set == set.set() && b.binding == number) else {
+                    continue;
+                };
+                self.write_descriptor(info, raw, binding, resource)?;
+            }
+            // SAFETY: the set was just allocated with the layout of this pipeline.
+            unsafe {
+                inner
+                    .device
+                    .cmd_bind_descriptor_sets(self.command_buffer, point, layout, set.set(), &[raw], &[])
+            };
+        }
+        Ok(())
+    }
+
+    fn write_descriptor(
+        &mut self,
+        info: &'static ShaderInfo,
+        set: vk::DescriptorSet,
+        binding: &super::interface::BindingInfo,
+        resource: BoundResource<'_>,
+    ) -> Result<()> {
+        let descriptor = vk::WriteDescriptorSet::default()
+            .dst_set(set)
+            .dst_binding(binding.binding)
+            .descriptor_type(descriptor_type(binding.kind));
+        let inner = Arc::clone(&self.recorder.gpu.inner);
+        // SAFETY (all updates): set and resources are alive and the set is not in use yet.
+        match (binding.kind, resource) {
+            (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
+                let read = if binding.reads {
+                    Access::COMPUTE_READ
+                } else {
+                    Access::NONE
+                };
+                let write = if binding.writes {
+                    Access::COMPUTE_WRITE
+                } else {
+                    Access::NONE
+                };
+                self.recorder.touch(self.name, view.buffer, read | write)?;
+                let raw = [vk::DescriptorBufferInfo {
+                    buffer: view.buffer.raw(),
+                    offset: view.offset,
+                    range: view.bytes,
+                }];
+                unsafe {
+                    inner
+                        .device
+                        .update_descriptor_sets(&[descriptor.buffer_info(&raw)], &[])
+                };
+            }
+            (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
+                self.recorder.keep(&image.inner);
+                let raw = [vk::DescriptorImageInfo::default()
+                    .image_view(image.view())
+                    .image_layout(vk::ImageLayout::GENERAL)];
+                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
+            }
+            (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
+                self.recorder.keep(&view.image.inner);
+                self.recorder.keep(&view.sampler.inner);
+                let raw = [vk::DescriptorImageInfo::default()
+                    .image_view(view.image.view())
+                    .sampler(view.sampler.inner.raw)
+                    .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
+                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
+            }
+            _ => {
+                let message = format!("binding {} is not a {:?}", binding.name, binding.kind);
+                return Err(Error::Shader {
+                    name: info.name.into(),
+                    message,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn whole_image(image: &Image, buffer_offset: u64) -> vk::BufferImageCopy {
+    vk::BufferImageCopy {
+        buffer_offset,
+        image_subresource: vk::ImageSubresourceLayers {
+            aspect_mask: aspect(image.format()),
+            layer_count: 1,
+            ..Default::default()
+        },
+        image_extent: vk::Extent3D {
+            width: image.size()[0],
+            height: image.size()[1],
+            depth: 1,
+        },
+        ..Default::default()
+    }
+}
