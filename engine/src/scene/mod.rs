@@ -3,6 +3,14 @@
 //! Units are metres, radians and W·m⁻²·sr⁻¹ (radiance), W·sr⁻¹ (point and spot intensity), W·m⁻² (directional irradiance). World space is
 //! right-handed with +Y up, as in glTF 2.0; a camera looks along its local −Z.
 
+pub mod builtin;
+mod check;
+pub mod metals;
+mod profile;
+pub mod tangents;
+
+pub use profile::{AlphaUse, EnvironmentUse, LightCounts, SceneProfile, TransmissionUse};
+
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 
 /// A scene as described, before anything is uploaded.
@@ -30,6 +38,68 @@ pub struct Scene {
     pub defaults: RenderDefaults,
     /// What the reader met and could not carry over, by name.
     pub notes: Vec<Note>,
+}
+
+/// Loads a scene: a `builtin:` address or a file.
+///
+/// # Errors
+/// [`Error::Scene`](crate::Error::Scene) with the place of the first fault.
+pub fn load(address_or_path: &str) -> crate::Result<Scene> {
+    if address_or_path.starts_with(builtin::PREFIX) {
+        return builtin::generate(address_or_path);
+    }
+    Err(crate::Error::scene(
+        address_or_path,
+        "file name",
+        "unknown kind of scene file",
+    ))
+}
+
+impl Scene {
+    /// Adds a material; returns its index.
+    pub fn add_material(&mut self, material: Material) -> u32 {
+        self.materials.push(material);
+        self.materials.len() as u32 - 1
+    }
+
+    /// Adds an image; returns its index.
+    pub fn add_image(&mut self, image: Image) -> u32 {
+        self.images.push(image);
+        self.images.len() as u32 - 1
+    }
+
+    /// Adds a mesh without placing it; returns its index.
+    pub fn add_mesh(&mut self, mesh: Mesh) -> u32 {
+        self.meshes.push(mesh);
+        self.meshes.len() as u32 - 1
+    }
+
+    /// Adds a mesh and places it once, where it is.
+    pub fn place(&mut self, mesh: Mesh) {
+        let name = mesh.name.clone();
+        let mesh = self.add_mesh(mesh);
+        self.instances.push(Instance {
+            mesh,
+            transform: DAffine3::IDENTITY,
+            name,
+        });
+    }
+
+    /// Adds a light without area.
+    pub fn add_light(&mut self, name: impl Into<String>, kind: LightKind) {
+        self.lights.push(Light {
+            name: name.into(),
+            kind,
+        });
+    }
+
+    /// The camera of that name, or the first one for `None`.
+    pub fn camera(&self, name: Option<&str>) -> Option<&Camera> {
+        match name {
+            Some(name) => self.cameras.iter().find(|camera| camera.name == name),
+            None => self.cameras.first(),
+        }
+    }
 }
 
 /// Something a reader met and did not model: always reported, never dropped in silence.
@@ -186,6 +256,32 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Smooth, clear glass of a solid body; it needs a closed mesh. Its thickness only marks it as solid.
+    pub fn glass(name: impl Into<String>, ior: f32) -> Self {
+        Self {
+            name: name.into(),
+            metallic: 0.0,
+            roughness: 0.0,
+            ior,
+            transmission: 1.0,
+            thickness: 1.0,
+            double_sided: true,
+            ..Self::default()
+        }
+    }
+
+    /// A smooth metal of reflectance `reflectance` at normal incidence, two-sided.
+    pub fn mirror(name: impl Into<String>, reflectance: Vec3) -> Self {
+        Self {
+            name: name.into(),
+            base_color: reflectance.extend(1.0),
+            metallic: 1.0,
+            roughness: 0.0,
+            double_sided: true,
+            ..Self::default()
+        }
+    }
+
     /// An ideally diffuse, one-coloured material: Lambert reflectance `reflectance`, no specular coat.
     pub fn lambert(name: impl Into<String>, reflectance: Vec3) -> Self {
         Self {

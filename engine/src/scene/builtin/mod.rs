@@ -1,0 +1,169 @@
+//! Generated test scenes, addressed as `builtin:cornell-box?key=value&key=value`.
+//!
+//! Each scene is a pure function of its parameters: the same address gives the same bits on every machine with IEEE 754 arithmetic and
+//! the same mathematics library. Every scene has a camera named `main` and a `defaults.aspect`.
+
+mod city;
+mod cornell;
+mod furnace;
+mod materials;
+pub mod noise;
+mod parameters;
+mod ring;
+mod rooms;
+mod shapes;
+mod slab;
+mod soup;
+mod sphere_flake;
+mod textures;
+
+pub use parameters::{Parameter, ParameterKind};
+
+use crate::scene::Scene;
+use crate::{Error, Result};
+use parameters::Values;
+
+/// How addresses of generated scenes begin.
+pub const PREFIX: &str = "builtin:";
+
+/// A generated scene: its name, what it shows and what can be set.
+#[derive(Debug, Clone, Copy, serde::Serialize)]
+pub struct Entry {
+    /// The name after `builtin:`.
+    pub name: &'static str,
+    /// What it shows, as one sentence.
+    pub summary: &'static str,
+    /// What can be set.
+    pub parameters: &'static [Parameter],
+    #[serde(skip)]
+    build: fn(&Values) -> Result<Scene>,
+}
+
+/// All generated scenes, by name.
+pub fn catalogue() -> &'static [Entry] {
+    &[
+        city::BOX_CITY,
+        rooms::BOX_ROOM,
+        cornell::CORNELL_BOX,
+        rooms::DIVIDER_ROOM,
+        furnace::FURNACE_BOX,
+        furnace::FURNACE_SPHERE,
+        materials::MATERIALS,
+        rooms::PASSAGE,
+        ring::RING,
+        slab::SLAB,
+        sphere_flake::SPHERE_FLAKE,
+        furnace::SPHERE_LIGHT,
+        soup::TRIANGLE_SOUP,
+        furnace::WHITE_FURNACE,
+    ]
+}
+
+/// Generates the scene of a `builtin:` address.
+///
+/// # Errors
+/// [`Error::Scene`] for an unknown scene or key, or a value outside its range; it says what is allowed.
+pub fn generate(address: &str) -> Result<Scene> {
+    let rest = address.strip_prefix(PREFIX).unwrap_or(address);
+    let (name, query) = rest.split_once('?').unwrap_or((rest, ""));
+    let Some(entry) = catalogue().iter().find(|entry| entry.name == name) else {
+        let known: Vec<&str> = catalogue().iter().map(|entry| entry.name).collect();
+        let cause = format!("no such generated scene; there are: {}", known.join(", "));
+        return Err(Error::scene(address, format!("name {name:?}"), cause));
+    };
+    let values = Values::parse(address, query, entry.parameters)?;
+    let mut scene = (entry.build)(&values)?;
+    scene.name = entry.name.into();
+    scene.source = address.into();
+    scene.check()?;
+    Ok(scene)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneProfile;
+
+    fn message(address: &str) -> String {
+        generate(address).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn every_entry_builds_with_its_defaults_and_has_what_it_promises() {
+        for entry in catalogue() {
+            let scene = generate(&format!("{PREFIX}{}", entry.name)).expect(entry.name);
+            assert_eq!(scene.cameras[0].name, "main", "{}", entry.name);
+            assert!(scene.defaults.aspect.is_some_and(|a| a > 0.0));
+            assert!(scene.notes.is_empty());
+            let profile = SceneProfile::of(&scene);
+            let lit = profile.has_area_lights()
+                || profile.has_environment()
+                || profile.lights.point + profile.lights.spot + profile.lights.directional > 0;
+            assert!(lit && profile.triangles > 0, "{}", entry.name);
+            assert!(entry.summary.ends_with('.'));
+            assert_eq!(profile, SceneProfile::of(&generate(&scene.source).expect("again")));
+        }
+        let names: Vec<&str> = catalogue().iter().map(|e| e.name).collect();
+        assert!(names.is_sorted());
+    }
+
+    #[test]
+    fn every_bound_and_word_of_every_parameter_is_accepted() {
+        for entry in catalogue() {
+            for parameter in entry.parameters {
+                let values: Vec<String> = match parameter.range {
+                    ParameterKind::Real { min, max } | ParameterKind::Color { min, max } => {
+                        vec![min.to_string(), max.to_string()]
+                    }
+                    // Greatest counts make millions of triangles; the least will do.
+                    ParameterKind::Integer { min, .. } => vec![min.to_string()],
+                    ParameterKind::Choice { words } => words.iter().map(|w| w.to_string()).collect(),
+                };
+                for value in values {
+                    let address = format!("{PREFIX}{}?{}={value}", entry.name, parameter.name);
+                    generate(&address).unwrap_or_else(|error| panic!("{error}"));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn mistakes_are_answered_with_what_is_allowed() {
+        assert!(message("builtin:nothing").contains("cornell-box"));
+        assert!(message("builtin:cornell-box?lihgt=1").contains("unknown; allowed: light"));
+        assert!(message("builtin:cornell-box?light=1&light=2").contains("given twice"));
+        assert!(message("builtin:cornell-box?light").contains("key=value"));
+        assert!(message("builtin:cornell-box?boxes=three").contains("both | short | tall | none"));
+        assert!(message("builtin:furnace-sphere?rho=1.5").contains("0 … 1"));
+        assert!(message("builtin:furnace-sphere?rho=NaN").contains("0 … 1"));
+        assert!(message("builtin:furnace-sphere?rho=1,1").contains("r,g,b"));
+        assert!(message("builtin:triangle-soup?n=1e3").contains("whole"));
+    }
+
+    #[test]
+    fn profiles_say_what_is_there() {
+        let of = |address: &str| SceneProfile::of(&generate(address).expect("scene"));
+        let cornell = of("builtin:cornell-box");
+        assert_eq!(
+            (cornell.triangles, cornell.emissive_triangles, cornell.instances),
+            (38, 2, 6)
+        );
+        assert!(!cornell.has_textures && !cornell.has_metal && !cornell.has_rough_dielectric_spec);
+        assert!(!cornell.has_environment() && !cornell.has_transmission() && !cornell.has_alpha());
+        assert_eq!(cornell.roughness, None);
+        let glass = of("builtin:cornell-box?sphere=glass");
+        assert!(glass.transmission.solid && !glass.transmission.thin && glass.has_rough_dielectric_spec);
+        let gold = of("builtin:cornell-box?sphere=gold");
+        assert!(gold.has_metal && gold.has_conductor && gold.roughness == Some([0.2, 0.2]));
+        let furnace = of("builtin:furnace-box");
+        assert_eq!((furnace.triangles, furnace.emissive_triangles), (12, 12));
+        assert_eq!(furnace.bounds, Some([[-1.0; 3], [1.0; 3]]));
+        let white = of("builtin:white-furnace?ior=1");
+        assert!(!white.has_rough_dielectric_spec && white.has_environment());
+        assert!(of("builtin:slab?attenuation_color=0.5").has_attenuation && !of("builtin:slab").has_attenuation);
+        assert!(of("builtin:divider-room").has_textures);
+        assert_eq!(of("builtin:ring").lights.point, 1);
+        let text = cornell.to_string();
+        assert!(text.contains("38 triangles") && text.contains("diffuse only"), "{text}");
+    }
+}

@@ -1,0 +1,338 @@
+//! What a scene needs of a renderer: the facts from which passes, buffers and shader specializations are chosen.
+//!
+//! A pure function of the scene; only what is placed by an instance counts. Factors of zero count as absence, and textures are looked
+//! at texel by texel where their values matter.
+
+use std::fmt;
+
+use glam::{DVec3, Vec3};
+
+use super::{AlphaMode, Image, LightKind, Material, Scene, Texture};
+
+/// How alpha is used by the materials that are placed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct AlphaUse {
+    /// Some material is cut out at a threshold.
+    pub mask: bool,
+    /// Some material is there with a probability.
+    pub blend: bool,
+}
+
+/// What kind of environment there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EnvironmentUse {
+    /// None, or black.
+    Absent,
+    /// The same radiance from everywhere.
+    Constant,
+    /// A map that wants importance sampling.
+    Map,
+}
+
+/// How specular transmission is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct TransmissionUse {
+    /// Solid bodies that refract.
+    pub solid: bool,
+    /// Thin walls.
+    pub thin: bool,
+}
+
+/// How many lights without area there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct LightCounts {
+    /// Point lights.
+    pub point: usize,
+    /// Spot lights.
+    pub spot: usize,
+    /// Directional lights.
+    pub directional: usize,
+}
+
+/// What a scene needs of a renderer.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct SceneProfile {
+    /// Triangles over all instances.
+    pub triangles: u64,
+    /// Triangles of the placed meshes, each mesh once.
+    pub unique_triangles: u64,
+    /// Vertices of the placed meshes, each mesh once.
+    pub vertices: u64,
+    /// Instances.
+    pub instances: usize,
+    /// Some placed material uses an image.
+    pub has_textures: bool,
+    /// Some placed material has a normal map.
+    pub has_normal_maps: bool,
+    /// The environment.
+    pub environment: EnvironmentUse,
+    /// Some placed material is, at least in part, metal.
+    pub has_metal: bool,
+    /// Some metal has an exact complex index of refraction.
+    pub has_conductor: bool,
+    /// Some non-metal reflects specularly.
+    pub has_rough_dielectric_spec: bool,
+    /// Specular transmission.
+    pub transmission: TransmissionUse,
+    /// Some solid body absorbs.
+    pub has_attenuation: bool,
+    /// Alpha.
+    pub alpha: AlphaUse,
+    /// Triangles over all instances whose material emits.
+    pub emissive_triangles: u64,
+    /// Lights without area.
+    pub lights: LightCounts,
+    /// Some placed mesh has vertex colours.
+    pub has_vertex_colors: bool,
+    /// Some placed mesh interpolates normals.
+    pub has_shading_normals: bool,
+    /// Some placed material is unlit.
+    pub has_unlit: bool,
+    /// Some camera has a lens.
+    pub has_lens: bool,
+    /// Least and greatest perceptual roughness of placed materials that reflect or transmit specularly; `None` without such.
+    pub roughness: Option<[f32; 2]>,
+    /// World bounds, metres: least and greatest corner; `None` for a scene without vertices.
+    pub bounds: Option<[[f64; 3]; 2]>,
+}
+
+impl SceneProfile {
+    /// Looks through a scene that passed [`Scene::check`].
+    pub fn of(scene: &Scene) -> Self {
+        let mut placed = vec![0u64; scene.meshes.len()];
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for instance in &scene.instances {
+            let Some(mesh) = scene.meshes.get(instance.mesh as usize) else {
+                continue;
+            };
+            placed[instance.mesh as usize] += 1;
+            for p in &mesh.positions {
+                let world = instance.transform.transform_point3(p.as_dvec3());
+                low = low.min(world);
+                high = high.max(world);
+            }
+        }
+        let default_material = Material::default();
+        let material_of = |index: Option<u32>| {
+            index
+                .and_then(|i| scene.materials.get(i as usize))
+                .unwrap_or(&default_material)
+        };
+        let mut profile = Self {
+            triangles: 0,
+            unique_triangles: 0,
+            vertices: 0,
+            instances: scene.instances.len(),
+            has_textures: false,
+            has_normal_maps: false,
+            environment: environment_use(scene),
+            has_metal: false,
+            has_conductor: false,
+            has_rough_dielectric_spec: false,
+            transmission: TransmissionUse {
+                solid: false,
+                thin: false,
+            },
+            has_attenuation: false,
+            alpha: AlphaUse {
+                mask: false,
+                blend: false,
+            },
+            emissive_triangles: 0,
+            lights: LightCounts {
+                point: 0,
+                spot: 0,
+                directional: 0,
+            },
+            has_vertex_colors: false,
+            has_shading_normals: false,
+            has_unlit: false,
+            has_lens: scene.cameras.iter().any(|c| c.lens_radius > 0.0),
+            roughness: None,
+            bounds: (low.x <= high.x).then(|| [low.to_array(), high.to_array()]),
+        };
+        for (mesh, &count) in scene.meshes.iter().zip(&placed).filter(|(_, count)| **count > 0) {
+            let triangles = mesh.triangles.len() as u64;
+            profile.triangles += triangles * count;
+            profile.unique_triangles += triangles;
+            profile.vertices += mesh.positions.len() as u64;
+            profile.has_vertex_colors |= !mesh.colors.is_empty();
+            profile.has_shading_normals |= !mesh.normals.is_empty();
+            if emits(material_of(mesh.material)) {
+                profile.emissive_triangles += triangles * count;
+            }
+        }
+        let mut used: Vec<Option<u32>> = (scene.meshes.iter().zip(&placed))
+            .filter(|(_, count)| **count > 0)
+            .map(|(mesh, _)| mesh.material)
+            .collect();
+        used.sort_unstable();
+        used.dedup();
+        for index in used {
+            profile.add_material(material_of(index), &scene.images);
+        }
+        for light in &scene.lights {
+            match light.kind {
+                LightKind::Point { .. } => profile.lights.point += 1,
+                LightKind::Spot { .. } => profile.lights.spot += 1,
+                LightKind::Directional { .. } => profile.lights.directional += 1,
+            }
+        }
+        profile
+    }
+
+    fn add_material(&mut self, material: &Material, images: &[Image]) {
+        self.has_textures |= material.textures().next().is_some();
+        match material.alpha_mode {
+            AlphaMode::Opaque => {}
+            AlphaMode::Mask { .. } => self.alpha.mask = true,
+            AlphaMode::Blend => self.alpha.blend = true,
+        }
+        if material.unlit {
+            // Unlit surfaces reflect nothing, whatever else the material says.
+            self.has_unlit = true;
+            return;
+        }
+        const ROUGHNESS_CHANNEL: usize = 1;
+        const METAL_CHANNEL: usize = 2;
+        let metal = channel_range(&material.metallic_roughness_texture, METAL_CHANNEL, images);
+        let roughness = channel_range(&material.metallic_roughness_texture, ROUGHNESS_CHANNEL, images);
+        let metallic = metal.map(|m| m * material.metallic);
+        let dielectric = metallic[0] < 1.0;
+        let fresnel = material.ior != 1.0;
+        let reflects = dielectric && fresnel && material.specular > 0.0 && material.specular_color.max_element() > 0.0;
+        let transmits = dielectric && material.transmission > 0.0;
+        self.has_normal_maps |= material.normal_texture.is_some();
+        self.has_metal |= metallic[1] > 0.0;
+        self.has_conductor |= metallic[1] > 0.0 && material.conductor.is_some();
+        self.has_rough_dielectric_spec |= reflects;
+        if transmits {
+            let solid = material.thickness > 0.0;
+            self.transmission.solid |= solid;
+            self.transmission.thin |= !solid;
+            self.has_attenuation |=
+                solid && material.attenuation_distance.is_finite() && material.attenuation_color != Vec3::ONE;
+        }
+        if reflects || transmits || metallic[1] > 0.0 {
+            let range = roughness.map(|r| r * material.roughness);
+            self.roughness = Some(match self.roughness {
+                None => range,
+                Some([low, high]) => [low.min(range[0]), high.max(range[1])],
+            });
+        }
+    }
+
+    /// Whether any surface emits.
+    pub fn has_area_lights(&self) -> bool {
+        self.emissive_triangles > 0
+    }
+
+    /// Whether there is light from infinity.
+    pub fn has_environment(&self) -> bool {
+        self.environment != EnvironmentUse::Absent
+    }
+
+    /// Whether some material transmits specularly.
+    pub fn has_transmission(&self) -> bool {
+        self.transmission.solid || self.transmission.thin
+    }
+
+    /// Whether alpha matters.
+    pub fn has_alpha(&self) -> bool {
+        self.alpha.mask || self.alpha.blend
+    }
+}
+
+fn emits(material: &Material) -> bool {
+    !material.unlit && material.emission.max_element() > 0.0
+}
+
+fn environment_use(scene: &Scene) -> EnvironmentUse {
+    let Some(environment) = &scene.environment else {
+        return EnvironmentUse::Absent;
+    };
+    let dark = environment.strength == 0.0 || environment.radiance.iter().all(|r| *r == Vec3::ZERO);
+    let constant = environment.radiance.windows(2).all(|pair| pair[0] == pair[1]);
+    match (dark, constant) {
+        (true, _) => EnvironmentUse::Absent,
+        (false, true) => EnvironmentUse::Constant,
+        (false, false) => EnvironmentUse::Map,
+    }
+}
+
+/// Least and greatest value of an image channel in [0, 1]; 1 without a texture.
+fn channel_range(texture: &Option<Texture>, channel: usize, images: &[Image]) -> [f32; 2] {
+    let Some(image) = texture.and_then(|t| images.get(t.image as usize)) else {
+        return [1.0, 1.0];
+    };
+    let (mut low, mut high) = (u8::MAX, 0);
+    for texel in &image.texels {
+        low = low.min(texel[channel]);
+        high = high.max(texel[channel]);
+    }
+    [f32::from(low) / 255.0, f32::from(high) / 255.0]
+}
+
+impl fmt::Display for SceneProfile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "geometry      {} triangles ({} unique), {} vertices, {} instances",
+            self.triangles, self.unique_triangles, self.vertices, self.instances
+        )?;
+        if let Some([low, high]) = self.bounds {
+            writeln!(
+                f,
+                "bounds        {:.4} {:.4} {:.4} … {:.4} {:.4} {:.4} m",
+                low[0], low[1], low[2], high[0], high[1], high[2]
+            )?;
+        }
+        let LightCounts {
+            point,
+            spot,
+            directional,
+        } = self.lights;
+        let environment = match self.environment {
+            EnvironmentUse::Absent => "no",
+            EnvironmentUse::Constant => "constant",
+            EnvironmentUse::Map => "mapped",
+        };
+        writeln!(
+            f,
+            "lights        {} emissive triangles, {point} point, {spot} spot, {directional} directional, {environment} environment",
+            self.emissive_triangles
+        )?;
+        let features = [
+            ("textures", self.has_textures),
+            ("normal maps", self.has_normal_maps),
+            ("vertex colours", self.has_vertex_colors),
+            ("shading normals", self.has_shading_normals),
+            ("metal", self.has_metal),
+            ("measured metal", self.has_conductor),
+            ("dielectric reflection", self.has_rough_dielectric_spec),
+            ("solid transmission", self.transmission.solid),
+            ("thin transmission", self.transmission.thin),
+            ("attenuation", self.has_attenuation),
+            ("alpha mask", self.alpha.mask),
+            ("alpha blend", self.alpha.blend),
+            ("unlit", self.has_unlit),
+            ("lens", self.has_lens),
+        ];
+        let present: Vec<&str> = features
+            .iter()
+            .filter(|(_, there)| *there)
+            .map(|(name, _)| *name)
+            .collect();
+        let list = if present.is_empty() {
+            "diffuse only".into()
+        } else {
+            present.join(", ")
+        };
+        write!(f, "materials     {list}")?;
+        if let Some([low, high]) = self.roughness {
+            write!(f, "\nroughness     {low:.3} … {high:.3}")?;
+        }
+        Ok(())
+    }
+}
