@@ -1,1 +1,18 @@
 //! Pictures: accumulation, files, tone curves, error metrics.
+
+pub mod accumulate;
+pub mod exr;
+pub mod hdr;
+pub mod metrics;
+pub mod picture;
+pub mod png;
+pub mod tone;
+pub mod z_test;
+
+mod atomic;
+
+pub use accumulate::{Accumulator, TwoFloat};
+pub use metrics::{CompareOptions, ErrorReport, compare};
+pub use picture::{Layer, Metadata, NonFinite, Picture};
+pub use tone::{ToneCurve, ToneMap};
+pub use z_test::{ZTest, z_test};

@@ -1,0 +1,348 @@
+//! How wrong a picture is: error metrics over linear radiance, and FLIP over tone-mapped pictures.
+//!
+//! FLIP: Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, *FLIP: A Difference Evaluator for Alternating Images*, HPG 2020, by
+//! its authors' implementation (crate nv-flip). Relative MSE as in Rousselle, Knaus and Zwicker, *Adaptive Sampling and Reconstruction using Greedy
+//! Error Minimization*, 2011, §5.
+//! Guarantees: sums are compensated f64 sums in pixel order, so the same pictures give the same bits; pixels that are not finite in either
+//! picture are left out, counted and reported.
+
+pub use super::z_test::{ZTest, z_test};
+
+use super::picture::{Layer, Picture};
+use super::tone::ToneMap;
+use crate::{Error, Result};
+
+/// ε of the relative MSE, in squared units of the reference's radiance.
+pub const RELATIVE_MSE_OFFSET: f64 = 0.01;
+
+/// The quantile of the absolute error that is reported.
+pub const QUANTILE: f64 = 0.999;
+
+/// What the metrics need to be told.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct CompareOptions {
+    /// ε in (a − b)² / (b² + ε); default [`RELATIVE_MSE_OFFSET`].
+    pub relative_mse_offset: f64,
+    /// Tone map applied to both pictures before FLIP; default: exposure 0, clipped sRGB.
+    pub tone: ToneMap,
+    /// Pixels per degree of visual angle for FLIP; default 67.02, a 0.7 m wide, 3840 pixels wide screen seen from 0.7 m (the authors' choice).
+    pub pixels_per_degree: f32,
+}
+
+impl Default for CompareOptions {
+    fn default() -> Self {
+        Self {
+            relative_mse_offset: RELATIVE_MSE_OFFSET,
+            tone: ToneMap::default(),
+            pixels_per_degree: nv_flip::DEFAULT_PIXELS_PER_DEGREE,
+        }
+    }
+}
+
+/// All error metrics of a test picture a against a reference b. Means run over the values (pixels × channels) of the finite pixels.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ErrorReport {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Mean squared error, mean of (a − b)².
+    pub mse: f64,
+    /// Root of the MSE.
+    pub rmse: f64,
+    /// Relative mean squared error, mean of (a − b)² / (b² + ε).
+    pub relative_mse: f64,
+    /// ε of the relative MSE.
+    pub relative_mse_offset: f64,
+    /// Mean signed error (bias), mean of a − b.
+    pub bias: f64,
+    /// Mean signed error over the reference's mean, Σ(a − b) / Σb; 0 for a black reference that is matched, else not finite.
+    pub relative_bias: f64,
+    /// The 99.9 % quantile of |a − b|: the value at rank ⌈0.999 n⌉ of n.
+    pub quantile_999: f64,
+    /// The largest |a − b|.
+    pub max_error: f64,
+    /// Mean FLIP error in [0, 1], over all pixels; those that are not finite in either picture are black in both.
+    pub flip: f64,
+    /// FLIP's pixels per degree of visual angle.
+    pub pixels_per_degree: f32,
+    /// Pixels of the test picture with a NaN or an infinity.
+    pub non_finite_test: u64,
+    /// Pixels of the reference with a NaN or an infinity.
+    pub non_finite_reference: u64,
+    /// Pixels that were compared.
+    pub pixels: u64,
+}
+
+impl std::fmt::Display for ErrorReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            width, height, pixels, ..
+        } = self;
+        let offset = format!("relative MSE (ε = {})", self.relative_mse_offset);
+        let flip = format!("FLIP ({:.2} pixels/degree)", self.pixels_per_degree);
+        writeln!(f, "{:<28} {pixels} of {width} × {height}", "pixels compared")?;
+        for (name, value) in [
+            ("MSE", self.mse),
+            ("RMSE", self.rmse),
+            (offset.as_str(), self.relative_mse),
+            ("bias (mean signed error)", self.bias),
+            ("relative bias", self.relative_bias),
+            ("99.9 % of errors below", self.quantile_999),
+            ("largest error", self.max_error),
+            (flip.as_str(), self.flip),
+        ] {
+            writeln!(f, "{name:<28} {value:.6e}")?;
+        }
+        write!(
+            f,
+            "{:<28} test {}, reference {}",
+            "pixels not finite", self.non_finite_test, self.non_finite_reference
+        )
+    }
+}
+
+/// A compensated f64 sum (Neumaier 1974): its error does not grow with the count.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sum {
+    sum: f64,
+    rest: f64,
+}
+
+impl Sum {
+    /// Adds one summand.
+    pub(crate) fn add(&mut self, value: f64) {
+        let sum = self.sum + value;
+        self.rest += if self.sum.abs() >= value.abs() {
+            (self.sum - sum) + value
+        } else {
+            (value - sum) + self.sum
+        };
+        self.sum = sum;
+    }
+
+    /// The sum so far.
+    pub(crate) fn value(self) -> f64 {
+        self.sum + self.rest
+    }
+}
+
+/// Rec. 709 luminance of linear RGB, weights of ITU-R BT.709-6 §3.
+pub fn luminance(rgb: [f32; 3]) -> f64 {
+    0.2126 * f64::from(rgb[0]) + 0.7152 * f64::from(rgb[1]) + 0.0722 * f64::from(rgb[2])
+}
+
+/// Compares the main layers of two pictures.
+///
+/// # Errors
+/// [`Error::Picture`] when sizes or channel counts differ, a main layer is missing, or an option is out of its range.
+pub fn compare(test: &Picture, reference: &Picture, options: &CompareOptions) -> Result<ErrorReport> {
+    let (size, expected) = ((test.width(), test.height()), (reference.width(), reference.height()));
+    let wrong = |cause: String| Error::Picture {
+        path: "comparison".into(),
+        cause,
+    };
+    if size != expected {
+        return Err(wrong(format!(
+            "the test picture is {}×{}, the reference {}×{}",
+            size.0, size.1, expected.0, expected.1
+        )));
+    }
+    if !(options.relative_mse_offset > 0.0 && options.pixels_per_degree > 0.0) {
+        return Err(wrong(
+            "the relative MSE's offset and the pixels per degree must be above 0".into(),
+        ));
+    }
+    compare_layers(test.main_layer()?, reference.main_layer()?, size, options)
+}
+
+fn compare_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &CompareOptions) -> Result<ErrorReport> {
+    let channels = test.channels();
+    if channels != reference.channels() {
+        return Err(Error::Picture {
+            path: "comparison".into(),
+            cause: format!(
+                "the test layer has {channels} channels, the reference {}",
+                reference.channels()
+            ),
+        });
+    }
+    let (mut squared, mut relative, mut signed, mut level) =
+        (Sum::default(), Sum::default(), Sum::default(), Sum::default());
+    let (mut non_finite_test, mut non_finite_reference) = (0, 0);
+    let mut errors = Vec::with_capacity(test.values().len());
+    let pairs = test
+        .values()
+        .chunks_exact(channels)
+        .zip(reference.values().chunks_exact(channels));
+    for (a, b) in pairs {
+        let finite = [a, b].map(|pixel| pixel.iter().all(|v| v.is_finite()));
+        non_finite_test += u64::from(!finite[0]);
+        non_finite_reference += u64::from(!finite[1]);
+        if finite != [true; 2] {
+            continue;
+        }
+        for (a, b) in a.iter().zip(b) {
+            let (a, b) = (f64::from(*a), f64::from(*b));
+            let error = a - b;
+            squared.add(error * error);
+            relative.add(error * error / (b * b + options.relative_mse_offset));
+            signed.add(error);
+            level.add(b);
+            errors.push(error.abs());
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    let count = errors.len();
+    let mean = |sum: Sum| sum.value() / count.max(1) as f64;
+    let rank = (QUANTILE * count as f64).ceil() as usize;
+    let relative_bias = if signed.value() == 0.0 {
+        0.0
+    } else {
+        signed.value() / level.value()
+    };
+    Ok(ErrorReport {
+        width: size.0,
+        height: size.1,
+        mse: mean(squared),
+        rmse: mean(squared).sqrt(),
+        relative_mse: mean(relative),
+        relative_mse_offset: options.relative_mse_offset,
+        bias: mean(signed),
+        relative_bias,
+        quantile_999: errors.get(rank.saturating_sub(1)).copied().unwrap_or(0.0),
+        max_error: errors.last().copied().unwrap_or(0.0),
+        flip: mean_flip(test, reference, size, options),
+        pixels_per_degree: options.pixels_per_degree,
+        non_finite_test,
+        non_finite_reference,
+        pixels: (count / channels) as u64,
+    })
+}
+
+/// The FLIP error of every pixel, in [0, 1]; pixels that are not finite in either layer are black in both.
+fn flip_map(test: &Layer, reference: &Layer, size: (u32, u32), options: &CompareOptions) -> Vec<f32> {
+    let (mut a, mut b) = (Vec::new(), Vec::new());
+    for (test, reference) in test.pixels().zip(reference.pixels()) {
+        let finite = test.iter().chain(&reference).all(|v| v.is_finite());
+        let shown = |pixel| if finite { options.tone.apply(pixel) } else { [0; 3] };
+        a.extend(shown(test));
+        b.extend(shown(reference));
+    }
+    let picture = |bytes: &[u8]| nv_flip::FlipImageRgb8::with_data(size.0, size.1, bytes);
+    nv_flip::flip(picture(&b), picture(&a), options.pixels_per_degree).to_vec()
+}
+
+fn mean_flip(test: &Layer, reference: &Layer, size: (u32, u32), options: &CompareOptions) -> f64 {
+    let map = flip_map(test, reference, size, options);
+    let mut sum = Sum::default();
+    for value in &map {
+        sum.add(f64::from(*value));
+    }
+    sum.value() / map.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(values: &[f32]) -> Result<Picture> {
+        Picture::from_radiance((values.len() / 3) as u32, 1, values.to_vec())
+    }
+
+    #[test]
+    fn formulas_on_numbers_done_by_hand() -> Result<()> {
+        let test = picture(&[1.0, 2.0, 3.0, 0.0, 0.0, 0.0])?;
+        let reference = picture(&[1.0, 1.0, 1.0, 0.0, 0.0, 0.5])?;
+        let report = compare(&test, &reference, &CompareOptions::default())?;
+        // Errors 0, 1, 2, 0, 0, −½.
+        assert_eq!(report.mse, 5.25 / 6.0);
+        assert_eq!(report.rmse, (5.25f64 / 6.0).sqrt());
+        assert!((report.relative_mse - (1.0 / 1.01 + 4.0 / 1.01 + 0.25 / 0.26) / 6.0).abs() < 1e-15);
+        assert_eq!(report.bias, 2.5 / 6.0);
+        assert_eq!(report.relative_bias, 2.5 / 3.5);
+        assert_eq!((report.quantile_999, report.max_error), (2.0, 2.0));
+        assert_eq!(
+            (report.pixels, report.non_finite_test, report.non_finite_reference),
+            (2, 0, 0)
+        );
+        assert!(report.flip > 0.0 && report.flip <= 1.0);
+        Ok(())
+    }
+
+    #[test]
+    fn equal_pictures_have_no_error() -> Result<()> {
+        let a = picture(&[0.1, 0.2, 0.3, 9.0, 8.0, 7.0])?;
+        let report = compare(&a, &a, &CompareOptions::default())?;
+        assert_eq!(
+            (
+                report.mse,
+                report.bias,
+                report.relative_bias,
+                report.flip,
+                report.max_error
+            ),
+            (0.0, 0.0, 0.0, 0.0, 0.0)
+        );
+        Ok(())
+    }
+
+    #[test]
+    fn pixels_that_are_not_finite_are_left_out_and_counted() -> Result<()> {
+        let test = picture(&[f32::NAN, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, f32::INFINITY, f32::NAN])?;
+        let reference = picture(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, f32::NAN, 0.0, 0.0])?;
+        let report = compare(&test, &reference, &CompareOptions::default())?;
+        assert_eq!(
+            (report.pixels, report.non_finite_test, report.non_finite_reference),
+            (1, 2, 1)
+        );
+        assert_eq!((report.mse, report.flip), (0.0, 0.0));
+        assert!(report.to_string().contains("test 2, reference 1"));
+        Ok(())
+    }
+
+    #[test]
+    fn sizes_must_agree() -> Result<()> {
+        let wide = Picture::from_radiance(2, 1, vec![0.0; 6])?;
+        let tall = Picture::from_radiance(1, 2, vec![0.0; 6])?;
+        assert!(matches!(
+            compare(&wide, &tall, &CompareOptions::default()),
+            Err(Error::Picture { .. })
+        ));
+        Ok(())
+    }
+
+    #[test]
+    fn quantile_is_the_value_at_its_rank() -> Result<()> {
+        let test: Vec<f32> = (0..3000u32).map(|i| (i * 7919 % 3000) as f32).collect();
+        let report = compare(
+            &picture(&test)?,
+            &picture(&vec![0.0; 3000])?,
+            &CompareOptions::default(),
+        )?;
+        // Errors 0 … 2999: rank ⌈2997⌉ holds 2996.
+        assert_eq!((report.quantile_999, report.max_error), (2996.0, 2999.0));
+        Ok(())
+    }
+
+    #[test]
+    fn flip_sees_what_tone_mapping_shows() -> Result<()> {
+        let grey = |v: f32| Picture::from_radiance(32, 32, vec![v; 32 * 32 * 3]);
+        let report = |a, b| compare(&grey(a)?, &grey(b)?, &CompareOptions::default()).map(|r| r.flip);
+        assert_eq!(report(2.0, 3.0)?, 0.0, "both clip to white");
+        // Black against white is FLIP's largest error: the authors normalise it to 1 within their tables' rounding.
+        assert!(report(0.0, 1.0)? > 0.95);
+        assert!(report(0.5, 0.6)? < report(0.3, 0.6)?);
+        Ok(())
+    }
+
+    #[test]
+    fn the_sum_keeps_what_a_plain_sum_loses() {
+        let mut sum = Sum::default();
+        for value in [1.0, 1e100, 1.0, -1e100] {
+            sum.add(value);
+        }
+        assert_eq!(sum.value(), 2.0);
+    }
+}
