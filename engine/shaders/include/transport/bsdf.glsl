@@ -1,0 +1,327 @@
+// The surface scattering function: glTF 2.0 metallic-roughness with transmission, and exact conductors.
+//
+// f = m f_metal + (1 - m) (f_layer + (1 - t) f_diffuse + t f_transmission), m = metallic, t = transmission.
+//   f_layer         GGX reflection under the exact dielectric Fresnel factor, tinted as KHR_materials_specular asks
+//   f_diffuse       base colour (1 - E(wo)) (1 - E(wi)) / (pi (1 - E_avg)), E the albedo of f_layer: reciprocal, and a white base
+//                   gives back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997)
+//   f_transmission  Walter et al. (2007) through solids, with radiance scaled by 1/eta^2; mirrored GGX lobe through thin walls
+//   f_metal         GGX with Schlick's or the exact conductor's Fresnel factor, plus the lobe of Kulla and Conty (2017)
+// Guarantees: never gains energy beyond the interpolation error of the albedo table (stated in bsdf.rs's tests); reflection is
+// reciprocal, transmission up to eta^2; specular 0 without transmission and metal is exactly Lambert. From inside a solid
+// (wo.z < 0) the diffuse base is black: what glTF calls its opaque part absorbs.
+// Frame: z is the shading normal; of a solid it points out of the body. Opaque and thin surfaces scatter alike on both sides.
+// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_SPECULAR_LAYER, HAS_TRANSMISSION,
+// HAS_MULTIPLE_SCATTERING, SEPARABLE_MASKING; `float albedo_table(uint)`, read only if HAS_SPECULAR_LAYER or
+// HAS_MULTIPLE_SCATTERING.
+#ifndef CLERESTORY_TRANSPORT_BSDF_GLSL
+#define CLERESTORY_TRANSPORT_BSDF_GLSL
+
+#include "transport/albedo.glsl"
+#include "transport/fresnel.glsl"
+#include "transport/ggx.glsl"
+#include "transport/warp.glsl"
+
+// Lobes are a class and a side; a mask allows a lobe when it has both bits. BsdfSample.flags holds the one that was sampled.
+const uint LOBE_DIFFUSE = 1u;
+const uint LOBE_GLOSSY = 2u;
+const uint LOBE_SPECULAR = 4u;
+const uint LOBE_REFLECTION = 8u;
+const uint LOBE_TRANSMISSION = 16u;
+const uint LOBE_ALL = 31u;
+
+const uint BSDF_THIN = 1u;        // transmission goes straight through a thin wall
+const uint BSDF_CONDUCTOR = 2u;   // the metal is conductor_eta + i conductor_k, not base_color
+const uint BSDF_IMPORTANCE = 4u;  // wo is where particles come from: no 1/eta^2
+
+// A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
+const float ETA_MATCHED = 1.001;
+// Below this 1 - E_avg there is no multiple scattering to speak of.
+const float LOSS_MIN = 1e-5;
+
+struct Bsdf {
+    vec3 base_color;
+    float metallic;
+    vec3 specular_f0;      // normal reflectance of the layer: min(F0(eta) specular_color, 1)
+    float specular;
+    vec3 conductor_eta;
+    float alpha;           // GGX width; a mirror below ALPHA_MIN
+    vec3 conductor_k;
+    float transmission;
+    vec3 conductor_average;  // fresnel_conductor_average of the two above
+    float eta;             // index inside / outside; 0 stands for Schlick's factor
+    uint flags;
+};
+
+struct BsdfSample {
+    vec3 wi;
+    float pdf;     // solid angle; 0 for a delta lobe
+    vec3 weight;   // f |cos| / pdf, all probabilities included
+    uint flags;    // the lobe; 0 when no direction was found: the path ends
+};
+
+float mean3(vec3 v) { return (v.x + v.y + v.z) * (1.0 / 3.0); }
+bool lobe_allowed(uint mask, uint lobe) { return (mask & lobe) == lobe; }
+bool bsdf_is_delta(Bsdf b) { return b.alpha < ALPHA_MIN; }
+float bsdf_metallic(Bsdf b) { return HAS_METAL ? b.metallic : 0.0; }
+float bsdf_transmission(Bsdf b) { return HAS_TRANSMISSION ? b.transmission : 0.0; }
+
+// The parameters that glTF's factors stand for. `thickness` > 0 bounds a solid.
+Bsdf bsdf_gltf(vec3 base_color, float metallic, float roughness, float transmission, float ior, float specular,
+               vec3 specular_color, float thickness) {
+    Bsdf b;
+    b.base_color = clamp(base_color, vec3(0.0), vec3(1.0));
+    b.metallic = clamp(metallic, 0.0, 1.0);
+    b.alpha = clamp(roughness * roughness, 0.0, 1.0);
+    b.eta = ior <= 0.0 ? 0.0 : max(ior, 1.0);
+    // An infinite index lets nothing in.
+    b.transmission = ior <= 0.0 ? 0.0 : clamp(transmission, 0.0, 1.0);
+    b.specular = clamp(specular, 0.0, 1.0);
+    b.specular_f0 = clamp(fresnel_f0(b.eta) * specular_color, vec3(0.0), vec3(1.0));
+    b.conductor_eta = vec3(1.0);
+    b.conductor_k = vec3(0.0);
+    b.conductor_average = vec3(0.0);
+    b.flags = thickness > 0.0 ? 0u : BSDF_THIN;
+    if (thickness > 0.0 && b.transmission > 0.0 && b.alpha >= ALPHA_MIN) {
+        b.eta = max(b.eta, ETA_MATCHED);
+    }
+    return b;
+}
+
+// Reflectance of the dielectric layer; eta is that beyond over that on the side of wo.
+vec3 layer_fresnel(Bsdf b, float cos_h, float eta) {
+    if (b.eta <= 0.0) {
+        return HAS_SPECULAR_LAYER ? b.specular * fresnel_schlick(cos_h, b.specular_f0) : vec3(0.0);
+    }
+    if (HAS_TRANSMISSION && eta * eta - 1.0 + cos_h * cos_h <= 0.0) {
+        return vec3(1.0);
+    }
+    if (!HAS_SPECULAR_LAYER) {
+        return vec3(0.0);
+    }
+    float f = fresnel_dielectric(cos_h, eta);
+    float f0 = fresnel_f0(eta);
+    // F where specular_f0 = F0; unit reflectance at grazing incidence whatever the tint.
+    return b.specular * max(f + (b.specular_f0 - f0) * ((1.0 - f) / (1.0 - f0)), vec3(0.0));
+}
+
+vec3 metal_fresnel(Bsdf b, float cos_h) {
+    if (HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u) {
+        return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
+    }
+    return fresnel_schlick(cos_h, b.base_color);
+}
+
+// What the layer reflects of a microfacet (r) and what goes through it (t), as the mask allows.
+void microfacet_split(Bsdf b, float cos_h, float eta, uint mask, out vec3 r, out vec3 t) {
+    uint shape = bsdf_is_delta(b) ? LOBE_SPECULAR : LOBE_GLOSSY;
+    vec3 f = layer_fresnel(b, cos_h, eta);
+    float m = bsdf_metallic(b);
+    r = (1.0 - m) * f;
+    if (HAS_METAL) {
+        r += m * metal_fresnel(b, cos_h);
+    }
+    t = ((1.0 - m) * bsdf_transmission(b)) * b.base_color * (1.0 - f);
+    if (!lobe_allowed(mask, shape | LOBE_REFLECTION)) {
+        r = vec3(0.0);
+    }
+    if (!HAS_TRANSMISSION || !lobe_allowed(mask, shape | LOBE_TRANSMISSION)) {
+        t = vec3(0.0);
+    }
+}
+
+// Probability of reflection at a microfacet.
+float reflection_probability(vec3 r, vec3 t) {
+    float total = mean3(r) + mean3(t);
+    return total > 0.0 ? mean3(r) / total : 1.0;
+}
+
+// One minus the albedo of the layer, towards one direction or (cos_theta < 0) averaged.
+vec3 layer_loss(Bsdf b, float cos_theta) {
+    if (!HAS_SPECULAR_LAYER) {
+        return vec3(1.0);
+    }
+    float w;
+    uint layer = albedo_layer(b.eta, w);
+    vec3 e = cos_theta < 0.0
+        ? vec3(albedo_average(0u, b.alpha), albedo_average(layer, b.alpha), albedo_average(layer + 1u, b.alpha))
+        : vec3(albedo_lookup(0u, cos_theta, b.alpha), albedo_lookup(layer, cos_theta, b.alpha),
+               albedo_lookup(layer + 1u, cos_theta, b.alpha));
+    return 1.0 - b.specular * (b.specular_f0 * e.x + (1.0 - b.specular_f0) * mix(e.y, e.z, w));
+}
+
+// Reflectances of the two lobes that are sampled by the cosine: the diffuse base and the metal's multiple scattering.
+// `seen` is their albedo towards wo.
+struct CosineLobes {
+    vec3 diffuse;
+    vec3 metal;
+    vec3 seen;
+};
+
+CosineLobes cosine_lobes(Bsdf b, float cos_o, bool inside, uint mask) {
+    CosineLobes lobes;
+    lobes.diffuse = vec3(0.0);
+    lobes.metal = vec3(0.0);
+    float m = bsdf_metallic(b);
+    float opaque = (1.0 - m) * (1.0 - bsdf_transmission(b));
+    if (opaque > 0.0 && !inside && lobe_allowed(mask, LOBE_DIFFUSE | LOBE_REFLECTION)) {
+        lobes.diffuse = opaque * b.base_color * layer_loss(b, cos_o);
+    }
+    lobes.seen = lobes.diffuse;
+    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && !bsdf_is_delta(b) && lobe_allowed(mask, LOBE_GLOSSY | LOBE_REFLECTION)) {
+        float e_average = albedo_average(0u, b.alpha);
+        float loss = 1.0 - e_average;
+        if (loss > LOSS_MIN) {
+            bool exact = HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u;
+            // 1/21 = 2 int (1 - mu)^5 mu dmu
+            vec3 f = exact ? b.conductor_average : mix(b.base_color, vec3(1.0), 1.0 / 21.0);
+            lobes.metal = m * f * f * e_average / (1.0 - f * loss) * (1.0 - albedo_lookup(0u, cos_o, b.alpha));
+            lobes.seen += lobes.metal;
+        }
+    }
+    return lobes;
+}
+
+// f of the cosine-sampled lobes towards a direction at cos_i > 0.
+vec3 cosine_lobes_eval(Bsdf b, CosineLobes lobes, float cos_i) {
+    vec3 f = lobes.diffuse;
+    if (HAS_SPECULAR_LAYER && lobes.diffuse != vec3(0.0)) {
+        f *= layer_loss(b, cos_i) / max(layer_loss(b, -1.0), vec3(LOSS_MIN));
+    }
+    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && lobes.metal != vec3(0.0)) {
+        f += lobes.metal * ((1.0 - albedo_lookup(0u, cos_i, b.alpha)) / (1.0 - albedo_average(0u, b.alpha)));
+    }
+    return f * INV_PI;
+}
+
+// Probability of the cosine strategy: its share of the albedo, with the microfacets taken at the macrosurface's angle.
+float cosine_probability(Bsdf b, CosineLobes lobes, float cos_o, float eta, uint mask) {
+    vec3 r;
+    vec3 t;
+    microfacet_split(b, cos_o, eta, mask, r, t);
+    float d = mean3(lobes.seen);
+    float s = mean3(r) + mean3(t);
+    return d > 0.0 ? d / (d + s) : 0.0;
+}
+
+// Radiance scaling of a refraction.
+float refraction_scale(Bsdf b, float eta) { return (b.flags & BSDF_IMPORTANCE) != 0u ? 1.0 : 1.0 / (eta * eta); }
+
+// Non-delta lobes for wo.z > 0: f |cos| in rgb, density in a.
+vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi, float eta, uint mask) {
+    vec4 result = vec4(0.0);
+    bool reflected = wi.z > 0.0;
+    float cos_i = abs(wi.z);
+    if (cos_i <= 0.0 || wo.z <= 0.0) {
+        return result;
+    }
+    if (reflected) {
+        result = vec4(cosine_lobes_eval(b, lobes, cos_i) * cos_i, p_cosine * cosine_hemisphere_pdf(cos_i));
+    }
+    bool microfacets = HAS_METAL || HAS_SPECULAR_LAYER || HAS_TRANSMISSION;
+    if (!microfacets || bsdf_is_delta(b) || !(reflected || HAS_TRANSMISSION)) {
+        return result;
+    }
+    bool refracted = HAS_TRANSMISSION && !reflected && (b.flags & BSDF_THIN) == 0u;
+    vec3 h = refracted ? -(wo + eta * wi) : wo + vec3(wi.xy, cos_i);
+    h = normalize(h.z < 0.0 ? -h : h);
+    float cos_h = dot(wo, h);
+    float cos_ih = dot(wi, h);
+    if (cos_h <= 0.0 || (refracted && cos_ih >= 0.0)) {
+        return result;
+    }
+    vec3 r;
+    vec3 t;
+    microfacet_split(b, cos_h, eta, mask, r, t);
+    float p_reflection = reflection_probability(r, t);
+    float density = (1.0 - p_cosine) * ggx_visible_pdf(wo, h, b.alpha) * (reflected ? p_reflection : 1.0 - p_reflection);
+    float d = ggx_d(h, b.alpha);
+    if (refracted) {
+        float q = cos_h + eta * cos_ih;
+        float jacobian = -cos_ih * eta * eta / (q * q);
+        float masking = ggx_g1(wo.z, b.alpha) * ggx_g1(cos_i, b.alpha);
+        return vec4(t * (d * masking * cos_h / wo.z * jacobian * refraction_scale(b, eta)), density * jacobian);
+    }
+    float shape = d * ggx_g2(wo.z, cos_i, b.alpha) / (4.0 * wo.z);
+    return result + vec4((reflected ? r : t) * shape, density / (4.0 * cos_h));
+}
+
+// f |cos| (rgb) and the density of bsdf_sample (a) of all allowed lobes that are not deltas.
+vec4 bsdf_eval_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) {
+    bool below = wo.z < 0.0;
+    bool inside = HAS_TRANSMISSION && below && b.transmission > 0.0 && (b.flags & BSDF_THIN) == 0u;
+    if (below) {
+        wo.z = -wo.z;
+        wi.z = -wi.z;
+    }
+    float eta = inside ? 1.0 / b.eta : b.eta;
+    CosineLobes lobes = cosine_lobes(b, wo.z, inside, mask);
+    float p_cosine = cosine_probability(b, lobes, wo.z, eta, mask);
+    return bsdf_eval_upper(b, lobes, p_cosine, wo, wi, eta, mask);
+}
+
+vec3 bsdf_eval(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).rgb; }
+float bsdf_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).a; }
+
+BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
+    BsdfSample s = BsdfSample(vec3(0.0), 0.0, vec3(0.0), 0u);
+    bool below = wo.z < 0.0;
+    bool inside = HAS_TRANSMISSION && below && b.transmission > 0.0 && (b.flags & BSDF_THIN) == 0u;
+    float side = below ? -1.0 : 1.0;
+    wo.z = abs(wo.z);
+    float eta = inside ? 1.0 / b.eta : b.eta;
+    CosineLobes lobes = cosine_lobes(b, wo.z, inside, mask);
+    float p_cosine = cosine_probability(b, lobes, wo.z, eta, mask);
+    vec3 wi;
+    uint flags;
+    if (u.z < p_cosine) {
+        wi = square_to_cosine_hemisphere(u.xy);
+        flags = LOBE_DIFFUSE | LOBE_REFLECTION;
+    } else {
+        bool delta = bsdf_is_delta(b);
+        vec3 h = delta ? vec3(0.0, 0.0, 1.0) : ggx_sample_visible(wo, b.alpha, u.xy);
+        float cos_h = dot(wo, h);
+        vec3 r;
+        vec3 t;
+        microfacet_split(b, cos_h, eta, mask, r, t);
+        float p_reflection = reflection_probability(r, t);
+        bool reflected = u.z - p_cosine < p_reflection * (1.0 - p_cosine);
+        wi = 2.0 * cos_h * h - wo;
+        flags = (delta ? LOBE_SPECULAR : LOBE_GLOSSY) | LOBE_REFLECTION;
+        float scale = 1.0 / (p_reflection * (1.0 - p_cosine));
+        if (wi.z <= 0.0 && (reflected || (b.flags & BSDF_THIN) != 0u)) {
+            return s;
+        }
+        if (HAS_TRANSMISSION && !reflected) {
+            flags ^= LOBE_REFLECTION | LOBE_TRANSMISSION;
+            scale = 1.0 / ((1.0 - p_reflection) * (1.0 - p_cosine));
+            if ((b.flags & BSDF_THIN) != 0u) {
+                wi.z = -wi.z;
+            } else {
+                float inv = 1.0 / eta;
+                float cos_t = sqrt(max(0.0, 1.0 - (1.0 - cos_h * cos_h) * inv * inv));
+                wi = (cos_h * inv - cos_t) * h - inv * wo;
+                scale *= refraction_scale(b, eta);
+                if (wi.z >= 0.0) {
+                    return s;
+                }
+            }
+        }
+        if (delta) {
+            s.weight = (reflected ? r : t) * scale;
+            s.wi = vec3(wi.xy, wi.z * side);
+            s.flags = s.weight == vec3(0.0) ? 0u : flags;
+            return s;
+        }
+    }
+    vec4 f = bsdf_eval_upper(b, lobes, p_cosine, wo, wi, eta, mask);
+    if (f.a <= 0.0) {
+        return s;
+    }
+    s.wi = vec3(wi.xy, wi.z * side);
+    s.pdf = f.a;
+    s.weight = f.rgb / f.a;
+    s.flags = flags;
+    return s;
+}
+
+#endif

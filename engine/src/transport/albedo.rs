@@ -1,0 +1,180 @@
+//! Directional albedos of the GGX reflection lobe, tabulated: what couples a diffuse base to its specular layer and what
+//! compensates for multiple scattering.
+//!
+//! Method: quadrature over the square that the visible-normal sampler maps to half vectors (Dupuy and Benyoub 2023), where the
+//! integrand is Fresnel × G2/G1; the use of such tables follows Kulla and Conty, "Revisiting Physically Based Shading at Imageworks"
+//! (SIGGRAPH course 2017). Guarantees: the averages are those of the interpolated tables, not of the functions behind them, so that
+//! lobes built from both lose and gain no energy but by the interpolation error of the table (stated by the tests). Deterministic.
+//! Twin of `transport/albedo.glsl`.
+//!
+//! Layers: 0 has unit Fresnel; 1..=`ETA_NODES` have max(0, (F − F0)/(1 − F0)) of an exact dielectric, evenly spaced in
+//! (η − 1)/(η + 1); the last has Schlick's (1 − cos)⁵. Within a layer rows are even in √α and columns in √cos θ.
+
+use super::fresnel::{fresnel_dielectric, fresnel_f0, schlick_weight};
+use super::ggx::{ggx_g1, ggx_g2, ggx_sample_visible};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use std::sync::OnceLock;
+
+/// Columns of a layer.
+pub const COS_NODES: usize = 48;
+/// Rows of a layer.
+pub const ALPHA_NODES: usize = 24;
+/// Layers for exact dielectrics.
+pub const ETA_NODES: usize = 8;
+/// (η − 1)/(η + 1) of the last of them (η = 3); larger indices use that layer, which only loses energy.
+pub const ETA_PARAMETER_MAX: f64 = 0.5;
+/// Number of the layer with Schlick's weight.
+pub const SCHLICK_LAYER: usize = ETA_NODES + 1;
+const LAYERS: usize = ETA_NODES + 2;
+/// Index of the first cosine-weighted average; each layer has `ALPHA_NODES` of them.
+pub const AVERAGE_BASE: usize = LAYERS * ALPHA_NODES * COS_NODES;
+/// Floats in the whole table.
+pub const TABLE_LENGTH: usize = AVERAGE_BASE + LAYERS * ALPHA_NODES;
+
+/// Quadrature points along each axis of the unit square.
+const QUADRATURE: [u32; 2] = [16, 48];
+
+/// The table as uploaded.
+#[derive(Debug, Clone)]
+pub struct AlbedoTable {
+    /// [`TABLE_LENGTH`] values: the layers, then their averages.
+    pub values: Vec<f32>,
+}
+
+/// Index of refraction of a dielectric layer.
+fn layer_eta(layer: usize) -> f64 {
+    let x = ETA_PARAMETER_MAX * (layer - 1) as f64 / (ETA_NODES - 1) as f64;
+    (1.0 + x) / (1.0 - x)
+}
+
+/// The Fresnel factor of each layer, normalised to run from 0 at normal incidence to 1 at grazing (layer 0: always 1).
+fn layer_factors(cos_h: f64) -> [f64; LAYERS] {
+    std::array::from_fn(|layer| match layer {
+        0 => 1.0,
+        SCHLICK_LAYER => schlick_weight(cos_h),
+        // Equal indices reflect nothing but at grazing incidence.
+        1 => 0.0,
+        _ => {
+            let (eta, f0) = (layer_eta(layer), fresnel_f0(layer_eta(layer)));
+            ((fresnel_dielectric(cos_h, eta) - f0) / (1.0 - f0)).max(0.0)
+        }
+    })
+}
+
+/// Albedos of all layers for one direction by quadrature with `points` along each axis.
+pub(crate) fn integrate_albedos(cos_o: f64, alpha: f64, points: [u32; 2]) -> [f64; LAYERS] {
+    if alpha == 0.0 {
+        return layer_factors(cos_o);
+    }
+    // The limit towards the horizon, where masking is 0/0 at the horizon itself.
+    let cos_o = cos_o.max(1e-6);
+    let wo = DVec3::new((1.0 - cos_o * cos_o).max(0.0).sqrt(), 0.0, cos_o);
+    let mut sums = [0.0; LAYERS];
+    for i in 0..points[0] {
+        // Half of the azimuth: the lobe is symmetric about the plane of incidence.
+        let x = 0.5 * (f64::from(i) + 0.5) / f64::from(points[0]);
+        for j in 0..points[1] {
+            let u = DVec2::new(x, (f64::from(j) + 0.5) / f64::from(points[1]));
+            let h = ggx_sample_visible(wo, alpha, u);
+            let cos_h = wo.dot(h);
+            let cos_i = 2.0 * cos_h * h.z - wo.z;
+            if cos_i > 0.0 {
+                let masking = ggx_g2(cos_o, cos_i, alpha, false) / ggx_g1(cos_o, alpha);
+                for (sum, factor) in sums.iter_mut().zip(layer_factors(cos_h)) {
+                    *sum += masking * factor;
+                }
+            }
+        }
+    }
+    sums.map(|s| s / f64::from(points[0] * points[1]))
+}
+
+impl AlbedoTable {
+    /// The table; computed at the first call and shared.
+    pub fn shared() -> &'static Self {
+        static TABLE: OnceLock<AlbedoTable> = OnceLock::new();
+        TABLE.get_or_init(Self::compute)
+    }
+
+    fn compute() -> Self {
+        let nodes: Vec<[f64; LAYERS]> = (0..ALPHA_NODES * COS_NODES)
+            .into_par_iter()
+            .map(|k| {
+                let root_alpha = (k / COS_NODES) as f64 / (ALPHA_NODES - 1) as f64;
+                let root_cos = (k % COS_NODES) as f64 / (COS_NODES - 1) as f64;
+                integrate_albedos(root_cos * root_cos, root_alpha * root_alpha, QUADRATURE)
+            })
+            .collect();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the device holds the table in single precision"
+        )]
+        let mut values: Vec<f32> = (0..LAYERS)
+            .flat_map(|layer| nodes.iter().map(move |n| n[layer].min(1.0) as f32))
+            .collect();
+        for row in 0..LAYERS * ALPHA_NODES {
+            let average = average_of_row(&values[row * COS_NODES..][..COS_NODES]);
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "the device holds the table in single precision"
+            )]
+            values.push(average as f32);
+        }
+        Self { values }
+    }
+
+    fn at(&self, index: usize) -> f64 {
+        f64::from(self.values[index])
+    }
+}
+
+/// 2∫ f(μ) μ dμ of the function that is linear in s = √μ between the nodes of a row: exactly, ∫ 4 s³ f ds.
+fn average_of_row(row: &[f32]) -> f64 {
+    let step = 1.0 / (row.len() - 1) as f64;
+    row.windows(2)
+        .enumerate()
+        .map(|(i, pair)| {
+            let (s0, s1) = (i as f64 * step, (i + 1) as f64 * step);
+            let (f0, f1) = (f64::from(pair[0]), f64::from(pair[1]));
+            let slope = (f1 - f0) / step;
+            (f0 - slope * s0) * (s1.powi(4) - s0.powi(4)) + slope * 0.8 * (s1.powi(5) - s0.powi(5))
+        })
+        .sum()
+}
+
+/// Position between two nodes: the lower node and the weight of the upper.
+fn node(x: f64, count: usize) -> (usize, f64) {
+    let p = x.clamp(0.0, 1.0) * (count - 1) as f64;
+    let i = (p as usize).min(count - 2);
+    (i, p - i as f64)
+}
+
+/// Bilinear look-up of the directional albedo of a layer.
+pub fn albedo_lookup(table: &AlbedoTable, layer: usize, cos_theta: f64, alpha: f64) -> f64 {
+    let (row, fr) = node(alpha.sqrt(), ALPHA_NODES);
+    let (column, fc) = node(cos_theta.max(0.0).sqrt(), COS_NODES);
+    let i = (layer * ALPHA_NODES + row) * COS_NODES + column;
+    let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    mix(
+        mix(table.at(i), table.at(i + 1), fc),
+        mix(table.at(i + COS_NODES), table.at(i + COS_NODES + 1), fc),
+        fr,
+    )
+}
+
+/// Linear look-up of a layer's average albedo, 2∫ E(μ) μ dμ.
+pub fn albedo_average(table: &AlbedoTable, layer: usize, alpha: f64) -> f64 {
+    let (row, fr) = node(alpha.sqrt(), ALPHA_NODES);
+    let i = AVERAGE_BASE + layer * ALPHA_NODES + row;
+    table.at(i) + (table.at(i + 1) - table.at(i)) * fr
+}
+
+/// Layer and weight of the next one for a dielectric of index `eta`; `eta` ≤ 0 stands for Schlick's weight.
+pub fn albedo_layer(eta: f64) -> (usize, f64) {
+    if eta <= 0.0 {
+        return (SCHLICK_LAYER - 1, 1.0);
+    }
+    let (i, t) = node((eta - 1.0) / (eta + 1.0) / ETA_PARAMETER_MAX, ETA_NODES);
+    (i + 1, t)
+}

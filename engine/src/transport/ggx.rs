@@ -1,0 +1,55 @@
+//! Isotropic GGX microfacets with Smith masking.
+//!
+//! Sources: Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (EGSR 2007); Heitz, "Understanding the
+//! Masking-Shadowing Function" (JCGT 3(2), 2014); visible normals by spherical caps, Dupuy and Benyoub, "Sampling Visible GGX
+//! Normals with Spherical Caps" (HPG 2023). Guarantees: for alpha ≥ [`ALPHA_MIN`] all values are finite, in f32 too; sampled
+//! normals face `wo` and the macrosurface. Twin of `transport/ggx.glsl`; all directions in the frame whose z is the normal.
+
+use glam::{DVec2, DVec3};
+use std::f64::consts::{FRAC_1_PI, TAU};
+
+/// Below this the lobe is a Dirac delta: half vectors carry f32 errors of 1e-7, a part in 10⁴ of this width.
+pub const ALPHA_MIN: f64 = 1e-3;
+
+/// Density of microfacet normals.
+pub fn ggx_d(h: DVec3, alpha: f64) -> f64 {
+    let a2 = alpha * alpha;
+    let d = h.truncate().length_squared() + a2 * h.z * h.z;
+    a2 * FRAC_1_PI / (d * d)
+}
+
+/// cos θ √(1 + α² tan² θ): the part of Smith's Λ that all masking terms share.
+pub fn ggx_stretched_cos(cos_theta: f64, alpha: f64) -> f64 {
+    let a2 = alpha * alpha;
+    (a2 + (1.0 - a2) * cos_theta * cos_theta).sqrt()
+}
+
+/// Smith masking of one direction; the cosine must be positive.
+pub fn ggx_g1(cos_theta: f64, alpha: f64) -> f64 {
+    2.0 * cos_theta / (cos_theta + ggx_stretched_cos(cos_theta, alpha))
+}
+
+/// Masking and shadowing of a reflection, height-correlated or (`separable`) G1·G1; both cosines positive.
+pub fn ggx_g2(cos_o: f64, cos_i: f64, alpha: f64, separable: bool) -> f64 {
+    if separable {
+        return ggx_g1(cos_o, alpha) * ggx_g1(cos_i, alpha);
+    }
+    let o = cos_i * ggx_stretched_cos(cos_o, alpha);
+    let i = cos_o * ggx_stretched_cos(cos_i, alpha);
+    2.0 * cos_o * cos_i / (o + i)
+}
+
+/// Density of the normals visible from `wo`, per solid angle of `h`.
+pub fn ggx_visible_pdf(wo: DVec3, h: DVec3, alpha: f64) -> f64 {
+    2.0 * wo.dot(h).max(0.0) * ggx_d(h, alpha) / (wo.z + ggx_stretched_cos(wo.z, alpha))
+}
+
+/// A normal visible from `wo` (`wo.z` ≥ 0) with density [`ggx_visible_pdf`].
+pub fn ggx_sample_visible(wo: DVec3, alpha: f64, u: DVec2) -> DVec3 {
+    let v = DVec3::new(alpha * wo.x, alpha * wo.y, wo.z).normalize();
+    let z = (1.0 - u.y) * (1.0 + v.z) - v.z;
+    let r = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
+    let (sin, cos) = (TAU * u.x).sin_cos();
+    let h = DVec3::new(r * cos, r * sin, z) + v;
+    DVec3::new(alpha * h.x, alpha * h.y, h.z).normalize()
+}

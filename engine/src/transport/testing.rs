@@ -1,0 +1,110 @@
+//! Statistics for the tests of samplers.
+
+use super::random::pcg4d;
+use glam::{DVec2, DVec3, UVec4};
+use std::f64::consts::TAU;
+
+/// Independent numbers in [0, 1)³ with 32 bits each, counted by `i`.
+pub fn random3(i: u32, seed: u32) -> DVec3 {
+    let v = pcg4d(UVec4::new(i, seed, 0x7e57, 0));
+    v.truncate().as_dvec3() / f64::from(u32::MAX).mul_add(1.0, 1.0)
+}
+
+/// Independent pairs in [0, 1)².
+pub fn random2(i: u32, seed: u32) -> DVec2 {
+    random3(i, seed).truncate()
+}
+
+/// Upper tail probability of a chi-square statistic, by the Wilson–Hilferty normal approximation.
+pub fn chi_square_p(statistic: f64, degrees: usize) -> f64 {
+    let k = degrees as f64;
+    let z = ((statistic / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
+    0.5 * erfc(z / std::f64::consts::SQRT_2)
+}
+
+/// Complementary error function (Abramowitz and Stegun 7.1.26 on the positive side; absolute error 1.5e-7).
+fn erfc(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
+    let poly =
+        t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
+    let tail = poly * (-x * x).exp();
+    if x >= 0.0 { tail } else { 2.0 - tail }
+}
+
+/// p-value of counts against expected counts. Cells expecting fewer than five are pooled; a count in a cell that expects
+/// nothing at all is an error at once.
+pub fn chi_square_test(observed: &[f64], expected: &[f64]) -> f64 {
+    const LEAST_EXPECTED: f64 = 5.0;
+    let (mut statistic, mut cells) = (0.0, 0usize);
+    let (mut pool_o, mut pool_e) = (0.0, 0.0);
+    for (&o, &e) in observed.iter().zip(expected) {
+        if e == 0.0 && o > 0.0 {
+            return 0.0;
+        }
+        if e < LEAST_EXPECTED {
+            pool_o += o;
+            pool_e += e;
+        } else {
+            statistic += (o - e) * (o - e) / e;
+            cells += 1;
+        }
+    }
+    if pool_e >= LEAST_EXPECTED {
+        statistic += (pool_o - pool_e) * (pool_o - pool_e) / pool_e;
+        cells += 1;
+    }
+    if cells < 2 {
+        return 1.0;
+    }
+    chi_square_p(statistic, cells - 1)
+}
+
+/// Cells of the sphere for [`sphere_test`]: even in z and azimuth.
+const SPHERE_CELLS: [usize; 2] = [24, 24];
+
+/// p-value of directions drawn by `sample` (`None`: no direction, counted as missing) against `pdf`, which may integrate to less
+/// than one. Cells are integrated by an 8 × 8 midpoint rule each, refined where the density is `peaked`.
+pub fn sphere_test(
+    draws: u32,
+    seed: u32,
+    refinement: u32,
+    sample: impl Fn(DVec3) -> Option<DVec3>,
+    pdf: impl Fn(DVec3) -> f64,
+) -> f64 {
+    let [rows, columns] = SPHERE_CELLS;
+    let mut observed = vec![0.0; rows * columns + 1];
+    for i in 0..draws {
+        let cell = sample(random3(i, seed)).map_or(rows * columns, |w| {
+            let row = (((w.z + 1.0) * 0.5 * rows as f64) as usize).min(rows - 1);
+            let azimuth = w.y.atan2(w.x).rem_euclid(TAU) / TAU;
+            row * columns + ((azimuth * columns as f64) as usize).min(columns - 1)
+        });
+        observed[cell] += 1.0;
+    }
+    let mut expected: Vec<f64> = (0..rows * columns)
+        .map(|cell| {
+            let (row, column) = (cell / columns, cell % columns);
+            let mut sum = 0.0;
+            for a in 0..refinement {
+                // The angle, not z, is stepped evenly: densities are smooth in it near the poles.
+                let theta = |r: usize| (1.0 - 2.0 * r as f64 / rows as f64).acos();
+                let (t0, t1) = (theta(row), theta(row + 1));
+                let t = t0 + (t1 - t0) * (f64::from(a) + 0.5) / f64::from(refinement);
+                for b in 0..refinement {
+                    let phi = TAU * (column as f64 + (f64::from(b) + 0.5) / f64::from(refinement)) / columns as f64;
+                    let w = DVec3::new(t.sin() * phi.cos(), t.sin() * phi.sin(), -t.cos());
+                    sum += pdf(w) * t.sin() * (t0 - t1).abs();
+                }
+            }
+            sum * TAU / columns as f64 / f64::from(refinement * refinement) * f64::from(draws)
+        })
+        .collect();
+    let missing = f64::from(draws) - expected.iter().sum::<f64>();
+    // Quadrature leaves a rest of about 1e-4 where nothing is missing.
+    expected.push(if missing > 1e-3 * f64::from(draws) || observed[rows * columns] > 0.0 {
+        missing.max(0.0)
+    } else {
+        0.0
+    });
+    chi_square_test(&observed, &expected)
+}
