@@ -3,7 +3,7 @@
 //
 // One loop, in which an iteration visits an inner node or tests one triangle, so that its iterations are all that a driver's cap on loops counts.
 // A ray that its quota stops returns the word of the node to go on with; call again with it and the same hit. The quota must exceed
-// 2 × BVH2_MAX_DEPTH; leaves on the stack may add (BVH2_MAX_DEPTH + 1) × leaf size iterations to it.
+// BVH2_MAX_DEPTH; leaves on the stack may add (BVH2_MAX_DEPTH + 1) × leaf size iterations to it.
 //
 // With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);

@@ -84,7 +84,7 @@ impl Traversal {
     /// Runs for about `quota` iterations, at least 1; [`Self::resume`] says whether it is done.
     ///
     /// It stops in front of inner nodes only, so the leaves that lie on top of the stack may come on top of the quota:
-    /// (`MAX_DEPTH` + 1) × leaf size iterations at most. Progress is certain for a quota above 2 × `MAX_DEPTH`.
+    /// (`MAX_DEPTH` + 1) × leaf size iterations at most. The walk back takes an iteration a level: a quota above `MAX_DEPTH` makes progress.
     pub fn run(
         &mut self,
         bvh: &Bvh2,
