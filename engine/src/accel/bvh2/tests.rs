@@ -351,7 +351,7 @@ fn filter_decides_which_candidates_count() {
     let bvh = build(&triangles);
     for ray in hard_rays(&mut random, &triangles, 1000) {
         let expected = brute_force(&triangles, |i| i % 3 == 0, &ray);
-        let mut even = |triangle: u32, _: [f32; 2]| triangle % 3 == 0;
+        let mut even = |triangle: u32, _: [f32; 2]| triangle.is_multiple_of(3);
         let hit = bvh.closest_hit_filtered(&ray, &mut even, &mut TraversalCounters::default());
         assert!(same_bits(&hit, &expected));
         assert_eq!(
