@@ -1,1 +1,158 @@
-//! Spatial indexes and their traversal.
+//! Spatial indexes and their traversal: what a ray meets first, and whether it meets anything.
+//!
+//! Every index implements [`RayIndex`]: it is built on the CPU or holds what a device build read back, offers the buffers that the
+//! kernels bind as set 1, and carries the twin of its traversal. All indexes report the same hit for the same ray, bit for bit on one
+//! machine: the triangle test is shared ([`triangle`]), boxes are conservative for everything that test can report, and of candidates
+//! with equal distance the lowest triangle index wins.
+
+pub mod bvh2;
+pub mod offset;
+pub mod sphere;
+pub mod triangle;
+
+#[cfg(test)]
+mod test_support;
+
+use bytemuck::{Pod, Zeroable};
+
+/// [`Hit::triangle`] of a ray that met nothing.
+pub const NO_HIT: u32 = u32::MAX;
+
+/// Smallest largest-component of a ray direction that is traced; shorter directions, zero among them, meet nothing.
+pub const MIN_DIRECTION: f32 = 1.0 / MAX_DIRECTION;
+
+/// Largest direction component that is traced (2²⁸); beyond it products of the triangle test could overflow.
+pub const MAX_DIRECTION: f32 = 268_435_456.0;
+
+/// Largest coordinate, metres, of an indexed vertex or a ray origin (2³⁰); what lies beyond is left out and counted.
+pub const MAX_COORDINATE: f32 = 1_073_741_824.0;
+
+/// A ray segment as the kernels read it (32 bytes, scalar layout).
+///
+/// The direction needs no unit length; `t` counts in multiples of it. Hits with `t_min` ≤ t ≤ `t_max` are reported. A ray with a NaN or
+/// an infinite origin or direction, or outside [`MIN_DIRECTION`], [`MAX_DIRECTION`], [`MAX_COORDINATE`], meets nothing; an infinite
+/// `t_max` is allowed.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Ray {
+    /// Origin, metres.
+    pub origin: [f32; 3],
+    /// Smallest parameter of a hit.
+    pub t_min: f32,
+    /// Direction, not necessarily of unit length.
+    pub direction: [f32; 3],
+    /// Largest parameter of a hit.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// Whether the ray can meet anything: finite and in range.
+    pub fn is_traceable(&self) -> bool {
+        let largest = |v: &[f32; 3]| v.iter().fold(0.0f32, |m, x| if x.abs() > m { x.abs() } else { m });
+        self.origin.iter().all(|x| x.abs() <= MAX_COORDINATE)
+            && self.direction.iter().all(|x| x.abs() <= MAX_DIRECTION)
+            && largest(&self.direction) >= MIN_DIRECTION
+    }
+}
+
+/// What a ray met (16 bytes, scalar layout).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Hit {
+    /// Ray parameter; the ray's `t_max` when nothing was met.
+    pub t: f32,
+    /// Weights of vertices 1 and 2; vertex 0 has one minus their sum.
+    pub barycentrics: [f32; 2],
+    /// Index of the triangle as given to the index, or [`NO_HIT`].
+    pub triangle: u32,
+}
+
+impl Hit {
+    /// Nothing met yet up to `t_max`.
+    pub fn none(t_max: f32) -> Self {
+        Self {
+            t: t_max,
+            barycentrics: [0.0; 2],
+            triangle: NO_HIT,
+        }
+    }
+
+    /// Whether something was met.
+    pub fn is_hit(&self) -> bool {
+        self.triangle != NO_HIT
+    }
+}
+
+/// One storage buffer of an index, bound as set 1.
+#[derive(Debug, Clone, Copy)]
+pub struct IndexBuffer<'a> {
+    /// Binding within set 1.
+    pub binding: u32,
+    /// Name for the memory report.
+    pub name: &'static str,
+    /// The bytes to upload; never empty.
+    pub bytes: &'a [u8],
+}
+
+/// Size and quality of an index.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct IndexStatistics {
+    /// Triangles that rays can meet.
+    pub triangles: u64,
+    /// Triangles left out since a coordinate is NaN, infinite or beyond [`MAX_COORDINATE`].
+    pub excluded_range: u64,
+    /// Triangles left out since their area is zero.
+    pub excluded_degenerate: u64,
+    /// Inner nodes.
+    pub nodes: u64,
+    /// Leaves that hold triangles.
+    pub leaves: u64,
+    /// Largest number of inner nodes on a way from the root.
+    pub max_depth: u32,
+    /// Surface area heuristic: expected node visits and triangle tests of a line that meets the root box, unit costs.
+    pub sah_cost: f64,
+    /// Bytes of all buffers.
+    pub bytes: u64,
+}
+
+/// Exact work counters of a traversal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TraversalCounters {
+    /// Inner nodes visited (two box tests each).
+    pub nodes: u64,
+    /// Triangle tests.
+    pub triangles: u64,
+    /// Loop iterations, those of resuming included.
+    pub iterations: u64,
+}
+
+/// Decides whether a candidate hit counts: original triangle index and the weights of vertices 1 and 2. Must be pure.
+pub type CandidateFilter<'a> = &'a mut dyn FnMut(u32, [f32; 2]) -> bool;
+
+/// A spatial index over triangles that kernels can traverse.
+pub trait RayIndex: Send + Sync {
+    /// Short name, as in reports.
+    fn name(&self) -> &'static str;
+
+    /// Size and quality.
+    fn statistics(&self) -> IndexStatistics;
+
+    /// The storage buffers of set 1, in binding order.
+    fn buffers(&self) -> Vec<IndexBuffer<'_>>;
+
+    /// Twin of the closest-hit kernel: the accepted candidate of least `t`, of equal ones that of least index.
+    fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit;
+
+    /// Twin of the any-hit kernel: whether an accepted candidate exists.
+    fn any_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> bool;
+
+    /// Closest hit among all triangles.
+    fn closest_hit(&self, ray: &Ray) -> Hit {
+        self.closest_hit_filtered(ray, &mut |_, _| true, &mut TraversalCounters::default())
+    }
+
+    /// Whether the ray meets any triangle.
+    fn any_hit(&self, ray: &Ray) -> bool {
+        self.any_hit_filtered(ray, &mut |_, _| true, &mut TraversalCounters::default())
+    }
+}

@@ -1,0 +1,37 @@
+// What the trace kernels share: rays in, hits out, and where stopped rays go on (set 0).
+//
+// The host zeroes `resume` and `status`, dispatches groups of 64 until `unfinished` stays zero, zeroing `status` in between; finished
+// rays return at once. Larger ray counts than one dispatch takes go in parts by `first_ray`.
+#ifndef CLERESTORY_ACCEL_TRACE_INTERFACE_GLSL
+#define CLERESTORY_ACCEL_TRACE_INTERFACE_GLSL
+
+#include "accel/ray.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(set = 0, binding = 0, scalar) restrict readonly buffer TraceRays {
+    Ray rays[];
+};
+
+layout(set = 0, binding = 1, scalar) restrict buffer TraceHits {
+    Hit hits[];
+};
+
+layout(set = 0, binding = 2, scalar) restrict buffer TraceResume {
+    uint resume_words[];
+};
+
+// Rays stopped by the quota, and traversal counters modulo 2³² when counting is specialised in.
+layout(set = 0, binding = 3, scalar) restrict buffer TraceStatus {
+    uint unfinished;
+    uint node_visits;
+    uint triangle_tests;
+    uint iterations;
+} trace_status;
+
+layout(push_constant, scalar) uniform TraceConstants {
+    uint first_ray;
+    uint ray_count;
+} trace_constants;
+
+#endif

@@ -1,0 +1,187 @@
+//! Binary bounding volume hierarchy: built on the CPU by the binned surface area heuristic, laid out for the kernels, and traversed by a
+//! twin of them.
+//!
+//! Sources: I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", IEEE RT 2007 (binning); T. Aila and S. Laine,
+//! "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009 (both children's boxes in the parent); S. Laine, "Restart Trail for
+//! Stackless BVH Traversal", HPG 2010 (the order of children does not depend on the hit so far, so a place in it can be found again).
+//!
+//! Guarantees: the same bytes whatever the number of threads; depth at most [`MAX_DEPTH`]; every triangle that can be met lies in exactly
+//! one leaf, the others are counted; a hit that the triangle test reports is never culled (see [`BOX_SLACK`]), so traversal returns
+//! exactly what trying all triangles in index order returns.
+
+mod build;
+mod traverse;
+
+pub use build::Bvh2Settings;
+pub use traverse::{FINISHED, Traversal};
+
+use super::{CandidateFilter, Hit, IndexBuffer, IndexStatistics, Ray, RayIndex, TraversalCounters};
+use crate::Result;
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Most inner nodes on a way from the root, which is the size of the kernels' stack.
+pub const MAX_DEPTH: u32 = 32;
+
+/// Largest number of triangles in a leaf that settings may ask for.
+pub const MAX_LEAF_SIZE: u32 = 8;
+
+/// Bits of a child word that hold the number of triangles; zero there marks an inner node, whose index is in the bits above. In a leaf
+/// the bits above hold its first triangle.
+pub const COUNT_BITS: u32 = 4;
+
+/// Most triangles that child words can address.
+pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);
+
+/// Share of the scene's size by which boxes are grown in the ray test, 2⁻¹⁸ = 64u with u = 2⁻²⁴.
+///
+/// Let M be the largest component distance from the ray's origin to a corner of the root box, and |d| the largest direction component.
+/// Divisions err by 2.5 ULP at most (Vulkan), that is 5u; first order in u:
+///
+/// - sheared vertex: difference uM, shear factor and product 7uM, subtraction 2uM: 10uM;
+/// - weights, relative error 2u each plus their use: the point q that they name is sheared to within 6uM of what exact weights give,
+///   which is the origin: so q lies on the triangle, within 16uM of the ray along the two sheared axes;
+/// - reported t: projection 7u, products and sum 3u, determinant 2u, division 6u: within 18uM/|d| of q's. The ray at t is thus within
+///   18uM of q along the dominant axis and 34uM along the others;
+/// - slab distances: difference u, reciprocal 5u, product u: 7uM; subtracting the slack: uM.
+///
+/// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. This
+/// replaces a relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013), which covers only the last item.
+pub const BOX_SLACK: f32 = 1.0 / 262_144.0;
+
+/// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).
+pub const MIN_RELATIVE_COMPONENT: f32 = 8.673_617_4e-19;
+
+/// An axis-aligned box.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Aabb {
+    /// Lower corner.
+    pub lower: Vec3,
+    /// Upper corner.
+    pub upper: Vec3,
+}
+
+impl Aabb {
+    /// The box that holds nothing.
+    pub const EMPTY: Self = Self {
+        lower: Vec3::INFINITY,
+        upper: Vec3::NEG_INFINITY,
+    };
+
+    /// Smallest box around both.
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            lower: self.lower.min(other.lower),
+            upper: self.upper.max(other.upper),
+        }
+    }
+
+    /// Smallest box around this and a point.
+    pub fn with_point(self, point: Vec3) -> Self {
+        self.union(Self {
+            lower: point,
+            upper: point,
+        })
+    }
+
+    /// Half the surface area, m²; zero for the empty box.
+    pub fn half_area(&self) -> f64 {
+        let e = (self.upper.as_dvec3() - self.lower.as_dvec3()).max(glam::DVec3::ZERO);
+        e.x * e.y + e.y * e.z + e.z * e.x
+    }
+}
+
+/// An inner node as the kernels read it: both children's boxes and words (64 bytes).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Bvh2Node {
+    /// Boxes of child 0 and child 1.
+    pub bounds: [Aabb; 2],
+    /// Child words: see [`COUNT_BITS`].
+    pub children: [u32; 2],
+    /// Parent's index × 2 + which of its children this is; 0 at the root. Resuming climbs along it.
+    pub parent: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// A binary bounding volume hierarchy over triangles.
+#[derive(Debug, Clone)]
+pub struct Bvh2 {
+    nodes: Vec<Bvh2Node>,
+    positions: Vec<[Vec3; 3]>,
+    indices: Vec<u32>,
+    statistics: IndexStatistics,
+}
+
+impl Bvh2 {
+    /// Builds over `triangles`; hits name triangles by their place in it. Deterministic whatever the number of threads.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for a leaf size outside 1..=[`MAX_LEAF_SIZE`] or a number of bins outside 2..=64,
+    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for more than [`MAX_TRIANGLES`].
+    pub fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<Self> {
+        build::build(triangles, settings)
+    }
+
+    /// Inner nodes; the root is the first.
+    pub fn nodes(&self) -> &[Bvh2Node] {
+        &self.nodes
+    }
+
+    /// Triangles in leaf order.
+    pub fn positions(&self) -> &[[Vec3; 3]] {
+        &self.positions
+    }
+
+    /// Original index of each triangle in leaf order.
+    pub fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+}
+
+impl RayIndex for Bvh2 {
+    fn name(&self) -> &'static str {
+        "bvh2"
+    }
+
+    fn statistics(&self) -> IndexStatistics {
+        self.statistics
+    }
+
+    fn buffers(&self) -> Vec<IndexBuffer<'_>> {
+        vec![
+            IndexBuffer {
+                binding: 0,
+                name: "bvh2 nodes",
+                bytes: bytemuck::cast_slice(&self.nodes),
+            },
+            IndexBuffer {
+                binding: 1,
+                name: "bvh2 triangle positions",
+                bytes: bytemuck::cast_slice(&self.positions),
+            },
+            IndexBuffer {
+                binding: 2,
+                name: "bvh2 triangle indices",
+                bytes: bytemuck::cast_slice(&self.indices),
+            },
+        ]
+    }
+
+    fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit {
+        let mut traversal = Traversal::closest(ray);
+        traversal.run(self, ray, u64::MAX, filter, counters);
+        traversal.hit
+    }
+
+    fn any_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> bool {
+        let mut traversal = Traversal::any(ray);
+        traversal.run(self, ray, u64::MAX, filter, counters);
+        traversal.hit.is_hit()
+    }
+}
+
+#[cfg(test)]
+mod tests;

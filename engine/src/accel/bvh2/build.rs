@@ -1,0 +1,468 @@
+//! Construction of the binary hierarchy by binned SAH.
+//!
+//! Determinism: every task works on a slice of triangle references and a slice of node slots that its parent cut out, bounds are merged
+//! by minimum and maximum and bins by integer counts, so nothing depends on which thread does what; nodes get their final places in one
+//! depth-first pass. Depth: a range of n references is halved at the median as soon as ⌈log₂ n⌉ inner nodes are all that the depth bound
+//! leaves below it.
+
+use super::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, MAX_TRIANGLES};
+use crate::accel::{IndexStatistics, MAX_COORDINATE, NO_HIT};
+use crate::{Error, Result};
+use bytemuck::Zeroable;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Ranges above this are binned, and their halves built, in parallel.
+const PARALLEL_RANGE: usize = 4096;
+
+/// References a binning task takes; fixed, so that the merge order is too.
+const BINNING_CHUNK: usize = 8192;
+
+/// Bins the largest setting asks for.
+const MAX_BINS: usize = 64;
+
+/// Settings of the build.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Bvh2Settings {
+    /// Most triangles in a leaf, 1..=8. Default 4.
+    pub leaf_size: u32,
+    /// Bins an axis, 2..=64. Default 16.
+    pub bins: u32,
+}
+
+impl Default for Bvh2Settings {
+    fn default() -> Self {
+        Self { leaf_size: 4, bins: 16 }
+    }
+}
+
+/// A triangle on its way into the tree.
+#[derive(Debug, Clone, Copy)]
+struct Reference {
+    bounds: Aabb,
+    index: u32,
+}
+
+impl Reference {
+    /// Twice the box centre: halving would only cost a rounding.
+    fn centroid(&self) -> Vec3 {
+        self.bounds.lower + self.bounds.upper
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Child {
+    Leaf { first: u32, count: u32 },
+    Inner { slot: u32 },
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    bounds: [Aabb; 2],
+    children: [Child; 2],
+}
+
+const EMPTY_SLOT: Slot = Slot {
+    bounds: [Aabb::EMPTY; 2],
+    children: [Child::Leaf { first: 0, count: 0 }; 2],
+};
+
+/// A range of references with the places it was given in both arrays.
+struct Range<'a> {
+    references: &'a mut [Reference],
+    first: u32,
+    slots: &'a mut [Slot],
+    first_slot: u32,
+    levels_left: u32,
+}
+
+enum Usable {
+    Yes(Reference),
+    OutOfRange,
+    Degenerate,
+}
+
+fn classify(triangle: &[Vec3; 3], index: u32) -> Usable {
+    // NaN fails the comparison.
+    if !triangle
+        .iter()
+        .all(|v| v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
+    {
+        return Usable::OutOfRange;
+    }
+    let [a, b, c] = triangle.map(|v| v.as_dvec3());
+    if (b - a).cross(c - a) == glam::DVec3::ZERO {
+        return Usable::Degenerate;
+    }
+    Usable::Yes(Reference {
+        bounds: triangle.iter().fold(Aabb::EMPTY, |bounds, v| bounds.with_point(*v)),
+        index,
+    })
+}
+
+pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<Bvh2> {
+    check_range("bvh2.leaf_size", settings.leaf_size, 1, MAX_LEAF_SIZE)?;
+    check_range("bvh2.bins", settings.bins, 2, MAX_BINS as u32)?;
+    if triangles.len() > MAX_TRIANGLES {
+        return Err(Error::LimitExceeded {
+            name: "bvh2 triangles".into(),
+            bytes: triangles.len() as u64,
+            limit_name: "accel::bvh2::MAX_TRIANGLES",
+            limit: MAX_TRIANGLES as u64,
+        });
+    }
+    let classified: Vec<Usable> = triangles
+        .par_iter()
+        .enumerate()
+        .map(|(i, t)| classify(t, i as u32))
+        .collect();
+    let mut statistics = IndexStatistics::default();
+    let mut references = Vec::with_capacity(triangles.len());
+    for usable in classified {
+        match usable {
+            Usable::Yes(reference) => references.push(reference),
+            Usable::OutOfRange => statistics.excluded_range += 1,
+            Usable::Degenerate => statistics.excluded_degenerate += 1,
+        }
+    }
+    statistics.triangles = references.len() as u64;
+
+    let slots = if references.len() >= 2 {
+        let mut slots = vec![EMPTY_SLOT; references.len() - 1];
+        build_range(
+            Range {
+                references: &mut references,
+                first: 0,
+                slots: &mut slots,
+                first_slot: 0,
+                levels_left: MAX_DEPTH,
+            },
+            settings,
+        );
+        slots
+    } else {
+        Vec::new()
+    };
+
+    let mut positions: Vec<[Vec3; 3]> = references.iter().map(|r| triangles[r.index as usize]).collect();
+    let mut indices: Vec<u32> = references.iter().map(|r| r.index).collect();
+    let nodes = if slots.is_empty() {
+        // A point triangle, which no ray meets, keeps the buffers and the root's children from being empty.
+        let bounds = references
+            .first()
+            .map_or(Aabb::EMPTY.with_point(Vec3::ZERO), |r| r.bounds);
+        positions.push([bounds.lower; 3]);
+        indices.push(NO_HIT);
+        let sentinel = leaf_word(references.len() as u32, 1);
+        vec![Bvh2Node {
+            bounds: [bounds, Aabb::EMPTY.with_point(bounds.lower)],
+            children: [leaf_word(0, 1), sentinel],
+            ..Bvh2Node::zeroed()
+        }]
+    } else {
+        flatten(&slots)
+    };
+    measure(&nodes, &mut statistics);
+    statistics.bytes =
+        (size_of_val(nodes.as_slice()) + size_of_val(positions.as_slice()) + size_of_val(indices.as_slice())) as u64;
+    Ok(Bvh2 {
+        nodes,
+        positions,
+        indices,
+        statistics,
+    })
+}
+
+fn check_range(name: &str, value: u32, least: u32, most: u32) -> Result<()> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::Setting {
+        name: name.into(),
+        value: value.to_string(),
+        cause: format!("is outside {least}..={most}"),
+    })
+}
+
+fn leaf_word(first: u32, count: u32) -> u32 {
+    first << COUNT_BITS | count
+}
+
+fn ceil_log2(n: usize) -> u32 {
+    n.next_power_of_two().trailing_zeros()
+}
+
+/// Splits a range of two or more references into the node at its first slot.
+fn build_range(range: Range<'_>, settings: &Bvh2Settings) {
+    let Range {
+        references,
+        first,
+        slots,
+        first_slot,
+        levels_left,
+    } = range;
+    let middle = split(references, levels_left, settings);
+    let Some((node, rest)) = slots.split_first_mut() else {
+        return;
+    };
+    let (left_references, right_references) = references.split_at_mut(middle);
+    let (left_slots, right_slots) = rest.split_at_mut(middle - 1);
+    let left = Range {
+        references: left_references,
+        first,
+        slots: left_slots,
+        first_slot: first_slot + 1,
+        levels_left: levels_left - 1,
+    };
+    let right = Range {
+        references: right_references,
+        first: first + middle as u32,
+        slots: right_slots,
+        first_slot: first_slot + middle as u32,
+        levels_left: levels_left - 1,
+    };
+    let parallel = left.references.len() + right.references.len() > PARALLEL_RANGE;
+    let (left, right) = if parallel {
+        rayon::join(|| build_child(left, settings), || build_child(right, settings))
+    } else {
+        (build_child(left, settings), build_child(right, settings))
+    };
+    *node = Slot {
+        bounds: [left.0, right.0],
+        children: [left.1, right.1],
+    };
+}
+
+fn build_child(range: Range<'_>, settings: &Bvh2Settings) -> (Aabb, Child) {
+    let count = range.references.len();
+    let bounds = range.references.iter().fold(Aabb::EMPTY, |b, r| b.union(r.bounds));
+    if count == 1 || (count <= settings.leaf_size as usize && !worth_splitting(range.references, &bounds, settings)) {
+        let leaf = Child::Leaf {
+            first: range.first,
+            count: count as u32,
+        };
+        return (bounds, leaf);
+    }
+    let slot = range.first_slot;
+    build_range(range, settings);
+    (bounds, Child::Inner { slot })
+}
+
+/// Whether a node over these pays for itself: one visit and one triangle test cost the same.
+fn worth_splitting(references: &[Reference], bounds: &Aabb, settings: &Bvh2Settings) -> bool {
+    best_split(references, settings)
+        .is_some_and(|split| split.cost < (references.len() - 1) as f64 * bounds.half_area())
+}
+
+/// Reorders the references and says where the right half begins: at least one on each side.
+fn split(references: &mut [Reference], levels_left: u32, settings: &Bvh2Settings) -> usize {
+    // One level goes to this node; the halves need ⌈log₂⌉ levels each, at worst as many as the whole less one.
+    if ceil_log2(references.len()) < levels_left
+        && let Some(best) = best_split(references, settings)
+    {
+        return partition(references, |r| best.bin(r) <= best.last_left);
+    }
+    let centroids = centroid_bounds(references);
+    let extent = centroids.upper - centroids.lower;
+    let axis = extent.max_position();
+    let middle = references.len() / 2;
+    references.select_nth_unstable_by(middle, |a, b| {
+        a.centroid()[axis]
+            .total_cmp(&b.centroid()[axis])
+            .then(a.index.cmp(&b.index))
+    });
+    middle
+}
+
+/// Moves what is left to the front; the order within each side depends on the input alone.
+fn partition(references: &mut [Reference], left: impl Fn(&Reference) -> bool) -> usize {
+    let mut end = 0;
+    for i in 0..references.len() {
+        if left(&references[i]) {
+            references.swap(i, end);
+            end += 1;
+        }
+    }
+    end
+}
+
+fn centroid_bounds(references: &[Reference]) -> Aabb {
+    let chunk = |chunk: &[Reference]| chunk.iter().fold(Aabb::EMPTY, |b, r| b.with_point(r.centroid()));
+    if references.len() > BINNING_CHUNK {
+        references
+            .par_chunks(BINNING_CHUNK)
+            .map(chunk)
+            .reduce(|| Aabb::EMPTY, Aabb::union)
+    } else {
+        chunk(references)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Bin {
+    bounds: Aabb,
+    count: u32,
+}
+
+const EMPTY_BIN: Bin = Bin {
+    bounds: Aabb::EMPTY,
+    count: 0,
+};
+
+impl Bin {
+    fn union(self, other: Self) -> Self {
+        Self {
+            bounds: self.bounds.union(other.bounds),
+            count: self.count + other.count,
+        }
+    }
+
+    fn cost(&self) -> f64 {
+        f64::from(self.count) * self.bounds.half_area()
+    }
+}
+
+/// Maps centroids to bins: `min((c − lower) · scale, bins − 1)` an axis.
+#[derive(Debug, Clone, Copy)]
+struct Binning {
+    lower: Vec3,
+    scale: Vec3,
+    last: Vec3,
+}
+
+impl Binning {
+    fn bins_of(&self, reference: &Reference) -> [usize; 3] {
+        let bin = ((reference.centroid() - self.lower) * self.scale).min(self.last);
+        bin.to_array().map(|b| b as usize)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Split {
+    binning: Binning,
+    axis: usize,
+    last_left: usize,
+    cost: f64,
+}
+
+impl Split {
+    fn bin(&self, reference: &Reference) -> usize {
+        self.binning.bins_of(reference)[self.axis]
+    }
+}
+
+/// The bins of the three axes, one axis after the other.
+fn fill_bins(references: &[Reference], binning: &Binning, count: usize) -> Vec<Bin> {
+    let mut bins = vec![EMPTY_BIN; 3 * count];
+    for reference in references {
+        let single = Bin {
+            bounds: reference.bounds,
+            count: 1,
+        };
+        for (axis, bin) in binning.bins_of(reference).into_iter().enumerate() {
+            let bin = &mut bins[axis * count + bin];
+            *bin = bin.union(single);
+        }
+    }
+    bins
+}
+
+/// The cheapest of all bin borders, by `Σ count · half area`; none when all centroids coincide (to within what binning can tell apart).
+fn best_split(references: &[Reference], settings: &Bvh2Settings) -> Option<Split> {
+    let count = settings.bins as usize;
+    let centroids = centroid_bounds(references);
+    let extent = centroids.upper - centroids.lower;
+    // A reciprocal that overflows would bin by NaN; such an axis is not split.
+    let scale = Vec3::from_array(extent.to_array().map(|e| {
+        let scale = count as f32 / e;
+        if scale.is_finite() { scale } else { 0.0 }
+    }));
+    let binning = Binning {
+        lower: centroids.lower,
+        scale,
+        last: Vec3::splat((count - 1) as f32),
+    };
+    let bins = if references.len() > BINNING_CHUNK {
+        let chunks: Vec<Vec<Bin>> = references
+            .par_chunks(BINNING_CHUNK)
+            .map(|chunk| fill_bins(chunk, &binning, count))
+            .collect();
+        chunks.into_iter().fold(vec![EMPTY_BIN; 3 * count], |all, part| {
+            all.iter().zip(part).map(|(a, p)| a.union(p)).collect()
+        })
+    } else {
+        fill_bins(references, &binning, count)
+    };
+    let mut best: Option<Split> = None;
+    for (axis, bins) in bins.chunks(count).enumerate() {
+        let mut right_costs = [0.0; MAX_BINS];
+        let mut right = EMPTY_BIN;
+        for i in (1..count).rev() {
+            right = right.union(bins[i]);
+            right_costs[i] = right.cost();
+        }
+        let mut left = EMPTY_BIN;
+        for (i, bin) in bins.iter().enumerate().take(count - 1) {
+            left = left.union(*bin);
+            if left.count == 0 || left.count as usize == references.len() {
+                continue;
+            }
+            let cost = left.cost() + right_costs[i + 1];
+            if best.is_none_or(|b| cost < b.cost) {
+                best = Some(Split {
+                    binning,
+                    axis,
+                    last_left: i,
+                    cost,
+                });
+            }
+        }
+    }
+    best
+}
+
+/// Nodes in depth-first order, left child first, with parent links.
+fn flatten(slots: &[Slot]) -> Vec<Bvh2Node> {
+    let mut nodes: Vec<Bvh2Node> = Vec::new();
+    let mut pending = vec![(0u32, 0u32)];
+    while let Some((slot, parent)) = pending.pop() {
+        let index = nodes.len() as u32;
+        if index > 0 {
+            nodes[(parent >> 1) as usize].children[(parent & 1) as usize] = index << COUNT_BITS;
+        }
+        let slot = &slots[slot as usize];
+        nodes.push(Bvh2Node {
+            bounds: slot.bounds,
+            parent,
+            ..Bvh2Node::zeroed()
+        });
+        for side in [1, 0] {
+            match slot.children[side] {
+                Child::Leaf { first, count } => nodes[index as usize].children[side] = leaf_word(first, count),
+                Child::Inner { slot } => pending.push((slot, index << 1 | side as u32)),
+            }
+        }
+    }
+    nodes
+}
+
+/// Counts nodes, leaves, depth and the SAH cost.
+fn measure(nodes: &[Bvh2Node], statistics: &mut IndexStatistics) {
+    let root = nodes[0].bounds[0].union(nodes[0].bounds[1]).half_area();
+    let mut depths = vec![1u32; nodes.len()];
+    let mut cost = root;
+    for (i, node) in nodes.iter().enumerate() {
+        if i > 0 {
+            depths[i] = depths[(node.parent >> 1) as usize] + 1;
+        }
+        for (bounds, word) in node.bounds.iter().zip(node.children) {
+            let triangles = word & ((1 << COUNT_BITS) - 1);
+            cost += bounds.half_area() * f64::from(triangles.max(1));
+            statistics.leaves += u64::from(triangles > 0 && (word >> COUNT_BITS) < statistics.triangles as u32);
+        }
+    }
+    statistics.nodes = nodes.len() as u64;
+    statistics.max_depth = depths.into_iter().max().unwrap_or(0);
+    statistics.sah_cost = if root > 0.0 { cost / root } else { 0.0 };
+}

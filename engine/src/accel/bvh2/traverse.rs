@@ -1,0 +1,189 @@
+//! Twin of the kernels' traversal of the binary hierarchy: same order, same f32 operations, exact counters.
+//!
+//! One loop; an iteration visits one inner node or tests one triangle of a leaf. Children are visited near one first, by a distance that
+//! does not depend on the hit so far: the order of all leaves is thus fixed for a ray, and a place in it is named by an inner node.
+//! A traversal that its quota stops in front of an inner node goes on from there later: the walk from the root to that node pushes each
+//! sibling that comes after the walk in the order, which rebuilds the stack, less what the hit so far has culled. Nothing is lost, and nothing
+//! is tested twice.
+
+use super::{BOX_SLACK, Bvh2, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
+use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
+use crate::accel::{CandidateFilter, Hit, Ray, TraversalCounters};
+use glam::Vec3;
+
+/// [`Traversal::resume`] of a traversal that is done.
+pub const FINISHED: u32 = u32::MAX;
+
+const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
+
+/// A traversal between two runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Traversal {
+    /// Best hit so far.
+    pub hit: Hit,
+    /// Word of the inner node to go on with, 0 at the start, or [`FINISHED`].
+    pub resume: u32,
+    any: bool,
+}
+
+/// Origin, clamped reciprocal direction and slack of the box test.
+#[derive(Debug, Clone, Copy)]
+struct BoxTest {
+    origin: Vec3,
+    inverse: Vec3,
+    slack: Vec3,
+}
+
+impl BoxTest {
+    fn new(bvh: &Bvh2, ray: &Ray) -> Self {
+        let origin = Vec3::from(ray.origin);
+        let direction = Vec3::from(ray.direction);
+        let least = direction.abs().max_element() * MIN_RELATIVE_COMPONENT;
+        let inverse = Vec3::from_array(ray.direction.map(|d| {
+            let size = if d.abs() > least { d.abs() } else { least };
+            (if d < 0.0 { -1.0 } else { 1.0 }) / size
+        }));
+        let [a, b] = bvh.nodes[0].bounds;
+        let root = a.union(b);
+        let reach = (root.lower - origin).abs().max((root.upper - origin).abs());
+        Self {
+            origin,
+            inverse,
+            slack: (BOX_SLACK * reach.max_element()) * inverse.abs(),
+        }
+    }
+
+    /// Entry and exit distance of a box.
+    fn span(&self, lower: Vec3, upper: Vec3) -> (f32, f32) {
+        let t0 = (lower - self.origin) * self.inverse;
+        let t1 = (upper - self.origin) * self.inverse;
+        let near = t0.min(t1) - self.slack;
+        let far = t0.max(t1) + self.slack;
+        (near.max_element(), far.min_element())
+    }
+}
+
+impl Traversal {
+    /// Starts a closest-hit query.
+    pub fn closest(ray: &Ray) -> Self {
+        Self {
+            hit: Hit::none(ray.t_max),
+            resume: 0,
+            any: false,
+        }
+    }
+
+    /// Starts an any-hit query: the first accepted candidate ends it.
+    pub fn any(ray: &Ray) -> Self {
+        Self {
+            any: true,
+            ..Self::closest(ray)
+        }
+    }
+
+    /// Runs for about `quota` iterations, at least 1; [`Self::resume`] says whether it is done.
+    ///
+    /// It stops in front of inner nodes only, so the leaves that lie on top of the stack may come on top of the quota:
+    /// (`MAX_DEPTH` + 1) × leaf size iterations at most. The walk back takes an iteration a level: a quota above `MAX_DEPTH` makes progress.
+    pub fn run(
+        &mut self,
+        bvh: &Bvh2,
+        ray: &Ray,
+        quota: u64,
+        filter: CandidateFilter<'_>,
+        counters: &mut TraversalCounters,
+    ) {
+        if self.resume == FINISHED {
+            return;
+        }
+        if !ray.is_traceable() {
+            self.resume = FINISHED;
+            return;
+        }
+        let shear = ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction));
+        let boxes = BoxTest::new(bvh, ray);
+        let mut stack = [FINISHED; MAX_DEPTH as usize + 1];
+        let mut top = 0;
+        let (mut trail, mut replay) = trail_to(bvh, self.resume);
+        let mut word = 0;
+        let mut iterations = 0;
+        while word != FINISHED && (iterations < quota || word & COUNT_MASK != 0) {
+            iterations += 1;
+            if word & COUNT_MASK == 0 {
+                counters.nodes += 1;
+                let node = &bvh.nodes[(word >> COUNT_BITS) as usize];
+                let [(near0, far0), (near1, far1)] = node.bounds.map(|b| boxes.span(b.lower, b.upper));
+                let (enter0, enter1) = (near0.max(ray.t_min), near1.max(ray.t_min));
+                let first = u32::from(enter1 < enter0);
+                let hits = [enter0 <= far0.min(self.hit.t), enter1 <= far1.min(self.hit.t)];
+                let on_trail = trail & 1;
+                let passed = replay > 0 && on_trail != first;
+                let visit_first = hits[first as usize] && !passed;
+                let visit_second = hits[1 - first as usize];
+                let next = if visit_first { first } else { 1 - first };
+                replay = if replay > 0 && next == on_trail { replay - 1 } else { 0 };
+                trail >>= 1;
+                if visit_first && visit_second {
+                    stack[top] = node.children[1 - first as usize];
+                    top += 1;
+                }
+                if visit_first || visit_second {
+                    word = node.children[next as usize];
+                    continue;
+                }
+                replay = 0;
+            } else {
+                counters.triangles += 1;
+                let first = word >> COUNT_BITS;
+                if self.test(bvh, &shear, first as usize, ray.t_min, filter) && self.any {
+                    word = FINISHED;
+                    continue;
+                }
+                if word & COUNT_MASK > 1 {
+                    word += COUNT_MASK;
+                    continue;
+                }
+            }
+            word = if top > 0 {
+                top -= 1;
+                stack[top]
+            } else {
+                FINISHED
+            };
+        }
+        counters.iterations += iterations;
+        self.resume = word;
+    }
+
+    /// Tests one triangle; true when it is the best hit now.
+    fn test(&mut self, bvh: &Bvh2, shear: &RayShear, slot: usize, t_min: f32, filter: CandidateFilter<'_>) -> bool {
+        let Some(candidate) = intersect_triangle(shear, &bvh.positions[slot], t_min, self.hit.t) else {
+            return false;
+        };
+        let triangle = bvh.indices[slot];
+        let barycentrics = [candidate.u, candidate.v];
+        let better = candidate.t < self.hit.t || triangle < self.hit.triangle;
+        if !better || !filter(triangle, barycentrics) {
+            return false;
+        }
+        self.hit = Hit {
+            t: candidate.t,
+            barycentrics,
+            triangle,
+        };
+        true
+    }
+}
+
+/// The turns from the root to an inner node, the first in the lowest bit, and their number.
+fn trail_to(bvh: &Bvh2, word: u32) -> (u32, u32) {
+    let mut node = word >> COUNT_BITS;
+    let (mut trail, mut length) = (0, 0);
+    while node != 0 {
+        let parent = bvh.nodes[node as usize].parent;
+        trail = trail << 1 | (parent & 1);
+        length += 1;
+        node = parent >> 1;
+    }
+    (trail, length)
+}

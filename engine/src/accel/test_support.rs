@@ -1,0 +1,131 @@
+//! Seeded random numbers, rays and triangle sets that the tests of this floor share.
+
+use super::{Hit, NO_HIT, Ray, triangle};
+use glam::{DVec3, Vec3};
+
+/// Unit roundoff of f32.
+pub const U: f64 = 1.0 / 16_777_216.0;
+
+/// SplitMix64 (Steele, Lea and Flood 2014).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+
+    /// Uniform in [-1, 1).
+    pub fn signed(&mut self) -> f32 {
+        ((self.bits() >> 40) as f32) / 8_388_608.0 - 1.0
+    }
+
+    pub fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    /// Power of two with a random factor in [1, 2).
+    pub fn magnitude(&mut self, low: i32, high: i32) -> f32 {
+        2f32.powi(low + self.below((high - low) as usize) as i32) * (1.5 + 0.5 * self.signed())
+    }
+}
+
+pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray {
+        origin: origin.into(),
+        t_min: 0.0,
+        direction: direction.into(),
+        t_max: f32::INFINITY,
+    }
+}
+
+/// Tries all triangles in index order with the kernels' test.
+pub fn brute_force(triangles: &[[Vec3; 3]], usable: impl Fn(usize) -> bool, ray: &Ray) -> Hit {
+    let mut hit = Hit::none(ray.t_max);
+    if !ray.is_traceable() {
+        return hit;
+    }
+    let shear = triangle::ray_shear(ray.origin.into(), ray.direction.into());
+    for (i, t) in triangles.iter().enumerate().filter(|(i, _)| usable(*i)) {
+        if let Some(c) = triangle::intersect_triangle(&shear, t, ray.t_min, hit.t)
+            && (c.t < hit.t || hit.triangle == NO_HIT)
+        {
+            hit = Hit {
+                t: c.t,
+                barycentrics: [c.u, c.v],
+                triangle: i as u32,
+            };
+        }
+    }
+    hit
+}
+
+/// A ray and a triangle in f64, seen along the ray: the sheared plane of the watertight test without its rounding.
+pub struct Sheared {
+    /// Sheared vertices; z is the ray parameter.
+    pub vertices: [DVec3; 3],
+    /// Largest component distance from the origin to a vertex.
+    pub reach: f64,
+    /// Size of the direction's largest component.
+    pub direction: f64,
+    axis: usize,
+    shear: DVec3,
+    origin: DVec3,
+}
+
+impl Sheared {
+    pub fn new(ray: &Ray, triangle: &[Vec3; 3]) -> Self {
+        let d = Vec3::from(ray.direction);
+        let axis = triangle::ray_shear(Vec3::ZERO, d).axis;
+        let d = triangle::dominant_axis_last(d, axis).as_dvec3();
+        let mut sheared = Self {
+            vertices: [DVec3::ZERO; 3],
+            reach: 0.0,
+            direction: d.z.abs(),
+            axis,
+            shear: DVec3::new(d.x / d.z, d.y / d.z, 1.0 / d.z),
+            origin: Vec3::from(ray.origin).as_dvec3(),
+        };
+        for (i, v) in triangle.iter().enumerate() {
+            sheared.vertices[i] = sheared.project(v.as_dvec3());
+            sheared.reach = sheared.reach.max((v.as_dvec3() - sheared.origin).abs().max_element());
+        }
+        sheared
+    }
+
+    pub fn project(&self, point: DVec3) -> DVec3 {
+        let a = point - self.origin;
+        let a = match self.axis {
+            0 => DVec3::new(a.y, a.z, a.x),
+            1 => DVec3::new(a.z, a.x, a.y),
+            _ => a,
+        };
+        DVec3::new(a.x - self.shear.x * a.z, a.y - self.shear.y * a.z, self.shear.z * a.z)
+    }
+
+    /// Signed distance of the ray from the nearest edge in the sheared plane, positive inside; −∞ when edge-on.
+    pub fn depth_inside(&self) -> f64 {
+        let [a, b, c] = self.vertices;
+        let edge = |p: DVec3, q: DVec3| (p.x * q.y - p.y * q.x, (q - p).truncate().length());
+        let edges = [edge(b, c), edge(c, a), edge(a, b)];
+        let area: f64 = edges.iter().map(|e| e.0).sum();
+        edges
+            .iter()
+            .map(|(e, l)| e * area.signum() / l)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Parameter where the ray meets the triangle's plane, and the largest slope of that parameter over the sheared plane.
+    pub fn plane(&self) -> (f64, f64) {
+        let [a, b, c] = self.vertices;
+        let n = (b - a).cross(c - a);
+        (n.dot(a) / n.z, n.truncate().length() / n.z.abs())
+    }
+}
