@@ -7,6 +7,13 @@ use std::process::Command;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// Vulkan 1.1 is the environment whose SPIR-V is 1.3: the newest version that every tool here reads.
+const COMMON_FLAGS: [&str; 3] = ["-Werror", "--target-env=vulkan1.1", "--target-spv=spv1.3"];
+
+/// Unoptimized, so that unused bindings and all names stay. Names are kept without `-g`, which would add the sources, cut in the middle of
+/// multi-byte characters.
+const REFLECTED_FLAGS: [&str; 1] = ["-O0"];
+
 /// File extensions of entry files; everything else under `shaders/` is included by them.
 const STAGES: [&str; 4] = ["comp", "vert", "frag", "geom"];
 
@@ -91,7 +98,7 @@ fn compile(root: &Path, file: &Path, out: &Path, debug_info: bool) -> Result<Sha
                 .is_ok_and(|new| old == new)
         });
     if !fresh {
-        glslc(root, file, &reflected, &["-g", "-O0"], Some(&depfile))?;
+        glslc(root, file, &reflected, &REFLECTED_FLAGS, Some(&depfile))?;
         glslc(root, file, &embedded, &embedded_flags, None)?;
         let print = fingerprint(&sources(&depfile)?, &embedded_flags)?;
         std::fs::write(&stamp, print).map_err(|error| format!("{}: {error}", stamp.display()))?;
@@ -156,7 +163,7 @@ fn sources(depfile: &Path) -> Result<Vec<PathBuf>, String> {
 /// A hash of the sources' contents and the flags: what decides whether a module is still fresh.
 fn fingerprint(sources: &[PathBuf], flags: &[&str]) -> Result<String, String> {
     let mut hasher = DefaultHasher::new();
-    flags.hash(&mut hasher);
+    (COMMON_FLAGS, REFLECTED_FLAGS, flags).hash(&mut hasher);
     for path in sources {
         std::fs::read(path)
             .map_err(|error| format!("{}: {error}", path.display()))?

@@ -443,6 +443,28 @@ impl Pass<'_> {
         Ok(())
     }
 
+    /// Writes a few values (at most 64 KiB) that travel inside the command buffer.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when they do not fit, [`Error::MissingBarrier`] in debug builds.
+    pub fn update<T: bytemuck::NoUninit>(&mut self, view: BufferView<'_>, data: &[T]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let limit = view.bytes.min(65_536);
+        if bytes.len() as u64 > limit || bytes.len() % 4 != 0 {
+            return Err(Error::LimitExceeded {
+                name: view.buffer.name().into(),
+                bytes: bytes.len() as u64,
+                limit_name: "size of an inline update, in whole words",
+                limit,
+            });
+        }
+        self.recorder.next_command();
+        self.recorder.touch(self.name, view.buffer, Access::TRANSFER_WRITE)?;
+        // SAFETY: size and alignment were checked; the buffer is kept alive.
+        unsafe { self.recorder.gpu.inner.device.cmd_update_buffer(self.command_buffer, view.buffer.raw(), view.offset, bytes) };
+        Ok(())
+    }
+
     /// Copies `from` to the start of `to`.
     ///
     /// # Errors

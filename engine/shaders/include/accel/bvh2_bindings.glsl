@@ -2,6 +2,8 @@
 #ifndef CLERESTORY_ACCEL_BVH2_BINDINGS_GLSL
 #define CLERESTORY_ACCEL_BVH2_BINDINGS_GLSL
 
+// descriptor set 1: Bvh2Set
+
 // Four quarters, so that four wide loads bring it: both children's boxes, child words, parent word.
 struct Bvh2Node {
     vec4 lower0_upper0x;

@@ -1,0 +1,105 @@
+// Direct light: choosing a light by its power, a point or direction on it, and the densities that multiple importance sampling needs.
+//
+// One draw chooses the light, stratified through the cumulative table; triangles are sampled uniformly by area, the environment by its
+// luminance. BG-2, BG-3. Expects the constants of path_features.glsl.
+#ifndef CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
+#define CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
+
+#include "scene/bindings.glsl"
+#include "transport/environment.glsl"
+#include "transport/lights.glsl"
+#include "transport/path_dimensions.glsl"
+#include "transport/surface.glsl"
+
+struct LightSample {
+    vec3 direction;      // unit, to the light
+    vec3 radiance;       // divided by the density
+    float pdf;           // solid angle, with the choice of the light; 0 for a light without area
+    SurfacePoint point;  // the far end
+    vec3 normal;         // of a triangle; zero otherwise
+    bool infinite;       // the far end is a direction only
+};
+
+vec3 world_to_environment(vec3 w) { return vec3(dot(environment_right, w), dot(environment_up, w), dot(environment_back, w)); }
+
+vec3 environment_texel_radiance(uvec2 texel) {
+    uint i = 3u * (texel.y * environment_width + texel.x);
+    return vec3(environment_texels[i], environment_texels[i + 1u], environment_texels[i + 2u]);
+}
+
+// Bilinear, around in u and clamped at the poles; `local` is in the environment's frame.
+vec3 environment_radiance(vec3 local) {
+    vec2 p = environment_uv(local) * vec2(float(environment_width), float(environment_height)) - 0.5;
+    vec2 base = floor(p);
+    vec2 w = p - base;
+    int width = int(environment_width);
+    uvec2 x = uvec2((ivec2(int(base.x)) + ivec2(width, width + 1)) % width);
+    uvec2 y = uvec2(clamp(ivec2(int(base.y)) + ivec2(0, 1), ivec2(0), ivec2(int(environment_height) - 1)));
+    return mix(mix(environment_texel_radiance(uvec2(x.x, y.x)), environment_texel_radiance(uvec2(x.y, y.x)), w.x),
+               mix(environment_texel_radiance(uvec2(x.x, y.y)), environment_texel_radiance(uvec2(x.y, y.y)), w.x), w.y);
+}
+
+// The environment is the last light.
+float environment_choice_probability() { return distribution_probability(0u, scene_lights.length() - 1u); }
+
+// Density with which light sampling finds a direction in which the environment is seen.
+float environment_light_pdf(vec3 local) {
+    return environment_choice_probability()
+        * environment_pdf(environment_cdf_base, uvec2(environment_width, environment_height), local);
+}
+
+// Density with which light sampling finds the point of a triangle light that a ray has hit at distance t.
+float triangle_light_pdf(Surface s, vec3 direction, float t) {
+    float choice = distribution_probability(0u, s.light);
+    return area_to_solid_angle(2.0 * choice / s.double_area, t * t, abs(dot(s.geometric_normal, direction)));
+}
+
+// `choice` picks the light, `u` the point or texel, `within` the direction in a texel. Zero radiance when there is nothing to see.
+LightSample sample_light(vec3 from, float choice, vec2 u, vec2 within, vec3 scene_lower, vec3 scene_upper) {
+    LightSample result = LightSample(vec3(0.0), vec3(0.0), 0.0, SurfacePoint(vec3(0.0), vec3(0.0)), vec3(0.0), false);
+    float probability;
+    SceneLight light = scene_lights[distribution_sample(0u, scene_lights.length(), choice, probability)];
+    if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
+        uvec2 texel;
+        float pdf;
+        uvec2 size = uvec2(environment_width, environment_height);
+        vec3 local = environment_sample(environment_cdf_base, size, u, within, texel, pdf);
+        result.direction = environment_right * local.x + environment_up * local.y + environment_back * local.z;
+        result.pdf = pdf * probability;
+        result.radiance = environment_radiance(local) / result.pdf;
+        result.infinite = true;
+        return result;
+    }
+    if (HAS_PUNCTUAL_LIGHTS && light.kind == LIGHT_DIRECTIONAL) {
+        result.direction = -light.direction;
+        result.radiance = light.strength / probability;
+        result.infinite = true;
+        return result;
+    }
+    Surface s;
+    result.point.position = light.position;
+    if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
+        s = surface_at(Hit(0.0, square_to_triangle(u).yz, light.triangle), scene_lower, scene_upper);
+        result.point = s.point;
+        result.normal = s.geometric_normal;
+    }
+    vec3 to = result.point.position - from;
+    float squared = dot(to, to);
+    if (squared <= 0.0) {
+        return result;
+    }
+    result.direction = to * inversesqrt(squared);
+    if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
+        result.pdf = area_to_solid_angle(2.0 * probability / s.double_area, squared, abs(dot(result.normal, result.direction)));
+        if (result.pdf > 0.0) {
+            result.radiance = surface_emission(scene_materials[s.material], s, -result.direction) / result.pdf;
+        }
+    } else if (HAS_PUNCTUAL_LIGHTS) {
+        float cos_angle = -dot(light.direction, result.direction);
+        float falloff = light.kind == LIGHT_SPOT ? spot_falloff(cos_angle, light.cos_inner, light.cos_outer) : 1.0;
+        result.radiance = light.strength * (falloff / (squared * probability));
+    }
+    return result;
+}
+
+#endif

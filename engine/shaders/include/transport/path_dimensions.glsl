@@ -1,0 +1,19 @@
+// Which sampler slot (two dimensions each) every decision of a path draws from.
+#ifndef CLERESTORY_TRANSPORT_PATH_DIMENSIONS_GLSL
+#define CLERESTORY_TRANSPORT_PATH_DIMENSIONS_GLSL
+
+const uint DIMENSION_PIXEL = 0u;
+const uint DIMENSION_LENS = 1u;
+// From here on each bounce has DIMENSIONS_A_BOUNCE slots.
+const uint DIMENSION_FIRST_BOUNCE = 2u;
+const uint DIMENSIONS_A_BOUNCE = 5u;
+const uint DIMENSION_DIRECTION = 0u;    // direction within a lobe
+const uint DIMENSION_LOBE = 1u;         // lobe; Russian roulette
+const uint DIMENSION_LIGHT = 2u;        // which light; which side of an alpha-blended surface
+const uint DIMENSION_LIGHT_POINT = 3u;  // point of a triangle, or texel of the environment
+const uint DIMENSION_LIGHT_WITHIN = 4u; // direction within the texel
+
+// A distance beyond every scene: coordinates are below 2^30 m.
+const float FAR_AWAY = 3.0e38;
+
+#endif

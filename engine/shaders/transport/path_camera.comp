@@ -1,0 +1,63 @@
+#version 460
+// Wavefront path tracer, first stage: camera rays of a wave of pixels × samples, one slot each (slot = sample × pixels + pixel).
+//
+// Pixel filter: a box of one pixel. Thin lens of a disk aperture. Deterministic in (seed, pixel, sample).
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL or SAMPLER_PCG
+layout(constant_id = 1) const bool HAS_LENS = true;
+layout(constant_id = 2) const bool ORTHOGRAPHIC = false;
+#define CLERESTORY_SAMPLER SAMPLER_KIND
+
+#include "transport/path_buffers.glsl"
+#include "transport/path_dimensions.glsl"
+#include "transport/random.glsl"
+#include "transport/warp.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    vec3 origin;
+    float half_width;   // of the picture at distance 1, or in metres (orthographic)
+    vec3 right;
+    float half_height;
+    vec3 up;
+    float lens_radius;
+    vec3 forward;
+    float focus_distance;
+    uint width;
+    uint height;
+    uint first_pixel;
+    uint pixel_count;
+    uint first_sample;
+    uint sample_count;
+    uint seed;
+} push;
+
+void main() {
+    uint slot = gl_GlobalInvocationID.x;
+    if (slot >= push.pixel_count * push.sample_count) {
+        return;
+    }
+    uint pixel = push.first_pixel + slot % push.pixel_count;
+    Sampler s = Sampler(pixel, push.first_sample + slot / push.pixel_count, DIMENSION_PIXEL, push.seed);
+    vec2 position = vec2(float(pixel % push.width), float(pixel / push.width)) + sample_2d(s);
+    vec2 plane = vec2(2.0 * position.x / float(push.width) - 1.0, 1.0 - 2.0 * position.y / float(push.height))
+        * vec2(push.half_width, push.half_height);
+    vec3 across = plane.x * push.right + plane.y * push.up;
+    vec3 origin = ORTHOGRAPHIC ? push.origin + across : push.origin;
+    vec3 direction = ORTHOGRAPHIC ? push.forward : push.forward + across;
+    if (HAS_LENS) {
+        s.dimension = DIMENSION_LENS;
+        vec2 lens = push.lens_radius * square_to_disk(sample_2d(s));
+        vec3 offset = lens.x * push.right + lens.y * push.up;
+        origin += offset;
+        direction = direction * push.focus_distance - offset;
+    }
+    rays[slot] = Ray(origin, 0.0, normalize(direction), FAR_AWAY);
+    paths[slot] = PathState(vec3(1.0), 0.0, vec3(0.0), 0u, 1.0);
+    aovs[slot].filled = 0u;
+    queue_in[slot] = slot;
+    resume_words[2u * slot] = 0u;
+    resume_words[2u * slot + 1u] = 0u;
+}

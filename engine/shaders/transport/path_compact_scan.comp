@@ -1,0 +1,54 @@
+#version 460
+// Queue compaction, second stage: one workgroup turns the chunks' counts into offsets, writes the arguments of the next round's
+// dispatches and keeps the ray counters.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/path_compact.glsl"
+
+shared uvec2 totals[PATH_GROUP];
+
+void add_64(inout uint low, inout uint high, uint amount) {
+    uint carry;
+    low = uaddCarry(low, amount, carry);
+    high += carry;
+}
+
+void main() {
+    uint lane = gl_LocalInvocationID.x;
+    uint count = status.active_count;
+    bool stalled = status.stalled != STALLED_NOT;
+    uint chunks = stalled ? 0u : chunks_for(count);
+    uint each = (chunks + PATH_GROUP - 1u) / PATH_GROUP;
+    uint first = min(lane * each, chunks);
+    uint last = min(first + each, chunks);
+    uvec2 total = uvec2(0u);
+    for (uint chunk = first; chunk < last; ++chunk) {
+        total += uvec2(chunk_counts[2u * chunk], chunk_counts[2u * chunk + 1u]);
+    }
+    totals[lane] = total;
+    barrier();
+    uvec2 before = uvec2(0u);
+    for (uint other = 0u; other < lane; ++other) {
+        before += totals[other];
+    }
+    uint offset = before.x;
+    for (uint chunk = first; chunk < last; ++chunk) {
+        uint alive = chunk_counts[2u * chunk];
+        chunk_counts[2u * chunk] = offset;
+        offset += alive;
+    }
+    if (lane == PATH_GROUP - 1u && !stalled) {
+        uvec2 all = before + total;
+        status.scatter_groups[0] = status.chunk_groups[0];
+        status.previous_count = count;
+        status.active_count = all.x;
+        status.item_groups[0] = groups_for(all.x);
+        status.chunk_groups[0] = groups_for(chunks_for(all.x));
+        status.rounds += count > 0u ? 1u : 0u;
+        add_64(status.extend_rays[0], status.extend_rays[1], count);
+        add_64(status.shadow_rays[0], status.shadow_rays[1], all.y);
+    }
+}

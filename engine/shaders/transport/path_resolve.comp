@@ -1,0 +1,72 @@
+#version 460
+// Wavefront path tracer, last stage: adds the samples of a wave to their pixels' sums, in the order of the samples, so that the sums do
+// not depend on the size of the waves. A sample with a NaN or an infinity is counted and left out.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool WRITE_AOVS = true;
+
+#include "transport/path_buffers.glsl"
+#include "film/two_float.glsl"
+
+// Sums over the samples of one pixel; squares for the variance.
+struct FilmPixel {
+    TwoFloat sum[3];
+    TwoFloat square[3];
+    uint samples;
+    uint non_finite;
+};
+
+// Sums of albedo, normal and depth over the samples that hit something.
+struct FilmAov {
+    TwoFloat sum[7];
+    uint hits;
+};
+
+layout(set = 1, binding = 0, scalar) restrict buffer FilmPixels { FilmPixel film_pixels[]; };
+layout(set = 1, binding = 1, scalar) restrict buffer FilmAovs { FilmAov film_aovs[]; };
+
+layout(push_constant, scalar) uniform Push {
+    uint first_film_pixel;  // of the wave, within this buffer
+    uint pixel_count;
+    uint sample_count;
+} push;
+
+void main() {
+    uint pixel = gl_GlobalInvocationID.x;
+    if (pixel >= push.pixel_count) {
+        return;
+    }
+    uint target = push.first_film_pixel + pixel;
+    FilmPixel film = film_pixels[target];
+    for (uint i = 0u; i < push.sample_count; ++i) {
+        vec3 radiance = paths[i * push.pixel_count + pixel].radiance;
+        if (any(isnan(radiance)) || any(isinf(radiance))) {
+            film.non_finite += 1u;
+            continue;
+        }
+        film.samples += 1u;
+        for (int c = 0; c < 3; ++c) {
+            film.sum[c] = two_float_add(film.sum[c], radiance[c]);
+            film.square[c] = two_float_add_square(film.square[c], radiance[c]);
+        }
+    }
+    film_pixels[target] = film;
+    if (WRITE_AOVS) {
+        FilmAov aov = film_aovs[target];
+        for (uint i = 0u; i < push.sample_count; ++i) {
+            PathAov a = aovs[i * push.pixel_count + pixel];
+            if (a.filled == 0u) {
+                continue;
+            }
+            aov.hits += 1u;
+            for (int c = 0; c < 3; ++c) {
+                aov.sum[c] = two_float_add(aov.sum[c], a.albedo[c]);
+                aov.sum[3 + c] = two_float_add(aov.sum[3 + c], a.normal[c]);
+            }
+            aov.sum[6] = two_float_add(aov.sum[6], a.depth);
+        }
+        film_aovs[target] = aov;
+    }
+}

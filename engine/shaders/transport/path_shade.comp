@@ -1,0 +1,163 @@
+#version 460
+// Wavefront path tracer: what happens where a path has arrived. Emission with its multiple-importance weight, one light sample (its
+// shadow ray goes to path_shadow.comp), one direction of the surface's scattering function, Russian roulette.
+//
+// BG-2, BG-3: unidirectional path tracing with next-event estimation (Kajiya 1986; Veach 1997, 9 and 10.3.2). Unbiased.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/path_features.glsl"
+#include "transport/path_buffers.glsl"
+#include "transport/path_dimensions.glsl"
+#include "transport/path_set.glsl"
+#include "transport/random.glsl"
+#include "transport/surface.glsl"
+#include "transport/light_choice.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint first_pixel;
+    vec3 scene_upper;
+    uint pixel_count;
+    uint first_sample;
+    uint seed;
+    uint path_set;          // PathSet, packed
+    uint roulette_start;    // first bounce at which Russian roulette may end a path
+    float roulette_cap;     // largest probability to go on
+} push;
+
+// Draws of the current bounce.
+Sampler bounce_sampler(uint slot, uint bounce, uint dimension) {
+    uint first = DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_A_BOUNCE;
+    uint pixel = push.first_pixel + slot % push.pixel_count;
+    return Sampler(pixel, push.first_sample + slot / push.pixel_count, first + dimension, push.seed);
+}
+
+vec2 bounce_sample(uint slot, uint bounce, uint dimension) {
+    Sampler s = bounce_sampler(slot, bounce, dimension);
+    return sample_2d(s);
+}
+
+// Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
+float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled != STALLED_NOT || place >= status.active_count) {
+        return;
+    }
+    uint slot = queue_in[place];
+    resume_words[2u * place] = 0u;
+    resume_words[2u * place + 1u] = 0u;
+    flags[place] = 0u;
+    Hit hit = hits[place];
+    Ray ray = rays[slot];
+    PathState path = paths[slot];
+    bool counted = path_set_contains(push.path_set, path.bounce);
+
+    if (hit.triangle == NO_HIT) {
+        if (HAS_ENVIRONMENT && counted) {
+            vec3 local = world_to_environment(ray.direction);
+            float weight = path.pdf > 0.0 ? emission_weight(path.pdf, environment_light_pdf(local)) : 1.0;
+            paths[slot].radiance += path.throughput * environment_radiance(local) * weight;
+        }
+        return;
+    }
+
+    Surface s = surface_at(hit, push.scene_lower, push.scene_upper);
+    SceneMaterial m = scene_materials[s.material];
+    vec3 wo = -ray.direction;
+    bool front = dot(wo, s.geometric_normal) > 0.0;
+    if (HAS_ATTENUATION && !front && m.thickness > 0.0 && m.transmission > 0.0) {
+        path.throughput *= exp(-m.attenuation * hit.t);
+    }
+
+    if ((HAS_AREA_LIGHTS || HAS_UNLIT) && counted) {
+        vec3 emission = surface_emission(m, s, wo);
+        if (emission != vec3(0.0)) {
+            float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? triangle_light_pdf(s, ray.direction, hit.t) : 0.0;
+            paths[slot].radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
+        }
+    }
+
+    Bsdf bsdf = surface_bsdf(m, s);
+    vec3 outward = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0 ? s.geometric_normal
+                 : front ? s.geometric_normal : -s.geometric_normal;
+    vec3 facing = front ? s.geometric_normal : -s.geometric_normal;
+    vec3 normal = facing;
+    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
+        normal = adapt_shading_normal(surface_mapped_normal(m, s), facing, wo);
+    }
+    if (WRITE_AOVS && path.bounce == 0u) {
+        vec3 albedo = HAS_CONDUCTOR && (bsdf.flags & BSDF_CONDUCTOR) != 0u ? bsdf.conductor_average : bsdf.base_color;
+        aovs[slot] = PathAov(albedo, hit.t, normal, 1u);
+    }
+    bool ends = (HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u) || !path_set_continues(push.path_set, path.bounce);
+    if (ends) {
+        return;
+    }
+    // z of the scattering frame points out of a solid body, and towards the viewer elsewhere.
+    vec3 z = dot(outward, facing) < 0.0 ? -normal : normal;
+    vec3 x;
+    vec3 y;
+    orthonormal_basis(z, x, y);
+    vec3 wo_local = vec3(dot(wo, x), dot(wo, y), dot(wo, z));
+    uint mask = path_set_lobes(push.path_set);
+    uint bounce = path.bounce;
+
+    bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
+    if (lit && path_set_contains(push.path_set, bounce + 1u)) {
+        vec2 choice = bounce_sample(slot, bounce, DIMENSION_LIGHT);
+        vec2 u = bounce_sample(slot, bounce, DIMENSION_LIGHT_POINT);
+        vec2 within = HAS_ENVIRONMENT ? bounce_sample(slot, bounce, DIMENSION_LIGHT_WITHIN) : vec2(0.0);
+        LightSample light = sample_light(s.point.position, choice.x, u, within, push.scene_lower, push.scene_upper);
+        vec3 wi = light.direction;
+        if (light.radiance != vec3(0.0) && sides_agree(z, outward, wi)) {
+            vec4 f = bsdf_eval_pdf(bsdf, wo_local, vec3(dot(wi, x), dot(wi, y), dot(wi, z)), mask);
+            if (f.rgb != vec3(0.0)) {
+                float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, f.a) : 1.0;
+                ShadowRay ray_to_light;
+                vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
+                ray_to_light.ray = Ray(start, 0.0, wi, FAR_AWAY);
+                if (!light.infinite) {
+                    vec3 segment;
+                    shadow_segment(s.point, s.geometric_normal, light.point, light.normal, start, segment);
+                    ray_to_light.ray = Ray(start, 0.0, segment, 1.0);
+                }
+                ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
+                shadow[place] = ray_to_light;
+                flags[place] = FLAG_SHADOW;
+            }
+        }
+    }
+
+    vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
+    BsdfSample scattered = bsdf_sample(bsdf, wo_local, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), mask);
+    vec3 wi = scattered.wi.x * x + scattered.wi.y * y + scattered.wi.z * z;
+    if (scattered.flags == 0u || !sides_agree(z, outward, wi)) {
+        return;
+    }
+    path.throughput *= scattered.weight;
+    if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
+        float eta = wo_local.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
+        path.eta_scale *= eta * eta;
+    }
+    path.bounce = bounce + 1u;
+    if (path.bounce >= push.roulette_start) {
+        vec3 t = path.throughput * path.eta_scale;
+        float survival = min(max(t.x, max(t.y, t.z)), push.roulette_cap);
+        if (lobe.y >= survival) {
+            return;
+        }
+        path.throughput /= survival;
+    }
+    vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
+    rays[slot] = Ray(start, 0.0, normalize(wi), FAR_AWAY);
+    paths[slot].throughput = path.throughput;
+    paths[slot].pdf = scattered.pdf;
+    paths[slot].bounce = path.bounce;
+    paths[slot].eta_scale = path.eta_scale;
+    flags[place] |= FLAG_ALIVE;
+}
