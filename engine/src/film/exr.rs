@@ -34,7 +34,7 @@ pub fn write(path: &Path, picture: &Picture) -> EngineResult<()> {
 /// The file's bytes; `name` is for messages.
 ///
 /// # Errors
-/// [`crate::Error::Picture`] as for [`write`].
+/// [`crate::Error::Picture`] as for [`write()`].
 pub fn to_bytes(picture: &Picture, name: &str) -> EngineResult<Vec<u8>> {
     let wrong = |cause: String| EngineError::Picture {
         path: name.to_owned(),
@@ -146,7 +146,7 @@ pub fn read(path: &Path) -> EngineResult<Picture> {
 /// Reads from memory or any other source; `name` is for messages.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read()`].
 pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineResult<Picture> {
     let wrong = |cause: String| EngineError::Picture {
         path: name.to_owned(),

@@ -26,7 +26,7 @@ pub struct CompareOptions {
     pub relative_mse_offset: f64,
     /// Tone map applied to both pictures before FLIP; default: exposure 0, clipped sRGB.
     pub tone: ToneMap,
-    /// Pixels per degree of visual angle for FLIP; default 67.02, a 0.7 m wide, 3840 pixels wide screen seen from 0.7 m (the authors' choice).
+    /// Pixels per degree of visual angle for FLIP; default 67, the authors' choice: a screen 0.7 m and 3840 pixels wide seen from 0.7 m.
     pub pixels_per_degree: f32,
 }
 
