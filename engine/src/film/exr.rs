@@ -34,7 +34,7 @@ pub fn write(path: &Path, picture: &Picture) -> EngineResult<()> {
 /// The file's bytes; `name` is for messages.
 ///
 /// # Errors
-/// [`crate::Error::Picture`] as for [`write`].
+/// [`crate::Error::Picture`] as for [`write()`].
 pub fn to_bytes(picture: &Picture, name: &str) -> EngineResult<Vec<u8>> {
     let wrong = |cause: String| EngineError::Picture {
         path: name.to_owned(),
@@ -146,7 +146,7 @@ pub fn read(path: &Path) -> EngineResult<Picture> {
 /// Reads from memory or any other source; `name` is for messages.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read()`].
 pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineResult<Picture> {
     let wrong = |cause: String| EngineError::Picture {
         path: name.to_owned(),
@@ -194,7 +194,7 @@ pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineRe
         }
         collect_text(&part.attributes.other, &mut entries);
         let part_name = part.attributes.layer_name.as_ref().map(ToString::to_string);
-        add_part(&mut picture, part, part_name.filter(|_| many).unwrap_or_default())?;
+        add_part(&mut picture, part, &part_name.filter(|_| many).unwrap_or_default())?;
     }
     picture.metadata = Metadata::from_entries(entries);
     Ok(picture)
@@ -214,12 +214,12 @@ fn collect_text(attributes: &std::collections::HashMap<Text, AttributeValue>, en
 }
 
 /// Groups the channels of one part by their prefix and adds them as layers.
-fn add_part(picture: &mut Picture, part: &Layer<AnyChannels<FlatSamples>>, part_name: String) -> EngineResult<()> {
+fn add_part(picture: &mut Picture, part: &Layer<AnyChannels<FlatSamples>>, part_name: &str) -> EngineResult<()> {
     let mut groups: Vec<(String, Vec<(String, &FlatSamples)>)> = Vec::new();
     for channel in &part.channel_data.list {
         let full = channel.name.to_string();
         let (prefix, suffix) = full.rsplit_once('.').unwrap_or(("", &full));
-        let prefix = if prefix.is_empty() { part_name.as_str() } else { prefix };
+        let prefix = if prefix.is_empty() { part_name } else { prefix };
         let entry = (suffix.to_owned(), &channel.sample_data);
         match groups.iter_mut().find(|(name, _)| name == prefix) {
             Some((_, channels)) => channels.push(entry),
@@ -236,13 +236,8 @@ fn add_part(picture: &mut Picture, part: &Layer<AnyChannels<FlatSamples>>, part_
             if let [Some(r), Some(g), Some(b)] = found {
                 let [r, g, b] = [r, g, b].map(|index| channels[index].1.values_as_f32());
                 let values = r.zip(g).zip(b).flat_map(|((r, g), b)| [r, g, b]).collect();
-                // The first colours without a name are what the file shows.
-                let shown = prefix.is_empty() || prefix == part_name;
-                let name = if shown && picture.layer(RADIANCE).is_none() && triple[0] == "R" {
-                    RADIANCE
-                } else {
-                    &prefix
-                };
+                let shown = prefix.is_empty() && picture.layer(RADIANCE).is_none() && triple[0] == "R";
+                let name = if shown { RADIANCE } else { &prefix };
                 add_unique(picture, name, 3, values)?;
                 channels.retain(|(suffix, _)| !triple.iter().any(|wanted| suffix.eq_ignore_ascii_case(wanted)));
             }

@@ -26,7 +26,7 @@ pub struct CompareOptions {
     pub relative_mse_offset: f64,
     /// Tone map applied to both pictures before FLIP; default: exposure 0, clipped sRGB.
     pub tone: ToneMap,
-    /// Pixels per degree of visual angle for FLIP; default 67.02, a 0.7 m wide, 3840 pixels wide screen seen from 0.7 m (the authors' choice).
+    /// Pixels per degree of visual angle for FLIP; default 67, the authors' choice: a screen 0.7 m and 3840 pixels wide seen from 0.7 m.
     pub pixels_per_degree: f32,
 }
 
@@ -138,23 +138,39 @@ pub fn luminance(rgb: [f32; 3]) -> f64 {
 /// # Errors
 /// [`Error::Picture`] when sizes or channel counts differ, a main layer is missing, or an option is out of its range.
 pub fn compare(test: &Picture, reference: &Picture, options: &CompareOptions) -> Result<ErrorReport> {
+    let size = check(test, reference, options)?;
+    compare_layers(test.main_layer()?, reference.main_layer()?, size, options)
+}
+
+/// The FLIP error of every pixel, in [0, 1], the top row first: for a false-colour picture. Pixels that are not finite in either picture are
+/// black in both.
+///
+/// # Errors
+/// As [`compare`].
+pub fn flip_map(test: &Picture, reference: &Picture, options: &CompareOptions) -> Result<Vec<f32>> {
+    let size = check(test, reference, options)?;
+    Ok(flip_layers(test.main_layer()?, reference.main_layer()?, size, options))
+}
+
+/// The common size of two pictures that can be compared.
+fn check(test: &Picture, reference: &Picture, options: &CompareOptions) -> Result<(u32, u32)> {
     let (size, expected) = ((test.width(), test.height()), (reference.width(), reference.height()));
-    let wrong = |cause: String| Error::Picture {
-        path: "comparison".into(),
-        cause,
+    let wrong = |cause: String| {
+        Err(Error::Picture {
+            path: "comparison".into(),
+            cause,
+        })
     };
     if size != expected {
-        return Err(wrong(format!(
+        return wrong(format!(
             "the test picture is {}×{}, the reference {}×{}",
             size.0, size.1, expected.0, expected.1
-        )));
-    }
-    if !(options.relative_mse_offset > 0.0 && options.pixels_per_degree > 0.0) {
-        return Err(wrong(
-            "the relative MSE's offset and the pixels per degree must be above 0".into(),
         ));
     }
-    compare_layers(test.main_layer()?, reference.main_layer()?, size, options)
+    if !(options.relative_mse_offset > 0.0 && options.pixels_per_degree > 0.0) {
+        return wrong("the relative MSE's offset and the pixels per degree must be above 0".into());
+    }
+    Ok(size)
 }
 
 fn compare_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &CompareOptions) -> Result<ErrorReport> {
@@ -221,8 +237,7 @@ fn compare_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &C
     })
 }
 
-/// The FLIP error of every pixel, in [0, 1]; pixels that are not finite in either layer are black in both.
-fn flip_map(test: &Layer, reference: &Layer, size: (u32, u32), options: &CompareOptions) -> Vec<f32> {
+fn flip_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &CompareOptions) -> Vec<f32> {
     let (mut a, mut b) = (Vec::new(), Vec::new());
     for (test, reference) in test.pixels().zip(reference.pixels()) {
         let finite = test.iter().chain(&reference).all(|v| v.is_finite());
@@ -235,7 +250,7 @@ fn flip_map(test: &Layer, reference: &Layer, size: (u32, u32), options: &Compare
 }
 
 fn mean_flip(test: &Layer, reference: &Layer, size: (u32, u32), options: &CompareOptions) -> f64 {
-    let map = flip_map(test, reference, size, options);
+    let map = flip_layers(test, reference, size, options);
     let mut sum = Sum::default();
     for value in &map {
         sum.add(f64::from(*value));

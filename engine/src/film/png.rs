@@ -61,7 +61,7 @@ pub fn difference(test: &Layer, reference: &Layer, width: u32, full_scale: f32) 
 /// # Errors
 /// [`Error::Picture`] when `width` does not divide the count of values or `full_scale` is not above zero.
 pub fn false_color(values: &[f32], width: u32, full_scale: f32) -> Result<Rgb8> {
-    if width == 0 || values.len() % width as usize != 0 || full_scale <= 0.0 || full_scale.is_nan() {
+    if width == 0 || !values.len().is_multiple_of(width as usize) || full_scale <= 0.0 || full_scale.is_nan() {
         return Err(Error::Picture {
             path: "false-colour picture".into(),
             cause: format!("needs whole rows of {width} values and a full scale above 0 (it is {full_scale})"),

@@ -109,7 +109,7 @@ mod tests {
         // Middle grey of the standard: 18 % reflectance is code 118 (0.4613…).
         assert_eq!(quantize(srgb_from_linear(0.18)), 118);
         // The two branches of the standard meet within its rounded constants.
-        let (below, above) = (srgb_from_linear(0.003_130_8), srgb_from_linear(0.003_130_8_000_1));
+        let (below, above) = (srgb_from_linear(0.003_130_8), srgb_from_linear(0.003_130_800_01));
         assert!((below - above).abs() < 1e-7);
     }
 

@@ -79,10 +79,11 @@ impl std::fmt::Display for ZTest {
 /// Tests value by value whether two means estimate the same expectation: z = (a − b) / √(var a + var b), where the variances are those *of the
 /// means* and the root is at least [`RELATIVE_DEVIATION_FLOOR`] · max(|a|, |b|).
 ///
-/// The values may be a picture's channels or its luminances. Their z are taken as standard normal, which needs means of many samples; a variance that
-/// is itself estimated from N passes makes z follow Student's t with N − 1 degrees of freedom, whose tails at Šidák's threshold are far
-/// heavier: take the variance from samples (thousands), or at least some hundred passes. Šidák's correction is exact for independent
-/// values and errs to the safe side (fewer false alarms) for the correlated channels of one pixel.
+/// The values may be a picture's channels or its luminances. Their z are taken as standard normal, which needs means of many samples; a
+/// variance that is itself estimated from N passes makes z follow Student's t with N − 1 degrees of freedom. At a threshold of 10⁻⁷ its tails hold 2.7
+/// times as much as the normal's for N = 200, 6 times for 100, 14 times for 64, 85 times for 32: take 100 passes or more, or the variance
+/// over samples. Šidák's correction is exact for independent values and errs to the safe side (fewer false alarms) for the correlated
+/// channels of one pixel.
 ///
 /// # Errors
 /// [`Error::Picture`] when the slices differ in length or are empty, or `alpha` is not between 0 and 1.

@@ -1,0 +1,3 @@
+//! What the command line program and its tests share.
+
+pub mod mitsuba;
