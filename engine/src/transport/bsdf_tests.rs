@@ -74,6 +74,13 @@ fn zoo() -> Vec<(&'static str, Bsdf)> {
             }),
         ));
         all.push(("coated, high index", bsdf_gltf(&GltfFactors { ior: 2.8, ..white })));
+        let opaque_solid = GltfFactors {
+            ior: 0.0,
+            transmission: 1.0,
+            thickness: 1.0,
+            ..white
+        };
+        all.push(("unit Fresnel solid", bsdf_gltf(&opaque_solid)));
         all.push(("metal", bsdf_gltf(&metal)));
         all.push(("gold", bsdf_gltf(&metal).with_conductor(&gold)));
         all.push(("thin", bsdf_gltf(&clear)));
