@@ -8,6 +8,8 @@ pub mod fresnel;
 pub mod ggx;
 pub mod lights;
 pub mod path_set;
+pub mod phase;
+pub mod phong;
 pub mod random;
 pub mod shading_normal;
 pub mod warp;
