@@ -76,8 +76,8 @@ mod tests {
         }
         let without_cosine = |wi: DVec3| k * FRAC_1_PI * wi.z / wi.z;
         assert!(
-            (reflectivity(without_cosine) - 2.0 * k).abs() < 0.01,
-            "the cosine belongs in the integral"
+            reflectivity(without_cosine) > 1.9 * k,
+            "without the cosine a Lambert surface seems to give twice"
         );
     }
 
