@@ -8,10 +8,11 @@
 //! Twin of `transport/albedo.glsl`.
 //!
 //! Layers: 0 has unit Fresnel; 1..=`ETA_NODES` have max(0, (F − F0)/(1 − F0)) of an exact dielectric, evenly spaced in
-//! (η − 1)/(η + 1); the last has Schlick's (1 − cos)⁵. Within a layer rows are even in √α and columns in √cos θ.
+//! (η − 1)/(η + 1); the last has Schlick's (1 − cos)⁵. Within a layer row 0 is the mirror (α below `ALPHA_MIN`), the other rows are
+//! even in α^¼ from `ALPHA_MIN` to 1, and columns are even in (cos θ)^¼: both follow the boundary layer cos θ ~ α near grazing.
 
 use super::fresnel::{fresnel_dielectric, fresnel_f0, schlick_weight};
-use super::ggx::{ggx_g1, ggx_g2, ggx_sample_visible};
+use super::ggx::{ALPHA_MIN, ggx_g1, ggx_g2, ggx_sample_visible};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -19,7 +20,7 @@ use std::sync::OnceLock;
 /// Columns of a layer.
 pub const COS_NODES: usize = 48;
 /// Rows of a layer.
-pub const ALPHA_NODES: usize = 24;
+pub const ALPHA_NODES: usize = 32;
 /// Layers for exact dielectrics.
 pub const ETA_NODES: usize = 8;
 /// (η − 1)/(η + 1) of the last of them (η = 3); larger indices use that layer, which only loses energy.
@@ -32,8 +33,10 @@ pub const AVERAGE_BASE: usize = LAYERS * ALPHA_NODES * COS_NODES;
 /// Floats in the whole table.
 pub const TABLE_LENGTH: usize = AVERAGE_BASE + LAYERS * ALPHA_NODES;
 
-/// Quadrature points along each axis of the unit square.
-const QUADRATURE: [u32; 2] = [16, 48];
+/// Points of the quadrature and the generator of its rule: a Fibonacci lattice, which a jump at the horizon does not upset.
+const QUADRATURE: [u32; 2] = [1597, 987];
+/// α^¼ at [`ALPHA_MIN`].
+const ALPHA_ROOT_MIN: f64 = 0.177_827_941_003_892_3;
 
 /// The table as uploaded.
 #[derive(Debug, Clone)]
@@ -62,8 +65,8 @@ fn layer_factors(cos_h: f64) -> [f64; LAYERS] {
     })
 }
 
-/// Albedos of all layers for one direction by quadrature with `points` along each axis.
-pub(crate) fn integrate_albedos(cos_o: f64, alpha: f64, points: [u32; 2]) -> [f64; LAYERS] {
+/// Albedos of all layers for one direction, by the lattice rule with `points` points and generator `step`.
+pub(crate) fn integrate_albedos(cos_o: f64, alpha: f64, [points, step]: [u32; 2]) -> [f64; LAYERS] {
     if alpha == 0.0 {
         return layer_factors(cos_o);
     }
@@ -71,23 +74,21 @@ pub(crate) fn integrate_albedos(cos_o: f64, alpha: f64, points: [u32; 2]) -> [f6
     let cos_o = cos_o.max(1e-6);
     let wo = DVec3::new((1.0 - cos_o * cos_o).max(0.0).sqrt(), 0.0, cos_o);
     let mut sums = [0.0; LAYERS];
-    for i in 0..points[0] {
+    for i in 0..points {
         // Half of the azimuth: the lobe is symmetric about the plane of incidence.
-        let x = 0.5 * (f64::from(i) + 0.5) / f64::from(points[0]);
-        for j in 0..points[1] {
-            let u = DVec2::new(x, (f64::from(j) + 0.5) / f64::from(points[1]));
-            let h = ggx_sample_visible(wo, alpha, u);
-            let cos_h = wo.dot(h);
-            let cos_i = 2.0 * cos_h * h.z - wo.z;
-            if cos_i > 0.0 {
-                let masking = ggx_g2(cos_o, cos_i, alpha, false) / ggx_g1(cos_o, alpha);
-                for (sum, factor) in sums.iter_mut().zip(layer_factors(cos_h)) {
-                    *sum += masking * factor;
-                }
+        let x = 0.5 * (f64::from(i) + 0.5) / f64::from(points);
+        let y = (f64::from(i * step % points) + 0.5) / f64::from(points);
+        let h = ggx_sample_visible(wo, alpha, DVec2::new(x, y));
+        let cos_h = wo.dot(h);
+        let cos_i = 2.0 * cos_h * h.z - wo.z;
+        if cos_i > 0.0 {
+            let masking = ggx_g2(cos_o, cos_i, alpha, false) / ggx_g1(cos_o, alpha);
+            for (sum, factor) in sums.iter_mut().zip(layer_factors(cos_h)) {
+                *sum += masking * factor;
             }
         }
     }
-    sums.map(|s| s / f64::from(points[0] * points[1]))
+    sums.map(|s| s / f64::from(points))
 }
 
 impl AlbedoTable {
@@ -101,9 +102,8 @@ impl AlbedoTable {
         let nodes: Vec<[f64; LAYERS]> = (0..ALPHA_NODES * COS_NODES)
             .into_par_iter()
             .map(|k| {
-                let root_alpha = (k / COS_NODES) as f64 / (ALPHA_NODES - 1) as f64;
                 let root_cos = (k % COS_NODES) as f64 / (COS_NODES - 1) as f64;
-                integrate_albedos(root_cos * root_cos, root_alpha * root_alpha, QUADRATURE)
+                integrate_albedos(root_cos.powi(4), row_alpha(k / COS_NODES), QUADRATURE)
             })
             .collect();
         #[expect(
@@ -129,7 +129,7 @@ impl AlbedoTable {
     }
 }
 
-/// 2∫ f(μ) μ dμ of the function that is linear in s = √μ between the nodes of a row: exactly, ∫ 4 s³ f ds.
+/// 2∫ f(μ) μ dμ of the function that is linear in s = μ^¼ between the nodes of a row: exactly, ∫ 8 s⁷ f ds.
 fn average_of_row(row: &[f32]) -> f64 {
     let step = 1.0 / (row.len() - 1) as f64;
     row.windows(2)
@@ -138,7 +138,7 @@ fn average_of_row(row: &[f32]) -> f64 {
             let (s0, s1) = (i as f64 * step, (i + 1) as f64 * step);
             let (f0, f1) = (f64::from(pair[0]), f64::from(pair[1]));
             let slope = (f1 - f0) / step;
-            (f0 - slope * s0) * (s1.powi(4) - s0.powi(4)) + slope * 0.8 * (s1.powi(5) - s0.powi(5))
+            (f0 - slope * s0) * (s1.powi(8) - s0.powi(8)) + slope * (8.0 / 9.0) * (s1.powi(9) - s0.powi(9))
         })
         .sum()
 }
@@ -150,10 +150,31 @@ fn node(x: f64, count: usize) -> (usize, f64) {
     (i, p - i as f64)
 }
 
+/// α of a row.
+fn row_alpha(row: usize) -> f64 {
+    if row == 0 {
+        return 0.0;
+    }
+    let t = (row - 1) as f64 / (ALPHA_NODES - 2) as f64;
+    (ALPHA_ROOT_MIN + (1.0 - ALPHA_ROOT_MIN) * t).powi(4)
+}
+
+/// Row below `alpha` and the weight of the next.
+fn alpha_node(alpha: f64) -> (usize, f64) {
+    if alpha < ALPHA_MIN {
+        return (0, 0.0);
+    }
+    let (row, t) = node(
+        (alpha.sqrt().sqrt() - ALPHA_ROOT_MIN) / (1.0 - ALPHA_ROOT_MIN),
+        ALPHA_NODES - 1,
+    );
+    (row + 1, t)
+}
+
 /// Bilinear look-up of the directional albedo of a layer.
 pub fn albedo_lookup(table: &AlbedoTable, layer: usize, cos_theta: f64, alpha: f64) -> f64 {
-    let (row, fr) = node(alpha.sqrt(), ALPHA_NODES);
-    let (column, fc) = node(cos_theta.max(0.0).sqrt(), COS_NODES);
+    let (row, fr) = alpha_node(alpha);
+    let (column, fc) = node(cos_theta.max(0.0).sqrt().sqrt(), COS_NODES);
     let i = (layer * ALPHA_NODES + row) * COS_NODES + column;
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
     mix(
@@ -165,7 +186,7 @@ pub fn albedo_lookup(table: &AlbedoTable, layer: usize, cos_theta: f64, alpha: f
 
 /// Linear look-up of a layer's average albedo, 2∫ E(μ) μ dμ.
 pub fn albedo_average(table: &AlbedoTable, layer: usize, alpha: f64) -> f64 {
-    let (row, fr) = node(alpha.sqrt(), ALPHA_NODES);
+    let (row, fr) = alpha_node(alpha);
     let i = AVERAGE_BASE + layer * ALPHA_NODES + row;
     table.at(i) + (table.at(i + 1) - table.at(i)) * fr
 }

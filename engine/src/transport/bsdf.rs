@@ -433,7 +433,7 @@ impl BsdfContext<'_> {
         }
         let f = &self.features;
         let microfacets = f.metal || f.specular_layer || f.transmission;
-        if !microfacets || b.is_delta() || !(reflected || f.transmission) {
+        if !microfacets || b.is_delta() || !(reflected || self.transmission(b) > 0.0) {
             return (value, pdf);
         }
         let refracted = !reflected && !b.is_thin();

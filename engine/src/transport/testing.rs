@@ -1,18 +1,13 @@
 //! Statistics for the tests of samplers.
 
 use super::random::pcg4d;
-use glam::{DVec2, DVec3, UVec4};
+use glam::{DVec3, UVec4};
 use std::f64::consts::TAU;
 
 /// Independent numbers in [0, 1)³ with 32 bits each, counted by `i`.
 pub fn random3(i: u32, seed: u32) -> DVec3 {
     let v = pcg4d(UVec4::new(i, seed, 0x7e57, 0));
-    v.truncate().as_dvec3() / f64::from(u32::MAX).mul_add(1.0, 1.0)
-}
-
-/// Independent pairs in [0, 1)².
-pub fn random2(i: u32, seed: u32) -> DVec2 {
-    random3(i, seed).truncate()
+    v.truncate().as_dvec3() / (f64::from(u32::MAX) + 1.0)
 }
 
 /// Upper tail probability of a chi-square statistic, by the Wilson–Hilferty normal approximation.

@@ -81,3 +81,122 @@ pub fn orthonormal_basis(n: DVec3) -> (DVec3, DVec3) {
         DVec3::new(c, s + n.y * n.y * a, -n.y),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{chi_square_test, random3, sphere_test};
+    use super::*;
+
+    /// Chi-square tests at p = 1e-5 each.
+    const SIGNIFICANCE: f64 = 1e-5;
+
+    #[test]
+    fn directions_follow_their_density() {
+        let narrow = 0.2;
+        let upper = |w: DVec3, pdf: f64| if w.z > 0.0 { pdf } else { 0.0 };
+        let n = 40_000;
+        let tests: [(&str, f64); 4] = [
+            (
+                "sphere",
+                sphere_test(
+                    n,
+                    1,
+                    4,
+                    |u| Some(square_to_sphere(u.truncate())),
+                    |_| UNIFORM_SPHERE_PDF,
+                ),
+            ),
+            (
+                "hemisphere",
+                sphere_test(
+                    n,
+                    2,
+                    4,
+                    |u| Some(square_to_hemisphere(u.truncate())),
+                    |w| upper(w, UNIFORM_HEMISPHERE_PDF),
+                ),
+            ),
+            (
+                "cosine",
+                sphere_test(
+                    n,
+                    3,
+                    16,
+                    |u| Some(square_to_cosine_hemisphere(u.truncate())),
+                    |w| cosine_hemisphere_pdf(w.z),
+                ),
+            ),
+            // The rim of the cone lies on the rim of a row of cells.
+            (
+                "cone",
+                sphere_test(
+                    n,
+                    4,
+                    4,
+                    |u| Some(square_to_cone(u.truncate(), 0.25)),
+                    |w| if w.z > 0.75 { cone_pdf(0.25) } else { 0.0 },
+                ),
+            ),
+        ];
+        for (name, p) in tests {
+            assert!(p > SIGNIFICANCE, "{name}: {p}");
+        }
+        let wrong = sphere_test(
+            n,
+            3,
+            16,
+            |u| Some(square_to_hemisphere(u.truncate())),
+            |w| cosine_hemisphere_pdf(w.z),
+        );
+        assert!(wrong < SIGNIFICANCE, "the test must be able to fail");
+        for i in 0..1000 {
+            let w = square_to_cone(random3(i, 5).truncate(), narrow * 1e-9);
+            assert!((w.length() - 1.0).abs() < 1e-12 && 1.0 - w.z <= narrow * 1e-9 + 1e-15);
+        }
+    }
+
+    /// Cells of equal area: rings by sectors of the disk, and the 64 congruent parts of a triangle.
+    #[test]
+    fn disk_and_triangle_are_uniform() {
+        let n = 64_000;
+        let (mut disk, mut triangle) = (vec![0.0; 64], vec![0.0; 64]);
+        for i in 0..n {
+            let u = random3(i, 6).truncate();
+            let p = square_to_disk(u);
+            let ring = ((p.length_squared() * 8.0) as usize).min(7);
+            let sector = ((p.y.atan2(p.x).rem_euclid(TAU) / TAU * 8.0) as usize).min(7);
+            disk[ring * 8 + sector] += 1.0;
+            let b = square_to_triangle(u);
+            assert!(b.min_element() >= 0.0 && (b.element_sum() - 1.0).abs() < 1e-15);
+            let (row, column) = ((b.y * 8.0) as usize, (b.z * 8.0) as usize);
+            // Small triangles of a row: upright ones first, then the inverted ones.
+            let inverted = (b.y * 8.0).fract() + (b.z * 8.0).fract() > 1.0;
+            let before: usize = (0..row).map(|r| 15 - 2 * r).sum();
+            triangle[before + column + if inverted { 8 - row } else { 0 }] += 1.0;
+        }
+        let expected = vec![f64::from(n) / 64.0; 64];
+        assert!(chi_square_test(&disk, &expected) > SIGNIFICANCE);
+        assert!(chi_square_test(&triangle, &expected) > SIGNIFICANCE);
+        assert_eq!(square_to_disk(DVec2::splat(0.5)), DVec2::ZERO);
+    }
+
+    #[test]
+    fn bases_are_orthonormal_everywhere() {
+        let poles = [
+            DVec3::Z,
+            -DVec3::Z,
+            DVec3::new(1e-9, 0.0, -1.0),
+            DVec3::X,
+            -DVec3::Y,
+            DVec3::new(1.0, 0.0, -0.0),
+        ];
+        for n in poles
+            .into_iter()
+            .chain((0..1000).map(|i| square_to_sphere(random3(i, 7).truncate())))
+        {
+            let (t, b) = orthonormal_basis(n);
+            assert!((t.length() - 1.0).abs() < 1e-14 && (b.length() - 1.0).abs() < 1e-14);
+            assert!(t.dot(n).abs() < 1e-14 && (t.cross(b) - n).length() < 1e-14, "{n}");
+        }
+    }
+}

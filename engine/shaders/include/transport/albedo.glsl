@@ -1,12 +1,16 @@
 // Directional albedos of the GGX reflection lobe, from the table that the host computes.
 //
 // Method and layout: transport/albedo.rs. Guarantee: averages are those of the interpolated rows.
-// Expects: `float albedo_table(uint index)`, declared before the inclusion, which reads the table.
+// Expects: `float albedo_table(uint index)`, declared before the inclusion, which reads the table; what ggx.glsl expects.
 #ifndef CLERESTORY_TRANSPORT_ALBEDO_GLSL
 #define CLERESTORY_TRANSPORT_ALBEDO_GLSL
 
+#include "transport/ggx.glsl"
+
 const uint COS_NODES = 48u;
-const uint ALPHA_NODES = 24u;
+const uint ALPHA_NODES = 32u;
+// ALPHA_MIN to the power 1/4.
+const float ALPHA_ROOT_MIN = 0.1778279410038923;
 const uint ETA_NODES = 8u;
 const float ETA_PARAMETER_MAX = 0.5;
 const uint SCHLICK_LAYER = ETA_NODES + 1u;
@@ -20,11 +24,19 @@ uint albedo_node(float x, uint count, out float t) {
     return i;
 }
 
+// Row below alpha and the weight of the next: row 0 is the mirror.
+uint alpha_node(float alpha, out float t) {
+    t = 0.0;
+    return alpha < ALPHA_MIN
+        ? 0u
+        : 1u + albedo_node((sqrt(sqrt(alpha)) - ALPHA_ROOT_MIN) / (1.0 - ALPHA_ROOT_MIN), ALPHA_NODES - 1u, t);
+}
+
 float albedo_lookup(uint layer, float cos_theta, float alpha) {
     float fr;
     float fc;
-    uint row = albedo_node(sqrt(alpha), ALPHA_NODES, fr);
-    uint column = albedo_node(sqrt(max(cos_theta, 0.0)), COS_NODES, fc);
+    uint row = alpha_node(alpha, fr);
+    uint column = albedo_node(sqrt(sqrt(max(cos_theta, 0.0))), COS_NODES, fc);
     uint i = (layer * ALPHA_NODES + row) * COS_NODES + column;
     return mix(mix(albedo_table(i), albedo_table(i + 1u), fc),
                mix(albedo_table(i + COS_NODES), albedo_table(i + COS_NODES + 1u), fc), fr);
@@ -32,7 +44,7 @@ float albedo_lookup(uint layer, float cos_theta, float alpha) {
 
 float albedo_average(uint layer, float alpha) {
     float fr;
-    uint i = AVERAGE_BASE + layer * ALPHA_NODES + albedo_node(sqrt(alpha), ALPHA_NODES, fr);
+    uint i = AVERAGE_BASE + layer * ALPHA_NODES + alpha_node(alpha, fr);
     return mix(albedo_table(i), albedo_table(i + 1u), fr);
 }
 

@@ -218,7 +218,7 @@ vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi
         result = vec4(cosine_lobes_eval(b, lobes, cos_i) * cos_i, p_cosine * cosine_hemisphere_pdf(cos_i));
     }
     bool microfacets = HAS_METAL || HAS_SPECULAR_LAYER || HAS_TRANSMISSION;
-    if (!microfacets || bsdf_is_delta(b) || !(reflected || HAS_TRANSMISSION)) {
+    if (!microfacets || bsdf_is_delta(b) || !(reflected || bsdf_transmission(b) > 0.0)) {
         return result;
     }
     bool refracted = HAS_TRANSMISSION && !reflected && (b.flags & BSDF_THIN) == 0u;
