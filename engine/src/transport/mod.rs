@@ -6,15 +6,19 @@ pub mod distribution;
 pub mod environment;
 pub mod fresnel;
 pub mod ggx;
+pub mod gpu_scene;
 pub mod lights;
 pub mod path_set;
+pub mod path_tracer;
 pub mod phase;
 pub mod phong;
 pub mod random;
 pub mod shading_normal;
 pub mod warp;
 
+pub use gpu_scene::GpuScene;
 pub use path_set::PathSet;
+pub use path_tracer::{PathTracer, PathTracerSettings};
 
 #[cfg(test)]
 mod testing;
