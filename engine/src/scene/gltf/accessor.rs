@@ -4,7 +4,7 @@ use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::validation::{Checked, USize64};
 use ::gltf::json::{Index, buffer};
 
-use super::{MAX_ELEMENTS, MAX_ZERO_ELEMENTS, Reader};
+use super::{MAX_ZERO_ELEMENTS, Reader};
 use crate::Result;
 
 /// A decoded accessor, component by component.
@@ -107,10 +107,13 @@ impl<'a> Reader<'a> {
             );
         }
         self.elements = self.elements.saturating_add(count);
-        if self.elements > MAX_ELEMENTS {
+        if self.elements > self.element_budget {
             return self.fail(
                 format!("{place}.count"),
-                format!("the file's accessors are used for more than {MAX_ELEMENTS} elements"),
+                format!(
+                    "the file's accessors are used for more than {} elements, too many for its size",
+                    self.element_budget
+                ),
             );
         }
         let component = Component {

@@ -40,7 +40,10 @@ const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Greatest number of accessor elements that one file may make us decode, repeated use counted.
+/// Greatest number of accessor elements that one file may make us decode, repeated use counted: for each byte of its buffers, beyond a
+/// free allowance, and at all. Sharing one vertex buffer among a hundred primitives fits; a small file cannot ask for gigabytes.
+const ELEMENTS_PER_BYTE: u64 = 32;
+const FREE_ELEMENTS: u64 = MAX_ZERO_ELEMENTS;
 const MAX_ELEMENTS: u64 = 1 << 27;
 /// Greatest length of an accessor without a buffer view (all zeros): it costs no bytes in the file.
 const MAX_ZERO_ELEMENTS: u64 = 1 << 22;
@@ -72,6 +75,7 @@ pub fn load_slice(bytes: &[u8], folder: &Path, source: &str) -> Result<Scene> {
         root: &root,
         buffers: Vec::new(),
         elements: 0,
+        element_budget: 0,
         texels: 0,
         images: BTreeMap::new(),
         meshes: BTreeMap::new(),
@@ -96,6 +100,8 @@ struct Reader<'a> {
     buffers: Vec<Vec<u8>>,
     /// Accessor elements decoded so far.
     elements: u64,
+    /// How many may be.
+    element_budget: u64,
     /// Texels decoded so far.
     texels: u64,
     /// glTF image index to scene image index; `None` for one that cannot be used.
@@ -175,6 +181,8 @@ impl<'a> Reader<'a> {
             }
             self.buffers.push(bytes);
         }
+        let bytes: u64 = self.buffers.iter().map(|b| b.len() as u64).sum();
+        self.element_budget = (FREE_ELEMENTS + ELEMENTS_PER_BYTE * bytes).min(MAX_ELEMENTS);
         Ok(())
     }
 

@@ -597,19 +597,12 @@ fn unusable_positions_and_counts_are_refused() {
 
 #[test]
 fn repeated_use_cannot_multiply_work_without_bound() {
-    // A thousand primitives that each use the same four million zeros.
     let mut document = Document::new();
     document
         .list("accessors")
-        .push(json!({"componentType": 5121, "type": "VEC3", "count": 4_000_000}));
-    document.json["meshes"][0]["primitives"] = (0..1000)
-        .map(|_| json!({"attributes": {"POSITION": 0}, "mode": 5}))
-        .collect();
-    // Shared, so that the test itself stays small: the budget ends it after 33 of them at the latest.
-    document.list("accessors")[0]["count"] = 4_000_000.into();
-    document.json["meshes"][0]["primitives"][0]["attributes"] = json!({"POSITION": 0, "NORMAL": 0});
-    document.list("accessors")[0]["count"] = ((1u64 << 22) + 1).into();
-    assert!(document.refusal().contains("zeros"));
+        .push(json!({"componentType": 5121, "type": "VEC3", "count": 3_000_000}));
+    document.json["meshes"][0]["primitives"] = (0..1000).map(|_| json!({"attributes": {"POSITION": 0}})).collect();
+    assert!(document.refusal().contains("too many for its size"));
 }
 
 #[test]
