@@ -118,11 +118,12 @@ fn add_material(scene: &mut Scene, source: &tobj::Material) {
     let unit = |value: f32| if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 };
     let diffuse = source.diffuse.unwrap_or([0.6; 3]).map(unit);
     let mut material = Material::lambert(&source.name, Vec3::from_array(diffuse));
-    if let Some(emission) = source.emissive.map(Vec3::from_array) {
-        if emission.is_finite() && emission.min_element() >= 0.0 {
-            material.emission = emission;
-        }
-    }
+    let usable = |emission: &Vec3| emission.is_finite() && emission.min_element() >= 0.0;
+    material.emission = source
+        .emissive
+        .map(Vec3::from_array)
+        .filter(usable)
+        .unwrap_or(Vec3::ZERO);
     let mut others: BTreeSet<&str> = BTreeSet::new();
     for key in source.unknown_param.keys() {
         others.insert(key);

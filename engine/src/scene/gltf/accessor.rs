@@ -181,9 +181,8 @@ impl<'a> Reader<'a> {
                 ),
             );
         }
-        let mut values = Vec::new();
         let place = format!("accessors[{}]", index.value());
-        self.decode(accessor, component, width, &place, &mut values, 0.0, Component::value)?;
+        let values = self.decode(accessor, component, width, &place, 0.0, Component::value)?;
         Ok(Floats { width, values })
     }
 
@@ -197,23 +196,21 @@ impl<'a> Reader<'a> {
         if width != 1 || !unsigned {
             return self.fail(at, format!("accessor {} is not of unsigned scalars", index.value()));
         }
-        let mut values = Vec::new();
         let place = format!("accessors[{}]", index.value());
-        self.decode(accessor, component, 1, &place, &mut values, 0, Component::index)?;
-        Ok(values)
+        self.decode(accessor, component, 1, &place, 0, Component::index)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call decodes both floats and indices")]
+    /// Reads every component by `read`; where there is no buffer view, elements begin as `zero`.
     fn decode<T: Copy>(
         &self,
         accessor: &Accessor,
         component: Component,
         width: usize,
         place: &str,
-        values: &mut Vec<T>,
         zero: T,
         read: fn(Component, &[u8]) -> T,
-    ) -> Result<()> {
+    ) -> Result<Vec<T>> {
+        let mut values = Vec::new();
         let part = component.kind.size();
         let size = part * width;
         let count = accessor.count.0;
@@ -228,7 +225,7 @@ impl<'a> Reader<'a> {
             None => values.resize(count as usize * width, zero),
         }
         let Some(sparse) = &accessor.sparse else {
-            return Ok(());
+            return Ok(values);
         };
         let place = format!("{place}.sparse");
         if sparse.count.0 == 0 || sparse.count.0 > count {
@@ -278,6 +275,6 @@ impl<'a> Reader<'a> {
                 *value = read(component, bytes);
             }
         }
-        Ok(())
+        Ok(values)
     }
 }
