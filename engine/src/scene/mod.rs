@@ -4,11 +4,17 @@
 //! right-handed with +Y up, as in glTF 2.0; a camera looks along its local −Z.
 
 pub mod builtin;
-mod check;
+pub mod check;
+mod files;
+pub mod gltf;
 pub mod metals;
+mod obj;
+mod ply;
 mod profile;
+pub mod sidecar;
 pub mod tangents;
 
+pub use files::load;
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, SceneProfile, TransmissionUse};
 
 use glam::{DAffine3, Vec2, Vec3, Vec4};
@@ -38,21 +44,6 @@ pub struct Scene {
     pub defaults: RenderDefaults,
     /// What the reader met and could not carry over, by name.
     pub notes: Vec<Note>,
-}
-
-/// Loads a scene: a `builtin:` address or a file.
-///
-/// # Errors
-/// [`Error::Scene`](crate::Error::Scene) with the place of the first fault.
-pub fn load(address_or_path: &str) -> crate::Result<Scene> {
-    if address_or_path.starts_with(builtin::PREFIX) {
-        return builtin::generate(address_or_path);
-    }
-    Err(crate::Error::scene(
-        address_or_path,
-        "file name",
-        "unknown kind of scene file",
-    ))
 }
 
 impl Scene {

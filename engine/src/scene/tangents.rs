@@ -1,6 +1,7 @@
 //! Tangents for normal maps, by the mikktspace algorithm that glTF 2.0 §3.7.2.1 prescribes.
 //!
-//! M. S. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008; the crate `mikktspace`. Vertices whose corners disagree are split.
+//! M. S. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008; the crate
+//! `bevy_mikktspace`, which is free of unsafe code. Vertices whose corners disagree are split.
 
 use std::collections::HashMap;
 
@@ -20,7 +21,7 @@ impl Corners<'_> {
     }
 }
 
-impl mikktspace::Geometry for Corners<'_> {
+impl bevy_mikktspace::Geometry for Corners<'_> {
     fn num_faces(&self) -> usize {
         self.mesh.triangles.len()
     }
@@ -43,8 +44,10 @@ impl mikktspace::Geometry for Corners<'_> {
         [uv.x, 1.0 - uv.y]
     }
 
-    fn set_tangent_encoded(&mut self, tangent: [f32; 4], face: usize, corner: usize) {
-        self.tangents[3 * face + corner] = Vec4::from_array(tangent);
+    fn set_tangent(&mut self, space: Option<bevy_mikktspace::TangentSpace>, face: usize, corner: usize) {
+        if let Some(space) = space {
+            self.tangents[3 * face + corner] = Vec4::from_array(space.tangent_encoded());
+        }
     }
 }
 
@@ -77,7 +80,7 @@ pub fn generate_from(mesh: &mut Mesh, uv_set: u32) -> bool {
         uv,
         tangents: vec![Vec4::ZERO; 3 * mesh.triangles.len()],
     };
-    if !mikktspace::generate_tangents(&mut corners) {
+    if bevy_mikktspace::generate_tangents(&mut corners).is_err() {
         return false;
     }
     let tangents = corners.tangents;

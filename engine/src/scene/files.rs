@@ -1,0 +1,112 @@
+//! The one entrance for scenes: `builtin:` addresses, model files with their sidecar, and sidecars given directly.
+//!
+//! A model without a camera gets one that frames it, and a model without any light gets a uniform environment, so that a picture comes
+//! out; both are reported as notes.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use super::{Camera, Environment, EnvironmentUse, Note, Scene, SceneProfile, builtin, gltf, obj, ply, sidecar};
+use crate::{Error, Result};
+
+/// Loads a scene: a `builtin:` address, a model (`.gltf`, `.glb`, `.ply`, `.obj`) or a sidecar (`.toml` with `file`).
+///
+/// Beside a model `NAME.EXT`, a file `NAME.scene.toml` is read as its sidecar.
+///
+/// # Errors
+/// [`Error::Io`] for a file that cannot be read; [`Error::Scene`] with the place of the first fault in it.
+pub fn load(address_or_path: &str) -> Result<Scene> {
+    if address_or_path.starts_with(builtin::PREFIX) {
+        return builtin::generate(address_or_path);
+    }
+    let path = Path::new(address_or_path);
+    let mut scene = if extension(path) == "toml" {
+        let sidecar = sidecar::Sidecar::read(path)?;
+        let mut scene = model(&sidecar.model_path()?)?;
+        scene.name = stem(path);
+        sidecar.apply(&mut scene)?;
+        scene
+    } else {
+        let mut scene = model(path)?;
+        let beside = path.with_extension("scene.toml");
+        if beside.is_file() {
+            sidecar::Sidecar::read(&beside)?.apply(&mut scene)?;
+        }
+        scene
+    };
+    scene.source = address_or_path.into();
+    complete(&mut scene);
+    scene.check()?;
+    Ok(scene)
+}
+
+fn extension(path: &Path) -> String {
+    path.extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
+}
+
+/// The file's name without its extensions, for output files.
+pub(super) fn stem(path: &Path) -> String {
+    let stem = path
+        .file_stem()
+        .map(|s| s.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    stem.strip_suffix(".scene").map(str::to_string).unwrap_or(stem)
+}
+
+fn model(path: &Path) -> Result<Scene> {
+    match extension(path).as_str() {
+        "gltf" | "glb" => gltf::load(path),
+        "ply" => ply::load(path),
+        "obj" => obj::load(path),
+        other => Err(Error::scene(
+            path.display().to_string(),
+            "file name",
+            format!(
+                "{other:?} is no known kind of scene file; known: gltf, glb, ply, obj, toml, and builtin: addresses"
+            ),
+        )),
+    }
+}
+
+/// Adds what a picture needs and the file did not say.
+fn complete(scene: &mut Scene) {
+    let profile = SceneProfile::of(scene);
+    if scene.cameras.is_empty() {
+        scene.cameras.push(framing_camera(&profile));
+        scene.notes.push(Note {
+            feature: "no camera in the file".into(),
+            at: "cameras".into(),
+            instead: "a camera \"main\" that frames the scene is used".into(),
+        });
+    }
+    let lights = profile.lights.point + profile.lights.spot + profile.lights.directional;
+    let dark = profile.environment == EnvironmentUse::Absent && !profile.has_area_lights() && !profile.has_unlit;
+    if lights == 0 && dark && scene.environment.is_none() {
+        scene.environment = Some(Environment::uniform(Vec3::ONE));
+        scene.notes.push(Note {
+            feature: "no light in the file".into(),
+            at: "lights".into(),
+            instead: "a uniform environment of radiance 1 is used".into(),
+        });
+    }
+}
+
+/// A camera that sees the whole bounding sphere from the front, a little from above and from the right.
+fn framing_camera(profile: &SceneProfile) -> Camera {
+    const FOV_Y: f32 = std::f32::consts::FRAC_PI_4;
+    const MARGIN: f64 = 1.1;
+    let [low, high] = profile
+        .bounds
+        .map_or([DVec3::NEG_ONE, DVec3::ONE], |b| b.map(DVec3::from_array));
+    let centre = low.midpoint(high);
+    let radius = low.distance(high) / 2.0;
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    let direction = DVec3::new(0.35, 0.3, 1.0).normalize();
+    let distance = MARGIN * radius / (f64::from(FOV_Y) / 2.0).sin();
+    let mut camera = Camera::look_at("main", centre + direction * distance, centre, DVec3::Y, FOV_Y);
+    camera.focus_distance = distance as f32;
+    camera
+}

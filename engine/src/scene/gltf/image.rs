@@ -1,0 +1,176 @@
+//! Images and the textures that use them ("glTF 2.0 Specification", §3.8; KHR_texture_transform).
+
+use std::io::Cursor;
+use std::path::Path;
+
+use ::gltf::json::validation::Checked;
+use ::gltf::json::{self, Index};
+use serde_json::Value;
+
+use super::{MAX_IMAGE_SIDE, MAX_TEXELS, Reader, uri};
+use crate::scene::{Filter, Image, Texture, Wrap};
+use crate::{Error, Result};
+
+/// Bytes that the decoder may allocate for one image.
+const MAX_DECODER_BYTES: u64 = 1 << 30;
+
+/// Where a texture is used and how.
+pub struct TextureUse<'u> {
+    pub index: Index<json::Texture>,
+    pub tex_coord: u32,
+    pub transform: Option<&'u json::extensions::texture::TextureTransform>,
+}
+
+impl<'u> TextureUse<'u> {
+    /// The use that a `textureInfo` describes.
+    pub fn of(info: &'u json::texture::Info) -> Self {
+        Self {
+            index: info.index,
+            tex_coord: info.tex_coord,
+            transform: info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref()),
+        }
+    }
+}
+
+/// Decodes a `KHR_texture_transform` that the crate left as JSON.
+pub fn transform_from_json(value: &Value) -> Option<json::extensions::texture::TextureTransform> {
+    serde_json::from_value(value.get("KHR_texture_transform")?.clone()).ok()
+}
+
+impl Reader<'_> {
+    /// A texture, or `None` with a note when it cannot be used.
+    pub fn texture(&mut self, usage: &TextureUse<'_>, folder: &Path, at: &str) -> Result<Option<Texture>> {
+        let i = usage.index.value();
+        let texture = self.get(&self.root.textures, "texture", i, &format!("{at}.index"))?;
+        let place = format!("textures[{i}]");
+        let other = texture
+            .extensions
+            .as_ref()
+            .and_then(|e| e.others.keys().next().cloned());
+        // The crate marks a missing source by the greatest index.
+        if texture.source.value() == u32::MAX as usize {
+            let feature = other.unwrap_or_else(|| "texture without an image".into());
+            self.note(feature, place, format!("{at} is left out"));
+            return Ok(None);
+        }
+        if let Some(name) = other {
+            self.note(name, &place, "the texture's plain image is used");
+        }
+        let Some(image) = self.image(texture.source.value(), folder, &format!("{place}.source"))? else {
+            return Ok(None);
+        };
+        let (wrap, filter) = match texture.sampler {
+            None => ([Wrap::Repeat; 2], Filter::Linear),
+            Some(sampler) => self.sampler(sampler.value(), &format!("{place}.sampler"))?,
+        };
+        let uv_set = usage.transform.and_then(|t| t.tex_coord).unwrap_or(usage.tex_coord);
+        if uv_set > 1 {
+            self.note(
+                format!("TEXCOORD_{uv_set}"),
+                at,
+                "the texture is left out; sets 0 and 1 are supported",
+            );
+            return Ok(None);
+        }
+        let transform = match usage.transform {
+            None => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            Some(t) => transform_rows(t.offset.0, t.rotation.0, t.scale.0),
+        };
+        Ok(Some(Texture {
+            image,
+            uv_set,
+            wrap,
+            filter,
+            transform,
+        }))
+    }
+
+    fn sampler(&mut self, i: usize, at: &str) -> Result<([Wrap; 2], Filter)> {
+        use json::texture::{MagFilter, WrappingMode};
+        let sampler = self.get(&self.root.samplers, "sampler", i, at)?;
+        let wrap = |mode: &Checked<WrappingMode>| match mode {
+            Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
+            Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::MirroredRepeat),
+            Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::ClampToEdge),
+            Checked::Invalid => self.fail(format!("samplers[{i}]"), "has a wrap mode that is none of the allowed"),
+        };
+        let wraps = [wrap(&sampler.wrap_s)?, wrap(&sampler.wrap_t)?];
+        let filter = match sampler.mag_filter {
+            Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
+            None | Some(Checked::Valid(MagFilter::Linear)) => Filter::Linear,
+            Some(Checked::Invalid) => {
+                return self.fail(format!("samplers[{i}].magFilter"), "is none of the allowed filters");
+            }
+        };
+        Ok((wraps, filter))
+    }
+
+    /// The scene's index of a glTF image, decoded at its first use; `None` with a note for an unknown format.
+    fn image(&mut self, i: usize, folder: &Path, at: &str) -> Result<Option<u32>> {
+        if let Some(known) = self.images.get(&i) {
+            return Ok(*known);
+        }
+        let image = self.get(&self.root.images, "image", i, at)?;
+        let place = format!("images[{i}]");
+        let name = image
+            .name
+            .clone()
+            .or_else(|| image.uri.clone().filter(|uri| !uri.starts_with("data:")));
+        let external;
+        let bytes = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => {
+                external = uri::read(uri, folder, self.source, &format!("{place}.uri"))?;
+                &external[..]
+            }
+            (None, Some(view)) => self.view(view, &format!("{place}.bufferView"))?.0,
+            (None, None) => return self.fail(place, "has neither uri nor bufferView"),
+        };
+        let fail = |cause: String| Error::scene(self.source, &place, cause);
+        let format = ::image::guess_format(bytes);
+        if !matches!(format, Ok(::image::ImageFormat::Png | ::image::ImageFormat::Jpeg)) {
+            let what = match format {
+                Ok(format) => format!("image format {format:?}"),
+                Err(_) => "unknown image format".into(),
+            };
+            self.note(
+                what,
+                place,
+                "textures that use it are left out; PNG and JPEG are supported",
+            );
+            self.images.insert(i, None);
+            return Ok(None);
+        }
+        let mut decoder = ::image::ImageReader::new(Cursor::new(bytes))
+            .with_guessed_format()
+            .map_err(|error| fail(error.to_string()))?;
+        let mut limits = ::image::Limits::default();
+        limits.max_image_width = Some(MAX_IMAGE_SIDE);
+        limits.max_image_height = Some(MAX_IMAGE_SIDE);
+        limits.max_alloc = Some(MAX_DECODER_BYTES);
+        decoder.limits(limits);
+        let decoded = decoder.decode().map_err(|error| fail(error.to_string()))?;
+        let texels = self.texels + u64::from(decoded.width()) * u64::from(decoded.height());
+        if texels > MAX_TEXELS {
+            return self.fail(place, format!("the file's images have more than {MAX_TEXELS} texels"));
+        }
+        self.texels = texels;
+        let rgba = decoded.into_rgba8();
+        let index = self.scene.add_image(Image {
+            name: name.unwrap_or(place),
+            width: rgba.width(),
+            height: rgba.height(),
+            texels: rgba.pixels().map(|p| p.0).collect(),
+        });
+        self.images.insert(i, Some(index));
+        Ok(Some(index))
+    }
+}
+
+/// Translation · rotation · scale as in KHR_texture_transform; its rotation is counter-clockwise with v downwards.
+pub fn transform_rows(offset: [f32; 2], rotation: f32, scale: [f32; 2]) -> [[f32; 3]; 2] {
+    let (sin, cos) = rotation.sin_cos();
+    [
+        [cos * scale[0], sin * scale[1], offset[0]],
+        [-sin * scale[0], cos * scale[1], offset[1]],
+    ]
+}

@@ -1,0 +1,248 @@
+//! Wavefront OBJ: positions, normals, texture coordinates and faces, with the Kd and Ke of `.mtl` files.
+//!
+//! Read by the crate `tobj`; polygons are cut into fans. Materials are Lambert with their Kd, and emit their Ke; everything else an
+//! `.mtl` says is reported.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::io::Cursor;
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+
+use super::{Material, Mesh, Note, Scene, files};
+use crate::{Error, Result};
+
+/// Reads an OBJ file and the material libraries beside it.
+pub(super) fn load(path: &Path) -> Result<Scene> {
+    let bytes = std::fs::read(path).map_err(|source| Error::io(path, source))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut scene = parse(&bytes, &path.display().to_string(), |library| {
+        std::fs::read(folder.join(library)).ok()
+    })?;
+    scene.name = files::stem(path);
+    Ok(scene)
+}
+
+fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>) -> Result<Scene> {
+    check_indices(bytes).map_err(|(line, cause)| Error::scene(source, format!("line {line}"), cause))?;
+    let options = tobj::LoadOptions {
+        single_index: true,
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+    };
+    let mut scene = Scene {
+        source: source.into(),
+        ..Scene::default()
+    };
+    let missing = RefCell::new(Vec::new());
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |name| match library(name) {
+        Some(text) => tobj::load_mtl_buf(&mut Cursor::new(text)),
+        None => {
+            missing.borrow_mut().push(name.display().to_string());
+            Ok(Default::default())
+        }
+    });
+    let (models, materials) = loaded.map_err(|error| Error::scene(source, "OBJ", error.to_string()))?;
+    for name in missing.into_inner() {
+        scene.notes.push(Note {
+            feature: "material library that cannot be read".into(),
+            at: name,
+            instead: "its materials are grey".into(),
+        });
+    }
+    let materials = materials.map_err(|error| Error::scene(source, "mtllib", error.to_string()))?;
+    for material in &materials {
+        add_material(&mut scene, material);
+    }
+    let grey = scene.add_material(Material::lambert("default", Vec3::splat(0.6)));
+    for model in models {
+        let name = model.name;
+        let mesh = model.mesh;
+        if mesh.indices.is_empty() {
+            continue;
+        }
+        let vectors = |values: &[f32]| values.as_chunks::<3>().0.iter().map(|v| Vec3::from_array(*v)).collect();
+        let mut normals: Vec<Vec3> = vectors(&mesh.normals);
+        for normal in &mut normals {
+            *normal = if normal.is_finite() {
+                normal.normalize_or(Vec3::Y)
+            } else {
+                Vec3::Y
+            };
+        }
+        let positions: Vec<Vec3> = vectors(&mesh.positions);
+        let mut uv0: Vec<Vec2> = (mesh.texcoords.as_chunks::<2>().0.iter())
+            // OBJ's v grows upwards.
+            .map(|[u, v]| Vec2::new(*u, 1.0 - v))
+            .map(|uv| if uv.is_finite() { uv } else { Vec2::ZERO })
+            .collect();
+        for (what, count) in [("normals", normals.len()), ("texture coordinates", uv0.len())] {
+            if count != 0 && count != positions.len() {
+                scene.notes.push(Note {
+                    feature: format!("{what} at some corners only"),
+                    at: format!("object {name:?}"),
+                    instead: "left out".into(),
+                });
+            }
+        }
+        if normals.len() != positions.len() {
+            normals.clear();
+        }
+        if uv0.len() != positions.len() {
+            uv0.clear();
+        }
+        let material = mesh
+            .material_id
+            .filter(|&i| i < materials.len())
+            .map_or(grey, |i| i as u32);
+        scene.place(Mesh {
+            name,
+            positions,
+            normals,
+            uv0,
+            triangles: mesh.indices.as_chunks::<3>().0.to_vec(),
+            material: Some(material),
+            ..Mesh::default()
+        });
+    }
+    if scene.meshes.is_empty() {
+        return Err(Error::scene(source, "faces", "there are none"));
+    }
+    scene.check()?;
+    Ok(scene)
+}
+
+fn add_material(scene: &mut Scene, source: &tobj::Material) {
+    let unit = |value: f32| if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 };
+    let diffuse = source.diffuse.unwrap_or([0.6; 3]).map(unit);
+    let mut material = Material::lambert(&source.name, Vec3::from_array(diffuse));
+    let usable = |emission: &Vec3| emission.is_finite() && emission.min_element() >= 0.0;
+    material.emission = source
+        .emissive
+        .map(Vec3::from_array)
+        .filter(usable)
+        .unwrap_or(Vec3::ZERO);
+    let mut others: BTreeSet<&str> = BTreeSet::new();
+    for key in source.unknown_param.keys() {
+        others.insert(key);
+    }
+    for (key, value) in [
+        ("map_Kd", &source.diffuse_texture),
+        ("map_Ks", &source.specular_texture),
+        ("map_Bump", &source.normal_texture),
+        ("map_d", &source.dissolve_texture),
+    ] {
+        if value.is_some() {
+            others.insert(key);
+        }
+    }
+    for (key, value) in [
+        ("Ks", source.specular.is_some_and(|s| s != [0.0; 3])),
+        ("d", source.dissolve.is_some_and(|d| d < 1.0)),
+    ] {
+        if value {
+            others.insert(key);
+        }
+    }
+    if !others.is_empty() {
+        let keys: Vec<&str> = others.into_iter().collect();
+        scene.notes.push(Note {
+            feature: format!("material keys {}", keys.join(", ")),
+            at: format!("newmtl {}", source.name),
+            instead: "only Kd and Ke are used".into(),
+        });
+    }
+    scene.add_material(material);
+}
+
+/// Checks faces and numbers line by line before the crate sees them, so that faults have a line.
+fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
+    // Counts of v, vt, vn so far: faces may refer backwards only, by the format's rules; forwards is refused.
+    let mut counts = [0i64; 3];
+    for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
+        let line = String::from_utf8_lossy(line);
+        let mut words = line.split_ascii_whitespace();
+        let Some(key) = words.next() else {
+            continue;
+        };
+        if let Some(slot) = ["v", "vt", "vn"].iter().position(|k| *k == key) {
+            counts[slot] += 1;
+            if key == "v" && !words.take(3).all(|w| w.parse::<f32>().is_ok_and(f32::is_finite)) {
+                return Err((i + 1, "a position is no finite number".into()));
+            }
+        } else if key == "f" {
+            for corner in words {
+                for (part, count) in corner.split('/').zip(counts) {
+                    if part.is_empty() {
+                        continue;
+                    }
+                    let index = part
+                        .parse::<i64>()
+                        .map_err(|_| (i + 1, format!("{part:?} is no index")))?;
+                    if index == 0 || index > count || index < -count {
+                        return Err((
+                            i + 1,
+                            format!("index {index} is out of range; there are {count} so far"),
+                        ));
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 2\nusemtl red\n\
+        f 1/1/1 2/2/1 3/3/1 -1/-1/-1\nusemtl lamp\nf 1//1 2//1 3//1\n";
+    const MTL: &str = "newmtl red\nKd 0.8 0.1 0.1\nKs 0.5 0.5 0.5\nNs 10\nnewmtl lamp\nKd 0 0 0\nKe 3 2 1\n";
+
+    fn read(text: &str) -> Result<Scene> {
+        parse(text.as_bytes(), "a.obj", |_| Some(MTL.as_bytes().to_vec()))
+    }
+
+    #[test]
+    fn faces_materials_and_coordinates_are_read() {
+        let scene = read(TEXT).expect("scene");
+        let triangles: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
+        assert_eq!((triangles, scene.meshes.len()), (3, 2));
+        let mesh = &scene.meshes[0];
+        assert_eq!(mesh.normals[0], Vec3::Z);
+        assert_eq!(mesh.uv0[0], Vec2::new(0.0, 1.0));
+        let material = |i: usize| &scene.materials[scene.meshes[i].material.expect("material") as usize];
+        assert_eq!(material(0).base_color.truncate(), Vec3::new(0.8, 0.1, 0.1));
+        assert_eq!(material(1).emission, Vec3::new(3.0, 2.0, 1.0));
+        assert!(
+            scene.notes.iter().any(|n| n.feature.contains("Ks")),
+            "{:?}",
+            scene.notes
+        );
+    }
+
+    #[test]
+    fn faults_have_their_line() {
+        let at = |text: String| read(&text).expect_err("fault").to_string();
+        assert!(at(TEXT.replace("1//1 2//1 3//1", "1//1 2//1 9//1")).contains("line 13"));
+        assert!(at(TEXT.replace("1//1 2//1 3//1", "1//1 2//1 0//1")).contains("line 13"));
+        assert!(at(TEXT.replace("v 1 1 0", "v 1 nan 0")).contains("line 4"));
+        assert!(at("v 0 0 0\n".into()).contains("faces"));
+    }
+
+    #[test]
+    fn cut_files_do_not_panic() {
+        for cut in 0..TEXT.len() {
+            let _ = read(&TEXT[..cut]);
+        }
+    }
+
+    #[test]
+    fn a_missing_library_is_a_note() {
+        let scene = parse(TEXT.as_bytes(), "a.obj", |_| None).expect("scene");
+        assert!(scene.notes.iter().any(|n| n.at == "a.mtl"));
+    }
+}

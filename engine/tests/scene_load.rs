@@ -1,0 +1,195 @@
+//! Scenes from files through the one entrance: sidecars, bare meshes, environment maps, and refusals with their place.
+
+use std::path::Path;
+
+use clerestory::Error;
+use clerestory::scene::{self, EnvironmentUse, Projection, Scene, SceneProfile};
+use glam::{DVec3, Vec3};
+
+const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl ring\nf 1 2 3\n";
+const MTL: &str = "newmtl ring\nKd 0.5 0.5 0.5\n";
+
+/// A folder with an OBJ model `m.obj` and a sidecar beside it.
+fn folder(sidecar: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("folder");
+    std::fs::write(folder.path().join("m.obj"), OBJ).expect("file");
+    std::fs::write(folder.path().join("m.mtl"), MTL).expect("file");
+    std::fs::write(folder.path().join("m.scene.toml"), sidecar).expect("file");
+    folder
+}
+
+fn load(folder: &Path, name: &str) -> Result<Scene, Error> {
+    scene::load(&folder.join(name).display().to_string())
+}
+
+fn refusal(sidecar: &str) -> String {
+    load(folder(sidecar).path(), "m.obj")
+        .expect_err("must be refused")
+        .to_string()
+}
+
+#[test]
+fn a_bare_mesh_is_framed_and_lit() {
+    let folder = folder("");
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    assert_eq!((scene.name.as_str(), scene.cameras[0].name.as_str()), ("m", "main"));
+    assert_eq!(SceneProfile::of(&scene).environment, EnvironmentUse::Constant);
+    let features: Vec<&str> = scene.notes.iter().map(|n| n.feature.as_str()).collect();
+    assert_eq!(features, ["no camera in the file", "no light in the file"]);
+    // Every vertex is inside the square picture.
+    let view = scene.cameras[0].transform.inverse();
+    let Projection::Perspective { fov_y } = scene.cameras[0].projection else {
+        panic!("perspective");
+    };
+    let half = (f64::from(fov_y) / 2.0).tan();
+    for p in &scene.meshes[0].positions {
+        let q = view.transform_point3(p.as_dvec3());
+        assert!(q.z < 0.0 && q.x.abs() < -q.z * half && q.y.abs() < -q.z * half);
+    }
+}
+
+#[test]
+fn a_sidecar_adds_what_the_model_cannot_say() {
+    let folder = folder(
+        "exposure = 1.5\ntechnique = \"path\"\naspect = 2.0\n[environment]\ncolor = [1.0, 2.0, 3.0]\nstrength = 2.0\nrotation = 90.0\n\
+         [metals]\nring = \"gold\"\n[[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 60.0\n\
+         aperture = 0.25\n[medium]\nsigma_a = [0.1, 0.1, 0.1]\nsigma_s = [1.0, 1.0, 1.0]\ng = 0.5\n",
+    );
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    assert_eq!(scene.defaults.exposure, 1.5);
+    assert_eq!(
+        (scene.defaults.technique.as_deref(), scene.defaults.aspect),
+        (Some("path"), Some(2.0))
+    );
+    let environment = scene.environment.as_ref().expect("environment");
+    assert_eq!(
+        (environment.radiance[0], environment.strength),
+        (Vec3::new(1.0, 2.0, 3.0), 2.0)
+    );
+    assert!((environment.rotation * Vec3::Z).distance(Vec3::X) < 1e-6);
+    assert!(scene.materials[0].conductor == scene::metals::by_name("gold") && scene.materials[0].metallic == 1.0);
+    let camera = &scene.cameras[0];
+    assert_eq!((camera.lens_radius, camera.focus_distance), (0.25, 5.0));
+    assert_eq!(camera.transform.translation, DVec3::new(0.0, 0.0, 5.0));
+    assert_eq!(scene.notes.len(), 1);
+    assert_eq!(scene.notes[0].feature, "participating media");
+    assert!(SceneProfile::of(&scene).has_lens);
+}
+
+#[test]
+fn a_sidecar_can_be_the_scene() {
+    let folder = folder("");
+    std::fs::write(folder.path().join("dusk.toml"), "file = \"m.obj\"\nexposure = -1.0\n").expect("file");
+    let scene = load(folder.path(), "dusk.toml").expect("scene");
+    assert_eq!((scene.name.as_str(), scene.defaults.exposure), ("dusk", -1.0));
+    std::fs::write(folder.path().join("empty.toml"), "exposure = 1.0\n").expect("file");
+    assert!(
+        load(folder.path(), "empty.toml")
+            .expect_err("no file")
+            .to_string()
+            .contains("file = ")
+    );
+}
+
+#[test]
+fn sidecar_faults_have_their_line_or_key() {
+    for (sidecar, expected) in [
+        ("exposure = 1.0\nlens = 3\n", "line 2"),
+        ("[environment]\ncolour = [1.0, 1.0, 1.0]\n", "line 2"),
+        ("[metals]\nring = \"mithril\"\n", "gold, silver, copper, aluminium"),
+        ("[metals]\nbell = \"gold\"\n", "no material has that name"),
+        (
+            "[metals]\nring = { eta = [0.0, 1.0, 1.0], k = [1.0, 1.0, 1.0] }\n",
+            "metals.ring",
+        ),
+        ("[[cameras]]\nname = \"new\"\n", "cameras.new"),
+        (
+            "[[cameras]]\nname = \"a\"\neye = [0.0, 1.0, 0.0]\ntarget = [0.0, 1.0, 0.0]\n",
+            "cameras.a",
+        ),
+        (
+            "[[cameras]]\nname = \"a\"\neye = [0.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n",
+            "up points along the view",
+        ),
+        ("[environment]\nstrength = 1.0\n", "either file or color"),
+        ("[environment]\nfile = \"none.exr\"\n", "none.exr"),
+        ("[environment]\ncolor = [nan, 0.0, 0.0]\n", "environment.color"),
+        (
+            "[medium]\nsigma_a = [0.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\ng = 1.0\n",
+            "medium.g",
+        ),
+        ("exposure = \n", "line 1"),
+    ] {
+        let error = refusal(sidecar);
+        assert!(error.contains(expected), "{expected}: {error}");
+    }
+}
+
+#[test]
+fn exr_and_hdr_environments_are_read_and_cleaned() {
+    let folder = folder("[environment]\nfile = \"sky.exr\"\n");
+    let texel = |x: usize, y: usize| {
+        if (x, y) == (1, 0) {
+            (f32::NAN, -1.0, 0.0)
+        } else {
+            (x as f32, y as f32, 7.5)
+        }
+    };
+    exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, texel).expect("EXR");
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    let environment = scene.environment.as_ref().expect("environment");
+    assert_eq!((environment.width, environment.height), (4, 2));
+    assert_eq!(environment.radiance[7], Vec3::new(3.0, 1.0, 7.5));
+    assert_eq!(environment.radiance[1], Vec3::ZERO);
+    assert!(scene.notes.iter().any(|n| n.instead.contains("1 texels")));
+    assert_eq!(SceneProfile::of(&scene).environment, EnvironmentUse::Map);
+
+    let file = std::fs::File::create(folder.path().join("sky.hdr")).expect("file");
+    let pixels = [image::Rgb([1.0f32, 0.5, 0.25]); 8];
+    image::codecs::hdr::HdrEncoder::new(file)
+        .encode(&pixels, 4, 2)
+        .expect("HDR");
+    std::fs::write(
+        folder.path().join("m.scene.toml"),
+        "[environment]\nfile = \"sky.hdr\"\n",
+    )
+    .expect("file");
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    assert_eq!(
+        scene.environment.expect("environment").radiance,
+        [Vec3::new(1.0, 0.5, 0.25); 8]
+    );
+
+    // Cut files are errors.
+    let whole = std::fs::read(folder.path().join("sky.exr")).expect("file");
+    std::fs::write(
+        folder.path().join("m.scene.toml"),
+        "[environment]\nfile = \"sky.exr\"\n",
+    )
+    .expect("file");
+    for cut in (0..whole.len()).step_by(7) {
+        std::fs::write(folder.path().join("sky.exr"), &whole[..cut]).expect("file");
+        assert!(
+            matches!(load(folder.path(), "m.obj"), Err(Error::Picture { .. })),
+            "{cut}"
+        );
+    }
+}
+
+#[test]
+fn unknown_files_are_refused_by_kind() {
+    let error = scene::load("model.fbx").expect_err("kind").to_string();
+    assert!(error.contains("\"fbx\"") && error.contains("gltf"), "{error}");
+    assert!(matches!(scene::load("nowhere/model.glb"), Err(Error::Io { .. })));
+    assert!(matches!(scene::load("builtin:nowhere"), Err(Error::Scene { .. })));
+}
+
+#[test]
+fn every_generated_scene_loads_by_its_address_and_serializes_its_profile() {
+    for entry in scene::builtin::catalogue() {
+        let scene = scene::load(&format!("builtin:{}", entry.name)).expect(entry.name);
+        let json = serde_json::to_value(SceneProfile::of(&scene)).expect("JSON");
+        assert!(json["triangles"].as_u64().is_some_and(|n| n > 0));
+        assert!(serde_json::to_string(entry).expect("JSON").contains(entry.name));
+    }
+}
