@@ -461,7 +461,13 @@ impl Pass<'_> {
         self.recorder.next_command();
         self.recorder.touch(self.name, view.buffer, Access::TRANSFER_WRITE)?;
         // SAFETY: size and alignment were checked; the buffer is kept alive.
-        unsafe { self.recorder.gpu.inner.device.cmd_update_buffer(self.command_buffer, view.buffer.raw(), view.offset, bytes) };
+        unsafe {
+            self.recorder
+                .gpu
+                .inner
+                .device
+                .cmd_update_buffer(self.command_buffer, view.buffer.raw(), view.offset, bytes)
+        };
         Ok(())
     }
 

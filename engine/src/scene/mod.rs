@@ -209,7 +209,7 @@ pub struct Material {
     pub conductor: Option<ConductorIor>,
     /// Alpha mode.
     pub alpha_mode: AlphaMode,
-    /// Lit and emitting on both sides.
+    /// Emits from both sides; surfaces scatter on both sides either way.
     pub double_sided: bool,
     /// `KHR_materials_unlit`: shows base colour as emitted radiance, reflects nothing.
     pub unlit: bool,

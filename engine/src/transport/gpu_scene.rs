@@ -90,7 +90,14 @@ impl GpuScene {
         let bounds = geometry.bounds();
         let bsdf = BsdfFeatures::of_materials(placed_materials(scene).into_iter());
         let buffers = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
-        Ok(Self { profile, bsdf, statistics: bvh.statistics(), bounds, index, buffers })
+        Ok(Self {
+            profile,
+            bsdf,
+            statistics: bvh.statistics(),
+            bounds,
+            index,
+            buffers,
+        })
     }
 
     /// What the scene needs.
@@ -122,7 +129,11 @@ impl GpuScene {
     /// Set 1.
     pub fn index_set(&self) -> Bvh2Set<'_> {
         let [nodes, triangles, indices] = &self.index;
-        Bvh2Set { bvh2_nodes: nodes.view(), bvh2_triangles: triangles.view(), bvh2_indices: indices.view() }
+        Bvh2Set {
+            bvh2_nodes: nodes.view(),
+            bvh2_triangles: triangles.view(),
+            bvh2_indices: indices.view(),
+        }
     }
 
     /// Set 2.
@@ -154,7 +165,12 @@ fn placed_materials(scene: &Scene) -> Vec<&Material> {
             used[material as usize] = true;
         }
     }
-    scene.materials.iter().zip(used).filter_map(|(material, used)| used.then_some(material)).collect()
+    scene
+        .materials
+        .iter()
+        .zip(used)
+        .filter_map(|(material, used)| used.then_some(material))
+        .collect()
 }
 
 /// All instances flattened to world space.
@@ -187,7 +203,11 @@ impl Geometry {
             let flipped = linear.determinant() < 0.0;
             let orientation = if flipped { -1.0 } else { 1.0 };
             let count = mesh.positions.len();
-            all.positions.extend(mesh.positions.iter().map(|p| instance.transform.transform_point3(p.as_dvec3()).as_vec3()));
+            all.positions.extend(
+                mesh.positions
+                    .iter()
+                    .map(|p| instance.transform.transform_point3(p.as_dvec3()).as_vec3()),
+            );
             if profile.has_shading_normals {
                 let normal = |n: &Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3();
                 all.normals.extend(mesh.normals.iter().map(normal));
@@ -216,7 +236,11 @@ impl Geometry {
             let material = mesh.material.unwrap_or(default_material);
             all.triangles.extend(mesh.triangles.iter().map(|&[a, b, c]| {
                 let (b, c) = if flipped { (c, b) } else { (b, c) };
-                SceneTriangle { vertices: [base + a, base + b, base + c], material, light: NONE }
+                SceneTriangle {
+                    vertices: [base + a, base + b, base + c],
+                    material,
+                    light: NONE,
+                }
             }));
         }
         Ok(all)
@@ -227,14 +251,22 @@ impl Geometry {
     }
 
     fn corners(&self) -> Vec<[Vec3; 3]> {
-        self.triangles.iter().map(|triangle| self.corners_of(triangle)).collect()
+        self.triangles
+            .iter()
+            .map(|triangle| self.corners_of(triangle))
+            .collect()
     }
 
     fn bounds(&self) -> [Vec3; 2] {
         let finite = self.positions.iter().filter(|p| p.is_finite());
-        let (lower, upper) =
-            finite.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| (lower.min(*p), upper.max(*p)));
-        if lower.x <= upper.x { [lower, upper] } else { [Vec3::ZERO; 2] }
+        let (lower, upper) = finite.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
+            (lower.min(*p), upper.max(*p))
+        });
+        if lower.x <= upper.x {
+            [lower, upper]
+        } else {
+            [Vec3::ZERO; 2]
+        }
     }
 }
 
@@ -248,12 +280,20 @@ impl SceneBuffers {
         bounds: [Vec3; 2],
     ) -> Result<Self> {
         let mut textures = Textures::default();
-        let mut materials: Vec<_> = scene.materials.iter().map(|material| textures.material(scene, material)).collect();
+        let mut materials: Vec<_> = scene
+            .materials
+            .iter()
+            .map(|material| textures.material(scene, material))
+            .collect();
         materials.push(textures.material(scene, &Material::default()));
         let lights = Lights::collect(scene, profile, &mut geometry, &materials, bounds)?;
         let absent = gpu.buffer_with("absent", Category::Material, &[0u8; 16])?;
         let optional = |name: &str, category, bytes: &[u8]| {
-            if bytes.is_empty() { Ok(absent.clone()) } else { gpu.buffer_with(name, category, bytes) }
+            if bytes.is_empty() {
+                Ok(absent.clone())
+            } else {
+                gpu.buffer_with(name, category, bytes)
+            }
         };
         let albedo = if bsdf.specular_layer || bsdf.multiple_scattering {
             AlbedoTable::shared().values.as_slice()
@@ -261,17 +301,37 @@ impl SceneBuffers {
             &[]
         };
         Ok(Self {
-            positions: optional("positions", Category::Geometry, bytemuck::cast_slice(&geometry.positions))?,
-            triangles: optional("triangles", Category::Geometry, bytemuck::cast_slice(&geometry.triangles))?,
+            positions: optional(
+                "positions",
+                Category::Geometry,
+                bytemuck::cast_slice(&geometry.positions),
+            )?,
+            triangles: optional(
+                "triangles",
+                Category::Geometry,
+                bytemuck::cast_slice(&geometry.triangles),
+            )?,
             normals: optional("normals", Category::Geometry, bytemuck::cast_slice(&geometry.normals))?,
-            uvs: optional("texture coordinates", Category::Geometry, bytemuck::cast_slice(&geometry.uvs))?,
+            uvs: optional(
+                "texture coordinates",
+                Category::Geometry,
+                bytemuck::cast_slice(&geometry.uvs),
+            )?,
             tangents: optional("tangents", Category::Geometry, bytemuck::cast_slice(&geometry.tangents))?,
-            colors: optional("vertex colours", Category::Geometry, bytemuck::cast_slice(&geometry.colors))?,
+            colors: optional(
+                "vertex colours",
+                Category::Geometry,
+                bytemuck::cast_slice(&geometry.colors),
+            )?,
             materials: optional("materials", Category::Material, bytemuck::cast_slice(&materials))?,
             textures: optional("textures", Category::Material, bytemuck::cast_slice(&textures.records))?,
             texels: optional("texels", Category::Material, bytemuck::cast_slice(&textures.texels))?,
             lights: optional("lights", Category::Light, bytemuck::cast_slice(&lights.records))?,
-            cdf: optional("light probabilities", Category::Light, bytemuck::cast_slice(&lights.cdf))?,
+            cdf: optional(
+                "light probabilities",
+                Category::Light,
+                bytemuck::cast_slice(&lights.cdf),
+            )?,
             environment: optional("environment", Category::Light, &lights.environment)?,
             albedo_table: optional("albedo table", Category::Material, bytemuck::cast_slice(albedo))?,
         })
@@ -295,7 +355,10 @@ impl Textures {
             AlphaMode::Mask { cutoff } => (cutoff, MATERIAL_MASK),
             AlphaMode::Blend => (0.0, MATERIAL_BLEND),
         };
-        let attenuation = m.attenuation_color.as_dvec3().map(|c| -c.clamp(f64::from(f32::MIN_POSITIVE), 1.0).ln());
+        let attenuation = m
+            .attenuation_color
+            .as_dvec3()
+            .map(|c| -c.clamp(f64::from(f32::MIN_POSITIVE), 1.0).ln());
         let attenuation = attenuation / f64::from(m.attenuation_distance);
         SceneMaterial {
             base_color: m.base_color.truncate().to_array(),
@@ -309,7 +372,9 @@ impl Textures {
             conductor_k: conductor.map_or([0.0; 3], |c| c.k.to_array()),
             ior: m.ior,
             conductor_average: conductor.map_or([0.0; 3], |c| {
-                fresnel_conductor_average(c.eta.as_dvec3(), c.k.as_dvec3()).as_vec3().to_array()
+                fresnel_conductor_average(c.eta.as_dvec3(), c.k.as_dvec3())
+                    .as_vec3()
+                    .to_array()
             }),
             specular: m.specular,
             attenuation: attenuation.as_vec3().to_array(),
@@ -345,7 +410,11 @@ impl Textures {
             Wrap::ClampToEdge => 2,
         };
         let flags = if srgb { TEXTURE_SRGB } else { 0 }
-            | if texture.filter == Filter::Nearest { TEXTURE_NEAREST } else { 0 }
+            | if texture.filter == Filter::Nearest {
+                TEXTURE_NEAREST
+            } else {
+                0
+            }
             | if texture.uv_set == 1 { TEXTURE_UV1 } else { 0 }
             | wrap(texture.wrap[0]) << TEXTURE_WRAP_U_SHIFT
             | wrap(texture.wrap[1]) << TEXTURE_WRAP_V_SHIFT;
@@ -397,7 +466,11 @@ impl Lights {
                 let double_sided = material.flags & MATERIAL_DOUBLE_SIDED != 0;
                 geometry.triangles[index].light = records.len() as u32;
                 powers.push(luminance(triangle_power(emission, area, double_sided)));
-                records.push(SceneLight { kind: LIGHT_TRIANGLE, triangle: index as u32, ..SceneLight::default() });
+                records.push(SceneLight {
+                    kind: LIGHT_TRIANGLE,
+                    triangle: index as u32,
+                    ..SceneLight::default()
+                });
             }
         }
         let radius = 0.5 * (upper - lower).as_dvec3().length();
@@ -413,13 +486,24 @@ impl Lights {
         if let Some(map) = scene.environment.as_ref().filter(|_| profile.has_environment()) {
             environment_cdf = environment_distribution(map)?;
             powers.push(environment_power(map, radius));
-            records.push(SceneLight { kind: LIGHT_ENVIRONMENT, ..SceneLight::default() });
+            records.push(SceneLight {
+                kind: LIGHT_ENVIRONMENT,
+                ..SceneLight::default()
+            });
             // The lights' table has one more entry than there are lights; the texels' begins behind it.
             environment = environment_block(map, records.len() as u32 + 1);
         }
-        let mut cdf = if records.is_empty() { Vec::new() } else { build_distribution("lights", &powers)? };
+        let mut cdf = if records.is_empty() {
+            Vec::new()
+        } else {
+            build_distribution("lights", &powers)?
+        };
         cdf.extend(environment_cdf);
-        Ok(Self { records, cdf, environment })
+        Ok(Self {
+            records,
+            cdf,
+            environment,
+        })
     }
 }
 
@@ -431,7 +515,13 @@ fn light_record(kind: &LightKind) -> SceneLight {
             strength: intensity.to_array(),
             ..SceneLight::default()
         },
-        LightKind::Spot { position, direction, intensity, inner, outer } => SceneLight {
+        LightKind::Spot {
+            position,
+            direction,
+            intensity,
+            inner,
+            outer,
+        } => SceneLight {
             kind: LIGHT_SPOT,
             position: position.to_array(),
             direction: direction.to_array(),

@@ -18,7 +18,8 @@ use crate::film::accumulate::TwoFloat;
 use crate::film::picture::Picture;
 use crate::gpu::shaders::sets::{Bvh2Set, PathBuffers, SceneSet};
 use crate::gpu::shaders::transport::{
-    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_resolve, path_shade, path_shadow,
+    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_resolve, path_shade,
+    path_shadow,
 };
 use crate::gpu::shaders::types::{FilmAov, FilmPixel, Hit, PathAov, PathState, Ray, ShadowRay};
 use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, Timings};
@@ -85,7 +86,11 @@ impl Default for PathTracerSettings {
 impl PathTracerSettings {
     fn check(&self) -> Result<()> {
         let fail = |name: &str, value: String, cause: &str| {
-            Err(Error::Setting { name: name.into(), value, cause: cause.into() })
+            Err(Error::Setting {
+                name: name.into(),
+                value,
+                cause: cause.into(),
+            })
         };
         if !(self.roulette_cap > 0.0 && self.roulette_cap <= 1.0) {
             return fail("roulette_cap", self.roulette_cap.to_string(), "is not in (0, 1]");
@@ -95,7 +100,11 @@ impl PathTracerSettings {
             return fail("ray_quota", self.ray_quota.to_string(), "is not in 128..=60000");
         }
         if self.paths_in_flight > 1 << 22 {
-            return fail("paths_in_flight", self.paths_in_flight.to_string(), "is more than 4194304");
+            return fail(
+                "paths_in_flight",
+                self.paths_in_flight.to_string(),
+                "is more than 4194304",
+            );
         }
         Ok(())
     }
@@ -216,7 +225,13 @@ impl PathTracer {
     ///
     /// # Errors
     /// [`Error::Setting`] for a setting or size out of range, [`Error::OutOfMemory`], [`Error::MissingFeature`].
-    pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, camera: &Camera, size: [u32; 2], settings: PathTracerSettings) -> Result<Self> {
+    pub fn new(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: PathTracerSettings,
+    ) -> Result<Self> {
         settings.check()?;
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         if pixels == 0 || pixels > u64::from(u32::MAX) {
@@ -237,7 +252,14 @@ impl PathTracer {
         let pipelines = Pipelines::new(gpu, &scene, &settings, &view, camera)?;
         let buffers = WaveBuffers::new(gpu, slots, settings.aovs)?;
         let bands = (0..pixels.div_ceil(BAND_PIXELS))
-            .map(|band| Band::new(gpu, band * BAND_PIXELS, (pixels - band * BAND_PIXELS).min(BAND_PIXELS), settings.aovs))
+            .map(|band| {
+                Band::new(
+                    gpu,
+                    band * BAND_PIXELS,
+                    (pixels - band * BAND_PIXELS).min(BAND_PIXELS),
+                    settings.aovs,
+                )
+            })
             .collect::<Result<_>>()?;
         let mut tracer = Self {
             gpu: gpu.clone(),
@@ -274,9 +296,15 @@ impl PathTracer {
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         let wanted = u64::from(samples) * u64::from(self.size[0]) * u64::from(self.size[1]);
-        let Some(wave) = self.next_wave(samples) else { return Ok(None) };
+        let Some(wave) = self.next_wave(samples) else {
+            return Ok(None);
+        };
         let timings = self.run(&wave)?;
-        Ok(Some(Step { timings, done: self.cursor.done, wanted }))
+        Ok(Some(Step {
+            timings,
+            done: self.cursor.done,
+            wanted,
+        }))
     }
 
     /// Renders until every pixel has `samples` samples.
@@ -334,15 +362,31 @@ impl PathTracer {
             }
         }
         let mut picture = Picture::new(self.size[0], self.size[1])?;
-        picture.add_layer("radiance", 3, film.iter().flat_map(|pixel| statistics(pixel).0).collect())?;
-        picture.add_layer("variance", 3, film.iter().flat_map(|pixel| statistics(pixel).1).collect())?;
+        picture.add_layer(
+            "radiance",
+            3,
+            film.iter().flat_map(|pixel| statistics(pixel).0).collect(),
+        )?;
+        picture.add_layer(
+            "variance",
+            3,
+            film.iter().flat_map(|pixel| statistics(pixel).1).collect(),
+        )?;
         picture.add_layer("samples", 1, film.iter().map(|pixel| pixel.samples as f32).collect())?;
         if self.settings.aovs {
             let mean = |aov: &FilmAov, i: usize| {
-                let sum = TwoFloat { hi: aov.sum[i].hi, lo: aov.sum[i].lo }.to_f64();
+                let sum = TwoFloat {
+                    hi: aov.sum[i].hi,
+                    lo: aov.sum[i].lo,
+                }
+                .to_f64();
                 (sum / f64::from(aov.hits.max(1))) as f32
             };
-            let layer = |first: usize| aovs.iter().flat_map(|a| [0, 1, 2].map(|i| mean(a, first + i))).collect::<Vec<_>>();
+            let layer = |first: usize| {
+                aovs.iter()
+                    .flat_map(|a| [0, 1, 2].map(|i| mean(a, first + i)))
+                    .collect::<Vec<_>>()
+            };
             picture.add_layer("albedo", 3, layer(0))?;
             picture.add_layer("normal", 3, layer(3))?;
             picture.add_layer("depth", 1, aovs.iter().map(|a| mean(a, 6)).collect())?;
@@ -359,7 +403,11 @@ impl PathTracer {
         let pixels = (band.pixels - c.pixel_in_band).min(self.slots);
         // Several samples of a pixel share a wave only where all of the picture fits.
         let whole = self.bands.len() == 1 && pixels == band.pixels;
-        let wave_samples = if whole { (self.slots / pixels).min(samples - c.sample).max(1) } else { 1 };
+        let wave_samples = if whole {
+            (self.slots / pixels).min(samples - c.sample).max(1)
+        } else {
+            1
+        };
         let wave = Wave {
             band: c.band,
             first_pixel: band.first_pixel + c.pixel_in_band,
@@ -394,7 +442,10 @@ impl PathTracer {
             (status.stalled, status.unfinished) = (0, 0);
             recorder.pass("path: begin", |pass| {
                 pass.update(self.buffers.status.view(), &[status])?;
-                pass.memory_barrier(Access::TRANSFER_WRITE | Access::COMPUTE, Access::COMPUTE | Access::INDIRECT_READ);
+                pass.memory_barrier(
+                    Access::TRANSFER_WRITE | Access::COMPUTE,
+                    Access::COMPUTE | Access::INDIRECT_READ,
+                );
                 Ok(())
             })?;
             if first {
@@ -406,14 +457,21 @@ impl PathTracer {
             }
             recorder.pass("path: read status", |pass| {
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
-                pass.copy(self.buffers.status.slice(0, size_of::<Status>() as u64), self.buffers.readback.view())
+                pass.copy(
+                    self.buffers.status.slice(0, size_of::<Status>() as u64),
+                    self.buffers.readback.view(),
+                )
             })?;
             timings.push(recorder.submit()?.wait()?);
             let before = status.rounds;
             status = self.buffers.readback.read::<Status>(0, 1)?[0];
             if status.stalled != 0 {
                 self.counters.stalls += 1;
-                stalls_in_a_row = if status.rounds == before { stalls_in_a_row + 1 } else { 0 };
+                stalls_in_a_row = if status.rounds == before {
+                    stalls_in_a_row + 1
+                } else {
+                    0
+                };
                 if stalls_in_a_row > STALLS_MAX {
                     return Err(Error::Overflow {
                         kernel: "path_extend".into(),
@@ -521,11 +579,22 @@ impl PathTracer {
             pixel_count: wave.pixels,
             sample_count: wave.samples,
         };
-        let film = path_resolve::Set1 { film_pixels: band.film.view(), film_aovs: band.aovs.view() };
+        let film = path_resolve::Set1 {
+            film_pixels: band.film.view(),
+            film_aovs: band.aovs.view(),
+        };
         recorder.pass("path: resolve", |pass| {
             let groups = self.pipelines.resolve.groups_for(wave.pixels);
-            pass.dispatch(&self.pipelines.resolve, &[&self.buffers.set(0), &film], &push, [groups, 1, 1])?;
-            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ);
+            pass.dispatch(
+                &self.pipelines.resolve,
+                &[&self.buffers.set(0), &film],
+                &push,
+                [groups, 1, 1],
+            )?;
+            pass.memory_barrier(
+                Access::COMPUTE,
+                Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,
+            );
             Ok(())
         })
     }
@@ -559,7 +628,10 @@ impl PathTracer {
 
 /// What every stage leaves behind is for the next one to read, write or take its arguments from.
 fn stage_barrier(pass: &mut Pass<'_>) {
-    pass.memory_barrier(Access::COMPUTE | Access::INDIRECT_READ, Access::COMPUTE | Access::INDIRECT_READ);
+    pass.memory_barrier(
+        Access::COMPUTE | Access::INDIRECT_READ,
+        Access::COMPUTE | Access::INDIRECT_READ,
+    );
 }
 
 fn initial_status(paths: u32) -> Status {
@@ -577,10 +649,20 @@ fn initial_status(paths: u32) -> Status {
 /// Mean and variance of the mean, per channel; zero for a pixel without samples.
 fn statistics(pixel: &FilmPixel) -> ([f32; 3], [f32; 3]) {
     let n = f64::from(pixel.samples);
-    let value = |pair: &crate::gpu::shaders::types::TwoFloat| TwoFloat { hi: pair.hi, lo: pair.lo }.to_f64();
+    let value = |pair: &crate::gpu::shaders::types::TwoFloat| {
+        TwoFloat {
+            hi: pair.hi,
+            lo: pair.lo,
+        }
+        .to_f64()
+    };
     let mean = |c: usize| if n > 0.0 { value(&pixel.sum[c]) / n } else { 0.0 };
     let variance = |c: usize| {
-        if n > 1.0 { ((value(&pixel.square[c]) / n - mean(c) * mean(c)).max(0.0) / (n - 1.0)) as f32 } else { 0.0 }
+        if n > 1.0 {
+            ((value(&pixel.square[c]) / n - mean(c) * mean(c)).max(0.0) / (n - 1.0)) as f32
+        } else {
+            0.0
+        }
     };
     ([0, 1, 2].map(|c| mean(c) as f32), [0, 1, 2].map(variance))
 }
@@ -657,13 +739,21 @@ impl Pipelines {
         };
         Ok(Self {
             camera: camera_pipeline(gpu, settings, view, camera)?,
-            extend: gpu.compute_pipeline(&path_extend::Spec { bvh2_quota: settings.ray_quota, ..Default::default() })?,
+            extend: gpu.compute_pipeline(&path_extend::Spec {
+                bvh2_quota: settings.ray_quota,
+                ..Default::default()
+            })?,
             shade: gpu.compute_pipeline(&shade)?,
-            shadow: gpu.compute_pipeline(&path_shadow::Spec { bvh2_quota: settings.ray_quota, ..Default::default() })?,
+            shadow: gpu.compute_pipeline(&path_shadow::Spec {
+                bvh2_quota: settings.ray_quota,
+                ..Default::default()
+            })?,
             count: gpu.compute_pipeline(&())?,
             scan: gpu.compute_pipeline(&())?,
             scatter: gpu.compute_pipeline(&())?,
-            resolve: gpu.compute_pipeline(&path_resolve::Spec { write_aovs: settings.aovs })?,
+            resolve: gpu.compute_pipeline(&path_resolve::Spec {
+                write_aovs: settings.aovs,
+            })?,
         })
     }
 }
@@ -671,10 +761,18 @@ impl Pipelines {
 impl WaveBuffers {
     fn new(gpu: &Gpu, slots: u32, aovs: bool) -> Result<Self> {
         let buffer = |name: &str, bytes: usize| {
-            gpu.buffer(&BufferDesc::storage(name, bytes as u64 * u64::from(slots), Category::Work))
+            gpu.buffer(&BufferDesc::storage(
+                name,
+                bytes as u64 * u64::from(slots),
+                Category::Work,
+            ))
         };
         Ok(Self {
-            status: gpu.buffer(&BufferDesc::storage("path status", size_of::<Status>() as u64, Category::Work))?,
+            status: gpu.buffer(&BufferDesc::storage(
+                "path status",
+                size_of::<Status>() as u64,
+                Category::Work,
+            ))?,
             queues: [buffer("path queue a", 4)?, buffer("path queue b", 4)?],
             rays: buffer("path rays", size_of::<Ray>())?,
             states: buffer("path states", size_of::<PathState>())?,
@@ -689,10 +787,17 @@ impl WaveBuffers {
             ))?,
             aovs: gpu.buffer(&BufferDesc::storage(
                 "path aovs",
-                if aovs { u64::from(slots) * size_of::<PathAov>() as u64 } else { 0 },
+                if aovs {
+                    u64::from(slots) * size_of::<PathAov>() as u64
+                } else {
+                    0
+                },
                 Category::Work,
             ))?,
-            readback: gpu.buffer(&BufferDesc::readback("path status readback", size_of::<Status>() as u64))?,
+            readback: gpu.buffer(&BufferDesc::readback(
+                "path status readback",
+                size_of::<Status>() as u64,
+            ))?,
         })
     }
 
@@ -717,7 +822,11 @@ impl WaveBuffers {
 impl Band {
     fn new(gpu: &Gpu, first_pixel: u32, pixels: u32, aovs: bool) -> Result<Self> {
         let buffer = |name: &str, bytes: u64| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Film));
-        let aov_bytes = if aovs { u64::from(pixels) * size_of::<FilmAov>() as u64 } else { 0 };
+        let aov_bytes = if aovs {
+            u64::from(pixels) * size_of::<FilmAov>() as u64
+        } else {
+            0
+        };
         Ok(Self {
             first_pixel,
             pixels,
