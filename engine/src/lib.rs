@@ -1,10 +1,29 @@
 //! Clerestory: a Vulkan-native rendering engine that says how long every picture took and how wrong it is.
+//!
+//! ```no_run
+//! use clerestory::gpu::{Gpu, GpuOptions};
+//! use clerestory::{film, render, scene};
+//!
+//! # fn main() -> clerestory::Result<()> {
+//! let gpu = Gpu::headless(&GpuOptions::default())?;
+//! let scene = scene::load("builtin:cornell-box")?;
+//! let rendered = render::render(&gpu, &scene, &render::RenderOptions::default())?;
+//! film::exr::write("cornell-box.exr".as_ref(), &rendered.picture)?;
+//! println!("{:.2} s of GPU time", rendered.report.gpu_seconds);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`scene`] and [`film`], [`accel`] (spatial
+//! indexes), [`transport`] (what light does), [`techniques`], and [`render`], which ties them together.
 
 pub mod accel;
 pub mod error;
 pub mod film;
 pub mod gpu;
+pub mod render;
 pub mod scene;
+pub mod techniques;
 pub mod transport;
 
 pub use error::{Error, Result};

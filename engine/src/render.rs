@@ -1,0 +1,441 @@
+//! Floor 6: a scene, a technique, a camera and a film, tied together.
+//!
+//! [`render`] is the whole way in one call; [`Renderer`] keeps a scene on the device for several pictures, and [`Rendering`] refines one
+//! step by step, so that a host can show progress, stop at any time and keep what is there.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use crate::accel::IndexStatistics;
+use crate::film::picture::{Metadata, Picture};
+use crate::gpu::{Gpu, MemoryReport, PipelineInfo};
+use crate::scene::{Note, Scene, SceneProfile};
+use crate::techniques::{self, Skipped, Technique, View};
+use crate::transport::GpuScene;
+use crate::{Error, Result};
+
+/// What to render and how.
+#[derive(Debug, Clone)]
+pub struct RenderOptions {
+    /// Technique id; `None` takes the scene's own, else `path`.
+    pub technique: Option<String>,
+    /// Camera by name; `None` takes the first.
+    pub camera: Option<String>,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Samples a pixel to stop at.
+    pub spp: u32,
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// Also gathers albedo, normal and depth of what is seen first.
+    pub aovs: bool,
+    /// Stops after about this long, with what is there.
+    pub time_budget: Option<Duration>,
+    /// The technique's settings as JSON; `null` for its defaults.
+    pub settings: serde_json::Value,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            technique: None,
+            camera: None,
+            size: [512, 512],
+            spp: 64,
+            seed: 0,
+            aovs: false,
+            time_budget: None,
+            settings: serde_json::Value::Null,
+        }
+    }
+}
+
+/// A finished picture with its report.
+#[derive(Debug, Clone)]
+pub struct Rendered {
+    /// Layers `radiance`, `variance` (of the mean), `samples`, and AOVs.
+    pub picture: Picture,
+    /// How it came about.
+    pub report: FrameReport,
+}
+
+/// GPU time of all passes of one name.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct PassReport {
+    /// The pass's name.
+    pub name: String,
+    /// How often it ran.
+    pub count: u64,
+    /// GPU milliseconds in all; `None` without timestamps.
+    pub gpu_ms: Option<f64>,
+}
+
+/// Everything that is known about how a picture was made.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct FrameReport {
+    /// File or `builtin:` address.
+    pub scene: String,
+    /// Camera name.
+    pub camera: String,
+    /// Technique id.
+    pub technique: String,
+    /// Which light paths the picture contains.
+    pub path_set: String,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Samples a pixel that were asked for.
+    pub spp: u32,
+    /// Least and greatest number of samples that a pixel has got.
+    pub samples: [u32; 2],
+    /// Seed.
+    pub seed: u32,
+    /// True when it was stopped before all samples were there.
+    pub stopped_early: bool,
+    /// Samples left out because they were NaN or infinite.
+    pub non_finite_samples: u64,
+    /// Device name.
+    pub device: String,
+    /// Driver name and version.
+    pub driver: String,
+    /// Engine version.
+    pub engine_version: String,
+    /// When it was finished, ISO 8601 in UTC.
+    pub time: String,
+    /// Seconds of wall clock: upload and index of the scene.
+    pub upload_seconds: f64,
+    /// Seconds of wall clock: rendering, with the compilation of kernels by the driver.
+    pub render_seconds: f64,
+    /// Seconds of wall clock after the first step, and the share of all work that was done in them: speed without compilation.
+    pub steady_seconds: f64,
+    /// Work units (see the technique's counters) per second of steady time.
+    pub steady_rates: BTreeMap<String, f64>,
+    /// Seconds of GPU time in all passes.
+    pub gpu_seconds: f64,
+    /// GPU time by pass.
+    pub passes: Vec<PassReport>,
+    /// Exact counts of work.
+    pub counters: BTreeMap<String, u64>,
+    /// Device memory in use.
+    pub memory: MemoryReport,
+    /// The ray index.
+    pub index: IndexStatistics,
+    /// What the scene needs.
+    pub profile: SceneProfile,
+    /// What was left out, and why.
+    pub skipped: Vec<Skipped>,
+    /// Kernels and their specialization.
+    pub pipelines: Vec<PipelineInfo>,
+    /// The technique's settings.
+    pub settings: serde_json::Value,
+    /// What the reader of the scene could not carry over.
+    pub notes: Vec<Note>,
+}
+
+/// Where a rendering stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Share of the work that is done, by samples or by the time budget, whichever is further.
+    pub fraction: f64,
+    /// Seconds since it began.
+    pub seconds: f64,
+    /// Rays traced so far.
+    pub rays: u64,
+}
+
+/// A scene on a device, ready to be rendered.
+#[derive(Debug, Clone)]
+pub struct Renderer {
+    gpu: Gpu,
+    scene: Arc<Scene>,
+    gpu_scene: Arc<GpuScene>,
+    upload_seconds: f64,
+}
+
+/// Renders a scene: upload, all samples, picture and report.
+///
+/// # Errors
+/// As [`Renderer::new`], [`Renderer::start`] and [`Rendering::step`].
+pub fn render(gpu: &Gpu, scene: &Scene, options: &RenderOptions) -> Result<Rendered> {
+    let mut rendering = Renderer::new(gpu, scene)?.start(options)?;
+    while rendering.step()?.is_some() {}
+    rendering.finish()
+}
+
+impl Renderer {
+    /// Checks and uploads a scene.
+    ///
+    /// # Errors
+    /// [`Error::Scene`], [`Error::LimitExceeded`], [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+        let start = Instant::now();
+        let gpu_scene = Arc::new(GpuScene::new(gpu, scene)?);
+        let upload_seconds = start.elapsed().as_secs_f64();
+        // Only names and cameras are needed from here on; the geometry lives on the device.
+        let scene = Scene {
+            meshes: Vec::new(),
+            images: Vec::new(),
+            environment: None,
+            ..scene.clone()
+        };
+        Ok(Self {
+            gpu: gpu.clone(),
+            scene: Arc::new(scene),
+            gpu_scene,
+            upload_seconds,
+        })
+    }
+
+    /// The scene on the device.
+    pub fn gpu_scene(&self) -> &Arc<GpuScene> {
+        &self.gpu_scene
+    }
+
+    /// Prepares a picture.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for an option out of range or a camera that does not exist, [`Error::Unsupported`] when the technique cannot
+    /// model the scene, [`Error::MissingFeature`], [`Error::OutOfMemory`].
+    pub fn start(&self, options: &RenderOptions) -> Result<Rendering> {
+        let fail = |name: &str, value: String, cause: String| Error::Setting {
+            name: name.into(),
+            value,
+            cause,
+        };
+        if options.spp == 0 {
+            return Err(fail("spp", "0".into(), "must be at least 1".into()));
+        }
+        let camera = self.scene.camera(options.camera.as_deref()).ok_or_else(|| {
+            let names: Vec<_> = self.scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+            let wanted = options.camera.clone().unwrap_or_default();
+            fail(
+                "camera",
+                wanted,
+                format!("is not in the scene; there is: {}", names.join(", ")),
+            )
+        })?;
+        let id = options
+            .technique
+            .as_deref()
+            .or(self.scene.defaults.technique.as_deref())
+            .unwrap_or("path");
+        let info = techniques::by_id(id)?;
+        let view = View {
+            camera,
+            size: options.size,
+            seed: options.seed,
+            aovs: options.aovs,
+        };
+        let start = Instant::now();
+        let technique = info.prepare(&self.gpu, Arc::clone(&self.gpu_scene), &view, &options.settings)?;
+        Ok(Rendering {
+            renderer: self.clone(),
+            options: options.clone(),
+            technique_id: info.id,
+            camera: camera.name.clone(),
+            technique,
+            start,
+            first_step: None,
+            passes: BTreeMap::new(),
+            finished: false,
+        })
+    }
+}
+
+/// A picture in the making.
+pub struct Rendering {
+    renderer: Renderer,
+    options: RenderOptions,
+    technique_id: &'static str,
+    camera: String,
+    technique: Box<dyn Technique>,
+    start: Instant,
+    /// When the first step ended, and the counters then.
+    first_step: Option<(Instant, BTreeMap<&'static str, u64>)>,
+    passes: BTreeMap<String, (u64, Option<u64>)>,
+    finished: bool,
+}
+
+impl Rendering {
+    /// Does a bounded piece of work; `None` when all samples are there or the time is used up.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`].
+    pub fn step(&mut self) -> Result<Option<Progress>> {
+        let out_of_time = self
+            .options
+            .time_budget
+            .is_some_and(|budget| self.start.elapsed() >= budget);
+        // One step is always done, so that there is a picture.
+        if out_of_time && self.first_step.is_some() {
+            return Ok(None);
+        }
+        let Some(step) = self.technique.step(self.options.spp)? else {
+            self.finished = true;
+            return Ok(None);
+        };
+        for pass in step.timings.iter().flat_map(|timings| &timings.passes) {
+            let entry = self.passes.entry(pass.name.clone()).or_insert((0, Some(0)));
+            entry.0 += 1;
+            entry.1 = entry.1.zip(pass.nanoseconds).map(|(sum, ns)| sum + ns);
+        }
+        let counters = self.technique.counters();
+        let rays = counters.get("rays").copied().unwrap_or(0);
+        if self.first_step.is_none() {
+            self.first_step = Some((Instant::now(), counters));
+        }
+        self.finished = step.done >= step.wanted;
+        let seconds = self.start.elapsed().as_secs_f64();
+        let by_work = step.done as f64 / step.wanted.max(1) as f64;
+        let by_time = self
+            .options
+            .time_budget
+            .map_or(0.0, |budget| seconds / budget.as_secs_f64().max(1e-9));
+        Ok(Some(Progress {
+            fraction: by_work.max(by_time).min(1.0),
+            seconds,
+            rays,
+        }))
+    }
+
+    /// Looks through another camera, from the first sample on.
+    ///
+    /// # Errors
+    /// [`Error::Setting`], [`Error::DeviceLost`].
+    pub fn set_camera(&mut self, camera: &crate::scene::Camera) -> Result<()> {
+        self.camera.clone_from(&camera.name);
+        self.finished = false;
+        self.technique.set_camera(camera)
+    }
+
+    /// The picture as it is now, without its report.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn picture(&mut self) -> Result<Picture> {
+        Ok(self.technique.picture()?.0)
+    }
+
+    /// The picture and its report, at any time after the first step.
+    ///
+    /// # Errors
+    /// As [`Rendering::picture`].
+    pub fn finish(mut self) -> Result<Rendered> {
+        let end = Instant::now();
+        let (mut picture, non_finite_samples) = self.technique.picture()?;
+        let report = self.report(&picture, non_finite_samples, end);
+        picture.metadata = Metadata {
+            scene: Some(report.scene.clone()),
+            technique: Some(report.technique.clone()),
+            path_set: Some(report.path_set.clone()),
+            settings: Some(report.settings.to_string()),
+            seed: Some(u64::from(report.seed)),
+            spp: Some(u64::from(report.samples[1])),
+            device: Some(report.device.clone()),
+            driver: Some(report.driver.clone()),
+            engine_version: Some(report.engine_version.clone()),
+            time: Some(report.time.clone()),
+            seconds: Some(report.render_seconds),
+            other: BTreeMap::from([("camera".to_owned(), self.camera.clone())]),
+        };
+        Ok(Rendered { picture, report })
+    }
+
+    fn report(&self, picture: &Picture, non_finite_samples: u64, end: Instant) -> FrameReport {
+        let caps = self.renderer.gpu.caps();
+        let counters = self.technique.counters();
+        let (steady_start, before) = self.first_step.clone().unwrap_or((end, counters.clone()));
+        let steady_seconds = end.saturating_duration_since(steady_start).as_secs_f64();
+        let rate = |(name, count): (&&'static str, &u64)| {
+            let done = count - before.get(*name).copied().unwrap_or(0);
+            (done > 0).then(|| ((*name).to_owned(), done as f64 / steady_seconds))
+        };
+        let samples = picture.layer("samples").map(|layer| layer.values()).unwrap_or_default();
+        let least = samples.iter().copied().fold(f32::INFINITY, f32::min);
+        let greatest = samples.iter().copied().fold(0.0, f32::max);
+        let gpu_ns: u64 = self.passes.values().filter_map(|(_, ns)| *ns).sum();
+        FrameReport {
+            scene: self.renderer.scene.source.clone(),
+            camera: self.camera.clone(),
+            technique: self.technique_id.into(),
+            path_set: self.technique.path_set().to_string(),
+            size: self.options.size,
+            spp: self.options.spp,
+            samples: [least.min(greatest) as u32, greatest as u32],
+            seed: self.options.seed,
+            stopped_early: !self.finished,
+            non_finite_samples,
+            device: caps.device.clone(),
+            driver: caps.driver.clone(),
+            engine_version: env!("CARGO_PKG_VERSION").into(),
+            time: iso_8601(SystemTime::now()),
+            upload_seconds: self.renderer.upload_seconds,
+            render_seconds: end.duration_since(self.start).as_secs_f64(),
+            steady_seconds,
+            steady_rates: if steady_seconds > 0.0 {
+                counters.iter().filter_map(rate).collect()
+            } else {
+                BTreeMap::new()
+            },
+            gpu_seconds: gpu_ns as f64 * 1e-9,
+            passes: self
+                .passes
+                .iter()
+                .map(|(name, (count, ns))| PassReport {
+                    name: name.clone(),
+                    count: *count,
+                    gpu_ms: ns.filter(|_| caps.timestamp_period > 0.0).map(|ns| ns as f64 * 1e-6),
+                })
+                .collect(),
+            counters: counters
+                .iter()
+                .map(|(name, count)| ((*name).to_owned(), *count))
+                .collect(),
+            memory: self.renderer.gpu.memory_report(),
+            index: self.renderer.gpu_scene.index_statistics(),
+            profile: self.renderer.gpu_scene.profile().clone(),
+            skipped: self.technique.skipped(),
+            pipelines: self.technique.pipelines(),
+            settings: self.technique.settings(),
+            notes: self.renderer.scene.notes.clone(),
+        }
+    }
+}
+
+/// `2026-11-21T04:40:00Z`, by the civil calendar (Howard Hinnant's `civil_from_days`).
+fn iso_8601(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let (days, second) = ((seconds / 86_400) as i64, seconds % 86_400);
+    let shifted = days + 719_468;
+    let era = shifted.div_euclid(146_097);
+    let day_of_era = shifted.rem_euclid(146_097);
+    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 {
+        month_from_march + 3
+    } else {
+        month_from_march - 9
+    };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    format!(
+        "{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z",
+        second / 3600,
+        second / 60 % 60,
+        second % 60
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_civil() {
+        let at = |seconds| iso_8601(UNIX_EPOCH + Duration::from_secs(seconds));
+        assert_eq!(at(0), "1970-01-01T00:00:00Z");
+        assert_eq!(at(951_782_400), "2000-02-29T00:00:00Z");
+        assert_eq!(at(1_798_761_599), "2026-12-31T23:59:59Z");
+    }
+}

@@ -1,0 +1,176 @@
+//! Techniques: what turns a scene on the device into a picture.
+//!
+//! [`all`] lists them. Each says what it needs of a device, which scenes it can model (and refuses the others with the reason), which
+//! light paths its picture contains, and whether and how it is biased.
+
+mod path;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::film::picture::Picture;
+use crate::gpu::{Gpu, PipelineInfo};
+use crate::scene::{Camera, SceneProfile};
+use crate::transport::path_tracer::Step;
+use crate::transport::{GpuScene, PathSet};
+use crate::{Error, Result};
+
+/// How a technique's expected picture relates to the truth on its own path set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind", content = "cause")]
+pub enum Bias {
+    /// The expected picture is right at any number of samples.
+    Unbiased,
+    /// The error goes to zero with more work, but the expected picture is wrong before.
+    Consistent(&'static str),
+    /// An error stays, for this reason.
+    Biased(&'static str),
+}
+
+/// A technique as the catalogue knows it.
+pub struct TechniqueInfo {
+    /// Name on the command line.
+    pub id: &'static str,
+    /// One sentence.
+    pub summary: &'static str,
+    /// Where it was published.
+    pub publication: &'static str,
+    /// Bias.
+    pub bias: Bias,
+    /// Device features beyond the baseline, by their Vulkan names.
+    pub needs: &'static [&'static str],
+    /// The light paths of its picture with default settings.
+    pub path_set: PathSet,
+    /// Why it cannot model a scene; empty when it can.
+    pub refusals: fn(&SceneProfile) -> Vec<String>,
+    /// Default settings as JSON.
+    pub default_settings: fn() -> serde_json::Value,
+    prepare: Prepare,
+}
+
+type Prepare = fn(&Gpu, Arc<GpuScene>, &View<'_>, &serde_json::Value) -> Result<Box<dyn Technique>>;
+
+impl std::fmt::Debug for TechniqueInfo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TechniqueInfo")
+            .field("id", &self.id)
+            .finish_non_exhaustive()
+    }
+}
+
+/// What is looked at, and how finely.
+#[derive(Debug, Clone)]
+pub struct View<'a> {
+    /// The camera.
+    pub camera: &'a Camera,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Seed of the random numbers.
+    pub seed: u32,
+    /// Also gathers albedo, normal and depth.
+    pub aovs: bool,
+}
+
+/// A technique at work on one view. It refines its picture step by step.
+pub trait Technique: Send {
+    /// Does a bounded piece of work towards `samples` samples a pixel; `None` when there is nothing left to do.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`].
+    fn step(&mut self, samples: u32) -> Result<Option<Step>>;
+
+    /// The picture so far, and how many samples were left out because they were not finite.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    fn picture(&mut self) -> Result<(Picture, u64)>;
+
+    /// Begins anew through another camera.
+    ///
+    /// # Errors
+    /// [`Error::Setting`], [`Error::DeviceLost`].
+    fn set_camera(&mut self, camera: &Camera) -> Result<()>;
+
+    /// The light paths of the picture.
+    fn path_set(&self) -> PathSet;
+
+    /// The settings in force.
+    fn settings(&self) -> serde_json::Value;
+
+    /// Exact counts of work by name.
+    fn counters(&self) -> BTreeMap<&'static str, u64>;
+
+    /// The kernels and their specialization.
+    fn pipelines(&self) -> Vec<PipelineInfo>;
+
+    /// What was left out, and why.
+    fn skipped(&self) -> Vec<Skipped>;
+}
+
+/// Something that was not compiled, allocated or recorded.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Skipped {
+    /// What.
+    pub what: &'static str,
+    /// Why.
+    pub why: &'static str,
+}
+
+/// Every technique of the engine.
+pub fn all() -> &'static [TechniqueInfo] {
+    &[path::INFO]
+}
+
+/// The technique of that id.
+///
+/// # Errors
+/// [`Error::Setting`] that lists the ids there are.
+pub fn by_id(id: &str) -> Result<&'static TechniqueInfo> {
+    all()
+        .iter()
+        .find(|technique| technique.id == id)
+        .ok_or_else(|| Error::Setting {
+            name: "technique".into(),
+            value: id.into(),
+            cause: format!(
+                "is unknown; there is: {}",
+                all().iter().map(|t| t.id).collect::<Vec<_>>().join(", ")
+            ),
+        })
+}
+
+impl TechniqueInfo {
+    /// Prepares the technique for a view, with its settings as JSON (missing ones take their defaults).
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] with every reason why the scene cannot be modelled, [`Error::Setting`], [`Error::MissingFeature`],
+    /// [`Error::OutOfMemory`].
+    pub fn prepare(
+        &self,
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        view: &View<'_>,
+        settings: &serde_json::Value,
+    ) -> Result<Box<dyn Technique>> {
+        let reasons = (self.refusals)(scene.profile());
+        if !reasons.is_empty() {
+            return Err(Error::Unsupported {
+                technique: self.id.into(),
+                reasons,
+            });
+        }
+        (self.prepare)(gpu, scene, view, settings)
+    }
+}
+
+/// Settings of type `T` from JSON; `null` gives the defaults.
+fn settings_from_json<T: serde::de::DeserializeOwned + Default>(json: &serde_json::Value) -> Result<T> {
+    if json.is_null() {
+        return Ok(T::default());
+    }
+    serde_json::from_value(json.clone()).map_err(|error| Error::Setting {
+        name: "settings".into(),
+        value: json.to_string(),
+        cause: error.to_string(),
+    })
+}

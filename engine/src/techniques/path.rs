@@ -1,0 +1,115 @@
+//! The reference path tracer as a technique.
+
+use std::collections::BTreeMap;
+
+use super::{Bias, Skipped, Technique, TechniqueInfo, settings_from_json};
+use crate::Result;
+use crate::film::picture::Picture;
+use crate::gpu::PipelineInfo;
+use crate::scene::Camera;
+use crate::transport::PathSet;
+use crate::transport::path_tracer::{PathTracer, PathTracerSettings, Step};
+
+/// The catalogue's entry.
+pub(super) const INFO: TechniqueInfo = TechniqueInfo {
+    id: "path",
+    summary: "unidirectional path tracing with next-event estimation and multiple importance sampling",
+    publication: "Kajiya 1986; Veach 1997, chapters 9 and 10",
+    bias: Bias::Unbiased,
+    needs: &[],
+    path_set: PathSet::ALL,
+    refusals: |_| Vec::new(),
+    default_settings: || serde_json::to_value(PathTracerSettings::default()).unwrap_or_default(),
+    prepare: |gpu, scene, view, settings| {
+        let mut settings: PathTracerSettings = settings_from_json(settings)?;
+        settings.seed = view.seed;
+        settings.aovs |= view.aovs;
+        Ok(Box::new(PathTracer::new(gpu, scene, view.camera, view.size, settings)?))
+    },
+};
+
+/// What each specialization constant of the shading stage stands for, and why it may be off.
+const FEATURES: [(&str, &str, &str); 13] = [
+    ("has_metal", "metal lobes", "no material is metal"),
+    (
+        "has_conductor",
+        "exact conductors",
+        "no metal has a complex index of refraction",
+    ),
+    (
+        "has_specular_layer",
+        "dielectric reflection",
+        "no material reflects specularly",
+    ),
+    ("has_transmission", "transmission", "no material transmits"),
+    (
+        "has_multiple_scattering",
+        "multiple-scattering compensation",
+        "there is no metal, or it is switched off",
+    ),
+    ("has_textures", "texture look-ups", "no material has a texture"),
+    ("has_shading_normals", "shading normals", "no mesh interpolates normals"),
+    ("has_normal_maps", "normal maps", "no material has one"),
+    ("has_vertex_colors", "vertex colours", "no mesh has them"),
+    ("has_attenuation", "absorption in solids", "no solid absorbs"),
+    ("has_environment", "environment light", "the scene has none"),
+    ("has_area_lights", "area lights", "no material emits"),
+    (
+        "has_punctual_lights",
+        "point, spot and directional lights",
+        "the scene has none",
+    ),
+];
+
+impl Technique for PathTracer {
+    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        PathTracer::step(self, samples)
+    }
+
+    fn picture(&mut self) -> Result<(Picture, u64)> {
+        PathTracer::picture(self)
+    }
+
+    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        PathTracer::set_camera(self, camera)
+    }
+
+    fn path_set(&self) -> PathSet {
+        PathTracer::settings(self).path_set
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        serde_json::to_value(PathTracer::settings(self)).unwrap_or_default()
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        let c = PathTracer::counters(self);
+        BTreeMap::from([
+            ("paths", c.paths),
+            ("extend_rays", c.extend_rays),
+            ("shadow_rays", c.shadow_rays),
+            ("rays", c.extend_rays + c.shadow_rays),
+            ("waves", c.waves),
+            ("stalls", c.stalls),
+        ])
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        PathTracer::pipelines(self)
+    }
+
+    fn skipped(&self) -> Vec<Skipped> {
+        let pipelines = PathTracer::pipelines(self);
+        let off = |name: &str| {
+            let shade = pipelines.iter().filter(|pipeline| pipeline.shader.contains("shade"));
+            shade
+                .flat_map(|pipeline| &pipeline.specialization)
+                .any(|(known, value)| *known == name && *value == 0)
+        };
+        FEATURES
+            .iter()
+            .filter(|(name, ..)| off(name))
+            .map(|&(_, what, why)| Skipped { what, why })
+            .collect()
+    }
+}
