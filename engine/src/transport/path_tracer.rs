@@ -18,8 +18,8 @@ use crate::film::accumulate::TwoFloat;
 use crate::film::picture::Picture;
 use crate::gpu::shaders::sets::{Bvh2Set, PathBuffers, SceneSet};
 use crate::gpu::shaders::transport::{
-    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_resolve, path_shade,
-    path_shadow,
+    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_extend_alpha,
+    path_resolve, path_shade, path_shadow, path_shadow_alpha,
 };
 use crate::gpu::shaders::types::{FilmAov, FilmPixel, Hit, PathAov, PathState, Ray, ShadowRay};
 use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, Timings};
@@ -167,13 +167,24 @@ struct View {
 
 struct Pipelines {
     camera: ComputePipeline<path_camera::Kernel>,
-    extend: ComputePipeline<path_extend::Kernel>,
+    trace: TracePipelines,
     shade: ComputePipeline<path_shade::Kernel>,
-    shadow: ComputePipeline<path_shadow::Kernel>,
     count: ComputePipeline<path_compact_count::Kernel>,
     scan: ComputePipeline<path_compact_scan::Kernel>,
     scatter: ComputePipeline<path_compact_scatter::Kernel>,
     resolve: ComputePipeline<path_resolve::Kernel>,
+}
+
+/// Ray kernels, with the alpha test only where a scene has alpha.
+enum TracePipelines {
+    Opaque {
+        extend: ComputePipeline<path_extend::Kernel>,
+        shadow: ComputePipeline<path_shadow::Kernel>,
+    },
+    Alpha {
+        extend: ComputePipeline<path_extend_alpha::Kernel>,
+        shadow: ComputePipeline<path_shadow_alpha::Kernel>,
+    },
 }
 
 /// Working memory of a wave.
@@ -334,11 +345,12 @@ impl PathTracer {
     /// The kernels with their specialization.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let p = &self.pipelines;
+        let [extend, shadow] = p.trace.info();
         vec![
             p.camera.info(),
-            p.extend.info(),
+            extend,
+            shadow,
             p.shade.info(),
-            p.shadow.info(),
             p.count.info(),
             p.scan.info(),
             p.scatter.info(),
@@ -526,24 +538,39 @@ impl PathTracer {
         let paths = self.buffers.set(parity);
         let index: Bvh2Set<'_> = self.scene.index_set();
         let scene: SceneSet<'_> = self.scene.scene_set();
+        let (first_pixel, pixel_count, first_sample, seed) =
+            (wave.first_pixel, wave.pixels, wave.first_sample, self.settings.seed);
         let status = &self.buffers.status;
         let items = status.slice(std::mem::offset_of!(Status, item_groups) as u64, 12);
         let chunks = status.slice(std::mem::offset_of!(Status, chunk_groups) as u64, 12);
         let scatter = status.slice(std::mem::offset_of!(Status, scatter_groups) as u64, 12);
         if !resume_shadow {
             recorder.pass("path: extend", |pass| {
-                pass.dispatch_indirect(&p.extend, &[&paths, &index], &(), items)?;
+                match &p.trace {
+                    TracePipelines::Opaque { extend, .. } => {
+                        pass.dispatch_indirect(extend, &[&paths, &index], &(), items)?;
+                    }
+                    TracePipelines::Alpha { extend, .. } => {
+                        let push = path_extend_alpha::Push {
+                            first_pixel,
+                            pixel_count,
+                            first_sample,
+                            seed,
+                        };
+                        pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
+                    }
+                }
                 stage_barrier(pass);
                 Ok(())
             })?;
             let [lower, upper] = self.scene.bounds();
             let push = path_shade::Push {
                 scene_lower: lower.to_array(),
-                first_pixel: wave.first_pixel,
+                first_pixel,
                 scene_upper: upper.to_array(),
-                pixel_count: wave.pixels,
-                first_sample: wave.first_sample,
-                seed: self.settings.seed,
+                pixel_count,
+                first_sample,
+                seed,
                 path_set: self.settings.path_set.packed(),
                 roulette_start: self.settings.roulette_start,
                 roulette_cap: self.settings.roulette_cap,
@@ -556,7 +583,20 @@ impl PathTracer {
         }
         if self.scene.has_lights() {
             recorder.pass("path: shadow", |pass| {
-                pass.dispatch_indirect(&p.shadow, &[&paths, &index], &(), items)?;
+                match &p.trace {
+                    TracePipelines::Opaque { shadow, .. } => {
+                        pass.dispatch_indirect(shadow, &[&paths, &index], &(), items)?;
+                    }
+                    TracePipelines::Alpha { shadow, .. } => {
+                        let push = path_shadow_alpha::Push {
+                            first_pixel,
+                            pixel_count,
+                            first_sample,
+                            seed,
+                        };
+                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, items)?;
+                    }
+                }
                 stage_barrier(pass);
                 Ok(())
             })?;
@@ -736,18 +776,12 @@ impl Pipelines {
             has_punctual_lights: profile.lights.point + profile.lights.spot + profile.lights.directional > 0,
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
+            has_alpha: profile.has_alpha(),
         };
         Ok(Self {
             camera: camera_pipeline(gpu, settings, view, camera)?,
-            extend: gpu.compute_pipeline(&path_extend::Spec {
-                bvh2_quota: settings.ray_quota,
-                ..Default::default()
-            })?,
+            trace: TracePipelines::new(gpu, scene, settings.ray_quota)?,
             shade: gpu.compute_pipeline(&shade)?,
-            shadow: gpu.compute_pipeline(&path_shadow::Spec {
-                bvh2_quota: settings.ray_quota,
-                ..Default::default()
-            })?,
             count: gpu.compute_pipeline(&())?,
             scan: gpu.compute_pipeline(&())?,
             scatter: gpu.compute_pipeline(&())?,
@@ -755,6 +789,48 @@ impl Pipelines {
                 write_aovs: settings.aovs,
             })?,
         })
+    }
+}
+
+impl TracePipelines {
+    fn new(gpu: &Gpu, scene: &GpuScene, bvh2_quota: u32) -> Result<Self> {
+        let profile = scene.profile();
+        if !profile.has_alpha() {
+            return Ok(Self::Opaque {
+                extend: gpu.compute_pipeline(&path_extend::Spec {
+                    bvh2_quota,
+                    ..Default::default()
+                })?,
+                shadow: gpu.compute_pipeline(&path_shadow::Spec {
+                    bvh2_quota,
+                    ..Default::default()
+                })?,
+            });
+        }
+        let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
+        let extend = path_extend_alpha::Spec {
+            has_textures,
+            has_vertex_colors,
+            bvh2_quota,
+            ..Default::default()
+        };
+        let shadow = path_shadow_alpha::Spec {
+            has_textures,
+            has_vertex_colors,
+            bvh2_quota,
+            ..Default::default()
+        };
+        Ok(Self::Alpha {
+            extend: gpu.compute_pipeline(&extend)?,
+            shadow: gpu.compute_pipeline(&shadow)?,
+        })
+    }
+
+    fn info(&self) -> [PipelineInfo; 2] {
+        match self {
+            Self::Opaque { extend, shadow } => [extend.info(), shadow.info()],
+            Self::Alpha { extend, shadow } => [extend.info(), shadow.info()],
+        }
     }
 }
 
