@@ -55,7 +55,7 @@ void main() {
         direction = direction * push.focus_distance - offset;
     }
     rays[slot] = Ray(origin, 0.0, normalize(direction), FAR_AWAY);
-    paths[slot] = PathState(vec3(1.0), 0.0, vec3(0.0), 0u, 1.0);
+    paths[slot] = PathState(vec3(1.0), 0.0, vec3(0.0), 0u, 1.0, OUTSIDE);
     aovs[slot].filled = 0u;
     queue_in[slot] = slot;
     resume_words[2u * slot] = 0u;
