@@ -30,6 +30,9 @@ use crate::{Error, Result};
 const BOUNCES_PER_SUBMISSION: usize = 12;
 /// Pixels of one film buffer, so that no picture's size meets `maxStorageBufferRange`.
 const BAND_PIXELS: u32 = 1 << 20;
+/// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
+/// iterations in all.
+const SAMPLES_A_WAVE: u32 = 1024;
 /// Places that one invocation of the compaction kernels handles (`COMPACT_CHUNK`).
 const COMPACT_CHUNK: u32 = 32;
 /// Invocations of a workgroup of every stage (`PATH_GROUP`).
@@ -416,7 +419,7 @@ impl PathTracer {
         // Several samples of a pixel share a wave only where all of the picture fits.
         let whole = self.bands.len() == 1 && pixels == band.pixels;
         let wave_samples = if whole {
-            (self.slots / pixels).min(samples - c.sample).max(1)
+            (self.slots / pixels).clamp(1, SAMPLES_A_WAVE).min(samples - c.sample)
         } else {
             1
         };
