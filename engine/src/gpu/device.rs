@@ -132,6 +132,7 @@ pub(super) struct Inner {
     pub pipelines: Mutex<PipelineTable>,
     pub pipeline_cache: PipelineCache,
     pub crash_markers: bool,
+    pub validation: Validation,
     /// The last pass that a lost device reached.
     pub lost: OnceLock<String>,
     next_id: AtomicU64,
@@ -334,6 +335,7 @@ impl Gpu {
             pipelines: Mutex::new(BTreeMap::new()),
             pipeline_cache,
             crash_markers: options.crash_markers,
+            validation: options.validation,
             lost: OnceLock::new(),
             next_id: AtomicU64::new(1),
             owned,

@@ -15,7 +15,7 @@ use super::marker::BEGUN;
 use super::memory::Category;
 use super::pipeline::{ComputePipeline, descriptor_type};
 use super::resources::FrameResources;
-use super::submission::Submission;
+use super::submission::{self, Submission};
 use super::tracker::Tracker;
 use crate::{Error, Result};
 
@@ -181,24 +181,8 @@ impl Recorder {
         }
         let mut queue = inner.lock_queue();
         let value = queue.last_value + 1;
-        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        let semaphore = |raw: &vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(*raw).stage_mask(all);
-        let waits: Vec<_> = wait.iter().map(semaphore).collect();
-        let mut signals: Vec<_> = signal.iter().map(semaphore).collect();
-        signals.push(
-            vk::SemaphoreSubmitInfo::default()
-                .semaphore(inner.timeline)
-                .value(value)
-                .stage_mask(all),
-        );
-        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(command_buffer)];
-        let info = vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&waits)
-            .command_buffer_infos(&buffers)
-            .signal_semaphore_infos(&signals);
         // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
-        unsafe { inner.device.queue_submit2(queue.raw, &[info], vk::Fence::null()) }
-            .map_err(|result| inner.error("vkQueueSubmit2", result))?;
+        unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) }?;
         queue.last_value = value;
         drop(queue);
         Ok(Submission::new(
