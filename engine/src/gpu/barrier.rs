@@ -35,6 +35,9 @@ impl Access {
     /// Reads and writes in compute shaders.
     pub const COMPUTE: Self = Self(Self::COMPUTE_READ.0 | Self::COMPUTE_WRITE.0);
 
+    /// Reads and writes by copies.
+    pub const TRANSFER: Self = Self(Self::TRANSFER_READ.0 | Self::TRANSFER_WRITE.0);
+
     const WRITES: u16 = Self::COMPUTE_WRITE.0 | Self::TRANSFER_WRITE.0 | Self::COLOR_WRITE.0 | Self::DEPTH_WRITE.0;
 
     /// All uses of either.
@@ -187,7 +190,7 @@ pub fn rw_compute_to_compute(buffer: &Buffer) -> BufferBarrier<'_> {
 pub fn transfer_to_compute(buffer: &Buffer) -> BufferBarrier<'_> {
     BufferBarrier {
         buffer,
-        from: Access::TRANSFER_READ | Access::TRANSFER_WRITE,
+        from: Access::TRANSFER,
         to: Access::COMPUTE,
     }
 }
@@ -197,7 +200,7 @@ pub fn compute_to_transfer(buffer: &Buffer) -> BufferBarrier<'_> {
     BufferBarrier {
         buffer,
         from: Access::COMPUTE,
-        to: Access::TRANSFER_READ | Access::TRANSFER_WRITE,
+        to: Access::TRANSFER,
     }
 }
 

@@ -35,10 +35,10 @@ pub use barrier::{
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, SubgroupOperations};
 pub use device::{DeviceSelection, Gpu, GpuOptions, Validation};
-pub use host::{EnabledFeatures, HostDevice};
+pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
 pub use instance::{DeviceSummary, ValidationMessage};
-pub use memory::{Category, MemoryReport};
+pub use memory::{AllocationInfo, Category, MemoryReport};
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorder::{Pass, Recorder};
 pub use submission::Submission;

@@ -181,8 +181,15 @@ impl Recorder {
         }
         let mut queue = inner.lock_queue();
         let value = queue.last_value + 1;
+        if let Some(markers) = &self.markers {
+            inner.in_flight().begin(value, markers.clone(), self.passes.clone());
+        }
         // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
-        unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) }?;
+        let submitted = unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) };
+        if let Err(error) = submitted {
+            inner.in_flight().end(value, false);
+            return Err(error);
+        }
         queue.last_value = value;
         drop(queue);
         Ok(Submission::new(
@@ -190,7 +197,6 @@ impl Recorder {
             std::mem::take(&mut self.name),
             value,
             self.resources.take(),
-            self.markers.take(),
             std::mem::take(&mut self.passes),
             std::mem::take(&mut self.kept),
             self.statistics,

@@ -5,9 +5,7 @@ use std::time::{Duration, Instant};
 
 use ash::vk;
 
-use super::buffer::Buffer;
 use super::device::{Gpu, Inner, Validation};
-use super::marker;
 use super::recorder::Kept;
 use super::resources::FrameResources;
 use super::timing::{PassTiming, Timings};
@@ -22,7 +20,6 @@ pub struct Submission {
     name: String,
     value: u64,
     resources: Option<FrameResources>,
-    markers: Option<Buffer>,
     passes: Vec<String>,
     kept: Kept,
     statistics: bool,
@@ -35,7 +32,6 @@ impl Submission {
         name: String,
         value: u64,
         resources: Option<FrameResources>,
-        markers: Option<Buffer>,
         passes: Vec<String>,
         kept: Kept,
         statistics: bool,
@@ -45,7 +41,6 @@ impl Submission {
             name,
             value,
             resources,
-            markers,
             passes,
             kept,
             statistics,
@@ -103,23 +98,12 @@ impl Submission {
         match unsafe { inner.device.wait_semaphores(&info, limit.as_nanos() as u64) } {
             Ok(()) => Ok(true),
             Err(vk::Result::TIMEOUT) => Ok(false),
-            Err(vk::Result::ERROR_DEVICE_LOST) => {
-                let last = self
-                    .markers
-                    .as_ref()
-                    .map(|markers| marker::last_pass(markers, &self.passes));
-                let last = inner
-                    .lost
-                    .get_or_init(|| last.unwrap_or_else(|| format!("somewhere in {:?}", self.name)));
-                Err(Error::DeviceLost {
-                    last_pass: last.clone(),
-                })
-            }
             Err(result) => Err(inner.error("vkWaitSemaphores", result)),
         }
     }
 
     fn finish(mut self) -> Result<Timings> {
+        self.gpu.inner.in_flight().end(self.value, true);
         let Some(mut resources) = self.resources.take() else {
             return Ok(Timings::default());
         };
@@ -238,7 +222,17 @@ unsafe fn submit_by_version_1(
 impl Drop for Submission {
     fn drop(&mut self) {
         let Some(resources) = self.resources.take() else { return };
-        while matches!(self.wait_slice(WAIT_SLICE), Ok(false)) {}
+        let outcome = loop {
+            match self.wait_slice(WAIT_SLICE) {
+                Ok(false) => {}
+                other => break other,
+            }
+        };
+        if outcome.is_err() {
+            // A device that was lost while it worked may still be stopping.
+            self.gpu.inner.wait_for_queue();
+        }
+        self.gpu.inner.in_flight().end(self.value, outcome.is_ok());
         // SAFETY: the device has finished, or is lost and will never touch anything again.
         unsafe { resources.destroy(&self.gpu.inner.device) };
     }
