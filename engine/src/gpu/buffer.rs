@@ -130,8 +130,7 @@ impl Gpu {
             .usage(desc.usage)
             .sharing_mode(vk::SharingMode::EXCLUSIVE);
         // SAFETY: `info` is complete; the buffer is destroyed in `BufferInner::drop`.
-        let raw =
-            unsafe { gpu.device.create_buffer(&info, None) }
+        let raw = unsafe { gpu.device.create_buffer(&info, None) }
             .map_err(|result| gpu.creation_error("vkCreateBuffer", result, desc.name, bytes))?;
         // SAFETY: `raw` was just created.
         let requirements = unsafe { gpu.device.get_buffer_memory_requirements(raw) };

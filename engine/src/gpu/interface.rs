@@ -106,6 +106,36 @@ pub trait ComputeShader {
     fn info() -> &'static ShaderInfo;
 }
 
+/// A vertex shader as a type; implemented by the generated modules.
+pub trait VertexShader {
+    /// Push constants, `()` for none.
+    type Push: PushConstants;
+    /// Specialization constants, `()` for none.
+    type Spec: SpecConstants;
+    /// The reflected interface.
+    fn info() -> &'static ShaderInfo;
+}
+
+/// A geometry shader as a type; implemented by the generated modules.
+pub trait GeometryShader {
+    /// Push constants, `()` for none.
+    type Push: PushConstants;
+    /// Specialization constants, `()` for none.
+    type Spec: SpecConstants;
+    /// The reflected interface.
+    fn info() -> &'static ShaderInfo;
+}
+
+/// A fragment shader as a type; implemented by the generated modules.
+pub trait FragmentShader {
+    /// Push constants, `()` for none.
+    type Push: PushConstants;
+    /// Specialization constants, `()` for none.
+    type Spec: SpecConstants;
+    /// The reflected interface.
+    fn info() -> &'static ShaderInfo;
+}
+
 /// A push-constant block.
 pub trait PushConstants {
     /// The bytes to push.

@@ -7,10 +7,12 @@
 #![allow(unsafe_code)]
 
 mod barrier;
+mod bind;
 mod buffer;
 mod caps;
 mod device;
 pub mod fault;
+mod graphics;
 mod host;
 mod image;
 mod instance;
@@ -35,6 +37,7 @@ pub use barrier::{
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, SubgroupOperations};
 pub use device::{DeviceSelection, Gpu, GpuOptions, Validation};
+pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
 pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
 pub use instance::{DeviceSummary, ValidationMessage};

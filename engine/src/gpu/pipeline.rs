@@ -134,16 +134,7 @@ impl PipelineInner {
             spec,
         };
         let module = shader_module(gpu, info)?;
-        let entries: Vec<_> = (0u32..)
-            .zip(&inner.spec)
-            .map(|(index, (id, _))| {
-                vk::SpecializationMapEntry::default()
-                    .constant_id(*id)
-                    .offset(index * 4)
-                    .size(4)
-            })
-            .collect();
-        let data: Vec<u8> = inner.spec.iter().flat_map(|(_, bits)| bits.to_ne_bytes()).collect();
+        let (entries, data) = specialization_data(&inner.spec);
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
@@ -158,7 +149,8 @@ impl PipelineInner {
         };
         // SAFETY: a module may go once its pipelines are made.
         unsafe { gpu.device.destroy_shader_module(module, None) };
-        inner.raw = made.map_err(|(_, result)| gpu.error("vkCreateComputePipelines", result))?[0];
+        inner.raw =
+            made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, info.name, 0))?[0];
         gpu.name(inner.raw, info.name);
         gpu.name(inner.layout, info.name);
         Ok(inner)
@@ -176,6 +168,19 @@ impl Drop for PipelineInner {
             }
         }
     }
+}
+
+/// Map entries and packed values of specialization constants.
+pub(super) fn specialization_data(values: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
+    let entry = |(index, (id, _)): (u32, &(u32, u32))| {
+        vk::SpecializationMapEntry::default()
+            .constant_id(*id)
+            .offset(index * 4)
+            .size(4)
+    };
+    let entries = (0u32..).zip(values).map(entry).collect();
+    let data = values.iter().flat_map(|(_, bits)| bits.to_ne_bytes()).collect();
+    (entries, data)
 }
 
 /// The shader module of a reflected shader.
