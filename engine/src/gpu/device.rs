@@ -563,7 +563,8 @@ fn create_device(
     })
 }
 
-fn no_window(error: raw_window_handle::HandleError) -> Error {
+/// The error of a window without usable handles.
+pub(super) fn no_window(error: raw_window_handle::HandleError) -> Error {
     Error::MissingFeature {
         feature: "a window handle".into(),
         needed_by: "presenting to a window".into(),

@@ -29,6 +29,14 @@ pub struct ImageDesc<'a> {
     pub category: Category,
 }
 
+/// The uses that want a view.
+const VIEWED: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
+    vk::ImageUsageFlags::SAMPLED.as_raw()
+        | vk::ImageUsageFlags::STORAGE.as_raw()
+        | vk::ImageUsageFlags::COLOR_ATTACHMENT.as_raw()
+        | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
+);
+
 /// A device image with a view of all of it. Cloning shares it.
 #[derive(Clone)]
 pub struct Image {
@@ -109,7 +117,11 @@ impl Gpu {
         };
         inner.allocation = Some(allocation);
         bound.map_err(|result| gpu.error("vkBindImageMemory", result))?;
-        inner.make_view(desc.layers, desc.mips)?;
+        if desc.usage.intersects(VIEWED) {
+            inner.make_view(desc.layers, desc.mips)?;
+        } else {
+            gpu.name(raw, desc.name);
+        }
         Ok(Image { inner: Arc::new(inner) })
     }
 }
@@ -217,7 +229,7 @@ impl Image {
         self.inner.raw
     }
 
-    /// The view of all of it.
+    /// The view of all of it; null for an image that is only copied.
     pub fn view(&self) -> vk::ImageView {
         self.inner.view
     }
