@@ -174,10 +174,11 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
     let _ = writeln!(
         text,
         "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
-         spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    local_size: [{}],\n    \
+         spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    fingerprint: {},\n    local_size: [{}],\n    \
          bindings: &[",
         shader.name,
         interface.stage,
+        interface.fingerprint(),
         local_size.join(", "),
     );
     for binding in &interface.bindings {

@@ -1,5 +1,8 @@
 //! The engine inside a host application: lent devices, several devices at once, several threads.
 
+use std::ffi::{CStr, c_void};
+use std::sync::Mutex;
+
 use clerestory::Error;
 use clerestory::gpu::ash::{self, vk};
 use clerestory::gpu::shaders::tests::out_of_bounds;
@@ -13,6 +16,24 @@ struct Host {
     physical_device: vk::PhysicalDevice,
     device: ash::Device,
     queue: vk::Queue,
+    messenger: vk::DebugUtilsMessengerEXT,
+    /// What the validation layer has said, and a box so that its address stays.
+    messages: Box<Mutex<Vec<String>>>,
+}
+
+#[expect(unsafe_code, reason = "a callback from Vulkan")]
+unsafe extern "system" fn on_message(
+    _: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer passes valid data, and `user` is the list in `Host::messages`.
+    let (data, messages) = unsafe { (&*data, &*user.cast::<Mutex<Vec<String>>>()) };
+    // SAFETY: the text is NUL-terminated.
+    let text = unsafe { CStr::from_ptr(data.p_message) };
+    messages.lock().unwrap().push(text.to_string_lossy().into_owned());
+    vk::FALSE
 }
 
 #[expect(unsafe_code, reason = "a host that speaks to Vulkan itself")]
@@ -30,6 +51,17 @@ impl Host {
                 .enabled_layer_names(&layers)
                 .enabled_extension_names(&extensions);
             let instance = entry.create_instance(&info, None).unwrap();
+            let messages = Box::<Mutex<Vec<String>>>::default();
+            let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                .message_severity(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                )
+                .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+                .pfn_user_callback(Some(on_message))
+                .user_data(std::ptr::from_ref(&*messages).cast_mut().cast());
+            let messenger = ash::ext::debug_utils::Instance::new(&entry, &instance)
+                .create_debug_utils_messenger(&info, None)
+                .unwrap();
             let physical_device = instance.enumerate_physical_devices().unwrap()[0];
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
             let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default()
@@ -51,6 +83,8 @@ impl Host {
                 physical_device,
                 device,
                 queue,
+                messenger,
+                messages,
             }
         }
     }
@@ -89,8 +123,15 @@ impl Drop for Host {
     fn drop(&mut self) {
         // SAFETY: the engine is gone and the queue idle.
         unsafe {
+            // The layer lists here what the engine left behind.
             self.device.destroy_device(None);
+            ash::ext::debug_utils::Instance::new(&self.entry, &self.instance)
+                .destroy_debug_utils_messenger(self.messenger, None);
             self.instance.destroy_instance(None);
+        }
+        if !std::thread::panicking() {
+            let messages = self.messages.lock().unwrap();
+            assert!(messages.is_empty(), "{messages:#?}");
         }
     }
 }

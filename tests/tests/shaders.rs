@@ -8,11 +8,35 @@ use clerestory::gpu::shaders;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 /// The modules that naga cannot read or does not accept, each with words of its reason. One that it starts to accept must leave the list.
-const REFUSED_BY_NAGA: &[(&str, &str)] = &[];
+const REFUSED_BY_NAGA: &[(&str, &str)] = &[
+    // Arrays of three-component vectors without padding: naga knows the standard layouts only, not the scalar one.
+    ("samples/gradient.comp", "ArrayStride { stride: 12, alignment"),
+    // Matrix columns of three rows without padding, likewise.
+    ("tests/layout_probe.comp", "UnsupportedMatrixStride"),
+];
+
+/// The module without its line numbers, which naga takes only inside functions.
+fn without_lines(spirv: &[u8]) -> Vec<u8> {
+    const HEADER_BYTES: usize = 20;
+    const OP_LINE: u16 = 8;
+    const OP_NO_LINE: u16 = 317;
+    let (header, mut rest) = spirv.split_at(HEADER_BYTES);
+    let mut kept = header.to_vec();
+    while let [low, high, size_low, size_high, ..] = rest {
+        let words = usize::from(u16::from_le_bytes([*size_low, *size_high]));
+        let (instruction, after) = rest.split_at(4 * words.max(1));
+        if ![OP_LINE, OP_NO_LINE].contains(&u16::from_le_bytes([*low, *high])) {
+            kept.extend_from_slice(instruction);
+        }
+        rest = after;
+    }
+    kept
+}
 
 fn naga_says(shader: &ShaderInfo) -> Result<(), String> {
     let options = naga::front::spv::Options::default();
-    let module = naga::front::spv::parse_u8_slice(shader.spirv, &options).map_err(|error| format!("{error:?}"))?;
+    let module = naga::front::spv::parse_u8_slice(&without_lines(shader.spirv), &options)
+        .map_err(|error| format!("{error:?}"))?;
     Validator::new(ValidationFlags::all(), Capabilities::all())
         .validate(&module)
         .map(drop)

@@ -179,8 +179,8 @@ fn check_shaders(gpu: &Inner, shaders: [&'static ShaderInfo; 2]) -> Result<()> {
 impl GraphicsInner {
     fn make<V: VertexShader, F: FragmentShader>(&mut self, desc: &GraphicsDesc<'_, V, F>) -> Result<()> {
         let device = &self.gpu.device;
-        let vertex = shader_module(&self.gpu, self.shaders[0])?;
-        let fragment = match shader_module(&self.gpu, self.shaders[1]) {
+        let vertex = shader_module(&self.gpu, self.shaders[0], self.shaders[0].spirv)?;
+        let fragment = match shader_module(&self.gpu, self.shaders[1], self.shaders[1].spirv) {
             Ok(module) => module,
             Err(error) => {
                 // SAFETY: nothing uses the module yet.

@@ -13,6 +13,8 @@ pub struct ShaderInfo {
     pub spirv: &'static [u8],
     /// Size of the push-constant block.
     pub push_constant_bytes: u32,
+    /// A hash of everything the generated Rust code depends on; the build's, over names, offsets and kinds.
+    pub fingerprint: u64,
     /// Workgroup size (compute).
     pub local_size: [LocalSize; 3],
     /// Bindings by set and number.

@@ -14,6 +14,8 @@ mod device;
 pub mod fault;
 mod graphics;
 mod host;
+#[cfg(feature = "hot-reload")]
+mod hot_reload;
 mod image;
 mod instance;
 pub mod interface;
@@ -22,6 +24,9 @@ mod memory;
 mod pipeline;
 mod pipeline_cache;
 mod recorder;
+#[cfg(feature = "hot-reload")]
+#[path = "../../build/reflect.rs"]
+mod reflect;
 mod resources;
 pub mod shaders;
 mod submission;
@@ -40,6 +45,8 @@ pub use caps::{Caps, SubgroupOperations};
 pub use device::{DeviceSelection, Gpu, GpuOptions, Validation};
 pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
 pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
+#[cfg(feature = "hot-reload")]
+pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
 pub use instance::{DeviceSummary, ValidationMessage};
 pub use memory::{AllocationInfo, Category, MemoryReport};

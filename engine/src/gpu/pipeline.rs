@@ -71,10 +71,22 @@ impl Gpu {
                 shader: PhantomData,
             });
         }
-        let inner = Arc::new(PipelineInner::compute(&self.inner, info, values)?);
+        let inner = Arc::new(PipelineInner::compute(&self.inner, info, info.spirv, values)?);
         table.insert(key, Arc::downgrade(&inner));
         Ok(ComputePipeline {
             inner,
+            shader: PhantomData,
+        })
+    }
+}
+
+#[cfg(feature = "hot-reload")]
+impl<K: ComputeShader> ComputePipeline<K> {
+    /// The pipeline of another module with the interface of `K`.
+    pub(super) fn from_spirv(gpu: &Gpu, spirv: &[u8], spec: &K::Spec) -> Result<Self> {
+        let inner = PipelineInner::compute(&gpu.inner, K::info(), spirv, spec.values())?;
+        Ok(Self {
+            inner: Arc::new(inner),
             shader: PhantomData,
         })
     }
@@ -108,7 +120,8 @@ impl<K> ComputePipeline<K> {
 }
 
 impl PipelineInner {
-    fn compute(gpu: &Arc<Inner>, info: &'static ShaderInfo, spec: Vec<(u32, u32)>) -> Result<Self> {
+    /// The pipeline of a module with the interface `info`.
+    fn compute(gpu: &Arc<Inner>, info: &'static ShaderInfo, spirv: &[u8], spec: Vec<(u32, u32)>) -> Result<Self> {
         gpu.check_alive()?;
         let local_size = info.local_size.map(|size| match size {
             LocalSize::Fixed(size) => size,
@@ -133,7 +146,7 @@ impl PipelineInner {
             local_size,
             spec,
         };
-        let module = shader_module(gpu, info)?;
+        let module = shader_module(gpu, info, spirv)?;
         let (entries, data) = specialization_data(&inner.spec);
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         let stage = vk::PipelineShaderStageCreateInfo::default()
@@ -184,8 +197,8 @@ pub(super) fn specialization_data(values: &[(u32, u32)]) -> (Vec<vk::Specializat
 }
 
 /// The shader module of a reflected shader.
-pub(super) fn shader_module(gpu: &Inner, info: &ShaderInfo) -> Result<vk::ShaderModule> {
-    let words = ash::util::read_spv(&mut std::io::Cursor::new(info.spirv)).map_err(|error| Error::Shader {
+pub(super) fn shader_module(gpu: &Inner, info: &ShaderInfo, spirv: &[u8]) -> Result<vk::ShaderModule> {
+    let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).map_err(|error| Error::Shader {
         name: info.name.into(),
         message: error.to_string(),
     })?;
