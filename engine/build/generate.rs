@@ -174,10 +174,11 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
     let _ = writeln!(
         text,
         "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
-         spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    local_size: [{}],\n    \
+         spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    fingerprint: {},\n    local_size: [{}],\n    \
          bindings: &[",
         shader.name,
         interface.stage,
+        interface.fingerprint(),
         local_size.join(", "),
     );
     for binding in &interface.bindings {
@@ -226,13 +227,17 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         }
     }
     let push = if interface.push.is_some() { "Push" } else { "()" };
-    if interface.stage == "Compute" {
-        let _ = writeln!(
-            text,
-            "/// The kernel as a type: its push constants and specialization constants.\n#[derive(Debug)]\npub enum Kernel {{}}\n\
-             impl ComputeShader for Kernel {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}"
-        );
-    }
+    let (kind, word) = if interface.stage == "Compute" {
+        ("Kernel", "kernel")
+    } else {
+        ("Shader", "shader")
+    };
+    let _ = writeln!(
+        text,
+        "/// The {word} as a type: its push constants and specialization constants.\n#[derive(Debug)]\npub enum {kind} {{}}\n\
+         impl {}Shader for {kind} {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}",
+        interface.stage
+    );
     text += "}\n";
     text
 }

@@ -15,7 +15,8 @@ use super::caps::Caps;
 use super::fault::{self, FaultPlan};
 use super::host::{EnabledFeatures, HostDevice};
 use super::instance::{DeviceSummary, Instance, ValidationMessage, surface_extensions, vulkan};
-use super::memory::{Memory, MemoryReport};
+use super::marker::InFlight;
+use super::memory::{AllocationInfo, Memory, MemoryReport};
 use super::pipeline::PipelineTable;
 use super::pipeline_cache::PipelineCache;
 use super::resources::FrameResources;
@@ -132,6 +133,10 @@ pub(super) struct Inner {
     pub pipelines: Mutex<PipelineTable>,
     pub pipeline_cache: PipelineCache,
     pub crash_markers: bool,
+    pub validation: Validation,
+    pub in_flight: Mutex<InFlight>,
+    /// The device can present to windows.
+    pub presents: bool,
     /// The last pass that a lost device reached.
     pub lost: OnceLock<String>,
     next_id: AtomicU64,
@@ -192,7 +197,8 @@ impl Gpu {
         let instance = Instance::from_host(host.entry, host.instance, host.debug_utils);
         let name = instance.summary(0, host.physical_device).name;
         host.enabled.check(&name, "enable it when creating the device")?;
-        let caps = Caps::read(&instance, host.physical_device, host.queue_family);
+        let mut caps = Caps::read(&instance, host.physical_device, host.queue_family);
+        host.enabled.restrict(&mut caps);
         Self::finish(
             instance,
             host.device,
@@ -200,7 +206,7 @@ impl Gpu {
             (host.queue, host.queue_family),
             caps,
             options,
-            false,
+            (false, false),
         )
     }
 
@@ -296,7 +302,7 @@ impl Gpu {
             (queue, queue_family),
             caps,
             options,
-            true,
+            (true, surface.is_some()),
         )
     }
 
@@ -307,7 +313,7 @@ impl Gpu {
         (queue, queue_family): (vk::Queue, u32),
         caps: Caps,
         options: &GpuOptions,
-        owned: bool,
+        (owned, presents): (bool, bool),
     ) -> Result<Self> {
         let memory = Memory::new(&instance.raw, &device, physical_device)?;
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
@@ -334,6 +340,9 @@ impl Gpu {
             pipelines: Mutex::new(BTreeMap::new()),
             pipeline_cache,
             crash_markers: options.crash_markers,
+            validation: options.validation,
+            in_flight: Mutex::default(),
+            presents,
             lost: OnceLock::new(),
             next_id: AtomicU64::new(1),
             owned,
@@ -351,6 +360,11 @@ impl Gpu {
     /// Device memory in use.
     pub fn memory_report(&self) -> MemoryReport {
         self.inner.memory.report()
+    }
+
+    /// Every live allocation, by name.
+    pub fn allocations(&self) -> Vec<AllocationInfo> {
+        self.inner.memory.allocations()
     }
 
     /// Takes the messages that the validation layers have left so far.
@@ -420,12 +434,36 @@ impl Inner {
     pub fn error(&self, call: &'static str, result: vk::Result) -> Error {
         match result {
             vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost {
-                last_pass: self.lost.get_or_init(|| "none recorded".into()).clone(),
+                last_pass: self.lost.get_or_init(|| self.in_flight().last_pass()).clone(),
             },
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => out_of_memory("device", call),
             vk::Result::ERROR_OUT_OF_HOST_MEMORY => out_of_memory("host", call),
             result => Error::Vulkan { call, result },
         }
+    }
+
+    /// As [`Inner::error`] for the creation of something with a name and a size.
+    pub fn creation_error(&self, call: &'static str, result: vk::Result, name: &str, bytes: u64) -> Error {
+        match self.error(call, result) {
+            Error::OutOfMemory { memory, .. } => Error::OutOfMemory {
+                memory,
+                name: name.into(),
+                bytes,
+                cause: format!("{call}: {result}"),
+            },
+            other => other,
+        }
+    }
+
+    pub fn in_flight(&self) -> MutexGuard<'_, InFlight> {
+        self.in_flight.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until the queue has nothing left to do, or answers that it never will.
+    pub fn wait_for_queue(&self) {
+        let queue = self.lock_queue();
+        // SAFETY: the queue is locked. An error means a lost device, for which there is nothing to wait.
+        let _ = unsafe { self.device.queue_wait_idle(queue.raw) };
     }
 
     /// Fails once the device has been lost.
@@ -493,9 +531,8 @@ fn create_device(
         .pipeline_statistics_query(caps.pipeline_statistics)
         .shader_int64(caps.int64)
         .shader_float64(caps.float64)
-        // GPU-assisted validation writes its findings from these stages and switches the features on itself where it can.
-        .fragment_stores_and_atomics(options.validation == Validation::GpuAssisted)
-        .vertex_pipeline_stores_and_atomics(options.validation == Validation::GpuAssisted);
+        .fragment_stores_and_atomics(caps.fragment_stores)
+        .vertex_pipeline_stores_and_atomics(caps.vertex_stores);
     let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default()
         .timeline_semaphore(true)
         .scalar_block_layout(true)
@@ -526,7 +563,8 @@ fn create_device(
     })
 }
 
-fn no_window(error: raw_window_handle::HandleError) -> Error {
+/// The error of a window without usable handles.
+pub(super) fn no_window(error: raw_window_handle::HandleError) -> Error {
     Error::MissingFeature {
         feature: "a window handle".into(),
         needed_by: "presenting to a window".into(),

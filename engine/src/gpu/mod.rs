@@ -7,11 +7,15 @@
 #![allow(unsafe_code)]
 
 mod barrier;
+mod bind;
 mod buffer;
 mod caps;
 mod device;
 pub mod fault;
+mod graphics;
 mod host;
+#[cfg(feature = "hot-reload")]
+mod hot_reload;
 mod image;
 mod instance;
 pub mod interface;
@@ -20,9 +24,13 @@ mod memory;
 mod pipeline;
 mod pipeline_cache;
 mod recorder;
+#[cfg(feature = "hot-reload")]
+#[path = "../../build/reflect.rs"]
+mod reflect;
 mod resources;
 pub mod shaders;
 mod submission;
+mod surface;
 mod timing;
 mod tracker;
 mod transfer;
@@ -35,11 +43,15 @@ pub use barrier::{
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, SubgroupOperations};
 pub use device::{DeviceSelection, Gpu, GpuOptions, Validation};
-pub use host::{EnabledFeatures, HostDevice};
+pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
+pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
+#[cfg(feature = "hot-reload")]
+pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
 pub use instance::{DeviceSummary, ValidationMessage};
-pub use memory::{Category, MemoryReport};
+pub use memory::{AllocationInfo, Category, MemoryReport};
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorder::{Pass, Recorder};
 pub use submission::Submission;
+pub use surface::{Presented, Surface};
 pub use timing::{PassTiming, Timings};

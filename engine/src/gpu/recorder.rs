@@ -10,12 +10,12 @@ use super::barrier::{Access, BufferBarrier, ImageBarrier};
 use super::buffer::{Buffer, BufferDesc, BufferView, Residency};
 use super::device::Gpu;
 use super::image::{Image, aspect};
-use super::interface::{BindingKind, BindingSet, BoundResource, ComputeShader, PushConstants, ShaderInfo};
+use super::interface::{BindingSet, ComputeShader, PushConstants};
 use super::marker::BEGUN;
 use super::memory::Category;
-use super::pipeline::{ComputePipeline, descriptor_type};
+use super::pipeline::ComputePipeline;
 use super::resources::FrameResources;
-use super::submission::Submission;
+use super::submission::{self, Submission};
 use super::tracker::Tracker;
 use crate::{Error, Result};
 
@@ -30,7 +30,7 @@ pub(super) type Kept = BTreeMap<usize, Arc<dyn Any + Send + Sync>>;
 /// It starts with a barrier over everything, so that a submission may rely on all earlier ones of the same queue. Between its own passes
 /// every barrier is the author's; debug builds check that none is missing.
 pub struct Recorder {
-    gpu: Gpu,
+    pub(super) gpu: Gpu,
     name: String,
     resources: Option<FrameResources>,
     markers: Option<Buffer>,
@@ -42,9 +42,9 @@ pub struct Recorder {
 
 /// One pass: what is recorded between two timestamps.
 pub struct Pass<'a> {
-    recorder: &'a mut Recorder,
-    command_buffer: vk::CommandBuffer,
-    name: &'a str,
+    pub(super) recorder: &'a mut Recorder,
+    pub(super) command_buffer: vk::CommandBuffer,
+    pub(super) name: &'a str,
 }
 
 impl Gpu {
@@ -181,24 +181,15 @@ impl Recorder {
         }
         let mut queue = inner.lock_queue();
         let value = queue.last_value + 1;
-        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        let semaphore = |raw: &vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(*raw).stage_mask(all);
-        let waits: Vec<_> = wait.iter().map(semaphore).collect();
-        let mut signals: Vec<_> = signal.iter().map(semaphore).collect();
-        signals.push(
-            vk::SemaphoreSubmitInfo::default()
-                .semaphore(inner.timeline)
-                .value(value)
-                .stage_mask(all),
-        );
-        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(command_buffer)];
-        let info = vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&waits)
-            .command_buffer_infos(&buffers)
-            .signal_semaphore_infos(&signals);
+        if let Some(markers) = &self.markers {
+            inner.in_flight().begin(value, markers.clone(), self.passes.clone());
+        }
         // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
-        unsafe { inner.device.queue_submit2(queue.raw, &[info], vk::Fence::null()) }
-            .map_err(|result| inner.error("vkQueueSubmit2", result))?;
+        let submitted = unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) };
+        if let Err(error) = submitted {
+            inner.in_flight().end(value, false);
+            return Err(error);
+        }
         queue.last_value = value;
         drop(queue);
         Ok(Submission::new(
@@ -206,7 +197,6 @@ impl Recorder {
             std::mem::take(&mut self.name),
             value,
             self.resources.take(),
-            self.markers.take(),
             std::mem::take(&mut self.passes),
             std::mem::take(&mut self.kept),
             self.statistics,
@@ -248,7 +238,7 @@ impl Recorder {
         Ok(())
     }
 
-    fn resources(&mut self) -> &mut FrameResources {
+    pub(super) fn resources(&mut self) -> &mut FrameResources {
         self.resources
             .as_mut()
             .expect("a recorder holds its resources until it is submitted")
@@ -261,14 +251,14 @@ impl Recorder {
             .or_insert_with(|| Arc::clone(item) as Arc<dyn Any + Send + Sync>);
     }
 
-    fn touch(&mut self, pass: &str, buffer: &Buffer, access: Access) -> Result<()> {
+    pub(super) fn touch(&mut self, pass: &str, buffer: &Buffer, access: Access) -> Result<()> {
         self.keep(&buffer.inner);
         self.tracker
             .as_mut()
             .map_or(Ok(()), |tracker| tracker.touch(pass, buffer, access))
     }
 
-    fn next_command(&mut self) {
+    pub(super) fn next_command(&mut self) {
         if let Some(tracker) = &mut self.tracker {
             tracker.next_command();
         }
@@ -341,6 +331,8 @@ impl Pass<'_> {
         push: &K::Push,
         arguments: BufferView<'_>,
     ) -> Result<()> {
+        let words = BufferView { bytes: 12, ..arguments };
+        words.check(4)?;
         self.recorder.next_command();
         self.recorder
             .touch(self.name, arguments.buffer, Access::INDIRECT_READ)?;
@@ -423,11 +415,15 @@ impl Pass<'_> {
         self.pipeline_barrier(&vk::DependencyInfo::default().image_memory_barriers(&raw));
     }
 
-    /// Fills a buffer with a word.
+    /// Fills a buffer with a word; the part must begin at and be a multiple of 4 bytes.
     ///
     /// # Errors
-    /// [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] for a part that is not in the buffer, [`Error::MissingBarrier`] in debug builds.
     pub fn fill(&mut self, view: BufferView<'_>, word: u32) -> Result<()> {
+        view.check(4)?;
+        if view.bytes == 0 {
+            return Ok(());
+        }
         self.recorder.next_command();
         self.recorder.touch(self.name, view.buffer, Access::TRANSFER_WRITE)?;
         // SAFETY: the range lies in the buffer (sizes are multiples of 4), which is kept alive.
@@ -484,6 +480,11 @@ impl Pass<'_> {
                 limit: to.bytes,
             });
         }
+        from.check(1)?;
+        to.check(1)?;
+        if from.bytes == 0 {
+            return Ok(());
+        }
         self.recorder.next_command();
         self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
         self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
@@ -507,8 +508,10 @@ impl Pass<'_> {
     /// Copies a whole image of one layer, in layout `TRANSFER_SRC_OPTIMAL`, to a buffer, rows packed.
     ///
     /// # Errors
-    /// [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
     pub fn copy_image_to_buffer(&mut self, from: &Image, to: BufferView<'_>) -> Result<()> {
+        image_rows(from, to)?;
+        self.recorder.next_command();
         self.recorder.keep(&from.inner);
         self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
         let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
@@ -528,8 +531,10 @@ impl Pass<'_> {
     /// Copies packed rows to a whole image of one layer, in layout `TRANSFER_DST_OPTIMAL`.
     ///
     /// # Errors
-    /// [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
     pub fn copy_buffer_to_image(&mut self, from: BufferView<'_>, to: &Image) -> Result<()> {
+        image_rows(to, from)?;
+        self.recorder.next_command();
         self.recorder.keep(&to.inner);
         self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
         let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
@@ -550,10 +555,6 @@ impl Pass<'_> {
     /// synchronize.
     pub fn raw(&self) -> vk::CommandBuffer {
         self.command_buffer
-    }
-
-    pub(super) fn recorder(&mut self) -> &mut Recorder {
-        self.recorder
     }
 
     fn pipeline_barrier(&self, info: &vk::DependencyInfo<'_>) {
@@ -583,7 +584,7 @@ impl Pass<'_> {
                 .device
                 .cmd_bind_pipeline(self.command_buffer, point, pipeline.inner.raw)
         };
-        self.bind_sets(info, point, pipeline.inner.layout, &pipeline.inner.set_layouts, sets)?;
+        self.bind_sets(&[info], point, pipeline.inner.layout, &pipeline.inner.set_layouts, sets)?;
         let bytes = push.bytes();
         if !bytes.is_empty() {
             let stages = vk::ShaderStageFlags::COMPUTE;
@@ -596,111 +597,29 @@ impl Pass<'_> {
         }
         Ok(())
     }
+}
 
-    /// Allocates, writes and binds the descriptor sets of one shader.
-    pub(super) fn bind_sets(
-        &mut self,
-        info: &'static ShaderInfo,
-        point: vk::PipelineBindPoint,
-        layout: vk::PipelineLayout,
-        set_layouts: &[vk::DescriptorSetLayout],
-        sets: &[&dyn BindingSet<'_>],
-    ) -> Result<()> {
-        let inner = Arc::clone(&self.recorder.gpu.inner);
-        let uncovered = info
-            .bindings
-            .iter()
-            .find(|binding| !sets.iter().any(|set| set.set() == binding.set));
-        if let Some(binding) = uncovered {
-            return Err(Error::Shader {
-                name: info.name.into(),
-                message: format!("descriptor set {} was not given", binding.set),
-            });
-        }
-        for set in sets {
-            let Some(set_layout) = set_layouts.get(set.set() as usize) else {
-                continue;
-            };
-            let raw = self.recorder.resources().descriptor_set(&inner, *set_layout)?;
-            for (number, resource) in set.resources() {
-                let Some(binding) = info.bindings.iter().find(|b| b.set == set.set() && b.binding == number) else {
-                    continue;
-                };
-                self.write_descriptor(info, raw, binding, resource)?;
-            }
-            // SAFETY: the set was just allocated with the layout of this pipeline.
-            unsafe {
-                inner
-                    .device
-                    .cmd_bind_descriptor_sets(self.command_buffer, point, layout, set.set(), &[raw], &[])
-            };
-        }
-        Ok(())
+/// Fails when the packed rows of the image do not fit into the view.
+fn image_rows(image: &Image, view: BufferView<'_>) -> Result<()> {
+    let [width, height] = image.size().map(u64::from);
+    let texel = super::image::texel_bytes(image.format()).ok_or_else(|| Error::Picture {
+        path: image.inner.name.clone(),
+        cause: format!("copies of format {:?} are not supported", image.format()),
+    })?;
+    let rows = BufferView {
+        bytes: width * height * texel,
+        ..view
+    };
+    rows.check(texel.max(4))?;
+    if rows.bytes > view.bytes {
+        return Err(Error::LimitExceeded {
+            name: view.buffer.name().into(),
+            bytes: rows.bytes,
+            limit_name: "size of the part",
+            limit: view.bytes,
+        });
     }
-
-    fn write_descriptor(
-        &mut self,
-        info: &'static ShaderInfo,
-        set: vk::DescriptorSet,
-        binding: &super::interface::BindingInfo,
-        resource: BoundResource<'_>,
-    ) -> Result<()> {
-        let descriptor = vk::WriteDescriptorSet::default()
-            .dst_set(set)
-            .dst_binding(binding.binding)
-            .descriptor_type(descriptor_type(binding.kind));
-        let inner = Arc::clone(&self.recorder.gpu.inner);
-        // SAFETY (all updates): set and resources are alive and the set is not in use yet.
-        match (binding.kind, resource) {
-            (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
-                let read = if binding.reads {
-                    Access::COMPUTE_READ
-                } else {
-                    Access::NONE
-                };
-                let write = if binding.writes {
-                    Access::COMPUTE_WRITE
-                } else {
-                    Access::NONE
-                };
-                self.recorder.touch(self.name, view.buffer, read | write)?;
-                let raw = [vk::DescriptorBufferInfo {
-                    buffer: view.buffer.raw(),
-                    offset: view.offset,
-                    range: view.bytes,
-                }];
-                unsafe {
-                    inner
-                        .device
-                        .update_descriptor_sets(&[descriptor.buffer_info(&raw)], &[])
-                };
-            }
-            (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
-                self.recorder.keep(&image.inner);
-                let raw = [vk::DescriptorImageInfo::default()
-                    .image_view(image.view())
-                    .image_layout(vk::ImageLayout::GENERAL)];
-                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
-            }
-            (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
-                self.recorder.keep(&view.image.inner);
-                self.recorder.keep(&view.sampler.inner);
-                let raw = [vk::DescriptorImageInfo::default()
-                    .image_view(view.image.view())
-                    .sampler(view.sampler.inner.raw)
-                    .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
-                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
-            }
-            _ => {
-                let message = format!("binding {} is not a {:?}", binding.name, binding.kind);
-                return Err(Error::Shader {
-                    name: info.name.into(),
-                    message,
-                });
-            }
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 fn whole_image(image: &Image, buffer_offset: u64) -> vk::BufferImageCopy {
