@@ -16,13 +16,17 @@ use super::path_set::PathSet;
 use super::random::SamplerKind;
 use crate::film::accumulate::TwoFloat;
 use crate::film::picture::Picture;
+use crate::gpu::shaders::film::display;
 use crate::gpu::shaders::sets::{Bvh2Set, PathBuffers, SceneSet};
 use crate::gpu::shaders::transport::{
     path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_extend_alpha,
     path_resolve, path_shade, path_shadow, path_shadow_alpha,
 };
 use crate::gpu::shaders::types::{FilmAov, FilmPixel, Hit, PathAov, PathState, Ray, ShadowRay};
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, Timings};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, Timings,
+    rw_compute_to_compute,
+};
 use crate::scene::{Camera, Projection};
 use crate::{Error, Result};
 
@@ -407,6 +411,45 @@ impl PathTracer {
             picture.add_layer("depth", 1, aovs.iter().map(|a| mean(a, 6)).collect())?;
         }
         Ok((picture, film.iter().map(|pixel| u64::from(pixel.non_finite)).sum()))
+    }
+
+    /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
+    /// and sRGB-encoded, blue first where `bgra` says so.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::DeviceLost`].
+    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        let bytes = 4 * u64::from(self.size[0]) * u64::from(self.size[1]);
+        if target.bytes() < bytes {
+            return Err(Error::LimitExceeded {
+                name: target.name().into(),
+                bytes,
+                limit_name: "size",
+                limit: target.bytes(),
+            });
+        }
+        self.flush()?;
+        let kernel = self.gpu.compute_pipeline::<display::Kernel>(&())?;
+        let mut recorder = self.gpu.recorder("display")?;
+        recorder.pass("film: display", |pass| {
+            for band in &self.bands {
+                let push = display::Push {
+                    first_pixel: band.first_pixel,
+                    pixel_count: band.pixels,
+                    scale: exposure.exp2(),
+                    bgra: bgra.into(),
+                };
+                let set = display::Set0 {
+                    film_pixels: band.film.view(),
+                    display_pixels: target.view(),
+                };
+                pass.dispatch(&kernel, &[&set], &push, [kernel.groups_for(band.pixels), 1, 1])?;
+                pass.barrier(&[rw_compute_to_compute(target)]);
+            }
+            Ok(())
+        })?;
+        recorder.submit()?.wait()?;
+        Ok(())
     }
 
     fn next_wave(&mut self, samples: u32) -> Option<Wave> {
