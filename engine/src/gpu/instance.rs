@@ -23,6 +23,17 @@ pub struct ValidationMessage {
 /// Messages so far, shared with the debug callback.
 pub(super) type Messages = Arc<Mutex<Vec<ValidationMessage>>>;
 
+/// Messages that outlive their device.
+#[derive(Debug, Clone)]
+pub struct ValidationLog(pub(super) Messages);
+
+impl ValidationLog {
+    /// Takes what has been left so far.
+    pub fn take(&self) -> Vec<ValidationMessage> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+}
+
 /// The Vulkan instance with its debug messenger.
 pub(super) struct Instance {
     pub entry: ash::Entry,

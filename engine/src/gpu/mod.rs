@@ -48,7 +48,7 @@ pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
 #[cfg(feature = "hot-reload")]
 pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
-pub use instance::{DeviceSummary, ValidationMessage};
+pub use instance::{DeviceSummary, ValidationLog, ValidationMessage};
 pub use memory::{AllocationInfo, Category, MemoryReport};
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorder::{Pass, Recorder};

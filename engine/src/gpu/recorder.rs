@@ -111,7 +111,7 @@ impl Recorder {
         };
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         let (device, counted) = (&inner.device, self.statistics);
-        // SAFETY (both blocks): the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
+        // SAFETY: the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
         unsafe {
             if let Some(debug) = &inner.debug {
                 let label = std::ffi::CString::new(name).unwrap_or_default();
@@ -550,7 +550,7 @@ impl Pass<'_> {
         let info = pipeline.inner.info;
         self.recorder.keep(&pipeline.inner);
         let point = vk::PipelineBindPoint::COMPUTE;
-        // SAFETY (all blocks): pipeline, layout and sets are alive and come from one reflection.
+        // SAFETY: pipeline, layout and sets are alive and come from one reflection.
         unsafe {
             inner
                 .device
