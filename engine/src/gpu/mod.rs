@@ -4,7 +4,7 @@
 //! on a timeline. All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].
 //!
 //! `unsafe` lives in this folder and at the FFI edge only.
-#![allow(unsafe_code)]
+#![expect(unsafe_code, reason = "Vulkan is called here")]
 
 mod barrier;
 mod bind;
