@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use ash::{ext, khr, vk};
 
-use super::device::Validation;
+use super::options::Validation;
 use crate::{Error, Result};
 
 /// One message of the validation layers.

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use ash::vk;
 
-use super::device::{Gpu, Inner, Validation};
+use super::device::{Gpu, Inner};
+use super::options::Validation;
 use super::recorder::Kept;
 use super::resources::FrameResources;
 use super::timing::{PassTiming, Timings};
