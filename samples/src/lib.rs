@@ -5,7 +5,7 @@ pub mod picture;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clerestory::gpu::Gpu;
+use clerestory::gpu::ValidationLog;
 use clerestory::{Error, Result};
 
 /// Runs a sample: its path of output is the first argument, or `out/<name>.png`. An error goes to the standard error stream.
@@ -31,8 +31,8 @@ pub fn report(result: Result<()>) -> ExitCode {
 ///
 /// # Errors
 /// [`Error::Shader`] with the first message.
-pub fn check_messages(gpu: &Gpu) -> Result<()> {
-    match gpu.take_validation_messages().into_iter().next() {
+pub fn check_messages(log: &ValidationLog) -> Result<()> {
+    match log.take().into_iter().next() {
         None => Ok(()),
         Some(message) => Err(Error::Shader {
             name: message.id,

@@ -85,7 +85,6 @@ impl Pass<'_> {
             .dst_binding(binding.binding)
             .descriptor_type(descriptor_type(binding.kind));
         let inner = Arc::clone(&self.recorder.gpu.inner);
-        // SAFETY (all updates): set and resources are alive and the set is not in use yet.
         match (binding.kind, resource) {
             (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
                 view.check(inner.caps.storage_buffer_alignment)?;
@@ -96,6 +95,7 @@ impl Pass<'_> {
                     offset: view.offset,
                     range: view.bytes,
                 }];
+                // SAFETY: set and buffer are alive, and the set is not in use yet.
                 unsafe {
                     inner
                         .device
@@ -107,6 +107,7 @@ impl Pass<'_> {
                 let raw = [vk::DescriptorImageInfo::default()
                     .image_view(image.view())
                     .image_layout(vk::ImageLayout::GENERAL)];
+                // SAFETY: as above.
                 unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
             }
             (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
@@ -116,6 +117,7 @@ impl Pass<'_> {
                     .image_view(view.image.view())
                     .sampler(view.sampler.inner.raw)
                     .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
+                // SAFETY: as above.
                 unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
             }
             _ => {

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::ffi::CStr;
-use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -12,98 +10,16 @@ use ash::{ext, khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
 use super::caps::Caps;
-use super::fault::{self, FaultPlan};
+use super::fault;
 use super::host::{EnabledFeatures, HostDevice};
-use super::instance::{DeviceSummary, Instance, ValidationMessage, surface_extensions, vulkan};
+use super::instance::{DeviceSummary, Instance, ValidationLog, ValidationMessage, surface_extensions, vulkan};
 use super::marker::InFlight;
 use super::memory::{AllocationInfo, Memory, MemoryReport};
+use super::options::{GpuOptions, Validation};
 use super::pipeline::PipelineTable;
 use super::pipeline_cache::PipelineCache;
 use super::resources::FrameResources;
 use crate::{Error, Result};
-
-/// Which device to take.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum DeviceSelection {
-    /// The fastest kind there is: discrete, integrated, virtual, then software.
-    #[default]
-    Fastest,
-    /// By index in the loader's order.
-    Index(usize),
-    /// By a part of its name, in any case. `lavapipe` also finds Mesa's name for it, `llvmpipe`.
-    Name(String),
-}
-
-impl FromStr for DeviceSelection {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
-    }
-}
-
-impl DeviceSelection {
-    fn matches(&self, summary: &DeviceSummary) -> bool {
-        match self {
-            Self::Fastest => true,
-            Self::Index(index) => summary.index == *index,
-            Self::Name(name) => {
-                let (name, device) = (
-                    name.to_lowercase(),
-                    format!("{} {}", summary.name, summary.driver).to_lowercase(),
-                );
-                device.contains(&name) || (name == "lavapipe" && device.contains("llvmpipe"))
-            }
-        }
-    }
-}
-
-/// Which validation layers run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Validation {
-    /// None.
-    #[default]
-    Off,
-    /// Core and synchronization checks.
-    Core,
-    /// GPU-assisted checks (out-of-bounds access in shaders), without the core checks.
-    GpuAssisted,
-}
-
-/// How to make a device.
-#[derive(Debug, Clone)]
-pub struct GpuOptions {
-    /// Which device.
-    pub device: DeviceSelection,
-    /// Validation layers; the default obeys the environment variable `CLERESTORY_VALIDATION` (`off`, `core`, `gpu`).
-    pub validation: Validation,
-    /// Folder of the pipeline cache; `None` keeps none. The default is `$XDG_CACHE_HOME/clerestory`, else `~/.cache/clerestory`.
-    pub cache_folder: Option<PathBuf>,
-    /// Writes a marker before every pass, so that a lost device names the last one. Costs a 4-byte fill a pass.
-    pub crash_markers: bool,
-    /// Makes the n-th call of a Vulkan command fail, for tests.
-    pub fault: Option<FaultPlan>,
-}
-
-impl Default for GpuOptions {
-    fn default() -> Self {
-        let validation = match std::env::var("CLERESTORY_VALIDATION").as_deref() {
-            Ok("core") => Validation::Core,
-            Ok("gpu") => Validation::GpuAssisted,
-            _ => Validation::Off,
-        };
-        let cache = std::env::var_os("XDG_CACHE_HOME")
-            .map(PathBuf::from)
-            .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")));
-        Self {
-            device: DeviceSelection::default(),
-            validation,
-            cache_folder: cache.map(|folder| folder.join("clerestory")),
-            crash_markers: true,
-            fault: None,
-        }
-    }
-}
 
 /// A Vulkan device with one queue. Cloning shares it.
 #[derive(Clone)]
@@ -169,19 +85,11 @@ impl Gpu {
         let display = window.display_handle().map_err(no_window)?.as_raw();
         let handle = window.window_handle().map_err(no_window)?.as_raw();
         let instance = Instance::new(options.validation, &surface_extensions(display)?)?;
-        // SAFETY: both handles are valid while `window` is borrowed; the probe surface is destroyed below.
+        // SAFETY: both handles are valid while `window` is borrowed; `ProbeSurface` destroys the surface.
         let surface = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None) }
             .map_err(vulkan("vkCreateSurfaceKHR"))?;
         let loader = khr::surface::Instance::new(&instance.entry, &instance.raw);
-        let result = Self::create(instance, options, Some((&loader, surface)));
-        if let Ok(gpu) = &result {
-            // SAFETY: the surface was only used for queries.
-            unsafe {
-                khr::surface::Instance::new(&gpu.inner.instance.entry, &gpu.inner.instance.raw)
-                    .destroy_surface(surface, None)
-            };
-        }
-        result
+        Self::create(instance, options, Some(ProbeSurface { loader, raw: surface }))
     }
 
     /// Wraps a host's device. Nothing of the host's is destroyed when the `Gpu` goes.
@@ -223,11 +131,7 @@ impl Gpu {
             .collect())
     }
 
-    fn create(
-        instance: Instance,
-        options: &GpuOptions,
-        surface: Option<(&khr::surface::Instance, vk::SurfaceKHR)>,
-    ) -> Result<Self> {
+    fn create(instance: Instance, options: &GpuOptions, surface: Option<ProbeSurface>) -> Result<Self> {
         let devices = instance.devices()?;
         let rank = |summary: &DeviceSummary| match summary.kind {
             "discrete" => 0,
@@ -262,9 +166,9 @@ impl Gpu {
                 .get_physical_device_queue_family_properties(physical_device)
         };
         let presents = |family: u32| {
-            surface.is_none_or(|(loader, surface)| {
+            surface.as_ref().is_none_or(|ProbeSurface { loader, raw }| {
                 // SAFETY: surface and physical device belong to the same instance.
-                unsafe { loader.get_physical_device_surface_support(physical_device, family, surface) }.unwrap_or(false)
+                unsafe { loader.get_physical_device_surface_support(physical_device, family, *raw) }.unwrap_or(false)
             })
         };
         let wanted = vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS;
@@ -293,6 +197,9 @@ impl Gpu {
             surface.is_some(),
             options,
         )?;
+        let presents = surface.is_some();
+        // It must go before the instance, which `finish` drops when it fails.
+        drop(surface);
         // SAFETY: the family was created with one queue.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
         Self::finish(
@@ -302,7 +209,7 @@ impl Gpu {
             (queue, queue_family),
             caps,
             options,
-            (true, surface.is_some()),
+            (true, presents),
         )
     }
 
@@ -315,11 +222,21 @@ impl Gpu {
         options: &GpuOptions,
         (owned, presents): (bool, bool),
     ) -> Result<Self> {
-        let memory = Memory::new(&instance.raw, &device, physical_device)?;
+        let give_up = |error| {
+            if owned {
+                // SAFETY: nothing hangs on the device yet, or any more.
+                unsafe { device.destroy_device(None) };
+            }
+            error
+        };
+        let memory = Memory::new(&instance.raw, &device, physical_device).map_err(give_up)?;
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: timelineSemaphore is enabled on every device that comes here.
-        let timeline = unsafe { device.create_semaphore(&info, None) }.map_err(vulkan("vkCreateSemaphore"))?;
+        let timeline = unsafe { device.create_semaphore(&info, None) }.map_err(|result| {
+            memory.shut_down();
+            give_up(vulkan("vkCreateSemaphore")(result))
+        })?;
         let debug = instance
             .debug_utils
             .then(|| ext::debug_utils::Device::new(&instance.raw, &device));
@@ -369,14 +286,12 @@ impl Gpu {
 
     /// Takes the messages that the validation layers have left so far.
     pub fn take_validation_messages(&self) -> Vec<ValidationMessage> {
-        std::mem::take(
-            &mut *self
-                .inner
-                .instance
-                .messages
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner),
-        )
+        self.validation_log().take()
+    }
+
+    /// The messages of the validation layers, to be read when the device has gone, too: that is when leaks are reported.
+    pub fn validation_log(&self) -> ValidationLog {
+        ValidationLog(Arc::clone(&self.inner.instance.messages))
     }
 
     /// The queue, locked against the engine's own submissions for as long as the guard lives.
@@ -397,6 +312,19 @@ impl Gpu {
     /// Writes the pipeline cache to disk; also done when the last handle goes.
     pub fn save_pipeline_cache(&self) {
         self.inner.pipeline_cache.save(&self.inner.device);
+    }
+}
+
+/// A surface that is only asked whether a device can present to it.
+struct ProbeSurface {
+    loader: khr::surface::Instance,
+    raw: vk::SurfaceKHR,
+}
+
+impl Drop for ProbeSurface {
+    fn drop(&mut self) {
+        // SAFETY: it was only used for queries, and is dropped before its instance.
+        unsafe { self.loader.destroy_surface(self.raw, None) };
     }
 }
 

@@ -420,7 +420,7 @@ impl Render<'_, '_> {
         pass.recorder.keep(inner);
         let point = vk::PipelineBindPoint::GRAPHICS;
         let device = inner.gpu.device.clone();
-        // SAFETY (this and below): pipeline, layout and sets are alive and come from one reflection.
+        // SAFETY: pipeline, layout and sets are alive and come from one reflection.
         unsafe { device.cmd_bind_pipeline(pass.command_buffer, point, inner.raw) };
         pass.bind_sets(&inner.shaders, point, inner.layout, &inner.set_layouts, sets)?;
         let bytes = push.bytes();

@@ -4,12 +4,13 @@
 //! on a timeline. All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].
 //!
 //! `unsafe` lives in this folder and at the FFI edge only.
-#![allow(unsafe_code)]
+#![expect(unsafe_code, reason = "Vulkan is called here")]
 
 mod barrier;
 mod bind;
 mod buffer;
 mod caps;
+mod copy;
 mod device;
 pub mod fault;
 mod graphics;
@@ -21,6 +22,7 @@ mod instance;
 pub mod interface;
 mod marker;
 mod memory;
+mod options;
 mod pipeline;
 mod pipeline_cache;
 mod recorder;
@@ -42,14 +44,15 @@ pub use barrier::{
 };
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, SubgroupOperations};
-pub use device::{DeviceSelection, Gpu, GpuOptions, Validation};
+pub use device::{Gpu, QueueGuard};
 pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
 pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
 #[cfg(feature = "hot-reload")]
 pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
-pub use instance::{DeviceSummary, ValidationMessage};
+pub use instance::{DeviceSummary, ValidationLog, ValidationMessage};
 pub use memory::{AllocationInfo, Category, MemoryReport};
+pub use options::{DeviceSelection, GpuOptions, Validation};
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorder::{Pass, Recorder};
 pub use submission::Submission;

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use ash::vk;
 
-use super::device::{Gpu, Inner, Validation};
+use super::device::{Gpu, Inner};
+use super::options::Validation;
 use super::recorder::Kept;
 use super::resources::FrameResources;
 use super::timing::{PassTiming, Timings};
@@ -26,7 +27,6 @@ pub struct Submission {
 }
 
 impl Submission {
-    #[expect(clippy::too_many_arguments, reason = "the parts of a recorder, handed over once")]
     pub(super) fn new(
         gpu: Gpu,
         name: String,
@@ -68,7 +68,7 @@ impl Submission {
     ///
     /// # Errors
     /// The error together with the submission, where there is one left.
-    pub fn wait_for(self, limit: Duration) -> std::result::Result<Timings, (Error, Option<Self>)> {
+    pub fn wait_for(self, limit: Duration) -> std::result::Result<Timings, (Error, Option<Box<Self>>)> {
         let start = Instant::now();
         loop {
             let left = limit.saturating_sub(start.elapsed());
@@ -80,7 +80,7 @@ impl Submission {
                             what: self.name.clone(),
                             seconds: limit.as_secs_f64(),
                         },
-                        Some(self),
+                        Some(Box::new(self)),
                     ));
                 }
                 Ok(false) => {}

@@ -88,6 +88,6 @@ fn sample(path: &Path) -> Result<()> {
     }
 
     let bytes: Vec<u8> = gpu.read(pixels.view(), (4 * SIZE[0] * SIZE[1]) as usize)?;
-    clerestory_samples::check_messages(&gpu)?;
-    clerestory_samples::save_png(path, SIZE, &bytes)
+    clerestory_samples::save_png(path, SIZE, &bytes)?;
+    clerestory_samples::check_messages(&gpu.validation_log())
 }

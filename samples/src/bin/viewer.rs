@@ -156,9 +156,9 @@ impl Open {
             clerestory_samples::save_png(&path, *size, &bytes)?;
             println!("wrote {}", path.display());
         }
-        let gpu = self.gpu.clone();
+        let log = self.gpu.validation_log();
         drop(self);
-        clerestory_samples::check_messages(&gpu)
+        clerestory_samples::check_messages(&log)
     }
 }
 
@@ -212,7 +212,11 @@ impl ApplicationHandler for Viewer {
                 self.leave(events, Ok(()));
             }
             WindowEvent::RedrawRequested => self.redraw(events),
-            WindowEvent::MouseInput { state, button, .. } if button == MouseButton::Left => {
+            WindowEvent::MouseInput {
+                state,
+                button: MouseButton::Left,
+                ..
+            } => {
                 self.dragging = state == ElementState::Pressed;
             }
             WindowEvent::CursorMoved { position, .. } => {
