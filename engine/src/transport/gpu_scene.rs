@@ -46,8 +46,17 @@ pub struct GpuScene {
     bsdf: BsdfFeatures,
     statistics: IndexStatistics,
     bounds: [Vec3; 2],
+    light_kinds: LightKinds,
     index: [Buffer; 3],
     buffers: SceneBuffers,
+}
+
+/// Which kinds of lights there are to choose: emitters without area and lights without power are none.
+#[derive(Debug, Clone, Copy, Default)]
+struct LightKinds {
+    area: bool,
+    punctual: bool,
+    environment: bool,
 }
 
 #[derive(Debug)]
@@ -89,12 +98,13 @@ impl GpuScene {
         })?;
         let bounds = geometry.bounds();
         let bsdf = BsdfFeatures::of_materials(placed_materials(scene).into_iter());
-        let buffers = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
+        let (buffers, light_kinds) = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
         Ok(Self {
             profile,
             bsdf,
             statistics: bvh.statistics(),
             bounds,
+            light_kinds,
             index,
             buffers,
         })
@@ -122,8 +132,18 @@ impl GpuScene {
 
     /// True when there is anything for light sampling to choose.
     pub fn has_lights(&self) -> bool {
-        let p = &self.profile;
-        p.has_area_lights() || p.has_environment() || p.lights.point + p.lights.spot + p.lights.directional > 0
+        let kinds = self.light_kinds;
+        kinds.area || kinds.punctual || kinds.environment
+    }
+
+    /// True when some surface of positive area emits.
+    pub fn has_area_lights(&self) -> bool {
+        self.light_kinds.area
+    }
+
+    /// True when some point, spot or directional light has power.
+    pub fn has_punctual_lights(&self) -> bool {
+        self.light_kinds.punctual
     }
 
     /// Set 1.
@@ -278,7 +298,7 @@ impl SceneBuffers {
         bsdf: BsdfFeatures,
         mut geometry: Geometry,
         bounds: [Vec3; 2],
-    ) -> Result<Self> {
+    ) -> Result<(Self, LightKinds)> {
         let mut textures = Textures::default();
         let mut materials: Vec<_> = scene
             .materials
@@ -300,7 +320,7 @@ impl SceneBuffers {
         } else {
             &[]
         };
-        Ok(Self {
+        let buffers = Self {
             positions: optional(
                 "positions",
                 Category::Geometry,
@@ -334,7 +354,8 @@ impl SceneBuffers {
             )?,
             environment: optional("environment", Category::Light, &lights.environment)?,
             albedo_table: optional("albedo table", Category::Material, bytemuck::cast_slice(albedo))?,
-        })
+        };
+        Ok((buffers, lights.kinds()))
     }
 }
 
@@ -504,6 +525,15 @@ impl Lights {
             cdf,
             environment,
         })
+    }
+
+    fn kinds(&self) -> LightKinds {
+        let some = |wanted: &[u32]| self.records.iter().any(|light| wanted.contains(&light.kind));
+        LightKinds {
+            area: some(&[LIGHT_TRIANGLE]),
+            punctual: some(&[LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL]),
+            environment: some(&[LIGHT_ENVIRONMENT]),
+        }
     }
 }
 

@@ -732,8 +732,8 @@ impl Pipelines {
             has_attenuation: profile.has_attenuation,
             has_unlit: profile.has_unlit,
             has_environment: profile.has_environment(),
-            has_area_lights: profile.has_area_lights(),
-            has_punctual_lights: profile.lights.point + profile.lights.spot + profile.lights.directional > 0,
+            has_area_lights: scene.has_area_lights(),
+            has_punctual_lights: scene.has_punctual_lights(),
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
         };
