@@ -30,29 +30,46 @@ pub struct Rendered {
 impl Rendered {
     /// Bits of radiance and variance: equal for equal pictures only.
     pub fn bits(&self) -> Vec<u32> {
-        self.radiance.iter().chain(&self.variance).map(|v| v.to_bits()).collect()
+        self.radiance
+            .iter()
+            .chain(&self.variance)
+            .map(|v| v.to_bits())
+            .collect()
     }
 
     /// 64-bit FNV-1a of [`Rendered::bits`].
     pub fn hash(&self) -> u64 {
-        self.bits().iter().flat_map(|word| word.to_le_bytes()).fold(
-            0xcbf2_9ce4_8422_2325,
-            |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3),
-        )
+        self.bits()
+            .iter()
+            .flat_map(|word| word.to_le_bytes())
+            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+            })
     }
 
     /// Mean over the picture and the variance of that mean, per channel.
     pub fn mean(&self) -> [(f64, f64); 3] {
         let pixels = (self.radiance.len() / 3) as f64;
         let sum = |values: &[f32], c: usize| values.iter().skip(c).step_by(3).map(|v| f64::from(*v)).sum::<f64>();
-        [0, 1, 2].map(|c| (sum(&self.radiance, c) / pixels, sum(&self.variance, c) / (pixels * pixels)))
+        [0, 1, 2].map(|c| {
+            (
+                sum(&self.radiance, c) / pixels,
+                sum(&self.variance, c) / (pixels * pixels),
+            )
+        })
     }
 
     /// Fails unless every sample was finite and each pixel has `samples` of them.
     pub fn expect_sound(&self, what: &str, samples: u32) {
         assert_eq!(self.non_finite, 0, "{what}: samples that are not finite");
-        assert!(self.samples.iter().all(|n| *n == samples as f32), "{what}: samples are missing");
-        assert!(self.radiance.iter().all(|v| v.is_finite() && *v >= 0.0), "{what}: radiance");
+        assert!(
+            self.samples.iter().all(|n| *n == samples as f32),
+            "{what}: samples are missing"
+        );
+        assert!(
+            self.radiance.iter().all(|v| v.is_finite() && *v >= 0.0),
+            "{what}: radiance"
+        );
     }
 
     /// Fails unless the mean over the picture is `expected` and every pixel agrees with it, by z-tests; a relative difference of up to
@@ -131,7 +148,11 @@ pub fn tracer(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &PathTracerSet
 pub fn finish(tracer: &mut PathTracer, samples: u32) -> Rendered {
     let picture = tracer.render(samples).and_then(|()| tracer.picture());
     let (picture, non_finite) = picture.unwrap_or_else(|error| panic!("{error}"));
-    let layer = |name: &str| picture.layer(name).map_or_else(Vec::new, |layer| layer.values().to_vec());
+    let layer = |name: &str| {
+        picture
+            .layer(name)
+            .map_or_else(Vec::new, |layer| layer.values().to_vec())
+    };
     Rendered {
         radiance: layer("radiance"),
         variance: layer("variance"),
@@ -161,7 +182,12 @@ pub fn floor(name: &str, material: u32, half: f32, y: f32) -> Mesh {
     let corner = |x: f32, z: f32| Vec3::new(x * half, y, z * half);
     Mesh {
         name: name.into(),
-        positions: vec![corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)],
+        positions: vec![
+            corner(-1.0, 1.0),
+            corner(1.0, 1.0),
+            corner(1.0, -1.0),
+            corner(-1.0, -1.0),
+        ],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         material: Some(material),
         ..Mesh::default()

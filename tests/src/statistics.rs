@@ -50,7 +50,11 @@ pub fn expect_counts(what: &str, observed: &[f64], expected: &[f64]) {
 /// at most `bias` is allowed for and has to be justified where it is stated.
 pub fn expect_mean(what: &str, mean: f64, variance: f64, expected: f64, bias: f64) {
     let excess = ((mean - expected).abs() - bias).max(0.0);
-    let p = if excess == 0.0 { 1.0 } else { two_sided_p(excess / variance.sqrt()) };
+    let p = if excess == 0.0 {
+        1.0
+    } else {
+        two_sided_p(excess / variance.sqrt())
+    };
     assert!(
         p >= FALSE_ALARM,
         "{what}: {mean} ± {:.3e}, expected {expected} (bias of at most {bias:.1e} allowed), p = {p:.3e}",

@@ -61,7 +61,11 @@ pub struct Tolerance {
 /// Absolute error of sine, cosine and arc tangent: 2⁻²⁰ is what the software driver's polynomials keep with room to spare; Vulkan's
 /// precision rules allow 2⁻¹¹, which is all that can be asked of other drivers.
 pub fn trigonometric_error(gpu: &Gpu) -> f64 {
-    if gpu.caps().kind == "cpu" { 1.0 / 1_048_576.0 } else { 1.0 / 2048.0 }
+    if gpu.caps().kind == "cpu" {
+        1.0 / 1_048_576.0
+    } else {
+        1.0 / 2048.0
+    }
 }
 
 /// Compares results of the first `inputs.len()` numbers `inputs` of cases with `twin`, which returns as many numbers as there are to compare.
@@ -131,7 +135,9 @@ where
         let output = gpu.buffer(&BufferDesc::storage("results", bytes, Category::Work))?;
         let table = gpu.buffer_with("table", Category::Work, if table.is_empty() { &[0.0] } else { table })?;
         let mut recorder = gpu.recorder("twins")?;
-        recorder.pass("twins", |pass| record(pass, &pipeline, [input.view(), output.view(), table.view()]))?;
+        recorder.pass("twins", |pass| {
+            record(pass, &pipeline, [input.view(), output.view(), table.view()])
+        })?;
         recorder.submit()?.wait()?;
         gpu.read(output.view(), cases.len())
     };

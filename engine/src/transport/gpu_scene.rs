@@ -3,6 +3,8 @@
 //! What a scene lacks is not allocated: its binding holds a shared buffer of 16 bytes that no specialized kernel reads. Transforms are
 //! applied in f64 and rounded once. Deterministic: equal scenes give equal bytes.
 
+use std::collections::BTreeMap;
+
 use glam::{DMat3, DVec3, Vec3};
 
 use super::albedo::AlbedoTable;
@@ -270,6 +272,32 @@ impl Geometry {
         triangle.vertices.map(|vertex| self.positions[vertex as usize])
     }
 
+    /// The corners' bits, whatever their order: equal for triangles that cover the same points.
+    fn place_of(&self, triangle: &SceneTriangle) -> [[u32; 3]; 3] {
+        // Adding zero makes both zeros one.
+        let mut place = self
+            .corners_of(triangle)
+            .map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
+        place.sort_unstable();
+        place
+    }
+
+    /// The first triangle in each place where some triangle `emits`.
+    fn first_copies(&self, emits: impl Fn(&SceneTriangle) -> bool) -> BTreeMap<[[u32; 3]; 3], usize> {
+        let emitters = self.triangles.iter().filter(|triangle| emits(triangle));
+        let mut first: BTreeMap<_, _> = emitters
+            .map(|triangle| (self.place_of(triangle), self.triangles.len()))
+            .collect();
+        if !first.is_empty() {
+            for (index, triangle) in self.triangles.iter().enumerate() {
+                if let Some(known) = first.get_mut(&self.place_of(triangle)) {
+                    *known = index.min(*known);
+                }
+            }
+        }
+        first
+    }
+
     fn corners(&self) -> Vec<[Vec3; 3]> {
         self.triangles
             .iter()
@@ -473,11 +501,27 @@ impl Lights {
     ) -> Result<Self> {
         let mut records = Vec::new();
         let mut powers = Vec::new();
+        let emits = |triangle: &SceneTriangle| {
+            let material = &materials[triangle.material as usize];
+            material.emission.iter().any(|e| *e > 0.0) && material.flags & MATERIAL_UNLIT == 0
+        };
+        let first_copies = geometry.first_copies(emits);
         for index in 0..geometry.triangles.len() {
             let triangle = geometry.triangles[index];
+            if !emits(&triangle) {
+                continue;
+            }
             let material = &materials[triangle.material as usize];
-            let emits = material.emission.iter().any(|e| *e > 0.0) && material.flags & MATERIAL_UNLIT == 0;
-            if !emits {
+            // Of triangles in one place rays meet the first, so only that one may be a light.
+            let first = first_copies
+                .get(&geometry.place_of(&triangle))
+                .copied()
+                .unwrap_or(index);
+            if first != index {
+                let other = geometry.triangles[first];
+                if other.material == triangle.material {
+                    geometry.triangles[index].light = other.light;
+                }
                 continue;
             }
             let [a, b, c] = geometry.corners_of(&triangle).map(|p| p.as_dvec3());

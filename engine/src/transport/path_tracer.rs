@@ -34,6 +34,9 @@ const BAND_PIXELS: u32 = 1 << 20;
 const COMPACT_CHUNK: u32 = 32;
 /// Invocations of a workgroup of every stage (`PATH_GROUP`).
 const PATH_GROUP: u32 = 64;
+/// Samples of a pixel in one wave: each is up to eight iterations of one invocation of the resolve kernel, which some drivers end in
+/// silence after 65,535.
+const SAMPLES_A_WAVE: u32 = 4096;
 /// `STALLED_SHADOW` of `path_buffers.glsl`.
 const STALLED_SHADOW: u32 = 2;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
@@ -404,7 +407,7 @@ impl PathTracer {
         // Several samples of a pixel share a wave only where all of the picture fits.
         let whole = self.bands.len() == 1 && pixels == band.pixels;
         let wave_samples = if whole {
-            (self.slots / pixels).min(samples - c.sample).max(1)
+            (self.slots / pixels).min(samples - c.sample).clamp(1, SAMPLES_A_WAVE)
         } else {
             1
         };
