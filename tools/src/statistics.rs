@@ -69,13 +69,24 @@ fn passes(report: &FrameReport) -> String {
 }
 
 fn work(report: &FrameReport) -> String {
-    let mut table = Table::new(&["work", "count", "per steady second"], &[]);
+    // A picture that took one step has no steady time.
+    let steady = !report.steady_rates.is_empty();
+    let head = if steady {
+        "per steady second"
+    } else {
+        "per second, with compilation"
+    };
+    let mut table = Table::new(&["work", "count", head], &[]);
     for (name, count) in &report.counters {
-        let rate = report.steady_rates.get(name).map(|rate| output::metric(*rate));
+        let rate = if steady {
+            report.steady_rates.get(name).copied()
+        } else {
+            Some(*count as f64 / report.render_seconds).filter(|rate| *rate > 0.0 && rate.is_finite())
+        };
         table.row([
             name.replace('_', " "),
             count.to_string(),
-            rate.unwrap_or_else(|| "-".into()),
+            rate.map_or_else(|| "-".into(), output::metric),
         ]);
     }
     table.text()

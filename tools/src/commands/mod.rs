@@ -30,10 +30,10 @@ struct Program {
 
 const AFTER_HELP: &str = "\
 Examples:
-  clerestory render                                      the Cornell box, to out/cornell-box.exr, .png and .json
+  clerestory render                     the Cornell box: out/cornell-box.exr, .png and .json
   clerestory render model.glb --spp 256 --size 1280x720
-  clerestory info                                        devices, and what each technique needs of them
-  clerestory scenes                                      generated scenes and their parameters
+  clerestory info                       devices, and what each technique needs of them
+  clerestory scenes                     generated scenes and their parameters
   clerestory compare picture.exr reference.exr --threshold rmse=1e-3
 
 Exit codes:

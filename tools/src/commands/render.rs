@@ -30,13 +30,14 @@ use progress::Watch;
 Examples:
   clerestory render                                          the Cornell box
   clerestory render 'builtin:cornell-box?sphere=glass' --spp 256 -o out/glass.exr
-  clerestory render model.glb --camera front --size 1280x720 --time-budget 30s --tone neutral --exposure 1
+  clerestory render model.glb --camera front --size 1280x720 --time-budget 30s --tone neutral
   clerestory render --path-set direct --aov normal,albedo,depth
-  clerestory render --spp 4096 -o reference.exr && clerestory render --spp 16 --reference reference.exr
+  clerestory render --spp 4096 -o reference.exr
+  clerestory render --spp 16 --seed 1 --reference reference.exr
   clerestory render --settings '{\"roulette_start\": 8}' --stats json | jq .steady_rates
 
-Ctrl-C stops after the step at hand and writes what is there, with exit code 130; a second Ctrl-C stops at once and writes nothing.
-`clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
+Ctrl-C stops after the step at hand and writes what is there, with exit code 130; a second one stops
+at once and writes nothing. `clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
 pub struct Arguments {
     /// A scene file (gltf, glb, ply, obj, toml) or `builtin:` address
     #[arg(default_value = "builtin:cornell-box")]

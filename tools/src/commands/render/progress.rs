@@ -51,6 +51,7 @@ impl Watch {
     }
 
     fn steps(&self, renderer: &Renderer, options: &RenderOptions) -> Outcome<(Rendered, bool)> {
+        tracing::info!("rendering; the first step compiles the kernels");
         self.bar.set_message("compiling kernels…");
         self.bar.enable_steady_tick(Duration::from_millis(120));
         let mut rendering = renderer.start(options)?;
