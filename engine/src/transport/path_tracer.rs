@@ -34,7 +34,7 @@ const BAND_PIXELS: u32 = 1 << 20;
 const COMPACT_CHUNK: u32 = 32;
 /// Invocations of a workgroup of every stage (`PATH_GROUP`).
 const PATH_GROUP: u32 = 64;
-/// Samples of a pixel in one wave: each is up to eight iterations of one invocation of the resolve kernel, which some drivers end in
+/// Samples of a pixel in one wave: each is up to ten iterations of one invocation of the resolve kernel, which some drivers end in
 /// silence after 65,535.
 const SAMPLES_A_WAVE: u32 = 4096;
 /// `STALLED_SHADOW` of `path_buffers.glsl`.
