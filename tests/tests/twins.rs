@@ -269,7 +269,7 @@ fn functions_without_tables() {
                 list![
                     [fresnel_f0(x[1]), fresnel_dielectric(x[0], x[1])],
                     fresnel_schlick(x[0], v3(x, 2)).to_array(),
-                    fresnel_conductor(x[0], v3(x, 2).max(DVec3::splat(1e-6)), v3(x, 5)).to_array(),
+                    fresnel_conductor(x[0], v3(x, 2), v3(x, 5)).to_array(),
                 ]
             },
         );
