@@ -177,23 +177,26 @@ fn visible_normals_follow_their_density() {
                 ROWS,
                 COLUMNS,
             );
-            // ∫ over a cell by the midpoint rule; dω = sinθ dθ dφ, and D cosθ sinθ dθ dφ = dq dφ / 2π.
+            // ∫ over a cell by the midpoint rule; D cosθ sinθ dθ dφ = dq dφ / 2π. At grazing heights the rest grows as (1 − q)^(−½), which the
+            // variable s with 1 − q = s² takes away.
             let expected: Vec<f64> = (0..ROWS * COLUMNS)
                 .map(|cell| {
                     let (row, column) = (cell / COLUMNS, cell % COLUMNS);
+                    let edge = |row: usize| (1.0 - row as f64 / ROWS as f64).sqrt();
+                    let (s0, s1) = (edge(row + 1), edge(row));
                     let sum: f64 = (0..STEPS * STEPS)
-                        .map(|s| {
-                            let q = (row as f64 + ((s / STEPS) as f64 + 0.5) / STEPS as f64) / ROWS as f64;
+                        .map(|i| {
+                            let s = s0 + (s1 - s0) * ((i / STEPS) as f64 + 0.5) / STEPS as f64;
                             let phi =
-                                TAU * (column as f64 + ((s % STEPS) as f64 + 0.5) / STEPS as f64) / COLUMNS as f64;
-                            let tan = alpha * (q / (1.0 - q)).sqrt();
+                                TAU * (column as f64 + ((i % STEPS) as f64 + 0.5) / STEPS as f64) / COLUMNS as f64;
+                            let tan = alpha * (1.0 - s * s).sqrt() / s;
                             let h = DVec3::new(tan * phi.cos(), tan * phi.sin(), 1.0).normalize();
                             let a2 = alpha * alpha;
                             let d = a2 / (PI * (h.z * h.z * (a2 - 1.0) + 1.0).powi(2));
-                            ggx_visible_pdf(wo, h, alpha) / (d * h.z)
+                            ggx_visible_pdf(wo, h, alpha) / (d * h.z) * 2.0 * s
                         })
                         .sum();
-                    sum / (STEPS * STEPS) as f64 * DRAWS as f64 / (ROWS * COLUMNS) as f64
+                    sum * (s1 - s0) / (STEPS * STEPS) as f64 * DRAWS as f64 / COLUMNS as f64
                 })
                 .collect();
             let total: f64 = expected.iter().sum();
