@@ -54,6 +54,8 @@ pub struct Tolerance {
     pub result: f64,
     /// Rounding units that inputs may have moved by.
     pub input: f64,
+    /// Least size that inputs are taken to have when they are moved: 1 for numbers that the function subtracts from 1.
+    pub input_size: f64,
     /// Absolute error of the device's trigonometric functions that enter results of size 1.
     pub absolute: f64,
 }
@@ -91,7 +93,7 @@ pub fn compare(
             let mut moved = vec![0.0f64; value.len()];
             for sign in [-1.0, 1.0] {
                 let mut near = exact.clone();
-                near[i] += sign * tolerance.input * U * exact[i].abs();
+                near[i] += sign * tolerance.input * U * exact[i].abs().max(tolerance.input_size);
                 for (m, (a, b)) in moved.iter_mut().zip(twin(&near).iter().zip(&value)) {
                     *m = m.max((a - b).abs());
                 }

@@ -49,7 +49,7 @@ pub struct GpuScene {
     statistics: IndexStatistics,
     bounds: [Vec3; 2],
     light_kinds: LightKinds,
-    index: [Buffer; 3],
+    index: Buffer,
     buffers: SceneBuffers,
 }
 
@@ -88,16 +88,15 @@ impl GpuScene {
         let profile = SceneProfile::of(scene);
         let geometry = Geometry::flatten(scene, &profile)?;
         let bvh = Bvh2::build(&geometry.corners(), &Bvh2Settings::default())?;
-        let parts: Vec<Buffer> = bvh
-            .buffers()
-            .iter()
-            .map(|part| gpu.buffer_with(part.name, Category::Index, part.bytes))
-            .collect::<Result<_>>()?;
-        let index: [Buffer; 3] = parts.try_into().map_err(|_| Error::Setting {
-            name: "index".into(),
-            value: bvh.name().into(),
-            cause: "does not have the three buffers of its set".into(),
-        })?;
+        let parts = bvh.buffers();
+        let [part] = parts.as_slice() else {
+            return Err(Error::Setting {
+                name: "index".into(),
+                value: bvh.name().into(),
+                cause: "does not have the one buffer of its set".into(),
+            });
+        };
+        let index = gpu.buffer_with(part.name, Category::Index, part.bytes)?;
         let bounds = geometry.bounds();
         let bsdf = BsdfFeatures::of_materials(placed_materials(scene).into_iter());
         let (buffers, light_kinds) = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
@@ -150,11 +149,8 @@ impl GpuScene {
 
     /// Set 1.
     pub fn index_set(&self) -> Bvh2Set<'_> {
-        let [nodes, triangles, indices] = &self.index;
         Bvh2Set {
-            bvh2_nodes: nodes.view(),
-            bvh2_triangles: triangles.view(),
-            bvh2_indices: indices.view(),
+            bvh2_quarters: self.index.view(),
         }
     }
 

@@ -488,7 +488,10 @@ impl PathTracer {
     fn run(&mut self, wave: &Wave) -> Result<Vec<Timings>> {
         let paths = wave.pixels * wave.samples;
         let mut timings = Vec::new();
-        let mut status = initial_status(paths);
+        let mut status = Status {
+            active_count: paths,
+            ..Status::default()
+        };
         let mut first = true;
         let mut stalls_in_a_row = 0;
         while first || status.active_count > 0 {
@@ -497,6 +500,9 @@ impl PathTracer {
                 self.record_resolve(&mut recorder, &pending)?;
             }
             let resume_shadow = status.stalled == STALLED_SHADOW;
+            // A stalled round leaves no groups to dispatch.
+            let groups = group_counts(status.active_count);
+            (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
             (status.stalled, status.unfinished) = (0, 0);
             recorder.pass("path: begin", |pass| {
                 pass.update(self.buffers.status.view(), &[status])?;
@@ -720,16 +726,9 @@ fn stage_barrier(pass: &mut Pass<'_>) {
     );
 }
 
-fn initial_status(paths: u32) -> Status {
-    let groups = |count: u32| [count.div_ceil(PATH_GROUP), 1, 1];
-    let chunks = groups(paths.div_ceil(COMPACT_CHUNK));
-    Status {
-        item_groups: groups(paths),
-        chunk_groups: chunks,
-        scatter_groups: chunks,
-        active_count: paths,
-        ..Status::default()
-    }
+/// Indirect arguments of stages with one invocation a place, and a chunk, of a queue.
+fn group_counts(places: u32) -> [[u32; 3]; 2] {
+    [places, places.div_ceil(COMPACT_CHUNK)].map(|count| [count.div_ceil(PATH_GROUP), 1, 1])
 }
 
 /// Mean and variance of the mean, per channel; zero for a pixel without samples.
