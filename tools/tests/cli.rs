@@ -276,6 +276,12 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;
     refuse(&["scenes", "nothing"], 2, &["ring"])?;
     refuse(&["info", "builtin:nothing"], 3, &["cornell-box"])?;
+    refuse(&["list", "nothing"], 2, &["nothing"])?;
+    refuse(
+        &["agreement", "--scene", "nothing", "--python", "true"],
+        2,
+        &["nothing"],
+    )?;
     refuse(&["rendre"], 2, &["render"])?;
     Ok(())
 }
@@ -327,6 +333,13 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
     let list = json(&succeed(&["list", "--json"])?.stdout)?;
     assert_eq!(list["techniques"][0]["id"], "path");
     assert!(list["techniques"][0]["default_settings"]["roulette_start"].is_u64());
+    assert!(
+        list["catalogue"]
+            .as_array()
+            .is_some_and(|rows| rows.iter().any(|row| row["id"] == "BG-3"))
+    );
+    let row = String::from_utf8(succeed(&["list", "bg-3"])?.stdout)?;
+    assert!(row.contains("engine/src/transport/path_tracer.rs"), "{row}");
     let devices = json(&succeed(&["info", "--json"])?.stdout)?;
     assert!(devices["devices"][0]["caps"]["subgroup_size"].is_u64());
     let scene = json(&succeed(&["info", "builtin:ring", "--json"])?.stdout)?;

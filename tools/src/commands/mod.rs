@@ -1,5 +1,6 @@
 //! The command line: one file a command.
 
+mod agreement;
 mod bench;
 mod compare;
 mod info;
@@ -41,7 +42,7 @@ Exit codes:
   1    the run failed: device lost, out of memory, a file that cannot be read or written
   2    the command line or a setting asks for what cannot be
   3    the scene cannot be read, or the technique cannot render it
-  4    pictures differ beyond a --threshold
+  4    pictures differ beyond a --threshold, or renderers beyond their noise
   5    no Vulkan device, or none that can do it
   130  stopped by Ctrl-C or a request to end, after writing what was there";
 
@@ -53,6 +54,7 @@ enum Command {
     Scenes(scenes::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
+    Agreement(agreement::Arguments),
 }
 
 /// Reads the command line, runs the command, reports its failure.
@@ -101,6 +103,7 @@ fn run(program: &Program) -> Outcome<ExitCode> {
         Command::Scenes(arguments) => scenes::run(arguments),
         Command::List(arguments) => list::run(arguments),
         Command::Bench(arguments) => bench::run(arguments, global),
+        Command::Agreement(arguments) => agreement::run(arguments),
     }
 }
 
