@@ -15,9 +15,11 @@
 //! ```
 //!
 //! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`scene`] and [`film`], [`accel`] (spatial
-//! indexes), [`transport`] (what light does), [`techniques`], and [`render`], which ties them together.
+//! indexes), [`transport`] (what light does), [`techniques`], and [`render`], which ties them together. [`catalogue`] says where each
+//! published method lives.
 
 pub mod accel;
+pub mod catalogue;
 pub mod error;
 pub mod film;
 pub mod gpu;

@@ -173,10 +173,12 @@ impl Renderer {
         let upload_seconds = start.elapsed().as_secs_f64();
         // Only names and cameras are needed from here on; the geometry lives on the device.
         let scene = Scene {
-            meshes: Vec::new(),
-            images: Vec::new(),
-            environment: None,
-            ..scene.clone()
+            name: scene.name.clone(),
+            source: scene.source.clone(),
+            cameras: scene.cameras.clone(),
+            defaults: scene.defaults.clone(),
+            notes: scene.notes.clone(),
+            ..Scene::default()
         };
         Ok(Self {
             gpu: gpu.clone(),

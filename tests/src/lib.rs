@@ -2,6 +2,11 @@
 //!
 //! Tests never skip for want of a device: without one they fail. Which validation layers run is decided by `CLERESTORY_VALIDATION`.
 
+pub mod random;
+pub mod render;
+pub mod statistics;
+pub mod twin;
+
 use clerestory::gpu::{Gpu, GpuOptions};
 
 /// A headless device for a test; the test fails when there is none.

@@ -159,6 +159,10 @@ void main() {
         path.throughput /= survival;
     }
     vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
+    if (HAS_ATTENUATION && m.thickness > 0.0 && m.transmission > 0.0 && dot(wi, s.geometric_normal) < 0.0) {
+        // The way through the body that the offset of the start leaves out.
+        path.throughput *= exp(m.attenuation * (distance(start, s.point.position) / dot(wi, s.geometric_normal)));
+    }
     rays[slot] = Ray(start, 0.0, normalize(wi), FAR_AWAY);
     paths[slot].throughput = path.throughput;
     paths[slot].pdf = scattered.pdf;
