@@ -1,6 +1,9 @@
 //! Small programs that each show one use of the Clerestory rendering engine; here is what they share.
 
+pub mod arguments;
+pub mod orbit;
 pub mod picture;
+pub mod progressive;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

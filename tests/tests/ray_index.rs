@@ -35,9 +35,7 @@ macro_rules! trace {
             .map(|part| gpu.buffer_with(part.name, Category::Index, part.bytes).unwrap())
             .collect();
         let index = Bvh2Set {
-            bvh2_nodes: parts[0].view(),
-            bvh2_triangles: parts[1].view(),
-            bvh2_indices: parts[2].view(),
+            bvh2_quarters: parts[0].view(),
         };
         let ray_buffer = gpu.buffer_with("rays", Category::Work, rays).unwrap();
         let hits = gpu
