@@ -98,8 +98,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
         let renderer = Renderer::new(&gpu, &scene)?;
         all.push(measure(&renderer, address, &options, arguments.repeat)?);
     }
-    check_validation(&gpu)?;
-    let caps = gpu.caps();
+    let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
+    drop(gpu);
+    check_validation(&log)?;
     if arguments.json {
         output::print_json(&serde_json::json!({
             "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "scenes": all,

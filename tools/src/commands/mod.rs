@@ -12,7 +12,7 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use clerestory::gpu::Gpu;
+use clerestory::gpu::ValidationLog;
 use tracing_subscriber::EnvFilter;
 
 use crate::failure::{Code, Failure, Outcome};
@@ -123,9 +123,9 @@ fn listen(verbose: u8) {
         .init();
 }
 
-/// Prints what the validation layers have said; their errors fail the run.
-fn check_validation(gpu: &Gpu) -> Outcome {
-    let messages = gpu.take_validation_messages();
+/// Prints what the validation layers have said, at best after the device has gone; their errors fail the run.
+fn check_validation(log: &ValidationLog) -> Outcome {
+    let messages = log.take();
     for message in &messages {
         let kind = if message.error { "error" } else { "warning" };
         output::note(&format!("validation {kind} {}: {}", message.id, message.text));

@@ -172,8 +172,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
     let files = Files::choose(arguments.output.as_deref(), &scene.name)?;
     files.prepare()?;
     let gpu = arguments.device.open(global)?;
+    tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
     let watch = Watch::start()?;
     let (rendered, interrupted) = watch.render(&Renderer::new(&gpu, &scene)?, &options)?;
+    let validation = gpu.validation_log();
+    drop(gpu);
     let tone = ToneMap {
         exposure: arguments.exposure.unwrap_or(f64::from(scene.defaults.exposure)),
         curve: arguments.tone.into(),
@@ -191,7 +194,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
     let layers: Vec<&str> = arguments.aov.iter().map(|aov| aov.layer()).collect();
     files.write(&rendered.picture, &layers, &document)?;
     conclude(arguments, &document, &files)?;
-    check_validation(&gpu)?;
+    check_validation(&validation)?;
     Ok(if interrupted {
         Code::Interrupted.into()
     } else {
