@@ -19,8 +19,8 @@ Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
 
-One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to the last; figures move with the
-load of the machine, so compare ratios of runs made together.")]
+One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to
+the last; figures move with the load of the machine, so compare ratios of runs made together.")]
 pub struct Arguments {
     /// Scenes
     #[arg(long = "scene", value_name = "SCENE", default_values = ["builtin:cornell-box", "builtin:materials"])]

@@ -18,11 +18,12 @@ use crate::{output, pictures};
 Examples:
   clerestory compare picture.exr reference.exr
   clerestory compare picture.exr reference.exr --diff difference.png
-  clerestory compare a.exr b.exr --threshold rmse=1e-3 --threshold flip=0.05   exit code 4 beyond either
+  clerestory compare a.exr b.exr --threshold rmse=1e-3,flip=0.05     exit code 4 beyond either
 
-Metrics are of linear radiance, FLIP of tone-mapped pictures. A metric that is not a number is beyond every threshold, and with any
-threshold so are pixels that are not finite, unless non_finite=COUNT allows them. Where both pictures have variance and more than one
-sample a pixel, a z-test says whether they differ by more than noise.")]
+Metrics are of linear radiance, FLIP of tone-mapped pictures. A metric that is not a number is beyond
+every threshold; so are pixels that are not finite, unless non_finite=COUNT allows them. Where both
+pictures have variance and more than one sample a pixel, a z-test says whether they differ by more
+than noise.")]
 pub struct Arguments {
     /// The picture: EXR, Radiance HDR or PNG (taken as sRGB)
     picture: PathBuf,

@@ -17,7 +17,6 @@ use tracing_subscriber::EnvFilter;
 
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::Global;
-use crate::output;
 
 /// Renders scenes on Vulkan and says how long each picture took and how wrong it is.
 #[derive(Debug, Parser)]
@@ -123,14 +122,9 @@ fn listen(verbose: u8) {
         .init();
 }
 
-/// Prints what the validation layers have said, at best after the device has gone; their errors fail the run.
+/// Errors of the validation layers, which the log has shown, fail the run. At best called after the device has gone.
 fn check_validation(log: &ValidationLog) -> Outcome {
-    let messages = log.take();
-    for message in &messages {
-        let kind = if message.error { "error" } else { "warning" };
-        output::note(&format!("validation {kind} {}: {}", message.id, message.text));
-    }
-    match messages.iter().filter(|message| message.error).count() {
+    match log.take().iter().filter(|message| message.error).count() {
         0 => Ok(()),
         count => Err(Failure {
             code: Code::Run,
