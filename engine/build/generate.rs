@@ -275,8 +275,15 @@ fn rust_spec(interface: &Interface) -> String {
     if interface.spec.is_empty() {
         return "/// Specialization constants: none.\npub type Spec = ();\n".into();
     }
-    let mut text = String::from(
-        "/// Specialization constants; the default is the shader's own.\n#[derive(Debug, Clone, Copy, PartialEq)]\npub struct Spec {\n",
+    // Clippy asks for a derived default where it is all zeros.
+    let derived = interface.spec.iter().all(|constant| constant.default == 0);
+    let traits = if derived {
+        "Debug, Clone, Copy, PartialEq, Default"
+    } else {
+        "Debug, Clone, Copy, PartialEq"
+    };
+    let mut text = format!(
+        "/// Specialization constants; the default is the shader's own.\n#[derive({traits})]\npub struct Spec {{\n"
     );
     for constant in &interface.spec {
         let _ = writeln!(
@@ -285,17 +292,11 @@ fn rust_spec(interface: &Interface) -> String {
             constant.id, constant.name, constant.kind
         );
     }
-    text += "}\nimpl Default for Spec {\n    fn default() -> Self {\n        Self {\n";
-    for constant in &interface.spec {
-        let value = match constant.kind {
-            "bool" => (constant.default != 0).to_string(),
-            "f32" => format!("f32::from_bits({})", constant.default),
-            "i32" => format!("{}", constant.default as i32),
-            _ => constant.default.to_string(),
-        };
-        let _ = writeln!(text, "            {}: {value},", constant.name);
+    text += "}\n";
+    if !derived {
+        text += &spec_default(interface);
     }
-    text += "        }\n    }\n}\nimpl SpecConstants for Spec {\n    fn values(&self) -> Vec<(u32, u32)> {\n        vec![\n";
+    text += "impl SpecConstants for Spec {\n    fn values(&self) -> Vec<(u32, u32)> {\n        vec![\n";
     for constant in &interface.spec {
         let bits = match constant.kind {
             "bool" | "i32" => format!("self.{} as u32", constant.name),
@@ -306,6 +307,20 @@ fn rust_spec(interface: &Interface) -> String {
     }
     text += "        ]\n    }\n}\n";
     text
+}
+
+fn spec_default(interface: &Interface) -> String {
+    let mut text = String::from("impl Default for Spec {\n    fn default() -> Self {\n        Self {\n");
+    for constant in &interface.spec {
+        let value = match constant.kind {
+            "bool" => (constant.default != 0).to_string(),
+            "f32" => format!("f32::from_bits({})", constant.default),
+            "i32" => format!("{}", constant.default as i32),
+            _ => constant.default.to_string(),
+        };
+        let _ = writeln!(text, "            {}: {value},", constant.name);
+    }
+    text + "        }\n    }\n}\n"
 }
 
 fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {

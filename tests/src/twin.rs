@@ -70,9 +70,8 @@ pub fn trigonometric_error(gpu: &Gpu) -> f64 {
     }
 }
 
-/// Compares results of the first `inputs.len()` numbers `inputs` of cases with `twin`, which returns as many numbers as there are to compare.
-///
-/// Inputs that `exact` names are not moved (integers, and numbers that only select).
+/// Compares the first results of each case with `twin`, which returns as many numbers as there are to compare, and gives the largest error
+/// as a share of what is allowed. Of the inputs, those in `inputs` are moved; integers and numbers that only select lie outside.
 pub fn compare(
     what: &str,
     cases: &[Case],

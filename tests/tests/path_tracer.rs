@@ -211,6 +211,9 @@ fn floor_picture(size: u32, irradiance: impl Fn(f64, f64) -> f64) -> Vec<f32> {
     values
 }
 
+/// Irradiance of the floor at (x, z), W·m⁻².
+type Irradiance<'a> = Box<dyn Fn(f64, f64) -> f64 + 'a>;
+
 #[test]
 fn point_spot_and_directional_lights_follow_their_laws() {
     with_gpu(|gpu| {
@@ -229,7 +232,7 @@ fn point_spot_and_directional_lights_follow_their_laws() {
         };
         let intensity = Vec3::splat(3.0);
         let direction = axis.as_vec3();
-        let lights: [(&str, LightKind, Box<dyn Fn(f64, f64) -> f64>); 3] = [
+        let lights: [(&str, LightKind, Irradiance<'_>); 3] = [
             (
                 "point",
                 LightKind::Point { position, intensity },

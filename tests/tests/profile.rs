@@ -175,13 +175,7 @@ fn what_is_absent_costs_no_byte() {
             s.materials[0].emission_texture = Some(texture(0));
         });
         assert_eq!((textured[0], textured[1], textured[3]), (64, 0, 0), "{textured:?}");
-        assert_eq!(
-            more(&|s| {
-                s.add_image(image());
-            }),
-            [0; 4],
-            "an image that nothing uses"
-        );
+        assert_eq!(more(&|s| s.images.push(image())), [0; 4], "an image that nothing uses");
         let sun = |s: &mut Scene| {
             s.add_light(
                 "sun",

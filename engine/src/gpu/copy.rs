@@ -40,7 +40,7 @@ impl Pass<'_> {
     pub fn update<T: bytemuck::NoUninit>(&mut self, view: BufferView<'_>, data: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let limit = view.bytes.min(65_536);
-        if bytes.len() as u64 > limit || bytes.len() % 4 != 0 {
+        if bytes.len() as u64 > limit || !bytes.len().is_multiple_of(4) {
             return Err(Error::LimitExceeded {
                 name: view.buffer.name().into(),
                 bytes: bytes.len() as u64,

@@ -98,7 +98,7 @@ impl GpuScene {
         };
         let index = gpu.buffer_with(part.name, Category::Index, part.bytes)?;
         let bounds = geometry.bounds();
-        let bsdf = BsdfFeatures::of_materials(placed_materials(scene).into_iter());
+        let bsdf = BsdfFeatures::of_materials(placed_materials(scene));
         let (buffers, light_kinds) = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
         Ok(Self {
             profile,

@@ -797,6 +797,7 @@ fn camera_pipeline(
         sampler_kind: settings.sampler as u32,
         has_lens: camera.lens_radius > 0.0 && !view.orthographic,
         orthographic: view.orthographic,
+        write_aovs: settings.aovs,
     })
 }
 
