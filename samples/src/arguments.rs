@@ -113,7 +113,13 @@ mod tests {
 
     #[test]
     fn mistakes_are_named() {
-        let message = |line| parse(line).map(|_| ()).err().map(|error| error.to_string()).unwrap_or_default();
+        let message = |line| {
+            parse(line)
+                .map(|_| ())
+                .err()
+                .map(|error| error.to_string())
+                .unwrap_or_default()
+        };
         assert!(message("--colour red").contains("--size, --spp"));
         assert!(message("--spp").contains("needs a value"));
         assert!(message("a b").contains("one too many"));

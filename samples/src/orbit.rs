@@ -181,7 +181,10 @@ mod tests {
             let scene = clerestory::scene::load(&format!("builtin:{name}"))?;
             let bounds = clerestory::scene::SceneProfile::of(&scene).bounds;
             for camera in &scene.cameras {
-                assert!(difference(&Orbit::new(camera, bounds).camera(), camera) < 1e-5, "{name}");
+                assert!(
+                    difference(&Orbit::new(camera, bounds).camera(), camera) < 1e-5,
+                    "{name}"
+                );
             }
         }
         Ok(())

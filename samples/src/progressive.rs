@@ -103,7 +103,9 @@ impl Progressive {
         let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
         Ok(State {
             rendering,
-            pixels: self.gpu.buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
+            pixels: self
+                .gpu
+                .buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
             size,
             pose: orbit.pose(),
             samples: 0.0,
