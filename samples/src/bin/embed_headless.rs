@@ -31,13 +31,17 @@ fn sample(path: &Path, arguments: &Arguments) -> Result<()> {
         ..RenderOptions::default()
     })?;
     // A host does what it likes between the steps: shows the picture so far, moves the camera, stops.
+    let mut printed = 0.0;
     while let Some(progress) = rendering.step()? {
-        println!(
-            "{:3.0} %  {:6.2} s  {} rays",
-            100.0 * progress.fraction,
-            progress.seconds,
-            progress.rays
-        );
+        if progress.fraction >= printed + 0.1 || progress.fraction == 1.0 {
+            printed = progress.fraction;
+            println!(
+                "{:3.0} %  {:6.2} s  {} rays",
+                100.0 * printed,
+                progress.seconds,
+                progress.rays
+            );
+        }
     }
     let picture = rendering.picture()?;
 
