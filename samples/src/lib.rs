@@ -2,8 +2,8 @@
 
 pub mod arguments;
 pub mod orbit;
-pub mod picture;
 pub mod progressive;
+pub mod small_gltf;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,12 +11,23 @@ use std::process::ExitCode;
 use clerestory::gpu::ValidationLog;
 use clerestory::{Error, Result};
 
+use arguments::Arguments;
+
 /// Runs a sample: its path of output is the first argument, or `out/<name>.png`. An error goes to the standard error stream.
 pub fn run(name: &str, sample: impl FnOnce(&Path) -> Result<()>) -> ExitCode {
-    let path = std::env::args_os()
-        .nth(1)
-        .map_or_else(|| PathBuf::from(format!("out/{name}.png")), PathBuf::from);
-    report(sample(&path).map(|()| println!("wrote {}", path.display())))
+    run_with(name, &[], |path, _| sample(path))
+}
+
+/// As [`run`], for a sample with options of these names.
+pub fn run_with(name: &str, options: &[&str], sample: impl FnOnce(&Path, &Arguments) -> Result<()>) -> ExitCode {
+    report(Arguments::of_process(options, 1).and_then(|arguments| {
+        let path = arguments
+            .alone(0)
+            .map_or_else(|| PathBuf::from(format!("out/{name}.png")), PathBuf::from);
+        sample(&path, &arguments)?;
+        println!("wrote {}", path.display());
+        Ok(())
+    }))
 }
 
 /// The exit code of a result; an error goes to the standard error stream.
@@ -44,14 +55,23 @@ pub fn check_messages(log: &ValidationLog) -> Result<()> {
     }
 }
 
+/// Makes the folder that a file is to lie in.
+///
+/// # Errors
+/// [`Error::Io`] for the folder.
+pub fn make_folder(file: &Path) -> Result<()> {
+    match file.parent() {
+        Some(folder) => std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error)),
+        None => Ok(()),
+    }
+}
+
 /// Writes rows of red, green, blue, alpha bytes as a PNG file, and makes the folder if there is none.
 ///
 /// # Errors
 /// [`Error::Io`] for the folder, [`Error::Picture`] for the file.
 pub fn save_png(path: &Path, size: [u32; 2], pixels: &[u8]) -> Result<()> {
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-    }
+    make_folder(path)?;
     image::save_buffer_with_format(
         path,
         pixels,

@@ -6,8 +6,11 @@ use std::sync::Mutex;
 use clerestory::Error;
 use clerestory::gpu::ash::{self, vk};
 use clerestory::gpu::shaders::tests::out_of_bounds;
-use clerestory::gpu::{BufferDesc, Category, EnabledFeatures, Gpu, GpuOptions, HostDevice, OptionalFeatures};
-use clerestory_tests::{assert_no_messages, gpu, with_gpu};
+use clerestory::gpu::{
+    BufferDesc, Category, DeviceSelection, EnabledFeatures, Gpu, GpuOptions, HostDevice, OptionalFeatures,
+};
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory_tests::{assert_no_messages, gpu, gpu_with, with_gpu};
 
 /// A host's own Vulkan objects, destroyed by the host.
 struct Host {
@@ -169,6 +172,52 @@ fn a_lent_device_works_and_stays_the_hosts() {
         drop(gpu);
         host.work();
     }
+}
+
+/// A small path-traced picture, with `between` called after every step.
+fn path_traced(gpu: &Gpu, between: impl Fn()) -> Vec<f32> {
+    let scene = clerestory::scene::load("builtin:cornell-box").unwrap();
+    let options = RenderOptions {
+        size: [32, 32],
+        spp: 4,
+        settings: serde_json::json!({"paths_in_flight": 1024}),
+        ..RenderOptions::default()
+    };
+    let mut rendering = Renderer::new(gpu, &scene).unwrap().start(&options).unwrap();
+    while rendering.step().unwrap().is_some() {
+        between();
+    }
+    rendering
+        .picture()
+        .unwrap()
+        .layer("radiance")
+        .unwrap()
+        .values()
+        .to_vec()
+}
+
+#[test]
+fn a_picture_on_a_lent_device_beside_the_hosts_work_is_the_same_to_the_bit() {
+    let host = Host::new();
+    let gpu = host.lend(EnabledFeatures::REQUIRED).unwrap();
+    let name = gpu.caps().device.clone();
+    let steps = std::cell::Cell::new(0);
+    let lent = path_traced(&gpu, || {
+        let _queue = gpu.lock_queue();
+        host.work();
+        steps.set(steps.get() + 1);
+    });
+    drop(gpu);
+    host.work();
+    // With 1024 paths in flight every wave is one sample of all pixels.
+    assert_eq!(steps.get(), 4);
+    let own = gpu_with(&GpuOptions {
+        device: DeviceSelection::Name(name),
+        ..GpuOptions::default()
+    });
+    assert!(lent.iter().any(|value| *value > 0.0));
+    assert!(lent == path_traced(&own, || {}), "the pictures differ");
+    assert_no_messages(&own);
 }
 
 #[test]

@@ -1,32 +1,39 @@
 //! A host application that has a Vulkan device of its own and lends it to the engine.
 //!
-//! The host makes instance, device and queue with the features that the engine asks for, lends them, lets the engine render into a buffer,
-//! copies that buffer by commands of its own on the same queue, and goes on using its device after the engine has gone.
+//! `embed_host_device [FILE] [--size WxH] [--spp N]`
+//!
+//! The host makes instance, device and queue with the features that the engine asks for and lends them. While the engine path-traces a
+//! picture the host goes on submitting work of its own to the same queue; it copies the result by its own commands, and uses its device
+//! after the engine has gone.
 
 use std::path::Path;
 use std::process::ExitCode;
 
 use clerestory::gpu::ash::{self, vk};
-use clerestory::gpu::{BufferDesc, EnabledFeatures, Gpu, GpuOptions, HostDevice};
-use clerestory::{Error, Result};
-use clerestory_samples::picture::{Gradient, Orbit, Picture};
-
-const SIZE: [u32; 2] = [640, 360];
+use clerestory::gpu::{BufferDesc, Category, EnabledFeatures, Gpu, GpuOptions, HostDevice};
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory::{Error, Result, scene};
+use clerestory_samples::arguments::Arguments;
 
 fn main() -> ExitCode {
-    clerestory_samples::run("embed_host_device", sample)
+    clerestory_samples::run_with("embed_host_device", &["--size", "--spp"], sample)
 }
 
 fn failed(call: &'static str) -> impl Fn(vk::Result) -> Error {
     move |result| Error::Vulkan { call, result }
 }
 
-fn sample(path: &Path) -> Result<()> {
+fn sample(path: &Path, arguments: &Arguments) -> Result<()> {
+    let options = RenderOptions {
+        size: arguments.size("--size")?.unwrap_or([200, 200]),
+        spp: arguments.value("--spp")?.unwrap_or(32),
+        ..RenderOptions::default()
+    };
     let host = Host::new()?;
-    let pixels = host.render()?;
+    let pixels = host.render(&options)?;
     // The engine and everything made from it are gone; the host's device works on.
     host.submit(vk::CommandBuffer::null())?;
-    clerestory_samples::save_png(path, SIZE, &pixels)
+    clerestory_samples::save_png(path, options.size, &pixels)
 }
 
 /// What a host application has.
@@ -93,8 +100,8 @@ impl Host {
         }
     }
 
-    /// Lends the device, has the engine render, and copies the result by the host's own commands.
-    fn render(&self) -> Result<Vec<u8>> {
+    /// Lends the device, has the engine render beside the host's own work, and copies the result by the host's own commands.
+    fn render(&self, options: &RenderOptions) -> Result<Vec<u8>> {
         let lent = HostDevice {
             entry: self.entry.clone(),
             instance: self.instance.clone(),
@@ -107,8 +114,17 @@ impl Host {
         };
         // SAFETY: the handles belong together and outlive the `Gpu`; the features are those of `new`.
         let gpu = unsafe { Gpu::from_host(lent, &GpuOptions::default()) }?;
-        let bytes = 4 * SIZE[0] as usize * SIZE[1] as usize;
-        let rendered = Gradient::new(&gpu, false)?.render(&Orbit::default(), SIZE)?;
+        let [width, height] = options.size;
+        let bytes = 4 * width as usize * height as usize;
+        let rendered = gpu.buffer(&BufferDesc::storage("displayed picture", bytes as u64, Category::Film))?;
+        let scene = scene::load("builtin:cornell-box")?;
+        let mut rendering = Renderer::new(&gpu, &scene)?.start(options)?;
+        while rendering.step()?.is_some() {
+            // The queue is the engine's too: the lock keeps the two from submitting at once.
+            let _guard = gpu.lock_queue();
+            self.submit(vk::CommandBuffer::null())?;
+        }
+        rendering.display(&rendered, scene.defaults.exposure, false)?;
         let readback = gpu.buffer(&BufferDesc::readback("the host's copy", bytes as u64))?;
 
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(self.queue_family);
@@ -119,7 +135,6 @@ impl Host {
                 .create_command_pool(&pool, None)
                 .map_err(failed("vkCreateCommandPool"))?;
             let recorded = self.record_copy(pool, rendered.raw(), readback.raw(), bytes as u64);
-            // The queue is the engine's too: the lock keeps the two from submitting at once.
             let guard = gpu.lock_queue();
             let result = recorded.and_then(|commands| self.submit(commands));
             drop(guard);
