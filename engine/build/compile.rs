@@ -94,13 +94,13 @@ fn compile(root: &Path, file: &Path, out: &Path, debug_info: bool) -> Result<Sha
         && reflected.exists()
         && std::fs::read_to_string(&stamp).is_ok_and(|old| {
             sources(&depfile)
-                .and_then(|list| fingerprint(&list, &embedded_flags))
+                .and_then(|list| fingerprint(file, &list, &embedded_flags))
                 .is_ok_and(|new| old == new)
         });
     if !fresh {
         glslc(root, file, &reflected, &REFLECTED_FLAGS, Some(&depfile))?;
         glslc(root, file, &embedded, &embedded_flags, None)?;
-        let print = fingerprint(&sources(&depfile)?, &embedded_flags)?;
+        let print = fingerprint(file, &sources(&depfile)?, &embedded_flags)?;
         std::fs::write(&stamp, print).map_err(|error| format!("{}: {error}", stamp.display()))?;
     }
     let text = std::fs::read_to_string(file).map_err(|error| format!("{name}: {error}"))?;
@@ -160,10 +160,11 @@ fn sources(depfile: &Path) -> Result<Vec<PathBuf>, String> {
         .collect())
 }
 
-/// A hash of the sources' contents and the flags: what decides whether a module is still fresh.
-fn fingerprint(sources: &[PathBuf], flags: &[&str]) -> Result<String, String> {
+/// A hash of the sources' contents, the flags and the entry file's place (a build folder may have been copied from another tree, whose
+/// files its dependency lists name): what decides whether a module is still fresh.
+fn fingerprint(file: &Path, sources: &[PathBuf], flags: &[&str]) -> Result<String, String> {
     let mut hasher = DefaultHasher::new();
-    (COMMON_FLAGS, REFLECTED_FLAGS, flags).hash(&mut hasher);
+    (file, COMMON_FLAGS, REFLECTED_FLAGS, flags).hash(&mut hasher);
     for path in sources {
         std::fs::read(path)
             .map_err(|error| format!("{}: {error}", path.display()))?

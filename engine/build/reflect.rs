@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
+use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, ExecutionModel, Op, StorageClass};
 
 /// A type inside a buffer, as the device lays it out.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,10 +67,21 @@ pub struct Member {
 /// What a binding holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Resource {
-    Storage { reads: bool, writes: bool, block: Struct },
-    Uniform { block: Struct },
-    StorageImage { reads: bool, writes: bool },
+    Storage {
+        reads: bool,
+        writes: bool,
+        block: Struct,
+    },
+    Uniform {
+        block: Struct,
+    },
+    StorageImage {
+        reads: bool,
+        writes: bool,
+    },
     SampledImage,
+    /// A buffer read texel by texel (`utextureBuffer`).
+    TexelBuffer,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -270,6 +281,7 @@ impl Reader {
             (StorageClass::Uniform, Op::TypeStruct) => Resource::Uniform {
                 block: self.structure(pointee)?,
             },
+            (_, Op::TypeImage) if self.is_texel_buffer(pointee) => Resource::TexelBuffer,
             (_, Op::TypeImage) => Resource::StorageImage {
                 reads: self.decoration(id, Decoration::NonReadable).is_none(),
                 writes: self.decoration(id, Decoration::NonWritable).is_none(),
@@ -289,6 +301,12 @@ impl Reader {
             name,
             resource,
         })
+    }
+
+    /// An image of dimension `Buffer` that is read through texel fetches.
+    fn is_texel_buffer(&self, image: u32) -> bool {
+        self.definition(image)
+            .is_ok_and(|definition| definition.operands.contains(&Operand::Dim(Dim::DimBuffer)))
     }
 
     fn structure(&self, id: u32) -> Result<Struct, String> {

@@ -29,13 +29,13 @@ macro_rules! trace {
             bvh2_count: true,
         };
         let pipeline = gpu.compute_pipeline::<$shader::Kernel>(&spec).unwrap();
-        let parts: Vec<Buffer> = $bvh
-            .buffers()
-            .iter()
-            .map(|part| gpu.buffer_with(part.name, Category::Index, part.bytes).unwrap())
-            .collect();
+        let parts = $bvh.buffers();
+        let format = clerestory::gpu::ash::vk::Format::R32G32B32A32_UINT;
+        let quarters = gpu
+            .texels_with(parts[0].name, Category::Index, format, parts[0].bytes)
+            .unwrap();
         let index = Bvh2Set {
-            bvh2_quarters: parts[0].view(),
+            bvh2_quarters: &quarters,
         };
         let ray_buffer = gpu.buffer_with("rays", Category::Work, rays).unwrap();
         let hits = gpu

@@ -102,6 +102,18 @@ impl Pass<'_> {
                         .update_descriptor_sets(&[descriptor.buffer_info(&raw)], &[])
                 };
             }
+            (BindingKind::TexelBuffer, BoundResource::Texels(view)) => {
+                self.recorder.keep(&view.inner);
+                self.recorder
+                    .touch(self.name, view.buffer(), access(shader.stage, binding))?;
+                let raw = [view.raw()];
+                // SAFETY: as above.
+                unsafe {
+                    inner
+                        .device
+                        .update_descriptor_sets(&[descriptor.texel_buffer_view(&raw)], &[])
+                };
+            }
             (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
                 self.recorder.keep(&image.inner);
                 let raw = [vk::DescriptorImageInfo::default()

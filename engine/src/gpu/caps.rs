@@ -43,6 +43,8 @@ pub struct Caps {
     pub timestamp_period: f32,
     /// `maxStorageBufferRange`, bytes.
     pub max_storage_buffer_range: u64,
+    /// `maxTexelBufferElements`.
+    pub max_texel_buffer_elements: u64,
     /// `minStorageBufferOffsetAlignment`, bytes.
     pub storage_buffer_alignment: u64,
     /// `maxMemoryAllocationSize`, bytes.
@@ -148,6 +150,7 @@ impl Caps {
                 && vulkan12.shader_sampled_image_array_non_uniform_indexing != 0,
             timestamp_period: if timestamps { limits.timestamp_period } else { 0.0 },
             max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
+            max_texel_buffer_elements: u64::from(limits.max_texel_buffer_elements),
             storage_buffer_alignment: limits.min_storage_buffer_offset_alignment,
             max_allocation_size: maintenance.max_memory_allocation_size,
             device_heap: heaps

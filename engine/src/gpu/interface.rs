@@ -1,6 +1,6 @@
 //! What the build generates for each shader is written in these terms.
 
-pub use crate::gpu::{BufferView, Image, Sampler};
+pub use crate::gpu::{BufferView, Image, Sampler, TexelView};
 
 /// A shader module with its reflected interface.
 #[derive(Debug)]
@@ -73,6 +73,8 @@ pub enum BindingKind {
     StorageImage,
     /// Combined image and sampler.
     SampledImage,
+    /// Uniform texel buffer.
+    TexelBuffer,
 }
 
 /// One specialization constant.
@@ -167,6 +169,8 @@ pub enum BoundResource<'a> {
     StorageImage(&'a Image),
     /// Combined image and sampler, in `SHADER_READ_ONLY_OPTIMAL` layout.
     Sampled(SampledView<'a>),
+    /// Texel buffer.
+    Texels(&'a TexelView),
 }
 
 /// An image with the sampler to read it by.

@@ -15,9 +15,10 @@ use super::fresnel::fresnel_conductor_average;
 use super::lights::{light_power, triangle_power};
 use crate::accel::bvh2::{Bvh2, Bvh2Settings};
 use crate::accel::{IndexStatistics, RayIndex};
+use crate::gpu::ash::vk;
 use crate::gpu::shaders::sets::{Bvh2Set, SceneSet};
 use crate::gpu::shaders::types::{SceneLight, SceneMaterial, SceneTexture, SceneTriangle};
-use crate::gpu::{Buffer, Category, Gpu};
+use crate::gpu::{Buffer, Category, Gpu, TexelView};
 use crate::scene::{AlphaMode, Environment, Filter, LightKind, Material, Scene, SceneProfile, Texture, Wrap};
 use crate::{Error, Result};
 
@@ -49,7 +50,7 @@ pub struct GpuScene {
     statistics: IndexStatistics,
     bounds: [Vec3; 2],
     light_kinds: LightKinds,
-    index: Buffer,
+    index: TexelView,
     buffers: SceneBuffers,
 }
 
@@ -96,7 +97,7 @@ impl GpuScene {
                 cause: "does not have the one buffer of its set".into(),
             });
         };
-        let index = gpu.buffer_with(part.name, Category::Index, part.bytes)?;
+        let index = gpu.texels_with(part.name, Category::Index, vk::Format::R32G32B32A32_UINT, part.bytes)?;
         let bounds = geometry.bounds();
         let bsdf = BsdfFeatures::of_materials(placed_materials(scene));
         let (buffers, light_kinds) = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
@@ -150,7 +151,7 @@ impl GpuScene {
     /// Set 1.
     pub fn index_set(&self) -> Bvh2Set<'_> {
         Bvh2Set {
-            bvh2_quarters: self.index.view(),
+            bvh2_quarters: &self.index,
         }
     }
 

@@ -52,10 +52,10 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     float least = largest_component(abs(ray.direction)) * BVH2_MIN_RELATIVE_COMPONENT;
     vec3 inverse = vec3(bvh2_clamped_reciprocal(ray.direction.x, least), bvh2_clamped_reciprocal(ray.direction.y, least),
                         bvh2_clamped_reciprocal(ray.direction.z, least));
-    vec4 root0 = uintBitsToFloat(bvh2_quarters[0]);
-    vec4 root1 = uintBitsToFloat(bvh2_quarters[1]);
-    vec4 root2 = uintBitsToFloat(bvh2_quarters[2]);
-    uint triangles = bvh2_quarters[3].w;
+    vec4 root0 = uintBitsToFloat(bvh2_quarter(0));
+    vec4 root1 = uintBitsToFloat(bvh2_quarter(1));
+    vec4 root2 = uintBitsToFloat(bvh2_quarter(2));
+    uint triangles = bvh2_quarter(3).w;
     vec3 root_lower = min(root0.xyz, vec3(root1.zw, root2.x));
     vec3 root_upper = max(vec3(root0.w, root1.xy), root2.yzw);
     float reach = largest_component(max(abs(root_lower - ray.origin), abs(root_upper - ray.origin)));
@@ -65,7 +65,7 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     uint trail = 0u;
     uint replay = 0u;
     for (uint node = resume >> BVH2_COUNT_BITS; node != 0u; ++replay) {
-        uint parent = bvh2_quarters[BVH2_NODE_QUARTERS * node + 3u].z;
+        uint parent = bvh2_quarter(BVH2_NODE_QUARTERS * node + 3u).z;
         trail = trail << 1 | (parent & 1u);
         node = parent >> 1;
     }
@@ -81,12 +81,12 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         uint place = word >> BVH2_COUNT_BITS;
         uint quarter = is_node ? BVH2_NODE_QUARTERS * place : triangles + BVH2_TRIANGLE_QUARTERS * place;
         // Loaded before the branch, from one address for both kinds.
-        vec4 q0 = uintBitsToFloat(bvh2_quarters[quarter]);
-        vec4 q1 = uintBitsToFloat(bvh2_quarters[quarter + 1u]);
-        uvec4 q2 = bvh2_quarters[quarter + 2u];
+        vec4 q0 = uintBitsToFloat(bvh2_quarter(quarter));
+        vec4 q1 = uintBitsToFloat(bvh2_quarter(quarter + 1u));
+        uvec4 q2 = bvh2_quarter(quarter + 2u);
         vec4 q2_float = uintBitsToFloat(q2);
         if (is_node) {
-            uvec2 children = bvh2_quarters[quarter + 3u].xy;
+            uvec2 children = bvh2_quarter(quarter + 3u).xy;
             vec2 span0 = bvh2_span(q0.xyz, vec3(q0.w, q1.xy), ray.origin, inverse, slack);
             vec2 span1 = bvh2_span(vec3(q1.zw, q2_float.x), q2_float.yzw, ray.origin, inverse, slack);
             vec2 enter = max(vec2(span0.x, span1.x), vec2(ray.t_min));

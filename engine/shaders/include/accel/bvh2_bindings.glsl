@@ -6,8 +6,9 @@
 
 // A node is four quarters: lower0 upper0.x | upper0.yz lower1.xy | lower1.z upper1 | child words, parent word, and of the root where the triangles
 // begin. A triangle is three, behind the nodes: vertex 0, 1, 2, its index, two that are unused.
-layout(set = 1, binding = 0, scalar) restrict readonly buffer Bvh2Quarters {
-    uvec4 bvh2_quarters[];
-};
+// A texel buffer, since software drivers fetch texels for all lanes at once, but load storage buffers lane by lane.
+layout(set = 1, binding = 0) uniform utextureBuffer bvh2_quarters;
+
+uvec4 bvh2_quarter(uint index) { return texelFetch(bvh2_quarters, int(index)); }
 
 #endif

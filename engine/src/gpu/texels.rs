@@ -1,0 +1,103 @@
+//! Texel buffers: buffers that shaders read by typed fetches.
+//!
+//! What is gathered at addresses that differ from lane to lane is best read this way: software drivers vectorise texel fetches, but load
+//! storage buffers lane by lane, and the size limit is `maxTexelBufferElements` instead of `maxStorageBufferRange`.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::buffer::{Buffer, BufferDesc, Residency};
+use super::device::{Gpu, Inner};
+use super::image::texel_bytes;
+use super::memory::Category;
+use crate::{Error, Result};
+
+/// A device buffer with a view of all of it in a texel format. Cloning shares it.
+#[derive(Clone)]
+pub struct TexelView {
+    pub(super) inner: Arc<TexelViewInner>,
+}
+
+impl std::fmt::Debug for TexelView {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("TexelView").field(&self.inner.buffer).finish()
+    }
+}
+
+pub(super) struct TexelViewInner {
+    gpu: Arc<Inner>,
+    raw: vk::BufferView,
+    buffer: Buffer,
+}
+
+impl Gpu {
+    /// A texel buffer in device memory with the given contents; `data` is rounded up to whole texels.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] past `maxTexelBufferElements`, and as [`Gpu::buffer`] and [`Gpu::upload`].
+    pub fn texels_with<T: bytemuck::NoUninit>(
+        &self,
+        name: &str,
+        category: Category,
+        format: vk::Format,
+        data: &[T],
+    ) -> Result<TexelView> {
+        let texel = texel_bytes(format).unwrap_or(1);
+        let bytes = (size_of_val(data) as u64).next_multiple_of(texel).max(texel);
+        let limit = self.caps().max_texel_buffer_elements;
+        if bytes / texel > limit {
+            return Err(Error::LimitExceeded {
+                name: name.into(),
+                bytes: bytes / texel,
+                limit_name: "maxTexelBufferElements",
+                limit,
+            });
+        }
+        let buffer = self.buffer(&BufferDesc {
+            name,
+            bytes,
+            residency: Residency::Device,
+            category,
+            usage: vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST,
+        })?;
+        self.upload(&buffer, 0, data)?;
+        let gpu = &self.inner;
+        let info = vk::BufferViewCreateInfo::default()
+            .buffer(buffer.raw())
+            .format(format)
+            .range(vk::WHOLE_SIZE);
+        // SAFETY: the buffer is alive, and kept so by the view; destroyed in `TexelViewInner::drop`.
+        let raw = unsafe { gpu.device.create_buffer_view(&info, None) }
+            .map_err(|result| gpu.error("vkCreateBufferView", result))?;
+        gpu.name(raw, name);
+        Ok(TexelView {
+            inner: Arc::new(TexelViewInner {
+                gpu: Arc::clone(gpu),
+                raw,
+                buffer,
+            }),
+        })
+    }
+}
+
+impl TexelView {
+    /// The buffer behind it.
+    pub fn buffer(&self) -> &Buffer {
+        &self.inner.buffer
+    }
+
+    /// The Vulkan handle.
+    pub fn raw(&self) -> vk::BufferView {
+        self.inner.raw
+    }
+}
+
+impl Drop for TexelViewInner {
+    fn drop(&mut self) {
+        // SAFETY: the last owner is gone, and submissions own what they use.
+        unsafe { self.gpu.device.destroy_buffer_view(self.raw, None) };
+    }
+}
