@@ -29,7 +29,12 @@ fn run(root: &Path, out: &Path) -> Result<(), String> {
     let shaders = compile::compile_all(&root.join("shaders"), out, debug_info)?;
     let interfaces = shaders
         .iter()
-        .map(|shader| reflect::reflect(shader).map_err(|message| format!("{}: {message}", shader.name)))
+        .map(|shader| {
+            std::fs::read(&shader.reflected)
+                .map_err(|error| error.to_string())
+                .and_then(|module| reflect::reflect(&module))
+                .map_err(|message| format!("{}: {message}", shader.name))
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let rust = generate::generate(&shaders, &interfaces)?;
     std::fs::write(out.join("shaders.rs"), rust).map_err(|error| format!("cannot write shaders.rs: {error}"))

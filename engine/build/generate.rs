@@ -174,10 +174,11 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
     let _ = writeln!(
         text,
         "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
-         spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    local_size: [{}],\n    \
+         spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    fingerprint: {},\n    local_size: [{}],\n    \
          bindings: &[",
         shader.name,
         interface.stage,
+        interface.fingerprint(),
         local_size.join(", "),
     );
     for binding in &interface.bindings {
@@ -226,13 +227,17 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         }
     }
     let push = if interface.push.is_some() { "Push" } else { "()" };
-    if interface.stage == "Compute" {
-        let _ = writeln!(
-            text,
-            "/// The kernel as a type: its push constants and specialization constants.\n#[derive(Debug)]\npub enum Kernel {{}}\n\
-             impl ComputeShader for Kernel {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}"
-        );
-    }
+    let (kind, word) = if interface.stage == "Compute" {
+        ("Kernel", "kernel")
+    } else {
+        ("Shader", "shader")
+    };
+    let _ = writeln!(
+        text,
+        "/// The {word} as a type: its push constants and specialization constants.\n#[derive(Debug)]\npub enum {kind} {{}}\n\
+         impl {}Shader for {kind} {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}",
+        interface.stage
+    );
     text += "}\n";
     text
 }
@@ -270,8 +275,15 @@ fn rust_spec(interface: &Interface) -> String {
     if interface.spec.is_empty() {
         return "/// Specialization constants: none.\npub type Spec = ();\n".into();
     }
-    let mut text = String::from(
-        "/// Specialization constants; the default is the shader's own.\n#[derive(Debug, Clone, Copy, PartialEq)]\npub struct Spec {\n",
+    // Clippy asks for a derived default where it is all zeros.
+    let derived = interface.spec.iter().all(|constant| constant.default == 0);
+    let traits = if derived {
+        "Debug, Clone, Copy, PartialEq, Default"
+    } else {
+        "Debug, Clone, Copy, PartialEq"
+    };
+    let mut text = format!(
+        "/// Specialization constants; the default is the shader's own.\n#[derive({traits})]\npub struct Spec {{\n"
     );
     for constant in &interface.spec {
         let _ = writeln!(
@@ -280,17 +292,11 @@ fn rust_spec(interface: &Interface) -> String {
             constant.id, constant.name, constant.kind
         );
     }
-    text += "}\nimpl Default for Spec {\n    fn default() -> Self {\n        Self {\n";
-    for constant in &interface.spec {
-        let value = match constant.kind {
-            "bool" => (constant.default != 0).to_string(),
-            "f32" => format!("f32::from_bits({})", constant.default),
-            "i32" => format!("{}", constant.default as i32),
-            _ => constant.default.to_string(),
-        };
-        let _ = writeln!(text, "            {}: {value},", constant.name);
+    text += "}\n";
+    if !derived {
+        text += &spec_default(interface);
     }
-    text += "        }\n    }\n}\nimpl SpecConstants for Spec {\n    fn values(&self) -> Vec<(u32, u32)> {\n        vec![\n";
+    text += "impl SpecConstants for Spec {\n    fn values(&self) -> Vec<(u32, u32)> {\n        vec![\n";
     for constant in &interface.spec {
         let bits = match constant.kind {
             "bool" | "i32" => format!("self.{} as u32", constant.name),
@@ -301,6 +307,20 @@ fn rust_spec(interface: &Interface) -> String {
     }
     text += "        ]\n    }\n}\n";
     text
+}
+
+fn spec_default(interface: &Interface) -> String {
+    let mut text = String::from("impl Default for Spec {\n    fn default() -> Self {\n        Self {\n");
+    for constant in &interface.spec {
+        let value = match constant.kind {
+            "bool" => (constant.default != 0).to_string(),
+            "f32" => format!("f32::from_bits({})", constant.default),
+            "i32" => format!("{}", constant.default as i32),
+            _ => constant.default.to_string(),
+        };
+        let _ = writeln!(text, "            {}: {value},", constant.name);
+    }
+    text + "        }\n    }\n}\n"
 }
 
 fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {

@@ -7,8 +7,6 @@ use std::collections::BTreeMap;
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
-use crate::compile::Shader;
-
 /// A type inside a buffer, as the device lays it out.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Type {
@@ -112,10 +110,24 @@ struct Reader {
     definitions: BTreeMap<u32, Instruction>,
 }
 
-/// Reflects one compiled shader.
-pub fn reflect(shader: &Shader) -> Result<Interface, String> {
-    let bytes = std::fs::read(&shader.reflected).map_err(|error| error.to_string())?;
-    let reader = Reader::new(rspirv::dr::load_bytes(bytes).map_err(|error| error.to_string())?);
+impl Interface {
+    /// A hash of all that the generated Rust code depends on: equal for two versions of a shader that can stand in for each other. The
+    /// defaults of specialization constants are left out, since the host always sets them. FNV-1a.
+    pub fn fingerprint(&self) -> u64 {
+        let spec: Vec<_> = self.spec.iter().map(|c| (c.id, &c.name, c.kind)).collect();
+        let text = format!(
+            "{} {:?} {:?} {spec:?} {:?}",
+            self.stage, self.bindings, self.push, self.local_size
+        );
+        text.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
+        })
+    }
+}
+
+/// Reflects a module that was compiled with all its names.
+pub fn reflect(module: &[u8]) -> Result<Interface, String> {
+    let reader = Reader::new(rspirv::dr::load_bytes(module).map_err(|error| error.to_string())?);
     let entry = reader.module.entry_points.first().ok_or("no entry point")?;
     let stage = match entry.operands[0] {
         Operand::ExecutionModel(ExecutionModel::GLCompute) => "Compute",

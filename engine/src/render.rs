@@ -9,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::accel::IndexStatistics;
 use crate::film::picture::{Metadata, Picture};
-use crate::gpu::{Gpu, MemoryReport, PipelineInfo};
+use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
 use crate::scene::{Note, Scene, SceneProfile};
 use crate::techniques::{self, Skipped, Technique, View};
 use crate::transport::GpuScene;
@@ -173,10 +173,12 @@ impl Renderer {
         let upload_seconds = start.elapsed().as_secs_f64();
         // Only names and cameras are needed from here on; the geometry lives on the device.
         let scene = Scene {
-            meshes: Vec::new(),
-            images: Vec::new(),
-            environment: None,
-            ..scene.clone()
+            name: scene.name.clone(),
+            source: scene.source.clone(),
+            cameras: scene.cameras.clone(),
+            defaults: scene.defaults.clone(),
+            notes: scene.notes.clone(),
+            ..Scene::default()
         };
         Ok(Self {
             gpu: gpu.clone(),
@@ -306,6 +308,14 @@ impl Rendering {
         self.camera.clone_from(&camera.name);
         self.finished = false;
         self.technique.set_camera(camera)
+    }
+
+    /// Writes the picture as it is now to a buffer on the device; see [`Technique::display`].
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`], [`Error::DeviceLost`].
+    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        self.technique.display(target, exposure, bgra)
     }
 
     /// The picture as it is now, without its report.

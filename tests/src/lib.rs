@@ -2,6 +2,11 @@
 //!
 //! Tests never skip for want of a device: without one they fail. Which validation layers run is decided by `CLERESTORY_VALIDATION`.
 
+pub mod random;
+pub mod render;
+pub mod statistics;
+pub mod twin;
+
 use clerestory::gpu::{Gpu, GpuOptions};
 
 /// A headless device for a test; the test fails when there is none.
@@ -17,11 +22,14 @@ pub fn gpu_with(options: &GpuOptions) -> Gpu {
     }
 }
 
-/// Runs `test` on a device and fails it on any validation message.
+/// Runs `test` on a device and fails it on any validation message, those about what is left when the device goes included.
 pub fn with_gpu(test: impl FnOnce(&Gpu)) {
     let gpu = gpu();
+    let log = gpu.validation_log();
     test(&gpu);
-    assert_no_messages(&gpu);
+    drop(gpu);
+    let messages = log.take();
+    assert!(messages.is_empty(), "validation messages: {messages:#?}");
 }
 
 /// Fails when the validation layers have said anything.

@@ -1,13 +1,14 @@
 //! Floor 1: generated interfaces, barriers, timing, memory, limits.
 
 use clerestory::Error;
-use clerestory::gpu::shaders::tests::layout_probe;
+use clerestory::gpu::ash::vk;
+use clerestory::gpu::shaders::tests::{layout_probe, out_of_bounds};
 use clerestory::gpu::shaders::types::{ProbeInner, ProbeRecord};
 use clerestory::gpu::{
-    Access, BufferDesc, Category, DeviceSelection, Gpu, GpuOptions, Validation, rw_compute_to_compute,
+    Access, BufferDesc, Category, DeviceSelection, Gpu, GpuOptions, ImageDesc, Pass, rw_compute_to_compute,
     transfer_to_compute,
 };
-use clerestory_tests::{gpu_with, with_gpu};
+use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
 
 /// Runs the probe over `count` records and returns the output block's header and its records.
 fn probe(gpu: &Gpu, spec: &layout_probe::Spec, count: u32) -> (layout_probe::ProbeOutput, Vec<ProbeRecord>) {
@@ -220,26 +221,258 @@ fn unknown_device_names_what_there_is() {
     }
 }
 
+/// A recorder with `count` dispatches of the word writer, each with a descriptor set of its own.
+fn many_dispatches(gpu: &Gpu, count: u32) -> Vec<u32> {
+    let pipeline = gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).unwrap();
+    let words = gpu
+        .buffer_with("words", Category::Work, &vec![0u32; count as usize])
+        .unwrap();
+    let set = out_of_bounds::Set0 { words: words.view() };
+    let mut recorder = gpu.recorder("many sets").unwrap();
+    recorder
+        .pass("write each", |pass| {
+            for index in 0..count {
+                let push = out_of_bounds::Push {
+                    index,
+                    value: index + 1,
+                };
+                pass.dispatch(&pipeline, &[&set], &push, [1, 1, 1])?;
+                pass.barrier(&[rw_compute_to_compute(&words)]);
+            }
+            Ok(())
+        })
+        .unwrap();
+    recorder.submit().unwrap().wait().unwrap();
+    gpu.read(words.view(), count as usize).unwrap()
+}
+
 #[test]
-fn planted_error_is_caught_by_the_layers() {
-    let gpu = gpu_with(&GpuOptions {
-        validation: Validation::Core,
-        ..GpuOptions::default()
-    });
-    let info = clerestory::gpu::ash::vk::BufferCreateInfo::default();
-    // A buffer of no bytes and no usage is against the specification; the driver makes one all the same.
-    #[expect(unsafe_code, reason = "the planted error")]
-    // SAFETY: the software driver and the layers take the faulty call without harm.
-    unsafe {
-        if let Ok(raw) = gpu.raw_device().create_buffer(&info, None) {
-            gpu.raw_device().destroy_buffer(raw, None);
+fn descriptor_pools_grow_and_are_used_again() {
+    with_gpu(|gpu| {
+        for _ in 0..2 {
+            let expected: Vec<u32> = (1..=700).collect();
+            assert_eq!(many_dispatches(gpu, 700), expected);
         }
-    }
-    let messages = gpu.take_validation_messages();
-    assert!(
-        messages
-            .iter()
-            .any(|message| message.id.contains("VUID-VkBufferCreateInfo-size")),
-        "{messages:#?}"
-    );
+    });
+}
+
+#[test]
+fn too_many_passes_are_an_error() {
+    with_gpu(|gpu| {
+        let mut recorder = gpu.recorder("passes").unwrap();
+        for index in 0..1024 {
+            recorder.pass(&format!("pass {index}"), |_| Ok(())).unwrap();
+        }
+        let error = recorder.pass("one too many", |_| Ok(())).unwrap_err();
+        assert!(matches!(error, Error::LimitExceeded { limit: 1024, .. }), "{error}");
+        let timings = recorder.submit().unwrap().wait().unwrap();
+        assert_eq!(timings.passes.len(), 1024);
+    });
+}
+
+#[test]
+fn timestamps_and_statistics_are_plausible() {
+    with_gpu(|gpu| {
+        let words = gpu
+            .buffer(&BufferDesc::storage("words", 64 << 20, Category::Work))
+            .unwrap();
+        let pipeline = gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).unwrap();
+        let set = out_of_bounds::Set0 { words: words.view() };
+        let start = std::time::Instant::now();
+        let mut recorder = gpu.recorder("timed").unwrap();
+        recorder.count_invocations();
+        recorder
+            .pass("fill", |pass| {
+                pass.fill(words.view(), 1)?;
+                pass.barrier(&[transfer_to_compute(&words)]);
+                Ok(())
+            })
+            .unwrap();
+        let push = out_of_bounds::Push { index: 3, value: 9 };
+        recorder
+            .pass("dispatch", |pass| pass.dispatch(&pipeline, &[&set], &push, [5, 2, 1]))
+            .unwrap();
+        let timings = recorder.submit().unwrap().wait().unwrap();
+        let wall = start.elapsed().as_secs_f64();
+        if gpu.caps().timestamp_period > 0.0 {
+            assert!(timings.passes[0].nanoseconds > Some(0), "{timings:?}");
+            // The device's clock and the host's run at one rate to within a percent.
+            assert!(timings.seconds() <= wall * 1.01, "{} > {wall}", timings.seconds());
+        }
+        if gpu.caps().pipeline_statistics {
+            assert_eq!(timings.passes[0].invocations, Some(0));
+            assert_eq!(timings.passes[1].invocations, Some(10));
+        }
+    });
+}
+
+#[test]
+fn the_pipeline_cache_is_written_and_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = GpuOptions {
+        cache_folder: Some(folder.path().to_owned()),
+        ..GpuOptions::default()
+    };
+    let files = || -> Vec<std::path::PathBuf> {
+        let mut list: Vec<_> = std::fs::read_dir(folder.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
+        list.sort();
+        list
+    };
+    let run = || {
+        let gpu = gpu_with(&options);
+        assert_eq!(many_dispatches(&gpu, 3), [1, 2, 3]);
+        assert_no_messages(&gpu);
+        drop(gpu);
+        let files = files();
+        assert_eq!(files.len(), 1, "{files:?}");
+        // The header that Vulkan prescribes: its size and version 1.
+        let bytes = std::fs::read(&files[0]).unwrap();
+        assert!(bytes.len() >= 32);
+        assert_eq!(bytes[..8], [32, 0, 0, 0, 1, 0, 0, 0]);
+        files[0].clone()
+    };
+    let file = run();
+    assert_eq!(run(), file);
+    std::fs::write(&file, b"not a pipeline cache").unwrap();
+    assert_eq!(run(), file);
+}
+
+#[test]
+fn live_allocations_are_listed_by_name() {
+    with_gpu(|gpu| {
+        let film = gpu
+            .buffer(&BufferDesc::storage("radiance", 4096, Category::Film))
+            .unwrap();
+        let found = |gpu: &Gpu| {
+            gpu.allocations()
+                .iter()
+                .any(|a| a.name == "radiance" && a.category == Category::Film && a.bytes >= 4096)
+        };
+        assert!(found(gpu));
+        drop(film);
+        assert!(!found(gpu));
+    });
+}
+
+#[test]
+fn submissions_may_be_empty_dropped_or_given_up() {
+    with_gpu(|gpu| {
+        let timings = gpu.recorder("empty").unwrap().submit().unwrap().wait().unwrap();
+        assert!(timings.passes.is_empty());
+        let before = gpu.memory_report();
+        let words = gpu
+            .buffer(&BufferDesc::storage("words", 1 << 20, Category::Work))
+            .unwrap();
+        // Dropping without waiting must keep the buffer until the device is done.
+        let mut recorder = gpu.recorder("dropped").unwrap();
+        recorder.pass("fill", |pass| pass.fill(words.view(), 1)).unwrap();
+        let submission = recorder.submit().unwrap();
+        drop(words);
+        drop(submission);
+        let words = gpu
+            .buffer(&BufferDesc::storage("words", 1 << 20, Category::Work))
+            .unwrap();
+        let mut recorder = gpu.recorder("given up").unwrap();
+        recorder.pass("fill", |pass| pass.fill(words.view(), 1)).unwrap();
+        drop((recorder, words));
+        assert_eq!(gpu.memory_report(), before);
+    });
+}
+
+#[test]
+fn waiting_with_a_limit_gives_the_submission_back() {
+    with_gpu(|gpu| {
+        let words = gpu
+            .buffer(&BufferDesc::storage("words", 64 << 20, Category::Work))
+            .unwrap();
+        let mut recorder = gpu.recorder("long").unwrap();
+        recorder
+            .pass("fill often", |pass| {
+                for turn in 0..20 {
+                    pass.fill(words.view(), turn)?;
+                    pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
+                }
+                Ok(())
+            })
+            .unwrap();
+        let submission = recorder.submit().unwrap();
+        // More than a gigabyte of writes cannot be over before the first question is asked.
+        match submission.wait_for(std::time::Duration::ZERO) {
+            Err((Error::TimedOut { what, .. }, Some(submission))) => {
+                assert_eq!(what, "long");
+                submission.wait().unwrap();
+            }
+            Err((error, _)) => panic!("{error}"),
+            Ok(timings) => panic!("done at once: {timings:?}"),
+        }
+        assert_eq!(gpu.read::<u32>(words.view(), 1).unwrap(), [19]);
+    });
+}
+
+#[test]
+fn threads_share_a_device() {
+    with_gpu(|gpu| {
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| assert_eq!(many_dispatches(gpu, 20), (1..=20).collect::<Vec<u32>>()));
+            }
+        });
+    });
+}
+
+#[test]
+fn parts_outside_of_a_buffer_are_refused() {
+    with_gpu(|gpu| {
+        let words = gpu.buffer(&BufferDesc::storage("words", 64, Category::Work)).unwrap();
+        let pipeline = gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).unwrap();
+        let mut recorder = gpu.recorder("outside").unwrap();
+        let mut refused = |what: &str, record: &dyn Fn(&mut Pass<'_>) -> clerestory::Result<()>| {
+            let result = recorder.pass(what, |pass| record(pass));
+            assert!(
+                matches!(&result, Err(Error::LimitExceeded { name, .. }) if name == "words"),
+                "{what}: {result:?}"
+            );
+        };
+        refused("fill past the end", &|pass| pass.fill(words.slice(32, 64), 0));
+        refused("fill at an odd place", &|pass| pass.fill(words.slice(2, 4), 0));
+        refused("copy from far outside", &|pass| {
+            pass.copy(words.slice(u64::MAX, 4), words.view())
+        });
+        refused("bind past the end", &|pass| {
+            let set = out_of_bounds::Set0 {
+                words: words.slice(0, 128),
+            };
+            pass.dispatch(&pipeline, &[&set], &Default::default(), [1, 1, 1])
+        });
+        let error = gpu.read::<u32>(words.view(), 17).unwrap_err();
+        assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+        assert!(gpu.read::<u32>(words.view(), 0).unwrap().is_empty());
+    });
+}
+
+#[test]
+fn images_that_the_device_cannot_make_are_refused() {
+    with_gpu(|gpu| {
+        let image = |size: [u32; 2], format| {
+            gpu.image(&ImageDesc {
+                name: "picture",
+                size,
+                layers: 1,
+                mips: 1,
+                format,
+                usage: vk::ImageUsageFlags::COLOR_ATTACHMENT,
+                category: Category::Film,
+            })
+        };
+        image([16, 16], vk::Format::R8G8B8A8_UNORM).unwrap();
+        let error = image([1 << 20, 16], vk::Format::R8G8B8A8_UNORM).unwrap_err();
+        assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+        let error = image([0, 16], vk::Format::R8G8B8A8_UNORM).unwrap_err();
+        assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+        let error = image([16, 16], vk::Format::D32_SFLOAT).unwrap_err();
+        assert!(matches!(error, Error::MissingFeature { .. }), "{error}");
+    });
 }

@@ -66,12 +66,15 @@ def main():
         # The conversion waits for the result, so that the clock sees the work.
         return numpy.array(mitsuba.render(scene, integrator=integrator, spp=arguments.spp, seed=seed), dtype=numpy.float64)
 
-    start = time.perf_counter()
-    render(arguments.seed + arguments.passes)
-    first_seconds = time.perf_counter() - start
+    # LLVM compiles its kernels in the first pass, which is not counted; the scalar variant has nothing to warm up.
+    first_seconds = None
+    if not variant.startswith("scalar"):
+        start = time.perf_counter()
+        render(arguments.seed + arguments.passes)
+        first_seconds = time.perf_counter() - start
 
     # Welford's update: no cancellation between large sums.
-    mean, squares, seconds = 0.0, 0.0, []
+    mean, squares, seconds, cpu_start = 0.0, 0.0, [], time.process_time()
     for index in range(arguments.passes):
         start = time.perf_counter()
         picture = render(arguments.seed + index)
@@ -79,6 +82,7 @@ def main():
         difference = picture - mean
         mean = mean + difference / (index + 1)
         squares = squares + difference * (picture - mean)
+    cpu_seconds = time.process_time() - cpu_start
     variance_of_mean = squares / (arguments.passes - 1) / arguments.passes
 
     height, width, _ = mean.shape
@@ -104,6 +108,8 @@ def main():
         "threads": os.cpu_count(),
         "first_pass_seconds": first_seconds,
         "seconds": total,
+        "seconds_each": seconds,
+        "cpu_seconds": cpu_seconds,
         "seconds_median_pass": sorted(seconds)[len(seconds) // 2],
         "paths_per_second": width * height * arguments.spp * arguments.passes / total,
         "non_finite_values": int(numpy.count_nonzero(~numpy.isfinite(layers))),

@@ -1,3 +1,4 @@
 //! What the command line program and its tests share.
 
+pub mod agreement;
 pub mod mitsuba;

@@ -1,2 +1,14 @@
 //! The command line program of the Clerestory rendering engine.
-fn main() {}
+
+mod commands;
+mod failure;
+mod options;
+mod output;
+mod pictures;
+mod statistics;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    commands::main()
+}

@@ -7,6 +7,7 @@
 //! Guarantees: deterministic files; no file is written for a scene that is refused.
 
 mod mesh;
+pub mod scenes;
 mod surface;
 
 use std::fmt::Write;

@@ -9,6 +9,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL or SAMPLER_PCG
 layout(constant_id = 1) const bool HAS_LENS = true;
 layout(constant_id = 2) const bool ORTHOGRAPHIC = false;
+layout(constant_id = 3) const bool WRITE_AOVS = true;
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 
 #include "transport/path_buffers.glsl"
@@ -55,8 +56,10 @@ void main() {
         direction = direction * push.focus_distance - offset;
     }
     rays[slot] = Ray(origin, 0.0, normalize(direction), FAR_AWAY);
-    paths[slot] = PathState(vec3(1.0), 0.0, vec3(0.0), 0u, 1.0);
-    aovs[slot].filled = 0u;
+    paths[slot] = PathState(vec3(1.0), 0.0, vec3(0.0), 0u, 1.0, OUTSIDE);
+    if (WRITE_AOVS) {
+        aovs[slot].filled = 0u;
+    }
     queue_in[slot] = slot;
     resume_words[2u * slot] = 0u;
     resume_words[2u * slot + 1u] = 0u;

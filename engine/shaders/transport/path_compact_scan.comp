@@ -40,6 +40,12 @@ void main() {
         chunk_counts[2u * chunk] = offset;
         offset += alive;
     }
+    if (lane == PATH_GROUP - 1u && stalled) {
+        // What is recorded for later rounds has the queues in the wrong roles: it must find nothing to do. The host sets these again.
+        status.item_groups[0] = 0u;
+        status.chunk_groups[0] = 0u;
+        status.scatter_groups[0] = 0u;
+    }
     if (lane == PATH_GROUP - 1u && !stalled) {
         uvec2 all = before + total;
         status.scatter_groups[0] = status.chunk_groups[0];

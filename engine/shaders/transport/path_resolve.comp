@@ -8,21 +8,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool WRITE_AOVS = true;
 
 #include "transport/path_buffers.glsl"
-#include "film/two_float.glsl"
-
-// Sums over the samples of one pixel; squares for the variance.
-struct FilmPixel {
-    TwoFloat sum[3];
-    TwoFloat square[3];
-    uint samples;
-    uint non_finite;
-};
-
-// Sums of albedo, normal and depth over the samples that hit something.
-struct FilmAov {
-    TwoFloat sum[7];
-    uint hits;
-};
+#include "film/film_pixel.glsl"
 
 layout(set = 1, binding = 0, scalar) restrict buffer FilmPixels { FilmPixel film_pixels[]; };
 layout(set = 1, binding = 1, scalar) restrict buffer FilmAovs { FilmAov film_aovs[]; };

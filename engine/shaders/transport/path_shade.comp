@@ -70,8 +70,13 @@ void main() {
     SceneMaterial m = scene_materials[s.material];
     vec3 wo = -ray.direction;
     bool front = dot(wo, s.geometric_normal) > 0.0;
-    if (HAS_ATTENUATION && !front && m.thickness > 0.0 && m.transmission > 0.0) {
-        path.throughput *= exp(-m.attenuation * hit.t);
+    bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
+    if (HAS_ATTENUATION) {
+        // A camera inside a solid does not know it until it looks out.
+        uint interior = path.interior == OUTSIDE && solid && !front ? s.material : path.interior;
+        if (interior != OUTSIDE) {
+            path.throughput *= exp(-scene_materials[interior].attenuation * hit.t);
+        }
     }
 
     if ((HAS_AREA_LIGHTS || HAS_UNLIT) && counted) {
@@ -83,9 +88,8 @@ void main() {
     }
 
     Bsdf bsdf = surface_bsdf(m, s);
-    vec3 outward = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0 ? s.geometric_normal
-                 : front ? s.geometric_normal : -s.geometric_normal;
     vec3 facing = front ? s.geometric_normal : -s.geometric_normal;
+    vec3 outward = solid ? s.geometric_normal : facing;
     vec3 normal = facing;
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
         normal = adapt_shading_normal(surface_mapped_normal(m, s), facing, wo);
@@ -143,6 +147,7 @@ void main() {
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
         float eta = wo_local.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
         path.eta_scale *= eta * eta;
+        path.interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
     }
     path.bounce = bounce + 1u;
     if (path.bounce >= push.roulette_start) {
@@ -154,10 +159,17 @@ void main() {
         path.throughput /= survival;
     }
     vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
+    if (HAS_ATTENUATION && m.thickness > 0.0 && m.transmission > 0.0 && dot(wi, s.geometric_normal) < 0.0) {
+        // The way through the body that the offset of the start leaves out.
+        path.throughput *= exp(m.attenuation * (distance(start, s.point.position) / dot(wi, s.geometric_normal)));
+    }
     rays[slot] = Ray(start, 0.0, normalize(wi), FAR_AWAY);
     paths[slot].throughput = path.throughput;
     paths[slot].pdf = scattered.pdf;
     paths[slot].bounce = path.bounce;
-    paths[slot].eta_scale = path.eta_scale;
+    if (HAS_TRANSMISSION) {
+        paths[slot].eta_scale = path.eta_scale;
+        paths[slot].interior = path.interior;
+    }
     flags[place] |= FLAG_ALIVE;
 }

@@ -52,6 +52,9 @@ pub const BOX_SLACK: f32 = 1.0 / 262_144.0;
 /// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).
 pub const MIN_RELATIVE_COMPONENT: f32 = 8.673_617_4e-19;
 
+/// Bytes of a quarter of a node, the unit in which kernels read.
+const QUARTER: usize = 16;
+
 /// An axis-aligned box.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -102,8 +105,17 @@ pub struct Bvh2Node {
     pub children: [u32; 2],
     /// Parent's index × 2 + which of its children this is; 0 at the root. Resuming climbs along it.
     pub parent: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Of the root: where the triangles begin, in quarters of a node (16 bytes); else 0.
+    pub triangles: u32,
+}
+
+/// A triangle as the kernels read it (48 bytes).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+struct PackedTriangle {
+    positions: [Vec3; 3],
+    index: u32,
+    reserved: [u32; 2],
 }
 
 /// A binary bounding volume hierarchy over triangles.
@@ -112,6 +124,8 @@ pub struct Bvh2 {
     nodes: Vec<Bvh2Node>,
     positions: Vec<[Vec3; 3]>,
     indices: Vec<u32>,
+    /// Nodes and triangles as the kernels read them, in quarters of a node.
+    packed: Vec<[u32; 4]>,
     statistics: IndexStatistics,
 }
 
@@ -141,6 +155,21 @@ impl Bvh2 {
     }
 }
 
+/// One buffer for both, nodes first: an iteration of the kernels reads three quarters from one address, whatever it is about to test. On devices that
+/// load lane by lane (software ones) that is most of the traversal's time.
+fn pack(nodes: &[Bvh2Node], positions: &[[Vec3; 3]], indices: &[u32]) -> Vec<[u32; 4]> {
+    let mut packed: Vec<[u32; 4]> = bytemuck::cast_slice(nodes).to_vec();
+    for (&positions, &index) in positions.iter().zip(indices) {
+        let triangle = PackedTriangle {
+            positions,
+            index,
+            reserved: [0; 2],
+        };
+        packed.extend_from_slice(bytemuck::cast_slice(&[triangle]));
+    }
+    packed
+}
+
 impl RayIndex for Bvh2 {
     fn name(&self) -> &'static str {
         "bvh2"
@@ -151,23 +180,11 @@ impl RayIndex for Bvh2 {
     }
 
     fn buffers(&self) -> Vec<IndexBuffer<'_>> {
-        vec![
-            IndexBuffer {
-                binding: 0,
-                name: "bvh2 nodes",
-                bytes: bytemuck::cast_slice(&self.nodes),
-            },
-            IndexBuffer {
-                binding: 1,
-                name: "bvh2 triangle positions",
-                bytes: bytemuck::cast_slice(&self.positions),
-            },
-            IndexBuffer {
-                binding: 2,
-                name: "bvh2 triangle indices",
-                bytes: bytemuck::cast_slice(&self.indices),
-            },
-        ]
+        vec![IndexBuffer {
+            binding: 0,
+            name: "bvh2",
+            bytes: bytemuck::cast_slice(&self.packed),
+        }]
     }
 
     fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit {

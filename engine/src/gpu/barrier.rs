@@ -26,16 +26,28 @@ impl Access {
     pub const HOST_READ: Self = Self(1 << 5);
     /// Reads in fragment shaders.
     pub const FRAGMENT_READ: Self = Self(1 << 6);
-    /// Writes by colour attachments.
+    /// Reads and writes of colour attachments.
     pub const COLOR_WRITE: Self = Self(1 << 7);
     /// Reads in vertex shaders.
     pub const VERTEX_READ: Self = Self(1 << 8);
     /// Reads and writes of depth attachments.
     pub const DEPTH_WRITE: Self = Self(1 << 9);
+    /// Writes in fragment shaders.
+    pub const FRAGMENT_WRITE: Self = Self(1 << 10);
+    /// Writes in vertex shaders.
+    pub const VERTEX_WRITE: Self = Self(1 << 11);
     /// Reads and writes in compute shaders.
     pub const COMPUTE: Self = Self(Self::COMPUTE_READ.0 | Self::COMPUTE_WRITE.0);
 
-    const WRITES: u16 = Self::COMPUTE_WRITE.0 | Self::TRANSFER_WRITE.0 | Self::COLOR_WRITE.0 | Self::DEPTH_WRITE.0;
+    /// Reads and writes by copies.
+    pub const TRANSFER: Self = Self(Self::TRANSFER_READ.0 | Self::TRANSFER_WRITE.0);
+
+    const WRITES: u16 = Self::COMPUTE_WRITE.0
+        | Self::TRANSFER_WRITE.0
+        | Self::COLOR_WRITE.0
+        | Self::DEPTH_WRITE.0
+        | Self::FRAGMENT_WRITE.0
+        | Self::VERTEX_WRITE.0;
 
     /// All uses of either.
     pub const fn union(self, other: Self) -> Self {
@@ -90,6 +102,9 @@ impl std::ops::BitOr for Access {
     }
 }
 
+const COLOR_KINDS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
+    vk::AccessFlags2::COLOR_ATTACHMENT_READ.as_raw() | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw(),
+);
 const DEPTH_STAGES: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
     vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS.as_raw() | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS.as_raw(),
 );
@@ -99,7 +114,7 @@ const DEPTH_KINDS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
 );
 
 /// Stage and access of every bit of [`Access`].
-const TABLE: [(u16, vk::PipelineStageFlags2, vk::AccessFlags2); 10] = [
+const TABLE: [(u16, vk::PipelineStageFlags2, vk::AccessFlags2); 12] = [
     (
         Access::COMPUTE_READ.0,
         vk::PipelineStageFlags2::COMPUTE_SHADER,
@@ -138,7 +153,7 @@ const TABLE: [(u16, vk::PipelineStageFlags2, vk::AccessFlags2); 10] = [
     (
         Access::COLOR_WRITE.0,
         vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-        vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+        COLOR_KINDS,
     ),
     (
         Access::VERTEX_READ.0,
@@ -146,6 +161,16 @@ const TABLE: [(u16, vk::PipelineStageFlags2, vk::AccessFlags2); 10] = [
         vk::AccessFlags2::SHADER_READ,
     ),
     (Access::DEPTH_WRITE.0, DEPTH_STAGES, DEPTH_KINDS),
+    (
+        Access::FRAGMENT_WRITE.0,
+        vk::PipelineStageFlags2::FRAGMENT_SHADER,
+        vk::AccessFlags2::SHADER_WRITE,
+    ),
+    (
+        Access::VERTEX_WRITE.0,
+        vk::PipelineStageFlags2::VERTEX_SHADER,
+        vk::AccessFlags2::SHADER_WRITE,
+    ),
 ];
 
 /// Makes the writes among `from` visible to `to`, and keeps `to` from starting before `from` has ended, for one buffer.
@@ -187,7 +212,7 @@ pub fn rw_compute_to_compute(buffer: &Buffer) -> BufferBarrier<'_> {
 pub fn transfer_to_compute(buffer: &Buffer) -> BufferBarrier<'_> {
     BufferBarrier {
         buffer,
-        from: Access::TRANSFER_READ | Access::TRANSFER_WRITE,
+        from: Access::TRANSFER,
         to: Access::COMPUTE,
     }
 }
@@ -197,7 +222,7 @@ pub fn compute_to_transfer(buffer: &Buffer) -> BufferBarrier<'_> {
     BufferBarrier {
         buffer,
         from: Access::COMPUTE,
-        to: Access::TRANSFER_READ | Access::TRANSFER_WRITE,
+        to: Access::TRANSFER,
     }
 }
 

@@ -130,8 +130,8 @@ impl Gpu {
             .usage(desc.usage)
             .sharing_mode(vk::SharingMode::EXCLUSIVE);
         // SAFETY: `info` is complete; the buffer is destroyed in `BufferInner::drop`.
-        let raw =
-            unsafe { gpu.device.create_buffer(&info, None) }.map_err(|result| gpu.error("vkCreateBuffer", result))?;
+        let raw = unsafe { gpu.device.create_buffer(&info, None) }
+            .map_err(|result| gpu.creation_error("vkCreateBuffer", result, desc.name, bytes))?;
         // SAFETY: `raw` was just created.
         let requirements = unsafe { gpu.device.get_buffer_memory_requirements(raw) };
         let location = match desc.residency {
@@ -226,11 +226,11 @@ impl Buffer {
     fn mapped(&self, offset: u64, bytes: u64) -> Result<*mut u8> {
         let error = |limit_name, limit| Error::LimitExceeded {
             name: self.inner.name.clone(),
-            bytes: offset + bytes,
+            bytes: offset.saturating_add(bytes),
             limit_name,
             limit,
         };
-        if offset + bytes > self.inner.bytes {
+        if offset.saturating_add(bytes) > self.inner.bytes {
             return Err(error("size", self.inner.bytes));
         }
         let pointer = self.inner.allocation.as_ref().and_then(Allocation::mapped_ptr);
@@ -259,6 +259,26 @@ pub struct BufferView<'a> {
     pub offset: u64,
     /// Length in bytes.
     pub bytes: u64,
+}
+
+impl BufferView<'_> {
+    /// Fails when the range does not lie in the buffer or does not begin at a multiple of `alignment`.
+    pub(super) fn check(&self, alignment: u64) -> Result<()> {
+        let error = |bytes, limit_name, limit| Error::LimitExceeded {
+            name: self.buffer.name().into(),
+            bytes,
+            limit_name,
+            limit,
+        };
+        let end = self.offset.saturating_add(self.bytes);
+        if end > self.buffer.bytes() {
+            return Err(error(end, "size", self.buffer.bytes()));
+        }
+        if !self.offset.is_multiple_of(alignment) {
+            return Err(error(self.offset, "offset alignment", alignment));
+        }
+        Ok(())
+    }
 }
 
 impl<'a> From<&'a Buffer> for BufferView<'a> {

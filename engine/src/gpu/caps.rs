@@ -29,6 +29,12 @@ pub struct Caps {
     pub robust_buffer_access: bool,
     /// `pipelineStatisticsQuery`.
     pub pipeline_statistics: bool,
+    /// `fragmentStoresAndAtomics`.
+    pub fragment_stores: bool,
+    /// `vertexPipelineStoresAndAtomics`.
+    pub vertex_stores: bool,
+    /// The queue takes draws as well as dispatches.
+    pub graphics: bool,
     /// `VK_KHR_ray_query` is offered.
     pub ray_query: bool,
     /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing` are offered.
@@ -37,6 +43,8 @@ pub struct Caps {
     pub timestamp_period: f32,
     /// `maxStorageBufferRange`, bytes.
     pub max_storage_buffer_range: u64,
+    /// `minStorageBufferOffsetAlignment`, bytes.
+    pub storage_buffer_alignment: u64,
     /// `maxMemoryAllocationSize`, bytes.
     pub max_allocation_size: u64,
     /// Size of the largest device-local heap, bytes.
@@ -128,6 +136,11 @@ impl Caps {
             int64_atomics: vulkan12.shader_buffer_int64_atomics != 0,
             robust_buffer_access: features.robust_buffer_access != 0,
             pipeline_statistics: features.pipeline_statistics_query != 0,
+            fragment_stores: features.fragment_stores_and_atomics != 0,
+            vertex_stores: features.vertex_pipeline_stores_and_atomics != 0,
+            graphics: families
+                .get(queue_family as usize)
+                .is_some_and(|family| family.queue_flags.contains(vk::QueueFlags::GRAPHICS)),
             ray_query: extensions
                 .iter()
                 .any(|e| e.extension_name_as_c_str() == Ok(ash::khr::ray_query::NAME)),
@@ -135,6 +148,7 @@ impl Caps {
                 && vulkan12.shader_sampled_image_array_non_uniform_indexing != 0,
             timestamp_period: if timestamps { limits.timestamp_period } else { 0.0 },
             max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
+            storage_buffer_alignment: limits.min_storage_buffer_offset_alignment,
             max_allocation_size: maintenance.max_memory_allocation_size,
             device_heap: heaps
                 .iter()

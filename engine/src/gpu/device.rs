@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::ffi::CStr;
-use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -12,97 +10,16 @@ use ash::{ext, khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
 use super::caps::Caps;
-use super::fault::{self, FaultPlan};
+use super::fault;
 use super::host::{EnabledFeatures, HostDevice};
-use super::instance::{DeviceSummary, Instance, ValidationMessage, surface_extensions, vulkan};
-use super::memory::{Memory, MemoryReport};
+use super::instance::{DeviceSummary, Instance, ValidationLog, ValidationMessage, surface_extensions, vulkan};
+use super::marker::InFlight;
+use super::memory::{AllocationInfo, Memory, MemoryReport};
+use super::options::{GpuOptions, Validation};
 use super::pipeline::PipelineTable;
 use super::pipeline_cache::PipelineCache;
 use super::resources::FrameResources;
 use crate::{Error, Result};
-
-/// Which device to take.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum DeviceSelection {
-    /// The fastest kind there is: discrete, integrated, virtual, then software.
-    #[default]
-    Fastest,
-    /// By index in the loader's order.
-    Index(usize),
-    /// By a part of its name, in any case. `lavapipe` also finds Mesa's name for it, `llvmpipe`.
-    Name(String),
-}
-
-impl FromStr for DeviceSelection {
-    type Err = std::convert::Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
-    }
-}
-
-impl DeviceSelection {
-    fn matches(&self, summary: &DeviceSummary) -> bool {
-        match self {
-            Self::Fastest => true,
-            Self::Index(index) => summary.index == *index,
-            Self::Name(name) => {
-                let (name, device) = (
-                    name.to_lowercase(),
-                    format!("{} {}", summary.name, summary.driver).to_lowercase(),
-                );
-                device.contains(&name) || (name == "lavapipe" && device.contains("llvmpipe"))
-            }
-        }
-    }
-}
-
-/// Which validation layers run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Validation {
-    /// None.
-    #[default]
-    Off,
-    /// Core and synchronization checks.
-    Core,
-    /// GPU-assisted checks (out-of-bounds access in shaders), without the core checks.
-    GpuAssisted,
-}
-
-/// How to make a device.
-#[derive(Debug, Clone)]
-pub struct GpuOptions {
-    /// Which device.
-    pub device: DeviceSelection,
-    /// Validation layers; the default obeys the environment variable `CLERESTORY_VALIDATION` (`off`, `core`, `gpu`).
-    pub validation: Validation,
-    /// Folder of the pipeline cache; `None` keeps none. The default is `$XDG_CACHE_HOME/clerestory`, else `~/.cache/clerestory`.
-    pub cache_folder: Option<PathBuf>,
-    /// Writes a marker before every pass, so that a lost device names the last one. Costs a 4-byte fill a pass.
-    pub crash_markers: bool,
-    /// Makes the n-th call of a Vulkan command fail, for tests.
-    pub fault: Option<FaultPlan>,
-}
-
-impl Default for GpuOptions {
-    fn default() -> Self {
-        let validation = match std::env::var("CLERESTORY_VALIDATION").as_deref() {
-            Ok("core") => Validation::Core,
-            Ok("gpu") => Validation::GpuAssisted,
-            _ => Validation::Off,
-        };
-        let cache = std::env::var_os("XDG_CACHE_HOME")
-            .map(PathBuf::from)
-            .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")));
-        Self {
-            device: DeviceSelection::default(),
-            validation,
-            cache_folder: cache.map(|folder| folder.join("clerestory")),
-            crash_markers: true,
-            fault: None,
-        }
-    }
-}
 
 /// A Vulkan device with one queue. Cloning shares it.
 #[derive(Clone)]
@@ -132,6 +49,10 @@ pub(super) struct Inner {
     pub pipelines: Mutex<PipelineTable>,
     pub pipeline_cache: PipelineCache,
     pub crash_markers: bool,
+    pub validation: Validation,
+    pub in_flight: Mutex<InFlight>,
+    /// The device can present to windows.
+    pub presents: bool,
     /// The last pass that a lost device reached.
     pub lost: OnceLock<String>,
     next_id: AtomicU64,
@@ -164,19 +85,11 @@ impl Gpu {
         let display = window.display_handle().map_err(no_window)?.as_raw();
         let handle = window.window_handle().map_err(no_window)?.as_raw();
         let instance = Instance::new(options.validation, &surface_extensions(display)?)?;
-        // SAFETY: both handles are valid while `window` is borrowed; the probe surface is destroyed below.
+        // SAFETY: both handles are valid while `window` is borrowed; `ProbeSurface` destroys the surface.
         let surface = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None) }
             .map_err(vulkan("vkCreateSurfaceKHR"))?;
         let loader = khr::surface::Instance::new(&instance.entry, &instance.raw);
-        let result = Self::create(instance, options, Some((&loader, surface)));
-        if let Ok(gpu) = &result {
-            // SAFETY: the surface was only used for queries.
-            unsafe {
-                khr::surface::Instance::new(&gpu.inner.instance.entry, &gpu.inner.instance.raw)
-                    .destroy_surface(surface, None)
-            };
-        }
-        result
+        Self::create(instance, options, Some(ProbeSurface { loader, raw: surface }))
     }
 
     /// Wraps a host's device. Nothing of the host's is destroyed when the `Gpu` goes.
@@ -192,7 +105,8 @@ impl Gpu {
         let instance = Instance::from_host(host.entry, host.instance, host.debug_utils);
         let name = instance.summary(0, host.physical_device).name;
         host.enabled.check(&name, "enable it when creating the device")?;
-        let caps = Caps::read(&instance, host.physical_device, host.queue_family);
+        let mut caps = Caps::read(&instance, host.physical_device, host.queue_family);
+        host.enabled.restrict(&mut caps);
         Self::finish(
             instance,
             host.device,
@@ -200,7 +114,7 @@ impl Gpu {
             (host.queue, host.queue_family),
             caps,
             options,
-            false,
+            (false, false),
         )
     }
 
@@ -217,11 +131,7 @@ impl Gpu {
             .collect())
     }
 
-    fn create(
-        instance: Instance,
-        options: &GpuOptions,
-        surface: Option<(&khr::surface::Instance, vk::SurfaceKHR)>,
-    ) -> Result<Self> {
+    fn create(instance: Instance, options: &GpuOptions, surface: Option<ProbeSurface>) -> Result<Self> {
         let devices = instance.devices()?;
         let rank = |summary: &DeviceSummary| match summary.kind {
             "discrete" => 0,
@@ -256,9 +166,9 @@ impl Gpu {
                 .get_physical_device_queue_family_properties(physical_device)
         };
         let presents = |family: u32| {
-            surface.is_none_or(|(loader, surface)| {
+            surface.as_ref().is_none_or(|ProbeSurface { loader, raw }| {
                 // SAFETY: surface and physical device belong to the same instance.
-                unsafe { loader.get_physical_device_surface_support(physical_device, family, surface) }.unwrap_or(false)
+                unsafe { loader.get_physical_device_surface_support(physical_device, family, *raw) }.unwrap_or(false)
             })
         };
         let wanted = vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS;
@@ -287,6 +197,9 @@ impl Gpu {
             surface.is_some(),
             options,
         )?;
+        let presents = surface.is_some();
+        // It must go before the instance, which `finish` drops when it fails.
+        drop(surface);
         // SAFETY: the family was created with one queue.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
         Self::finish(
@@ -296,7 +209,7 @@ impl Gpu {
             (queue, queue_family),
             caps,
             options,
-            true,
+            (true, presents),
         )
     }
 
@@ -307,13 +220,23 @@ impl Gpu {
         (queue, queue_family): (vk::Queue, u32),
         caps: Caps,
         options: &GpuOptions,
-        owned: bool,
+        (owned, presents): (bool, bool),
     ) -> Result<Self> {
-        let memory = Memory::new(&instance.raw, &device, physical_device)?;
+        let give_up = |error| {
+            if owned {
+                // SAFETY: nothing hangs on the device yet, or any more.
+                unsafe { device.destroy_device(None) };
+            }
+            error
+        };
+        let memory = Memory::new(&instance.raw, &device, physical_device).map_err(give_up)?;
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: timelineSemaphore is enabled on every device that comes here.
-        let timeline = unsafe { device.create_semaphore(&info, None) }.map_err(vulkan("vkCreateSemaphore"))?;
+        let timeline = unsafe { device.create_semaphore(&info, None) }.map_err(|result| {
+            memory.shut_down();
+            give_up(vulkan("vkCreateSemaphore")(result))
+        })?;
         let debug = instance
             .debug_utils
             .then(|| ext::debug_utils::Device::new(&instance.raw, &device));
@@ -334,6 +257,9 @@ impl Gpu {
             pipelines: Mutex::new(BTreeMap::new()),
             pipeline_cache,
             crash_markers: options.crash_markers,
+            validation: options.validation,
+            in_flight: Mutex::default(),
+            presents,
             lost: OnceLock::new(),
             next_id: AtomicU64::new(1),
             owned,
@@ -353,16 +279,19 @@ impl Gpu {
         self.inner.memory.report()
     }
 
+    /// Every live allocation, by name.
+    pub fn allocations(&self) -> Vec<AllocationInfo> {
+        self.inner.memory.allocations()
+    }
+
     /// Takes the messages that the validation layers have left so far.
     pub fn take_validation_messages(&self) -> Vec<ValidationMessage> {
-        std::mem::take(
-            &mut *self
-                .inner
-                .instance
-                .messages
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner),
-        )
+        self.validation_log().take()
+    }
+
+    /// The messages of the validation layers, to be read when the device has gone, too: that is when leaks are reported.
+    pub fn validation_log(&self) -> ValidationLog {
+        ValidationLog(Arc::clone(&self.inner.instance.messages))
     }
 
     /// The queue, locked against the engine's own submissions for as long as the guard lives.
@@ -383,6 +312,19 @@ impl Gpu {
     /// Writes the pipeline cache to disk; also done when the last handle goes.
     pub fn save_pipeline_cache(&self) {
         self.inner.pipeline_cache.save(&self.inner.device);
+    }
+}
+
+/// A surface that is only asked whether a device can present to it.
+struct ProbeSurface {
+    loader: khr::surface::Instance,
+    raw: vk::SurfaceKHR,
+}
+
+impl Drop for ProbeSurface {
+    fn drop(&mut self) {
+        // SAFETY: it was only used for queries, and is dropped before its instance.
+        unsafe { self.loader.destroy_surface(self.raw, None) };
     }
 }
 
@@ -420,12 +362,36 @@ impl Inner {
     pub fn error(&self, call: &'static str, result: vk::Result) -> Error {
         match result {
             vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost {
-                last_pass: self.lost.get_or_init(|| "none recorded".into()).clone(),
+                last_pass: self.lost.get_or_init(|| self.in_flight().last_pass()).clone(),
             },
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => out_of_memory("device", call),
             vk::Result::ERROR_OUT_OF_HOST_MEMORY => out_of_memory("host", call),
             result => Error::Vulkan { call, result },
         }
+    }
+
+    /// As [`Inner::error`] for the creation of something with a name and a size.
+    pub fn creation_error(&self, call: &'static str, result: vk::Result, name: &str, bytes: u64) -> Error {
+        match self.error(call, result) {
+            Error::OutOfMemory { memory, .. } => Error::OutOfMemory {
+                memory,
+                name: name.into(),
+                bytes,
+                cause: format!("{call}: {result}"),
+            },
+            other => other,
+        }
+    }
+
+    pub fn in_flight(&self) -> MutexGuard<'_, InFlight> {
+        self.in_flight.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until the queue has nothing left to do, or answers that it never will.
+    pub fn wait_for_queue(&self) {
+        let queue = self.lock_queue();
+        // SAFETY: the queue is locked. An error means a lost device, for which there is nothing to wait.
+        let _ = unsafe { self.device.queue_wait_idle(queue.raw) };
     }
 
     /// Fails once the device has been lost.
@@ -493,9 +459,8 @@ fn create_device(
         .pipeline_statistics_query(caps.pipeline_statistics)
         .shader_int64(caps.int64)
         .shader_float64(caps.float64)
-        // GPU-assisted validation writes its findings from these stages and switches the features on itself where it can.
-        .fragment_stores_and_atomics(options.validation == Validation::GpuAssisted)
-        .vertex_pipeline_stores_and_atomics(options.validation == Validation::GpuAssisted);
+        .fragment_stores_and_atomics(caps.fragment_stores)
+        .vertex_pipeline_stores_and_atomics(caps.vertex_stores);
     let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default()
         .timeline_semaphore(true)
         .scalar_block_layout(true)
@@ -526,7 +491,8 @@ fn create_device(
     })
 }
 
-fn no_window(error: raw_window_handle::HandleError) -> Error {
+/// The error of a window without usable handles.
+pub(super) fn no_window(error: raw_window_handle::HandleError) -> Error {
     Error::MissingFeature {
         feature: "a window handle".into(),
         needed_by: "presenting to a window".into(),

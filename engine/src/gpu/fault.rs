@@ -68,7 +68,7 @@ macro_rules! faulty_calls {
 
         mod real {
             use super::*;
-            $(#[allow(non_upper_case_globals)] pub static $trampoline: AtomicPtr<c_void> = AtomicPtr::new(std::ptr::null_mut());)*
+            $(#[expect(non_upper_case_globals, reason = "named like the trampolines")] pub static $trampoline: AtomicPtr<c_void> = AtomicPtr::new(std::ptr::null_mut());)*
         }
     };
 }

@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use super::caps::Caps;
 use crate::{Error, Result};
 
 /// A host's Vulkan objects, for [`Gpu::from_host`](super::Gpu::from_host). The host keeps ownership of all of them.
@@ -38,6 +39,49 @@ pub struct EnabledFeatures {
     pub scalar_block_layout: bool,
     /// `VkPhysicalDeviceVulkan12Features::hostQueryReset`.
     pub host_query_reset: bool,
+    /// What is used where it is enabled, and not missed otherwise.
+    pub optional: OptionalFeatures,
+}
+
+/// Features that the engine can do without, by their Vulkan names; one that a host did not enable counts as absent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct OptionalFeatures {
+    /// `robustBufferAccess`.
+    pub robust_buffer_access: bool,
+    /// `geometryShader`.
+    pub geometry_shader: bool,
+    /// `pipelineStatisticsQuery`.
+    pub pipeline_statistics_query: bool,
+    /// `shaderInt64`.
+    pub shader_int64: bool,
+    /// `shaderFloat64`.
+    pub shader_float64: bool,
+    /// `fragmentStoresAndAtomics`.
+    pub fragment_stores_and_atomics: bool,
+    /// `vertexPipelineStoresAndAtomics`.
+    pub vertex_pipeline_stores_and_atomics: bool,
+    /// `VkPhysicalDeviceVulkan12Features::shaderBufferInt64Atomics`.
+    pub shader_buffer_int64_atomics: bool,
+    /// `VK_KHR_ray_query` with its feature.
+    pub ray_query: bool,
+    /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing`.
+    pub descriptor_indexing: bool,
+}
+
+impl OptionalFeatures {
+    /// Nothing enabled.
+    pub const NONE: Self = Self {
+        robust_buffer_access: false,
+        geometry_shader: false,
+        pipeline_statistics_query: false,
+        shader_int64: false,
+        shader_float64: false,
+        fragment_stores_and_atomics: false,
+        vertex_pipeline_stores_and_atomics: false,
+        shader_buffer_int64_atomics: false,
+        ray_query: false,
+        descriptor_indexing: false,
+    };
 }
 
 impl EnabledFeatures {
@@ -48,6 +92,7 @@ impl EnabledFeatures {
         timeline_semaphore: true,
         scalar_block_layout: true,
         host_query_reset: true,
+        optional: OptionalFeatures::NONE,
     };
 
     /// Nothing enabled.
@@ -57,9 +102,25 @@ impl EnabledFeatures {
         timeline_semaphore: false,
         scalar_block_layout: false,
         host_query_reset: false,
+        optional: OptionalFeatures::NONE,
     };
 
-    /// What a physical device offers.
+    /// Takes away what the host did not enable.
+    pub(super) fn restrict(&self, caps: &mut Caps) {
+        let optional = &self.optional;
+        caps.robust_buffer_access &= optional.robust_buffer_access;
+        caps.geometry_shader &= optional.geometry_shader;
+        caps.pipeline_statistics &= optional.pipeline_statistics_query;
+        caps.int64 &= optional.shader_int64;
+        caps.float64 &= optional.shader_float64;
+        caps.fragment_stores &= optional.fragment_stores_and_atomics;
+        caps.vertex_stores &= optional.vertex_pipeline_stores_and_atomics;
+        caps.int64_atomics &= optional.shader_buffer_int64_atomics;
+        caps.ray_query &= optional.ray_query;
+        caps.descriptor_indexing &= optional.descriptor_indexing;
+    }
+
+    /// The required features that a physical device offers.
     pub(super) fn offered(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
@@ -74,6 +135,7 @@ impl EnabledFeatures {
             timeline_semaphore: vulkan12.timeline_semaphore != 0,
             scalar_block_layout: vulkan12.scalar_block_layout != 0,
             host_query_reset: vulkan12.host_query_reset != 0,
+            optional: OptionalFeatures::NONE,
         }
     }
 

@@ -8,7 +8,7 @@ use gpu_allocator::vulkan::Allocation;
 
 use super::device::{Gpu, Inner};
 use super::memory::Category;
-use crate::Result;
+use crate::{Error, Result};
 
 /// What image to allocate: two-dimensional, one sample, in device memory.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +28,14 @@ pub struct ImageDesc<'a> {
     /// What it is counted as.
     pub category: Category,
 }
+
+/// The uses that want a view.
+const VIEWED: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
+    vk::ImageUsageFlags::SAMPLED.as_raw()
+        | vk::ImageUsageFlags::STORAGE.as_raw()
+        | vk::ImageUsageFlags::COLOR_ATTACHMENT.as_raw()
+        | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
+);
 
 /// A device image with a view of all of it. Cloning shares it.
 #[derive(Clone)]
@@ -51,6 +59,7 @@ pub(super) struct ImageInner {
     pub name: String,
     pub size: [u32; 2],
     pub format: vk::Format,
+    pub layers: u32,
     allocated: u64,
     category: Category,
     /// `None` for images that a swapchain owns.
@@ -62,10 +71,11 @@ impl Gpu {
     /// Allocates an image in layout `UNDEFINED`.
     ///
     /// # Errors
-    /// [`crate::Error::OutOfMemory`], or [`crate::Error::Vulkan`] for a format or size that the device refuses.
+    /// [`Error::OutOfMemory`], [`Error::MissingFeature`] for a format or use that the device lacks, [`Error::LimitExceeded`] for a size.
     pub fn image(&self, desc: &ImageDesc<'_>) -> Result<Image> {
         let gpu = &self.inner;
         gpu.check_alive()?;
+        gpu.check_image(desc)?;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(desc.format)
@@ -80,8 +90,8 @@ impl Gpu {
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(desc.usage);
         // SAFETY: `info` is complete; the image is destroyed in `ImageInner::drop`.
-        let raw =
-            unsafe { gpu.device.create_image(&info, None) }.map_err(|result| gpu.error("vkCreateImage", result))?;
+        let raw = unsafe { gpu.device.create_image(&info, None) }
+            .map_err(|result| gpu.creation_error("vkCreateImage", result, desc.name, 0))?;
         // SAFETY: `raw` was just created.
         let requirements = unsafe { gpu.device.get_image_memory_requirements(raw) };
         let mut inner = ImageInner {
@@ -91,6 +101,7 @@ impl Gpu {
             name: desc.name.into(),
             size: desc.size,
             format: desc.format,
+            layers: desc.layers,
             allocated: requirements.size,
             category: desc.category,
             allocation: None,
@@ -106,12 +117,75 @@ impl Gpu {
         };
         inner.allocation = Some(allocation);
         bound.map_err(|result| gpu.error("vkBindImageMemory", result))?;
-        inner.make_view(desc.layers, desc.mips)?;
+        if desc.usage.intersects(VIEWED) {
+            inner.make_view(desc.layers, desc.mips)?;
+        } else {
+            gpu.name(raw, desc.name);
+        }
         Ok(Image { inner: Arc::new(inner) })
     }
 }
 
+impl Inner {
+    /// Fails when the device cannot make such an image.
+    fn check_image(&self, desc: &ImageDesc<'_>) -> Result<()> {
+        // SAFETY: the physical device belongs to the instance.
+        let properties = unsafe {
+            self.instance.raw.get_physical_device_image_format_properties(
+                self.physical_device,
+                desc.format,
+                vk::ImageType::TYPE_2D,
+                vk::ImageTiling::OPTIMAL,
+                desc.usage,
+                vk::ImageCreateFlags::empty(),
+            )
+        };
+        let properties = properties.map_err(|_| Error::MissingFeature {
+            feature: format!("format {:?} for {:?}", desc.format, desc.usage),
+            needed_by: desc.name.into(),
+            device: self.caps.device.clone(),
+            instead: "choose another format".into(),
+        })?;
+        let extent = properties.max_extent;
+        let largest_mips = u32::BITS - desc.size[0].max(desc.size[1]).leading_zeros();
+        let limits = [
+            (desc.size[0], extent.width, "maxExtent.width"),
+            (desc.size[1], extent.height, "maxExtent.height"),
+            (desc.layers, properties.max_array_layers, "maxArrayLayers"),
+            (desc.mips, properties.max_mip_levels.min(largest_mips), "maxMipLevels"),
+        ];
+        match limits.iter().find(|(wanted, limit, _)| *wanted == 0 || wanted > limit) {
+            None => Ok(()),
+            Some((wanted, limit, limit_name)) => Err(Error::LimitExceeded {
+                name: desc.name.into(),
+                bytes: u64::from(*wanted),
+                limit_name,
+                limit: u64::from(*limit),
+            }),
+        }
+    }
+}
+
 impl ImageInner {
+    /// Wraps an image that a swapchain owns; only the view is this one's.
+    pub fn borrowed(gpu: &Arc<Inner>, raw: vk::Image, name: &str, size: [u32; 2], format: vk::Format) -> Result<Self> {
+        let mut inner = Self {
+            gpu: Arc::clone(gpu),
+            raw,
+            view: vk::ImageView::null(),
+            name: name.into(),
+            size,
+            format,
+            layers: 1,
+            allocated: 0,
+            category: Category::Film,
+            allocation: None,
+            borrowed: true,
+        };
+        inner.make_view(1, 1)?;
+        Ok(inner)
+    }
+
     fn make_view(&mut self, layers: u32, mips: u32) -> Result<()> {
         let kind = if layers > 1 {
             vk::ImageViewType::TYPE_2D_ARRAY
@@ -155,7 +229,7 @@ impl Image {
         self.inner.raw
     }
 
-    /// The view of all of it.
+    /// The view of all of it; null for an image that is only copied.
     pub fn view(&self) -> vk::ImageView {
         self.inner.view
     }
@@ -182,6 +256,28 @@ pub(super) fn aspect(format: vk::Format) -> vk::ImageAspectFlags {
         vk::Format::D16_UNORM | vk::Format::D32_SFLOAT | vk::Format::X8_D24_UNORM_PACK32 => vk::ImageAspectFlags::DEPTH,
         _ => vk::ImageAspectFlags::COLOR,
     }
+}
+
+/// Bytes of one texel, for the formats that pictures and tables use.
+pub(super) fn texel_bytes(format: vk::Format) -> Option<u64> {
+    Some(match format {
+        vk::Format::R8_UNORM | vk::Format::R8_UINT => 1,
+        vk::Format::D16_UNORM | vk::Format::R16_SFLOAT | vk::Format::R16_UNORM | vk::Format::R8G8_UNORM => 2,
+        vk::Format::R8G8B8A8_UNORM
+        | vk::Format::R8G8B8A8_SRGB
+        | vk::Format::B8G8R8A8_UNORM
+        | vk::Format::B8G8R8A8_SRGB
+        | vk::Format::A2B10G10R10_UNORM_PACK32
+        | vk::Format::R16G16_SFLOAT
+        | vk::Format::R32_SFLOAT
+        | vk::Format::R32_UINT
+        | vk::Format::R32_SINT
+        | vk::Format::D32_SFLOAT
+        | vk::Format::X8_D24_UNORM_PACK32 => 4,
+        vk::Format::R16G16B16A16_SFLOAT | vk::Format::R32G32_SFLOAT | vk::Format::R32G32_UINT => 8,
+        vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => 16,
+        _ => return None,
+    })
 }
 
 /// How to sample.
@@ -216,7 +312,7 @@ impl Gpu {
     /// Makes a sampler.
     ///
     /// # Errors
-    /// [`crate::Error::OutOfMemory`].
+    /// [`Error::OutOfMemory`].
     pub fn sampler(&self, desc: &SamplerDesc<'_>) -> Result<Sampler> {
         let mipmap = if desc.filter == vk::Filter::NEAREST {
             vk::SamplerMipmapMode::NEAREST

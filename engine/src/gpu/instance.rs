@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use ash::{ext, khr, vk};
 
-use super::device::Validation;
+use super::options::Validation;
 use crate::{Error, Result};
 
 /// One message of the validation layers.
@@ -22,6 +22,17 @@ pub struct ValidationMessage {
 
 /// Messages so far, shared with the debug callback.
 pub(super) type Messages = Arc<Mutex<Vec<ValidationMessage>>>;
+
+/// Messages that outlive their device.
+#[derive(Debug, Clone)]
+pub struct ValidationLog(pub(super) Messages);
+
+impl ValidationLog {
+    /// Takes what has been left so far.
+    pub fn take(&self) -> Vec<ValidationMessage> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+}
 
 /// The Vulkan instance with its debug messenger.
 pub(super) struct Instance {

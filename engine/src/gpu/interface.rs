@@ -13,6 +13,8 @@ pub struct ShaderInfo {
     pub spirv: &'static [u8],
     /// Size of the push-constant block.
     pub push_constant_bytes: u32,
+    /// A hash of everything the generated Rust code depends on; the build's, over names, offsets and kinds.
+    pub fingerprint: u64,
     /// Workgroup size (compute).
     pub local_size: [LocalSize; 3],
     /// Bindings by set and number.
@@ -98,6 +100,36 @@ impl SpecConstants for () {
 
 /// A compute shader as a type; implemented by the generated modules.
 pub trait ComputeShader {
+    /// Push constants, `()` for none.
+    type Push: PushConstants;
+    /// Specialization constants, `()` for none.
+    type Spec: SpecConstants;
+    /// The reflected interface.
+    fn info() -> &'static ShaderInfo;
+}
+
+/// A vertex shader as a type; implemented by the generated modules.
+pub trait VertexShader {
+    /// Push constants, `()` for none.
+    type Push: PushConstants;
+    /// Specialization constants, `()` for none.
+    type Spec: SpecConstants;
+    /// The reflected interface.
+    fn info() -> &'static ShaderInfo;
+}
+
+/// A geometry shader as a type; implemented by the generated modules.
+pub trait GeometryShader {
+    /// Push constants, `()` for none.
+    type Push: PushConstants;
+    /// Specialization constants, `()` for none.
+    type Spec: SpecConstants;
+    /// The reflected interface.
+    fn info() -> &'static ShaderInfo;
+}
+
+/// A fragment shader as a type; implemented by the generated modules.
+pub trait FragmentShader {
     /// Push constants, `()` for none.
     type Push: PushConstants;
     /// Specialization constants, `()` for none.

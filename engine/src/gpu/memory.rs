@@ -1,8 +1,9 @@
 //! Device memory: named allocations, counted by category.
 
+use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use ash::vk;
+use ash::vk::{self, Handle};
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 
@@ -62,6 +63,17 @@ impl MemoryReport {
     }
 }
 
+/// One live allocation.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct AllocationInfo {
+    /// The buffer's or image's name.
+    pub name: String,
+    /// What it is counted as.
+    pub category: Category,
+    /// Size in bytes.
+    pub bytes: u64,
+}
+
 /// The device's memory.
 pub(super) struct Memory {
     state: Mutex<State>,
@@ -71,7 +83,8 @@ struct State {
     /// `None` only while the owner drops.
     allocator: Option<Allocator>,
     bytes: [u64; CATEGORIES.len()],
-    allocations: u64,
+    /// By memory object and offset.
+    live: BTreeMap<(u64, u64), AllocationInfo>,
 }
 
 impl Memory {
@@ -89,7 +102,7 @@ impl Memory {
             state: Mutex::new(State {
                 allocator: Some(allocator),
                 bytes: [0; CATEGORIES.len()],
-                allocations: 0,
+                live: BTreeMap::new(),
             }),
         })
     }
@@ -122,20 +135,27 @@ impl Memory {
             })
             .map_err(|error| out_of_memory(name, requirements.size, &error))?;
         state.bytes[category as usize] += requirements.size;
-        state.allocations += 1;
+        state.live.insert(
+            place(&allocation),
+            AllocationInfo {
+                name: name.into(),
+                category,
+                bytes: requirements.size,
+            },
+        );
         Ok(allocation)
     }
 
     /// Gives an allocation back. `bytes` is the size that was required.
     pub fn free(&self, category: Category, bytes: u64, allocation: Allocation) {
         let mut state = self.lock();
+        state.live.remove(&place(&allocation));
         if let Some(allocator) = state.allocator.as_mut()
             && let Err(error) = allocator.free(allocation)
         {
             tracing::error!("freeing device memory: {error}");
         }
         state.bytes[category as usize] -= bytes;
-        state.allocations -= 1;
     }
 
     /// Bytes in use now.
@@ -147,8 +167,15 @@ impl Memory {
                 .zip(state.bytes)
                 .filter(|(_, bytes)| *bytes > 0)
                 .collect(),
-            allocations: state.allocations,
+            allocations: state.live.len() as u64,
         }
+    }
+
+    /// Every live allocation, by name and then size.
+    pub fn allocations(&self) -> Vec<AllocationInfo> {
+        let mut list: Vec<_> = self.lock().live.values().cloned().collect();
+        list.sort_by(|a, b| (&a.name, a.bytes).cmp(&(&b.name, b.bytes)));
+        list
     }
 
     /// Frees the allocator's blocks; must come before the device is destroyed.
@@ -160,6 +187,13 @@ impl Memory {
         // A panic while the lock was held leaves counters that are at worst stale.
         self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
+}
+
+/// The memory object and the offset in it, which no two live allocations share.
+fn place(allocation: &Allocation) -> (u64, u64) {
+    // SAFETY: the handle is only looked at.
+    let memory = unsafe { allocation.memory() };
+    (memory.as_raw(), allocation.offset())
 }
 
 fn out_of_memory(name: &str, bytes: u64, error: &gpu_allocator::AllocationError) -> Error {

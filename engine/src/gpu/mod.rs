@@ -4,25 +4,35 @@
 //! on a timeline. All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].
 //!
 //! `unsafe` lives in this folder and at the FFI edge only.
-#![allow(unsafe_code)]
+#![expect(unsafe_code, reason = "Vulkan is called here")]
 
 mod barrier;
+mod bind;
 mod buffer;
 mod caps;
+mod copy;
 mod device;
 pub mod fault;
+mod graphics;
 mod host;
+#[cfg(feature = "hot-reload")]
+mod hot_reload;
 mod image;
 mod instance;
 pub mod interface;
 mod marker;
 mod memory;
+mod options;
 mod pipeline;
 mod pipeline_cache;
 mod recorder;
+#[cfg(feature = "hot-reload")]
+#[path = "../../build/reflect.rs"]
+mod reflect;
 mod resources;
 pub mod shaders;
 mod submission;
+mod surface;
 mod timing;
 mod tracker;
 mod transfer;
@@ -34,12 +44,17 @@ pub use barrier::{
 };
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, SubgroupOperations};
-pub use device::{DeviceSelection, Gpu, GpuOptions, Validation};
-pub use host::{EnabledFeatures, HostDevice};
+pub use device::{Gpu, QueueGuard};
+pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
+pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
+#[cfg(feature = "hot-reload")]
+pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
-pub use instance::{DeviceSummary, ValidationMessage};
-pub use memory::{Category, MemoryReport};
+pub use instance::{DeviceSummary, ValidationLog, ValidationMessage};
+pub use memory::{AllocationInfo, Category, MemoryReport};
+pub use options::{DeviceSelection, GpuOptions, Validation};
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorder::{Pass, Recorder};
 pub use submission::Submission;
+pub use surface::{Presented, Surface};
 pub use timing::{PassTiming, Timings};

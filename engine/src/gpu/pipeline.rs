@@ -71,10 +71,22 @@ impl Gpu {
                 shader: PhantomData,
             });
         }
-        let inner = Arc::new(PipelineInner::compute(&self.inner, info, values)?);
+        let inner = Arc::new(PipelineInner::compute(&self.inner, info, info.spirv, values)?);
         table.insert(key, Arc::downgrade(&inner));
         Ok(ComputePipeline {
             inner,
+            shader: PhantomData,
+        })
+    }
+}
+
+#[cfg(feature = "hot-reload")]
+impl<K: ComputeShader> ComputePipeline<K> {
+    /// The pipeline of another module with the interface of `K`.
+    pub(super) fn from_spirv(gpu: &Gpu, spirv: &[u8], spec: &K::Spec) -> Result<Self> {
+        let inner = PipelineInner::compute(&gpu.inner, K::info(), spirv, spec.values())?;
+        Ok(Self {
+            inner: Arc::new(inner),
             shader: PhantomData,
         })
     }
@@ -108,7 +120,8 @@ impl<K> ComputePipeline<K> {
 }
 
 impl PipelineInner {
-    fn compute(gpu: &Arc<Inner>, info: &'static ShaderInfo, spec: Vec<(u32, u32)>) -> Result<Self> {
+    /// The pipeline of a module with the interface `info`.
+    fn compute(gpu: &Arc<Inner>, info: &'static ShaderInfo, spirv: &[u8], spec: Vec<(u32, u32)>) -> Result<Self> {
         gpu.check_alive()?;
         let local_size = info.local_size.map(|size| match size {
             LocalSize::Fixed(size) => size,
@@ -133,17 +146,8 @@ impl PipelineInner {
             local_size,
             spec,
         };
-        let module = shader_module(gpu, info)?;
-        let entries: Vec<_> = (0u32..)
-            .zip(&inner.spec)
-            .map(|(index, (id, _))| {
-                vk::SpecializationMapEntry::default()
-                    .constant_id(*id)
-                    .offset(index * 4)
-                    .size(4)
-            })
-            .collect();
-        let data: Vec<u8> = inner.spec.iter().flat_map(|(_, bits)| bits.to_ne_bytes()).collect();
+        let module = shader_module(gpu, info, spirv)?;
+        let (entries, data) = specialization_data(&inner.spec);
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
@@ -158,7 +162,8 @@ impl PipelineInner {
         };
         // SAFETY: a module may go once its pipelines are made.
         unsafe { gpu.device.destroy_shader_module(module, None) };
-        inner.raw = made.map_err(|(_, result)| gpu.error("vkCreateComputePipelines", result))?[0];
+        inner.raw =
+            made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, info.name, 0))?[0];
         gpu.name(inner.raw, info.name);
         gpu.name(inner.layout, info.name);
         Ok(inner)
@@ -178,9 +183,22 @@ impl Drop for PipelineInner {
     }
 }
 
+/// Map entries and packed values of specialization constants.
+pub(super) fn specialization_data(values: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
+    let entry = |(index, (id, _)): (u32, &(u32, u32))| {
+        vk::SpecializationMapEntry::default()
+            .constant_id(*id)
+            .offset(index * 4)
+            .size(4)
+    };
+    let entries = (0u32..).zip(values).map(entry).collect();
+    let data = values.iter().flat_map(|(_, bits)| bits.to_ne_bytes()).collect();
+    (entries, data)
+}
+
 /// The shader module of a reflected shader.
-pub(super) fn shader_module(gpu: &Inner, info: &ShaderInfo) -> Result<vk::ShaderModule> {
-    let words = ash::util::read_spv(&mut std::io::Cursor::new(info.spirv)).map_err(|error| Error::Shader {
+pub(super) fn shader_module(gpu: &Inner, info: &ShaderInfo, spirv: &[u8]) -> Result<vk::ShaderModule> {
+    let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).map_err(|error| Error::Shader {
         name: info.name.into(),
         message: error.to_string(),
     })?;

@@ -1,8 +1,12 @@
 //! The on-disk pipeline cache, one file a device and driver version.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use ash::vk;
+
+/// Tells apart the temporary files of several devices in one process.
+static SAVES: AtomicU32 = AtomicU32::new(0);
 
 /// A `VkPipelineCache` and where it is kept. A cache that cannot be read or written is no error: pipelines are then made anew.
 pub(super) struct PipelineCache {
@@ -38,7 +42,8 @@ impl PipelineCache {
         let Ok(data) = (unsafe { device.get_pipeline_cache_data(self.raw) }) else {
             return;
         };
-        let temporary = file.with_extension(format!("{}.tmp", std::process::id()));
+        let turn = SAVES.fetch_add(1, Ordering::Relaxed);
+        let temporary = file.with_extension(format!("{}-{turn}.tmp", std::process::id()));
         let written = file
             .parent()
             .map_or(Ok(()), std::fs::create_dir_all)

@@ -9,13 +9,13 @@ use ash::vk;
 use super::barrier::{Access, BufferBarrier, ImageBarrier};
 use super::buffer::{Buffer, BufferDesc, BufferView, Residency};
 use super::device::Gpu;
-use super::image::{Image, aspect};
-use super::interface::{BindingKind, BindingSet, BoundResource, ComputeShader, PushConstants, ShaderInfo};
+use super::image::aspect;
+use super::interface::{BindingSet, ComputeShader, PushConstants};
 use super::marker::BEGUN;
 use super::memory::Category;
-use super::pipeline::{ComputePipeline, descriptor_type};
+use super::pipeline::ComputePipeline;
 use super::resources::FrameResources;
-use super::submission::Submission;
+use super::submission::{self, Submission};
 use super::tracker::Tracker;
 use crate::{Error, Result};
 
@@ -30,7 +30,7 @@ pub(super) type Kept = BTreeMap<usize, Arc<dyn Any + Send + Sync>>;
 /// It starts with a barrier over everything, so that a submission may rely on all earlier ones of the same queue. Between its own passes
 /// every barrier is the author's; debug builds check that none is missing.
 pub struct Recorder {
-    gpu: Gpu,
+    pub(super) gpu: Gpu,
     name: String,
     resources: Option<FrameResources>,
     markers: Option<Buffer>,
@@ -42,9 +42,9 @@ pub struct Recorder {
 
 /// One pass: what is recorded between two timestamps.
 pub struct Pass<'a> {
-    recorder: &'a mut Recorder,
-    command_buffer: vk::CommandBuffer,
-    name: &'a str,
+    pub(super) recorder: &'a mut Recorder,
+    pub(super) command_buffer: vk::CommandBuffer,
+    pub(super) name: &'a str,
 }
 
 impl Gpu {
@@ -111,7 +111,7 @@ impl Recorder {
         };
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         let (device, counted) = (&inner.device, self.statistics);
-        // SAFETY (both blocks): the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
+        // SAFETY: the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
         unsafe {
             if let Some(debug) = &inner.debug {
                 let label = std::ffi::CString::new(name).unwrap_or_default();
@@ -181,24 +181,15 @@ impl Recorder {
         }
         let mut queue = inner.lock_queue();
         let value = queue.last_value + 1;
-        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        let semaphore = |raw: &vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(*raw).stage_mask(all);
-        let waits: Vec<_> = wait.iter().map(semaphore).collect();
-        let mut signals: Vec<_> = signal.iter().map(semaphore).collect();
-        signals.push(
-            vk::SemaphoreSubmitInfo::default()
-                .semaphore(inner.timeline)
-                .value(value)
-                .stage_mask(all),
-        );
-        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(command_buffer)];
-        let info = vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&waits)
-            .command_buffer_infos(&buffers)
-            .signal_semaphore_infos(&signals);
+        if let Some(markers) = &self.markers {
+            inner.in_flight().begin(value, markers.clone(), self.passes.clone());
+        }
         // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
-        unsafe { inner.device.queue_submit2(queue.raw, &[info], vk::Fence::null()) }
-            .map_err(|result| inner.error("vkQueueSubmit2", result))?;
+        let submitted = unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) };
+        if let Err(error) = submitted {
+            inner.in_flight().end(value, false);
+            return Err(error);
+        }
         queue.last_value = value;
         drop(queue);
         Ok(Submission::new(
@@ -206,7 +197,6 @@ impl Recorder {
             std::mem::take(&mut self.name),
             value,
             self.resources.take(),
-            self.markers.take(),
             std::mem::take(&mut self.passes),
             std::mem::take(&mut self.kept),
             self.statistics,
@@ -248,7 +238,7 @@ impl Recorder {
         Ok(())
     }
 
-    fn resources(&mut self) -> &mut FrameResources {
+    pub(super) fn resources(&mut self) -> &mut FrameResources {
         self.resources
             .as_mut()
             .expect("a recorder holds its resources until it is submitted")
@@ -261,14 +251,14 @@ impl Recorder {
             .or_insert_with(|| Arc::clone(item) as Arc<dyn Any + Send + Sync>);
     }
 
-    fn touch(&mut self, pass: &str, buffer: &Buffer, access: Access) -> Result<()> {
+    pub(super) fn touch(&mut self, pass: &str, buffer: &Buffer, access: Access) -> Result<()> {
         self.keep(&buffer.inner);
         self.tracker
             .as_mut()
             .map_or(Ok(()), |tracker| tracker.touch(pass, buffer, access))
     }
 
-    fn next_command(&mut self) {
+    pub(super) fn next_command(&mut self) {
         if let Some(tracker) = &mut self.tracker {
             tracker.next_command();
         }
@@ -341,6 +331,8 @@ impl Pass<'_> {
         push: &K::Push,
         arguments: BufferView<'_>,
     ) -> Result<()> {
+        let words = BufferView { bytes: 12, ..arguments };
+        words.check(4)?;
         self.recorder.next_command();
         self.recorder
             .touch(self.name, arguments.buffer, Access::INDIRECT_READ)?;
@@ -423,137 +415,10 @@ impl Pass<'_> {
         self.pipeline_barrier(&vk::DependencyInfo::default().image_memory_barriers(&raw));
     }
 
-    /// Fills a buffer with a word.
-    ///
-    /// # Errors
-    /// [`Error::MissingBarrier`] in debug builds.
-    pub fn fill(&mut self, view: BufferView<'_>, word: u32) -> Result<()> {
-        self.recorder.next_command();
-        self.recorder.touch(self.name, view.buffer, Access::TRANSFER_WRITE)?;
-        // SAFETY: the range lies in the buffer (sizes are multiples of 4), which is kept alive.
-        unsafe {
-            self.recorder.gpu.inner.device.cmd_fill_buffer(
-                self.command_buffer,
-                view.buffer.raw(),
-                view.offset,
-                view.bytes,
-                word,
-            );
-        }
-        Ok(())
-    }
-
-    /// Writes a few values (at most 64 KiB) that travel inside the command buffer.
-    ///
-    /// # Errors
-    /// [`Error::LimitExceeded`] when they do not fit, [`Error::MissingBarrier`] in debug builds.
-    pub fn update<T: bytemuck::NoUninit>(&mut self, view: BufferView<'_>, data: &[T]) -> Result<()> {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
-        let limit = view.bytes.min(65_536);
-        if bytes.len() as u64 > limit || bytes.len() % 4 != 0 {
-            return Err(Error::LimitExceeded {
-                name: view.buffer.name().into(),
-                bytes: bytes.len() as u64,
-                limit_name: "size of an inline update, in whole words",
-                limit,
-            });
-        }
-        self.recorder.next_command();
-        self.recorder.touch(self.name, view.buffer, Access::TRANSFER_WRITE)?;
-        // SAFETY: size and alignment were checked; the buffer is kept alive.
-        unsafe {
-            self.recorder
-                .gpu
-                .inner
-                .device
-                .cmd_update_buffer(self.command_buffer, view.buffer.raw(), view.offset, bytes)
-        };
-        Ok(())
-    }
-
-    /// Copies `from` to the start of `to`.
-    ///
-    /// # Errors
-    /// [`Error::LimitExceeded`] when it does not fit, [`Error::MissingBarrier`] in debug builds.
-    pub fn copy(&mut self, from: BufferView<'_>, to: BufferView<'_>) -> Result<()> {
-        if from.bytes > to.bytes {
-            return Err(Error::LimitExceeded {
-                name: to.buffer.name().into(),
-                bytes: from.bytes,
-                limit_name: "size",
-                limit: to.bytes,
-            });
-        }
-        self.recorder.next_command();
-        self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
-        self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
-        let region = vk::BufferCopy {
-            src_offset: from.offset,
-            dst_offset: to.offset,
-            size: from.bytes,
-        };
-        // SAFETY: both ranges lie in their buffers, which are kept alive.
-        unsafe {
-            self.recorder.gpu.inner.device.cmd_copy_buffer(
-                self.command_buffer,
-                from.buffer.raw(),
-                to.buffer.raw(),
-                &[region],
-            );
-        }
-        Ok(())
-    }
-
-    /// Copies a whole image of one layer, in layout `TRANSFER_SRC_OPTIMAL`, to a buffer, rows packed.
-    ///
-    /// # Errors
-    /// [`Error::MissingBarrier`] in debug builds.
-    pub fn copy_image_to_buffer(&mut self, from: &Image, to: BufferView<'_>) -> Result<()> {
-        self.recorder.keep(&from.inner);
-        self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
-        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-        // SAFETY: both are kept alive; the author put the image into the layout.
-        unsafe {
-            self.recorder.gpu.inner.device.cmd_copy_image_to_buffer(
-                self.command_buffer,
-                from.raw(),
-                layout,
-                to.buffer.raw(),
-                &[whole_image(from, to.offset)],
-            );
-        }
-        Ok(())
-    }
-
-    /// Copies packed rows to a whole image of one layer, in layout `TRANSFER_DST_OPTIMAL`.
-    ///
-    /// # Errors
-    /// [`Error::MissingBarrier`] in debug builds.
-    pub fn copy_buffer_to_image(&mut self, from: BufferView<'_>, to: &Image) -> Result<()> {
-        self.recorder.keep(&to.inner);
-        self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
-        let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-        // SAFETY: as in `copy_image_to_buffer`.
-        unsafe {
-            self.recorder.gpu.inner.device.cmd_copy_buffer_to_image(
-                self.command_buffer,
-                from.buffer.raw(),
-                to.raw(),
-                layout,
-                &[whole_image(to, from.offset)],
-            );
-        }
-        Ok(())
-    }
-
     /// The Vulkan command buffer, for commands that have no method here. What they touch is the caller's to keep alive and to
     /// synchronize.
     pub fn raw(&self) -> vk::CommandBuffer {
         self.command_buffer
-    }
-
-    pub(super) fn recorder(&mut self) -> &mut Recorder {
-        self.recorder
     }
 
     fn pipeline_barrier(&self, info: &vk::DependencyInfo<'_>) {
@@ -577,13 +442,13 @@ impl Pass<'_> {
         let info = pipeline.inner.info;
         self.recorder.keep(&pipeline.inner);
         let point = vk::PipelineBindPoint::COMPUTE;
-        // SAFETY (all blocks): pipeline, layout and sets are alive and come from one reflection.
+        // SAFETY: pipeline, layout and sets are alive and come from one reflection.
         unsafe {
             inner
                 .device
                 .cmd_bind_pipeline(self.command_buffer, point, pipeline.inner.raw)
         };
-        self.bind_sets(info, point, pipeline.inner.layout, &pipeline.inner.set_layouts, sets)?;
+        self.bind_sets(&[info], point, pipeline.inner.layout, &pipeline.inner.set_layouts, sets)?;
         let bytes = push.bytes();
         if !bytes.is_empty() {
             let stages = vk::ShaderStageFlags::COMPUTE;
@@ -595,127 +460,5 @@ impl Pass<'_> {
             };
         }
         Ok(())
-    }
-
-    /// Allocates, writes and binds the descriptor sets of one shader.
-    pub(super) fn bind_sets(
-        &mut self,
-        info: &'static ShaderInfo,
-        point: vk::PipelineBindPoint,
-        layout: vk::PipelineLayout,
-        set_layouts: &[vk::DescriptorSetLayout],
-        sets: &[&dyn BindingSet<'_>],
-    ) -> Result<()> {
-        let inner = Arc::clone(&self.recorder.gpu.inner);
-        let uncovered = info
-            .bindings
-            .iter()
-            .find(|binding| !sets.iter().any(|set| set.set() == binding.set));
-        if let Some(binding) = uncovered {
-            return Err(Error::Shader {
-                name: info.name.into(),
-                message: format!("descriptor set {} was not given", binding.set),
-            });
-        }
-        for set in sets {
-            let Some(set_layout) = set_layouts.get(set.set() as usize) else {
-                continue;
-            };
-            let raw = self.recorder.resources().descriptor_set(&inner, *set_layout)?;
-            for (number, resource) in set.resources() {
-                let Some(binding) = info.bindings.iter().find(|b| b.set == set.set() && b.binding == number) else {
-                    continue;
-                };
-                self.write_descriptor(info, raw, binding, resource)?;
-            }
-            // SAFETY: the set was just allocated with the layout of this pipeline.
-            unsafe {
-                inner
-                    .device
-                    .cmd_bind_descriptor_sets(self.command_buffer, point, layout, set.set(), &[raw], &[])
-            };
-        }
-        Ok(())
-    }
-
-    fn write_descriptor(
-        &mut self,
-        info: &'static ShaderInfo,
-        set: vk::DescriptorSet,
-        binding: &super::interface::BindingInfo,
-        resource: BoundResource<'_>,
-    ) -> Result<()> {
-        let descriptor = vk::WriteDescriptorSet::default()
-            .dst_set(set)
-            .dst_binding(binding.binding)
-            .descriptor_type(descriptor_type(binding.kind));
-        let inner = Arc::clone(&self.recorder.gpu.inner);
-        // SAFETY (all updates): set and resources are alive and the set is not in use yet.
-        match (binding.kind, resource) {
-            (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
-                let read = if binding.reads {
-                    Access::COMPUTE_READ
-                } else {
-                    Access::NONE
-                };
-                let write = if binding.writes {
-                    Access::COMPUTE_WRITE
-                } else {
-                    Access::NONE
-                };
-                self.recorder.touch(self.name, view.buffer, read | write)?;
-                let raw = [vk::DescriptorBufferInfo {
-                    buffer: view.buffer.raw(),
-                    offset: view.offset,
-                    range: view.bytes,
-                }];
-                unsafe {
-                    inner
-                        .device
-                        .update_descriptor_sets(&[descriptor.buffer_info(&raw)], &[])
-                };
-            }
-            (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
-                self.recorder.keep(&image.inner);
-                let raw = [vk::DescriptorImageInfo::default()
-                    .image_view(image.view())
-                    .image_layout(vk::ImageLayout::GENERAL)];
-                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
-            }
-            (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
-                self.recorder.keep(&view.image.inner);
-                self.recorder.keep(&view.sampler.inner);
-                let raw = [vk::DescriptorImageInfo::default()
-                    .image_view(view.image.view())
-                    .sampler(view.sampler.inner.raw)
-                    .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
-                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
-            }
-            _ => {
-                let message = format!("binding {} is not a {:?}", binding.name, binding.kind);
-                return Err(Error::Shader {
-                    name: info.name.into(),
-                    message,
-                });
-            }
-        }
-        Ok(())
-    }
-}
-
-fn whole_image(image: &Image, buffer_offset: u64) -> vk::BufferImageCopy {
-    vk::BufferImageCopy {
-        buffer_offset,
-        image_subresource: vk::ImageSubresourceLayers {
-            aspect_mask: aspect(image.format()),
-            layer_count: 1,
-            ..Default::default()
-        },
-        image_extent: vk::Extent3D {
-            width: image.size()[0],
-            height: image.size()[1],
-            depth: 1,
-        },
-        ..Default::default()
     }
 }

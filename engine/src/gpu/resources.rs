@@ -58,7 +58,7 @@ impl FrameResources {
         let info = vk::CommandPoolCreateInfo::default()
             .queue_family_index(inner.queue_family)
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
-        // SAFETY (this and below): plain creation on a live device.
+        // SAFETY: plain creation on a live device.
         self.command_pool =
             unsafe { device.create_command_pool(&info, None) }.map_err(|r| inner.error("vkCreateCommandPool", r))?;
         let info = vk::CommandBufferAllocateInfo::default()

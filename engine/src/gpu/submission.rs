@@ -5,9 +5,8 @@ use std::time::{Duration, Instant};
 
 use ash::vk;
 
-use super::buffer::Buffer;
-use super::device::Gpu;
-use super::marker;
+use super::device::{Gpu, Inner};
+use super::options::Validation;
 use super::recorder::Kept;
 use super::resources::FrameResources;
 use super::timing::{PassTiming, Timings};
@@ -22,20 +21,17 @@ pub struct Submission {
     name: String,
     value: u64,
     resources: Option<FrameResources>,
-    markers: Option<Buffer>,
     passes: Vec<String>,
     kept: Kept,
     statistics: bool,
 }
 
 impl Submission {
-    #[expect(clippy::too_many_arguments, reason = "the parts of a recorder, handed over once")]
     pub(super) fn new(
         gpu: Gpu,
         name: String,
         value: u64,
         resources: Option<FrameResources>,
-        markers: Option<Buffer>,
         passes: Vec<String>,
         kept: Kept,
         statistics: bool,
@@ -45,7 +41,6 @@ impl Submission {
             name,
             value,
             resources,
-            markers,
             passes,
             kept,
             statistics,
@@ -73,7 +68,7 @@ impl Submission {
     ///
     /// # Errors
     /// The error together with the submission, where there is one left.
-    pub fn wait_for(self, limit: Duration) -> std::result::Result<Timings, (Error, Option<Self>)> {
+    pub fn wait_for(self, limit: Duration) -> std::result::Result<Timings, (Error, Option<Box<Self>>)> {
         let start = Instant::now();
         loop {
             let left = limit.saturating_sub(start.elapsed());
@@ -85,7 +80,7 @@ impl Submission {
                             what: self.name.clone(),
                             seconds: limit.as_secs_f64(),
                         },
-                        Some(self),
+                        Some(Box::new(self)),
                     ));
                 }
                 Ok(false) => {}
@@ -103,23 +98,12 @@ impl Submission {
         match unsafe { inner.device.wait_semaphores(&info, limit.as_nanos() as u64) } {
             Ok(()) => Ok(true),
             Err(vk::Result::TIMEOUT) => Ok(false),
-            Err(vk::Result::ERROR_DEVICE_LOST) => {
-                let last = self
-                    .markers
-                    .as_ref()
-                    .map(|markers| marker::last_pass(markers, &self.passes));
-                let last = inner
-                    .lost
-                    .get_or_init(|| last.unwrap_or_else(|| format!("somewhere in {:?}", self.name)));
-                Err(Error::DeviceLost {
-                    last_pass: last.clone(),
-                })
-            }
             Err(result) => Err(inner.error("vkWaitSemaphores", result)),
         }
     }
 
     fn finish(mut self) -> Result<Timings> {
+        self.gpu.inner.in_flight().end(self.value, true);
         let Some(mut resources) = self.resources.take() else {
             return Ok(Timings::default());
         };
@@ -171,10 +155,84 @@ impl Submission {
     }
 }
 
+/// Hands a command buffer to the queue: it waits for `wait`, then signals `signal` and raises the timeline to `value`.
+///
+/// # Safety
+/// What the command buffer uses must live until the timeline has reached `value`; the queue must be locked.
+pub(super) unsafe fn submit(
+    inner: &Inner,
+    queue: vk::Queue,
+    command_buffer: vk::CommandBuffer,
+    wait: &[vk::Semaphore],
+    signal: &[vk::Semaphore],
+    value: u64,
+) -> Result<()> {
+    if inner.validation == Validation::GpuAssisted {
+        // SAFETY: the caller's promises.
+        return unsafe { submit_by_version_1(inner, queue, command_buffer, wait, signal, value) };
+    }
+    let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+    let semaphore = |raw: &vk::Semaphore| vk::SemaphoreSubmitInfo::default().semaphore(*raw).stage_mask(all);
+    let waits: Vec<_> = wait.iter().map(semaphore).collect();
+    let mut signals: Vec<_> = signal.iter().map(semaphore).collect();
+    signals.push(semaphore(&inner.timeline).value(value));
+    let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(command_buffer)];
+    let info = vk::SubmitInfo2::default()
+        .wait_semaphore_infos(&waits)
+        .command_buffer_infos(&buffers)
+        .signal_semaphore_infos(&signals);
+    // SAFETY: the caller's promises; the infos live on this stack.
+    unsafe { inner.device.queue_submit2(queue, &[info], vk::Fence::null()) }
+        .map_err(|result| inner.error("vkQueueSubmit2", result))
+}
+
+/// As [`submit`] by `vkQueueSubmit`: GPU-assisted validation (1.3.239) does not follow `vkQueueSubmit2`, so it would neither report what
+/// shaders did nor see the timeline rise, and every wait would take its ten seconds of patience.
+///
+/// # Safety
+/// As [`submit`].
+unsafe fn submit_by_version_1(
+    inner: &Inner,
+    queue: vk::Queue,
+    command_buffer: vk::CommandBuffer,
+    wait: &[vk::Semaphore],
+    signal: &[vk::Semaphore],
+    value: u64,
+) -> Result<()> {
+    let stages = vec![vk::PipelineStageFlags::ALL_COMMANDS; wait.len()];
+    let signals = [signal, &[inner.timeline]].concat();
+    // Values of binary semaphores are ignored.
+    let wait_values = vec![0; wait.len()];
+    let signal_values = [vec![0; signal.len()], vec![value]].concat();
+    let mut timeline = vk::TimelineSemaphoreSubmitInfo::default()
+        .wait_semaphore_values(&wait_values)
+        .signal_semaphore_values(&signal_values);
+    let buffers = [command_buffer];
+    let info = vk::SubmitInfo::default()
+        .wait_semaphores(wait)
+        .wait_dst_stage_mask(&stages)
+        .command_buffers(&buffers)
+        .signal_semaphores(&signals)
+        .push_next(&mut timeline);
+    // SAFETY: the caller's promises; the infos live on this stack.
+    unsafe { inner.device.queue_submit(queue, &[info], vk::Fence::null()) }
+        .map_err(|result| inner.error("vkQueueSubmit", result))
+}
+
 impl Drop for Submission {
     fn drop(&mut self) {
         let Some(resources) = self.resources.take() else { return };
-        while matches!(self.wait_slice(WAIT_SLICE), Ok(false)) {}
+        let outcome = loop {
+            match self.wait_slice(WAIT_SLICE) {
+                Ok(false) => {}
+                other => break other,
+            }
+        };
+        if outcome.is_err() {
+            // A device that was lost while it worked may still be stopping.
+            self.gpu.inner.wait_for_queue();
+        }
+        self.gpu.inner.in_flight().end(self.value, outcome.is_ok());
         // SAFETY: the device has finished, or is lost and will never touch anything again.
         unsafe { resources.destroy(&self.gpu.inner.device) };
     }

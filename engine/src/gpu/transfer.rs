@@ -4,7 +4,7 @@ use super::barrier::{Access, BufferBarrier};
 use super::buffer::{Buffer, BufferDesc, BufferView};
 use super::device::Gpu;
 use super::memory::Category;
-use crate::Result;
+use crate::{Error, Result};
 
 /// Bytes of one staging copy.
 const CHUNK: usize = 16 << 20;
@@ -54,7 +54,19 @@ impl Gpu {
     /// # Errors
     /// As [`Gpu::upload`].
     pub fn read<T: bytemuck::Pod>(&self, view: BufferView<'_>, count: usize) -> Result<Vec<T>> {
-        let bytes = ((count * size_of::<T>()) as u64).next_multiple_of(4);
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
+        if bytes > view.bytes {
+            return Err(Error::LimitExceeded {
+                name: view.buffer.name().into(),
+                bytes,
+                limit_name: "size",
+                limit: view.bytes,
+            });
+        }
+        let bytes = bytes.next_multiple_of(4);
         let staging = self.buffer(&BufferDesc::readback("readback", bytes))?;
         let mut recorder = self.recorder("readback")?;
         recorder.pass("readback", |pass| {

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::film::picture::Picture;
-use crate::gpu::{Gpu, PipelineInfo};
+use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::transport::path_tracer::Step;
 use crate::transport::{GpuScene, PathSet};
@@ -84,6 +84,13 @@ pub trait Technique: Send {
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     fn picture(&mut self) -> Result<(Picture, u64)>;
+
+    /// Writes the picture so far to a buffer of four bytes a pixel on the device: `exposure` in stops, clipped, sRGB-encoded, blue first
+    /// where `bgra` says so.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::DeviceLost`].
+    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()>;
 
     /// Begins anew through another camera.
     ///

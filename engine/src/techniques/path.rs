@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Bias, Skipped, Technique, TechniqueInfo, settings_from_json};
 use crate::Result;
 use crate::film::picture::Picture;
-use crate::gpu::PipelineInfo;
+use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
 use crate::transport::PathSet;
 use crate::transport::path_tracer::{PathTracer, PathTracerSettings, Step};
@@ -68,6 +68,10 @@ impl Technique for PathTracer {
 
     fn picture(&mut self) -> Result<(Picture, u64)> {
         PathTracer::picture(self)
+    }
+
+    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        PathTracer::display(self, target, exposure, bgra)
     }
 
     fn set_camera(&mut self, camera: &Camera) -> Result<()> {

@@ -3,6 +3,8 @@
 //! What a scene lacks is not allocated: its binding holds a shared buffer of 16 bytes that no specialized kernel reads. Transforms are
 //! applied in f64 and rounded once. Deterministic: equal scenes give equal bytes.
 
+use std::collections::BTreeMap;
+
 use glam::{DMat3, DVec3, Vec3};
 
 use super::albedo::AlbedoTable;
@@ -46,8 +48,17 @@ pub struct GpuScene {
     bsdf: BsdfFeatures,
     statistics: IndexStatistics,
     bounds: [Vec3; 2],
-    index: [Buffer; 3],
+    light_kinds: LightKinds,
+    index: Buffer,
     buffers: SceneBuffers,
+}
+
+/// Which kinds of lights there are to choose: emitters without area and lights without power are none.
+#[derive(Debug, Clone, Copy, Default)]
+struct LightKinds {
+    area: bool,
+    punctual: bool,
+    environment: bool,
 }
 
 #[derive(Debug)]
@@ -77,24 +88,24 @@ impl GpuScene {
         let profile = SceneProfile::of(scene);
         let geometry = Geometry::flatten(scene, &profile)?;
         let bvh = Bvh2::build(&geometry.corners(), &Bvh2Settings::default())?;
-        let parts: Vec<Buffer> = bvh
-            .buffers()
-            .iter()
-            .map(|part| gpu.buffer_with(part.name, Category::Index, part.bytes))
-            .collect::<Result<_>>()?;
-        let index: [Buffer; 3] = parts.try_into().map_err(|_| Error::Setting {
-            name: "index".into(),
-            value: bvh.name().into(),
-            cause: "does not have the three buffers of its set".into(),
-        })?;
+        let parts = bvh.buffers();
+        let [part] = parts.as_slice() else {
+            return Err(Error::Setting {
+                name: "index".into(),
+                value: bvh.name().into(),
+                cause: "does not have the one buffer of its set".into(),
+            });
+        };
+        let index = gpu.buffer_with(part.name, Category::Index, part.bytes)?;
         let bounds = geometry.bounds();
-        let bsdf = BsdfFeatures::of_materials(placed_materials(scene).into_iter());
-        let buffers = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
+        let bsdf = BsdfFeatures::of_materials(placed_materials(scene));
+        let (buffers, light_kinds) = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
         Ok(Self {
             profile,
             bsdf,
             statistics: bvh.statistics(),
             bounds,
+            light_kinds,
             index,
             buffers,
         })
@@ -122,17 +133,24 @@ impl GpuScene {
 
     /// True when there is anything for light sampling to choose.
     pub fn has_lights(&self) -> bool {
-        let p = &self.profile;
-        p.has_area_lights() || p.has_environment() || p.lights.point + p.lights.spot + p.lights.directional > 0
+        let kinds = self.light_kinds;
+        kinds.area || kinds.punctual || kinds.environment
+    }
+
+    /// True when some surface of positive area emits.
+    pub fn has_area_lights(&self) -> bool {
+        self.light_kinds.area
+    }
+
+    /// True when some point, spot or directional light has power.
+    pub fn has_punctual_lights(&self) -> bool {
+        self.light_kinds.punctual
     }
 
     /// Set 1.
     pub fn index_set(&self) -> Bvh2Set<'_> {
-        let [nodes, triangles, indices] = &self.index;
         Bvh2Set {
-            bvh2_nodes: nodes.view(),
-            bvh2_triangles: triangles.view(),
-            bvh2_indices: indices.view(),
+            bvh2_quarters: self.index.view(),
         }
     }
 
@@ -250,6 +268,32 @@ impl Geometry {
         triangle.vertices.map(|vertex| self.positions[vertex as usize])
     }
 
+    /// The corners' bits, whatever their order: equal for triangles that cover the same points.
+    fn place_of(&self, triangle: &SceneTriangle) -> [[u32; 3]; 3] {
+        // Adding zero makes both zeros one.
+        let mut place = self
+            .corners_of(triangle)
+            .map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
+        place.sort_unstable();
+        place
+    }
+
+    /// The first triangle in each place where some triangle `emits`.
+    fn first_copies(&self, emits: impl Fn(&SceneTriangle) -> bool) -> BTreeMap<[[u32; 3]; 3], usize> {
+        let emitters = self.triangles.iter().filter(|triangle| emits(triangle));
+        let mut first: BTreeMap<_, _> = emitters
+            .map(|triangle| (self.place_of(triangle), self.triangles.len()))
+            .collect();
+        if !first.is_empty() {
+            for (index, triangle) in self.triangles.iter().enumerate() {
+                if let Some(known) = first.get_mut(&self.place_of(triangle)) {
+                    *known = index.min(*known);
+                }
+            }
+        }
+        first
+    }
+
     fn corners(&self) -> Vec<[Vec3; 3]> {
         self.triangles
             .iter()
@@ -278,7 +322,7 @@ impl SceneBuffers {
         bsdf: BsdfFeatures,
         mut geometry: Geometry,
         bounds: [Vec3; 2],
-    ) -> Result<Self> {
+    ) -> Result<(Self, LightKinds)> {
         let mut textures = Textures::default();
         let mut materials: Vec<_> = scene
             .materials
@@ -300,7 +344,7 @@ impl SceneBuffers {
         } else {
             &[]
         };
-        Ok(Self {
+        let buffers = Self {
             positions: optional(
                 "positions",
                 Category::Geometry,
@@ -334,7 +378,8 @@ impl SceneBuffers {
             )?,
             environment: optional("environment", Category::Light, &lights.environment)?,
             albedo_table: optional("albedo table", Category::Material, bytemuck::cast_slice(albedo))?,
-        })
+        };
+        Ok((buffers, lights.kinds()))
     }
 }
 
@@ -452,11 +497,27 @@ impl Lights {
     ) -> Result<Self> {
         let mut records = Vec::new();
         let mut powers = Vec::new();
+        let emits = |triangle: &SceneTriangle| {
+            let material = &materials[triangle.material as usize];
+            material.emission.iter().any(|e| *e > 0.0) && material.flags & MATERIAL_UNLIT == 0
+        };
+        let first_copies = geometry.first_copies(emits);
         for index in 0..geometry.triangles.len() {
             let triangle = geometry.triangles[index];
+            if !emits(&triangle) {
+                continue;
+            }
             let material = &materials[triangle.material as usize];
-            let emits = material.emission.iter().any(|e| *e > 0.0) && material.flags & MATERIAL_UNLIT == 0;
-            if !emits {
+            // Of triangles in one place rays meet the first, so only that one may be a light.
+            let first = first_copies
+                .get(&geometry.place_of(&triangle))
+                .copied()
+                .unwrap_or(index);
+            if first != index {
+                let other = geometry.triangles[first];
+                if other.material == triangle.material {
+                    geometry.triangles[index].light = other.light;
+                }
                 continue;
             }
             let [a, b, c] = geometry.corners_of(&triangle).map(|p| p.as_dvec3());
@@ -504,6 +565,15 @@ impl Lights {
             cdf,
             environment,
         })
+    }
+
+    fn kinds(&self) -> LightKinds {
+        let some = |wanted: &[u32]| self.records.iter().any(|light| wanted.contains(&light.kind));
+        LightKinds {
+            area: some(&[LIGHT_TRIANGLE]),
+            punctual: some(&[LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL]),
+            environment: some(&[LIGHT_ENVIRONMENT]),
+        }
     }
 }
 

@@ -16,13 +16,17 @@ use super::path_set::PathSet;
 use super::random::SamplerKind;
 use crate::film::accumulate::TwoFloat;
 use crate::film::picture::Picture;
+use crate::gpu::shaders::film::display;
 use crate::gpu::shaders::sets::{Bvh2Set, PathBuffers, SceneSet};
 use crate::gpu::shaders::transport::{
-    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_resolve, path_shade,
-    path_shadow,
+    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_extend_alpha,
+    path_resolve, path_shade, path_shadow, path_shadow_alpha,
 };
 use crate::gpu::shaders::types::{FilmAov, FilmPixel, Hit, PathAov, PathState, Ray, ShadowRay};
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, Timings};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, Timings,
+    rw_compute_to_compute,
+};
 use crate::scene::{Camera, Projection};
 use crate::{Error, Result};
 
@@ -30,6 +34,9 @@ use crate::{Error, Result};
 const BOUNCES_PER_SUBMISSION: usize = 12;
 /// Pixels of one film buffer, so that no picture's size meets `maxStorageBufferRange`.
 const BAND_PIXELS: u32 = 1 << 20;
+/// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
+/// iterations in all.
+const SAMPLES_A_WAVE: u32 = 1024;
 /// Places that one invocation of the compaction kernels handles (`COMPACT_CHUNK`).
 const COMPACT_CHUNK: u32 = 32;
 /// Invocations of a workgroup of every stage (`PATH_GROUP`).
@@ -167,13 +174,24 @@ struct View {
 
 struct Pipelines {
     camera: ComputePipeline<path_camera::Kernel>,
-    extend: ComputePipeline<path_extend::Kernel>,
+    trace: TracePipelines,
     shade: ComputePipeline<path_shade::Kernel>,
-    shadow: ComputePipeline<path_shadow::Kernel>,
     count: ComputePipeline<path_compact_count::Kernel>,
     scan: ComputePipeline<path_compact_scan::Kernel>,
     scatter: ComputePipeline<path_compact_scatter::Kernel>,
     resolve: ComputePipeline<path_resolve::Kernel>,
+}
+
+/// Ray kernels, with the alpha test only where a scene has alpha.
+enum TracePipelines {
+    Opaque {
+        extend: ComputePipeline<path_extend::Kernel>,
+        shadow: ComputePipeline<path_shadow::Kernel>,
+    },
+    Alpha {
+        extend: ComputePipeline<path_extend_alpha::Kernel>,
+        shadow: ComputePipeline<path_shadow_alpha::Kernel>,
+    },
 }
 
 /// Working memory of a wave.
@@ -334,11 +352,12 @@ impl PathTracer {
     /// The kernels with their specialization.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let p = &self.pipelines;
+        let [extend, shadow] = p.trace.info();
         vec![
             p.camera.info(),
-            p.extend.info(),
+            extend,
+            shadow,
             p.shade.info(),
-            p.shadow.info(),
             p.count.info(),
             p.scan.info(),
             p.scatter.info(),
@@ -394,6 +413,45 @@ impl PathTracer {
         Ok((picture, film.iter().map(|pixel| u64::from(pixel.non_finite)).sum()))
     }
 
+    /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
+    /// and sRGB-encoded, blue first where `bgra` says so.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::DeviceLost`].
+    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        let bytes = 4 * u64::from(self.size[0]) * u64::from(self.size[1]);
+        if target.bytes() < bytes {
+            return Err(Error::LimitExceeded {
+                name: target.name().into(),
+                bytes,
+                limit_name: "size",
+                limit: target.bytes(),
+            });
+        }
+        self.flush()?;
+        let kernel = self.gpu.compute_pipeline::<display::Kernel>(&())?;
+        let mut recorder = self.gpu.recorder("display")?;
+        recorder.pass("film: display", |pass| {
+            for band in &self.bands {
+                let push = display::Push {
+                    first_pixel: band.first_pixel,
+                    pixel_count: band.pixels,
+                    scale: exposure.exp2(),
+                    bgra: bgra.into(),
+                };
+                let set = display::Set0 {
+                    film_pixels: band.film.view(),
+                    display_pixels: target.view(),
+                };
+                pass.dispatch(&kernel, &[&set], &push, [kernel.groups_for(band.pixels), 1, 1])?;
+                pass.barrier(&[rw_compute_to_compute(target)]);
+            }
+            Ok(())
+        })?;
+        recorder.submit()?.wait()?;
+        Ok(())
+    }
+
     fn next_wave(&mut self, samples: u32) -> Option<Wave> {
         let c = self.cursor;
         if c.sample >= samples {
@@ -404,7 +462,7 @@ impl PathTracer {
         // Several samples of a pixel share a wave only where all of the picture fits.
         let whole = self.bands.len() == 1 && pixels == band.pixels;
         let wave_samples = if whole {
-            (self.slots / pixels).min(samples - c.sample).max(1)
+            (self.slots / pixels).clamp(1, SAMPLES_A_WAVE).min(samples - c.sample)
         } else {
             1
         };
@@ -430,7 +488,10 @@ impl PathTracer {
     fn run(&mut self, wave: &Wave) -> Result<Vec<Timings>> {
         let paths = wave.pixels * wave.samples;
         let mut timings = Vec::new();
-        let mut status = initial_status(paths);
+        let mut status = Status {
+            active_count: paths,
+            ..Status::default()
+        };
         let mut first = true;
         let mut stalls_in_a_row = 0;
         while first || status.active_count > 0 {
@@ -439,6 +500,9 @@ impl PathTracer {
                 self.record_resolve(&mut recorder, &pending)?;
             }
             let resume_shadow = status.stalled == STALLED_SHADOW;
+            // A stalled round leaves no groups to dispatch.
+            let groups = group_counts(status.active_count);
+            (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
             (status.stalled, status.unfinished) = (0, 0);
             recorder.pass("path: begin", |pass| {
                 pass.update(self.buffers.status.view(), &[status])?;
@@ -526,24 +590,39 @@ impl PathTracer {
         let paths = self.buffers.set(parity);
         let index: Bvh2Set<'_> = self.scene.index_set();
         let scene: SceneSet<'_> = self.scene.scene_set();
+        let (first_pixel, pixel_count, first_sample, seed) =
+            (wave.first_pixel, wave.pixels, wave.first_sample, self.settings.seed);
         let status = &self.buffers.status;
         let items = status.slice(std::mem::offset_of!(Status, item_groups) as u64, 12);
         let chunks = status.slice(std::mem::offset_of!(Status, chunk_groups) as u64, 12);
         let scatter = status.slice(std::mem::offset_of!(Status, scatter_groups) as u64, 12);
         if !resume_shadow {
             recorder.pass("path: extend", |pass| {
-                pass.dispatch_indirect(&p.extend, &[&paths, &index], &(), items)?;
+                match &p.trace {
+                    TracePipelines::Opaque { extend, .. } => {
+                        pass.dispatch_indirect(extend, &[&paths, &index], &(), items)?;
+                    }
+                    TracePipelines::Alpha { extend, .. } => {
+                        let push = path_extend_alpha::Push {
+                            first_pixel,
+                            pixel_count,
+                            first_sample,
+                            seed,
+                        };
+                        pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
+                    }
+                }
                 stage_barrier(pass);
                 Ok(())
             })?;
             let [lower, upper] = self.scene.bounds();
             let push = path_shade::Push {
                 scene_lower: lower.to_array(),
-                first_pixel: wave.first_pixel,
+                first_pixel,
                 scene_upper: upper.to_array(),
-                pixel_count: wave.pixels,
-                first_sample: wave.first_sample,
-                seed: self.settings.seed,
+                pixel_count,
+                first_sample,
+                seed,
                 path_set: self.settings.path_set.packed(),
                 roulette_start: self.settings.roulette_start,
                 roulette_cap: self.settings.roulette_cap,
@@ -556,7 +635,20 @@ impl PathTracer {
         }
         if self.scene.has_lights() {
             recorder.pass("path: shadow", |pass| {
-                pass.dispatch_indirect(&p.shadow, &[&paths, &index], &(), items)?;
+                match &p.trace {
+                    TracePipelines::Opaque { shadow, .. } => {
+                        pass.dispatch_indirect(shadow, &[&paths, &index], &(), items)?;
+                    }
+                    TracePipelines::Alpha { shadow, .. } => {
+                        let push = path_shadow_alpha::Push {
+                            first_pixel,
+                            pixel_count,
+                            first_sample,
+                            seed,
+                        };
+                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, items)?;
+                    }
+                }
                 stage_barrier(pass);
                 Ok(())
             })?;
@@ -634,16 +726,9 @@ fn stage_barrier(pass: &mut Pass<'_>) {
     );
 }
 
-fn initial_status(paths: u32) -> Status {
-    let groups = |count: u32| [count.div_ceil(PATH_GROUP), 1, 1];
-    let chunks = groups(paths.div_ceil(COMPACT_CHUNK));
-    Status {
-        item_groups: groups(paths),
-        chunk_groups: chunks,
-        scatter_groups: chunks,
-        active_count: paths,
-        ..Status::default()
-    }
+/// Indirect arguments of stages with one invocation a place, and a chunk, of a queue.
+fn group_counts(places: u32) -> [[u32; 3]; 2] {
+    [places, places.div_ceil(COMPACT_CHUNK)].map(|count| [count.div_ceil(PATH_GROUP), 1, 1])
 }
 
 /// Mean and variance of the mean, per channel; zero for a pixel without samples.
@@ -712,6 +797,7 @@ fn camera_pipeline(
         sampler_kind: settings.sampler as u32,
         has_lens: camera.lens_radius > 0.0 && !view.orthographic,
         orthographic: view.orthographic,
+        write_aovs: settings.aovs,
     })
 }
 
@@ -732,22 +818,16 @@ impl Pipelines {
             has_attenuation: profile.has_attenuation,
             has_unlit: profile.has_unlit,
             has_environment: profile.has_environment(),
-            has_area_lights: profile.has_area_lights(),
-            has_punctual_lights: profile.lights.point + profile.lights.spot + profile.lights.directional > 0,
+            has_area_lights: scene.has_area_lights(),
+            has_punctual_lights: scene.has_punctual_lights(),
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
+            has_alpha: profile.has_alpha(),
         };
         Ok(Self {
             camera: camera_pipeline(gpu, settings, view, camera)?,
-            extend: gpu.compute_pipeline(&path_extend::Spec {
-                bvh2_quota: settings.ray_quota,
-                ..Default::default()
-            })?,
+            trace: TracePipelines::new(gpu, scene, settings.ray_quota)?,
             shade: gpu.compute_pipeline(&shade)?,
-            shadow: gpu.compute_pipeline(&path_shadow::Spec {
-                bvh2_quota: settings.ray_quota,
-                ..Default::default()
-            })?,
             count: gpu.compute_pipeline(&())?,
             scan: gpu.compute_pipeline(&())?,
             scatter: gpu.compute_pipeline(&())?,
@@ -755,6 +835,48 @@ impl Pipelines {
                 write_aovs: settings.aovs,
             })?,
         })
+    }
+}
+
+impl TracePipelines {
+    fn new(gpu: &Gpu, scene: &GpuScene, bvh2_quota: u32) -> Result<Self> {
+        let profile = scene.profile();
+        if !profile.has_alpha() {
+            return Ok(Self::Opaque {
+                extend: gpu.compute_pipeline(&path_extend::Spec {
+                    bvh2_quota,
+                    ..Default::default()
+                })?,
+                shadow: gpu.compute_pipeline(&path_shadow::Spec {
+                    bvh2_quota,
+                    ..Default::default()
+                })?,
+            });
+        }
+        let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
+        let extend = path_extend_alpha::Spec {
+            has_textures,
+            has_vertex_colors,
+            bvh2_quota,
+            ..Default::default()
+        };
+        let shadow = path_shadow_alpha::Spec {
+            has_textures,
+            has_vertex_colors,
+            bvh2_quota,
+            ..Default::default()
+        };
+        Ok(Self::Alpha {
+            extend: gpu.compute_pipeline(&extend)?,
+            shadow: gpu.compute_pipeline(&shadow)?,
+        })
+    }
+
+    fn info(&self) -> [PipelineInfo; 2] {
+        match self {
+            Self::Opaque { extend, shadow } => [extend.info(), shadow.info()],
+            Self::Alpha { extend, shadow } => [extend.info(), shadow.info()],
+        }
     }
 }
 

@@ -20,6 +20,8 @@ layout(constant_id = 101) const bool BVH2_COUNT = false;
 const uint BVH2_MAX_DEPTH = 32u;
 const uint BVH2_COUNT_BITS = 4u;
 const uint BVH2_COUNT_MASK = (1u << BVH2_COUNT_BITS) - 1u;
+const uint BVH2_NODE_QUARTERS = 4u;
+const uint BVH2_TRIANGLE_QUARTERS = 3u;
 const uint BVH2_START = 0u;
 const uint BVH2_FINISHED = 0xFFFFFFFFu;
 const float BVH2_BOX_SLACK = 1.0 / 262144.0;
@@ -50,9 +52,12 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     float least = largest_component(abs(ray.direction)) * BVH2_MIN_RELATIVE_COMPONENT;
     vec3 inverse = vec3(bvh2_clamped_reciprocal(ray.direction.x, least), bvh2_clamped_reciprocal(ray.direction.y, least),
                         bvh2_clamped_reciprocal(ray.direction.z, least));
-    Bvh2Node root = bvh2_nodes[0];
-    vec3 root_lower = min(root.lower0_upper0x.xyz, vec3(root.upper0yz_lower1xy.zw, root.lower1z_upper1.x));
-    vec3 root_upper = max(vec3(root.lower0_upper0x.w, root.upper0yz_lower1xy.xy), root.lower1z_upper1.yzw);
+    vec4 root0 = uintBitsToFloat(bvh2_quarters[0]);
+    vec4 root1 = uintBitsToFloat(bvh2_quarters[1]);
+    vec4 root2 = uintBitsToFloat(bvh2_quarters[2]);
+    uint triangles = bvh2_quarters[3].w;
+    vec3 root_lower = min(root0.xyz, vec3(root1.zw, root2.x));
+    vec3 root_upper = max(vec3(root0.w, root1.xy), root2.yzw);
     float reach = largest_component(max(abs(root_lower - ray.origin), abs(root_upper - ray.origin)));
     vec3 slack = (BVH2_BOX_SLACK * reach) * abs(inverse);
 
@@ -60,7 +65,7 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     uint trail = 0u;
     uint replay = 0u;
     for (uint node = resume >> BVH2_COUNT_BITS; node != 0u; ++replay) {
-        uint parent = bvh2_nodes[node].children_parent.z;
+        uint parent = bvh2_quarters[BVH2_NODE_QUARTERS * node + 3u].z;
         trail = trail << 1 | (parent & 1u);
         node = parent >> 1;
     }
@@ -72,12 +77,18 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     do {
         ++iterations;
         bool pop = true;
-        if ((word & BVH2_COUNT_MASK) == 0u) {
-            Bvh2Node node = bvh2_nodes[word >> BVH2_COUNT_BITS];
-            vec2 span0 = bvh2_span(node.lower0_upper0x.xyz, vec3(node.lower0_upper0x.w, node.upper0yz_lower1xy.xy),
-                                   ray.origin, inverse, slack);
-            vec2 span1 = bvh2_span(vec3(node.upper0yz_lower1xy.zw, node.lower1z_upper1.x), node.lower1z_upper1.yzw,
-                                   ray.origin, inverse, slack);
+        bool is_node = (word & BVH2_COUNT_MASK) == 0u;
+        uint place = word >> BVH2_COUNT_BITS;
+        uint quarter = is_node ? BVH2_NODE_QUARTERS * place : triangles + BVH2_TRIANGLE_QUARTERS * place;
+        // Loaded before the branch, from one address for both kinds.
+        vec4 q0 = uintBitsToFloat(bvh2_quarters[quarter]);
+        vec4 q1 = uintBitsToFloat(bvh2_quarters[quarter + 1u]);
+        uvec4 q2 = bvh2_quarters[quarter + 2u];
+        vec4 q2_float = uintBitsToFloat(q2);
+        if (is_node) {
+            uvec2 children = bvh2_quarters[quarter + 3u].xy;
+            vec2 span0 = bvh2_span(q0.xyz, vec3(q0.w, q1.xy), ray.origin, inverse, slack);
+            vec2 span1 = bvh2_span(vec3(q1.zw, q2_float.x), q2_float.yzw, ray.origin, inverse, slack);
             vec2 enter = max(vec2(span0.x, span1.x), vec2(ray.t_min));
             vec2 leave = min(vec2(span0.y, span1.y), vec2(hit.t));
             uint first = enter.y < enter.x ? 1u : 0u;
@@ -89,23 +100,21 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             replay = replay > 0u && next == (trail & 1u) ? replay - 1u : 0u;
             trail >>= 1;
             if (visit_first && visit_second) {
-                stack[top++] = first == 0u ? node.children_parent.y : node.children_parent.x;
+                stack[top++] = first == 0u ? children.y : children.x;
             }
             pop = !(visit_first || visit_second);
             replay = pop ? 0u : replay;
-            word = next == 0u ? node.children_parent.x : node.children_parent.y;
+            word = next == 0u ? children.x : children.y;
             if (BVH2_COUNT) {
                 ++bvh2_counters.x;
             }
         } else {
-            uint slot = word >> BVH2_COUNT_BITS;
-            Bvh2Triangle positions = bvh2_triangles[slot];
             TriangleHit candidate;
-            bool better = intersect_triangle(shear, positions.v0, positions.v1, positions.v2, ray.t_min, hit.t, candidate);
+            bool better = intersect_triangle(shear, q0.xyz, vec3(q0.w, q1.xy), vec3(q1.zw, q2_float.x), ray.t_min, hit.t, candidate);
             pop = (word & BVH2_COUNT_MASK) == 1u;
             word += BVH2_COUNT_MASK;
             if (better) {
-                uint triangle = bvh2_indices[slot];
+                uint triangle = q2.y;
                 better = candidate.t < hit.t || triangle < hit.triangle;
 #ifdef CLERESTORY_CANDIDATE_FILTER
                 better = better && accept_candidate(triangle, candidate.barycentrics);

@@ -33,7 +33,8 @@ vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     vec3 d = eta * eta - k * k - s2;
     vec3 ek = eta * k;
     vec3 a2b2 = sqrt(d * d + 4.0 * ek * ek);
-    vec3 a = sqrt(max(vec3(0.0), 0.5 * (a2b2 + d)));
+    // (a2b2 + d) / 2 without its cancellation at good metals, where d is negative: (a2b2 + d) (a2b2 - d) = 4 ek^2.
+    vec3 a = sqrt(mix(2.0 * ek * ek / (a2b2 - d), 0.5 * (a2b2 + d), greaterThanEqual(d, vec3(0.0))));
     vec3 sum = a2b2 + c2;
     vec3 cross_s = 2.0 * cos_i * a;
     vec3 rs = (sum - cross_s) / (sum + cross_s);

@@ -91,8 +91,13 @@ LightSample sample_light(vec3 from, float choice, vec2 u, vec2 within, vec3 scen
     result.direction = to * inversesqrt(squared);
     if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
         result.pdf = area_to_solid_angle(2.0 * probability / s.double_area, squared, abs(dot(result.normal, result.direction)));
+        SceneMaterial m = scene_materials[s.material];
         if (result.pdf > 0.0) {
-            result.radiance = surface_emission(scene_materials[s.material], s, -result.direction) / result.pdf;
+            result.radiance = surface_emission(m, s, -result.direction) / result.pdf;
+        }
+        if (HAS_ALPHA) {
+            // What a ray would meet there only in part, light sampling must not find in full.
+            result.radiance *= material_coverage(m, surface_base_color(m, s).a);
         }
     } else if (HAS_PUNCTUAL_LIGHTS) {
         float cos_angle = -dot(light.direction, result.direction);

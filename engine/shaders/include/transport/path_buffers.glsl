@@ -17,7 +17,7 @@ const uint STALLED_SHADOW = 2u;
 const uint FLAG_ALIVE = 1u;
 const uint FLAG_SHADOW = 2u;
 
-const uint BOUNCE_MASK = 0xFFFFFFu;
+const uint OUTSIDE = 0xFFFFFFFFu;
 
 // Places of the queue that one invocation of the compaction kernels handles.
 const uint COMPACT_CHUNK = 32u;
@@ -30,6 +30,7 @@ struct PathState {
     vec3 radiance;    // gathered so far
     uint bounce;      // scattering events so far
     float eta_scale;  // undoes the radiance scaling of refractions for Russian roulette
+    uint interior;    // material of the solid that the path is inside of, or OUTSIDE
 };
 
 struct ShadowRay {

@@ -19,6 +19,7 @@ layout(constant_id = 13) const bool HAS_AREA_LIGHTS = true;
 layout(constant_id = 14) const bool HAS_PUNCTUAL_LIGHTS = true;
 layout(constant_id = 15) const uint SAMPLER_KIND = 0;                  // SAMPLER_SOBOL or SAMPLER_PCG
 layout(constant_id = 16) const bool WRITE_AOVS = true;
+layout(constant_id = 17) const bool HAS_ALPHA = true;                  // surfaces that are there in part
 
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 

@@ -7,7 +7,7 @@
 
 #include "accel/offset.glsl"
 #include "accel/ray.glsl"
-#include "scene/texture.glsl"
+#include "scene/material.glsl"
 #include "transport/bsdf.glsl"
 #include "transport/shading_normal.glsl"
 
@@ -24,7 +24,8 @@ struct Surface {
 };
 
 vec3 interpolate(vec3 a, vec3 b, vec3 c, vec3 w) { return w.x * a + w.y * b + w.z * c; }
-vec4 interpolate(vec4 a, vec4 b, vec4 c, vec3 w) { return w.x * a + w.y * b + w.z * c; }
+// Exact where all corners are equal: white vertex colours change no bit.
+vec4 interpolate(vec4 a, vec4 b, vec4 c, vec3 w) { return a + (w.y * (b - a) + w.z * (c - a)); }
 
 Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     SceneTriangle triangle = scene_triangles[hit.triangle];
@@ -64,13 +65,7 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     return s;
 }
 
-vec4 material_texture(uint texture_index, vec4 uvs) {
-    return HAS_TEXTURES && texture_index != NO_TEXTURE ? sample_texture(texture_index, uvs) : vec4(1.0);
-}
-
-vec4 surface_base_color(SceneMaterial m, Surface s) {
-    return vec4(m.base_color, m.base_alpha) * material_texture(m.base_color_texture, s.uvs) * s.color;
-}
+vec4 surface_base_color(SceneMaterial m, Surface s) { return material_base_color(m, s.uvs, s.color); }
 
 // Radiance that the surface emits towards wo.
 vec3 surface_emission(SceneMaterial m, Surface s, vec3 wo) {

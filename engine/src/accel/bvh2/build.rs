@@ -5,7 +5,7 @@
 //! depth-first pass. Depth: a range of n references is halved at the median as soon as ⌈log₂ n⌉ inner nodes are all that the depth bound
 //! leaves below it.
 
-use super::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, MAX_TRIANGLES};
+use super::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, MAX_TRIANGLES, QUARTER, pack};
 use crate::accel::{IndexStatistics, MAX_COORDINATE, NO_HIT};
 use crate::{Error, Result};
 use bytemuck::Zeroable;
@@ -147,7 +147,7 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
 
     let mut positions: Vec<[Vec3; 3]> = references.iter().map(|r| triangles[r.index as usize]).collect();
     let mut indices: Vec<u32> = references.iter().map(|r| r.index).collect();
-    let nodes = if slots.is_empty() {
+    let mut nodes = if slots.is_empty() {
         // A point triangle, which no ray meets, keeps the buffers and the root's children from being empty.
         let bounds = references
             .first()
@@ -164,12 +164,14 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
         flatten(&slots)
     };
     measure(&nodes, &mut statistics);
-    statistics.bytes =
-        (size_of_val(nodes.as_slice()) + size_of_val(positions.as_slice()) + size_of_val(indices.as_slice())) as u64;
+    nodes[0].triangles = (size_of_val(nodes.as_slice()) / QUARTER) as u32;
+    let packed = pack(&nodes, &positions, &indices);
+    statistics.bytes = size_of_val(packed.as_slice()) as u64;
     Ok(Bvh2 {
         nodes,
         positions,
         indices,
+        packed,
         statistics,
     })
 }

@@ -1,0 +1,68 @@
+// Which candidate hits count for a path: all, or (with PATH_ALPHA defined) those where the material's alpha says that there is a surface.
+//
+// A blended surface is met with probability alpha, drawn from a hash of (seed, pixel, sample, bounce, kind of ray, triangle): the same
+// answer however often the traversal asks, and whatever index it walks.
+#ifndef CLERESTORY_TRANSPORT_PATH_CANDIDATES_GLSL
+#define CLERESTORY_TRANSPORT_PATH_CANDIDATES_GLSL
+
+#include "transport/path_buffers.glsl"
+
+const uint CANDIDATES_EXTEND = 0u;
+const uint CANDIDATES_SHADOW = 1u;
+
+#ifdef PATH_ALPHA
+
+#define CLERESTORY_SAMPLER SAMPLER_PCG
+#include "transport/random.glsl"
+
+layout(constant_id = 6) const bool HAS_TEXTURES = true;
+layout(constant_id = 9) const bool HAS_VERTEX_COLORS = true;
+#include "scene/material.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    uint first_pixel;
+    uint pixel_count;
+    uint first_sample;
+    uint seed;
+} push;
+
+// (pixel, sample, bounce and kind, seed) of the ray under way.
+uvec4 candidate_key;
+
+void begin_candidates(uint slot, uint kind) {
+    candidate_key = uvec4(push.first_pixel + slot % push.pixel_count, push.first_sample + slot / push.pixel_count,
+                          paths[slot].bounce * 2u + kind, push.seed);
+}
+
+bool accept_candidate(uint triangle, vec2 barycentrics) {
+    SceneTriangle t = scene_triangles[triangle];
+    SceneMaterial m = scene_materials[t.material];
+    if ((m.flags & (MATERIAL_MASK | MATERIAL_BLEND)) == 0u) {
+        return true;
+    }
+    vec3 w = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
+    vec4 uvs = vec4(0.0);
+    if (HAS_TEXTURES) {
+        uvs = w.x * scene_uvs[t.vertices.x] + w.y * scene_uvs[t.vertices.y] + w.z * scene_uvs[t.vertices.z];
+    }
+    vec4 color = vec4(1.0);
+    if (HAS_VERTEX_COLORS) {
+        color = w.x * scene_colors[t.vertices.x] + w.y * scene_colors[t.vertices.y] + w.z * scene_colors[t.vertices.z];
+    }
+    float coverage = material_coverage(m, material_base_color(m, uvs, color).a);
+    uint bits = pcg4d(pcg4d(candidate_key) + uvec4(triangle, 0u, 0u, 0u)).w;
+    return unit_float(bits) < coverage;
+}
+
+#define CLERESTORY_CANDIDATE_FILTER
+#define BEGIN_CANDIDATES(SLOT, KIND) begin_candidates(SLOT, KIND);
+
+#else
+
+#define BEGIN_CANDIDATES(SLOT, KIND)
+
+#endif
+
+#include "accel/bvh2.glsl"
+
+#endif

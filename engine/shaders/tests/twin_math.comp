@@ -1,0 +1,131 @@
+#version 460
+// Shader functions that read no tables, for comparison with their Rust twins: `function` says which.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "twin_interface.glsl"
+
+const bool SEPARABLE_MASKING = false;
+
+#include "accel/offset.glsl"
+#include "accel/sphere.glsl"
+#include "accel/triangle.glsl"
+#include "film/two_float.glsl"
+#include "transport/fresnel.glsl"
+#include "transport/ggx.glsl"
+#include "transport/lights.glsl"
+#include "transport/phase.glsl"
+#include "transport/phong.glsl"
+#include "transport/shading_normal.glsl"
+#include "transport/warp.glsl"
+
+void out_pair(uint i, TwoFloat x) { out2(i, vec2(x.hi, x.lo)); }
+
+void main() {
+    if (twin_case() >= push.case_count) {
+        return;
+    }
+    switch (push.function) {
+    case 0u: {  // warps of the square
+        out2(0u, square_to_disk(in2(0u)));
+        out3(2u, square_to_cosine_hemisphere(in2(0u)));
+        out3(5u, square_to_sphere(in2(0u)));
+        out3(8u, square_to_hemisphere(in2(0u)));
+        out3(11u, square_to_triangle(in2(0u)));
+        break;
+    }
+    case 1u: {  // cone, and the bases about a unit vector
+        out3(0u, square_to_cone(in2(0u), in1(2u)));
+        out1(3u, cone_pdf(in1(2u)));
+        out1(4u, cosine_hemisphere_pdf(in1(3u)));
+        vec3 t;
+        vec3 b;
+        orthonormal_basis(in3(4u), t, b);
+        out3(5u, t);
+        out3(8u, b);
+        break;
+    }
+    case 2u: {  // Fresnel
+        out1(0u, fresnel_f0(in1(1u)));
+        out1(1u, fresnel_dielectric(in1(0u), in1(1u)));
+        out3(2u, fresnel_schlick(in1(0u), in3(2u)));
+        out3(5u, fresnel_conductor(in1(0u), in3(2u), in3(5u)));
+        break;
+    }
+    case 3u: {  // GGX
+        vec3 wo = in3(0u);
+        float alpha = in1(3u);
+        out3(0u, ggx_sample_visible(wo, alpha, in2(4u)));
+        out1(3u, ggx_d(in3(6u), alpha));
+        out1(4u, ggx_g1(wo.z, alpha));
+        out1(5u, ggx_g2(wo.z, in1(9u), alpha));
+        out1(6u, ggx_visible_pdf(wo, in3(6u), alpha));
+        break;
+    }
+    case 4u: {  // lights
+        out1(0u, area_to_solid_angle(in1(0u), in1(1u), in1(2u)));
+        out1(1u, spot_falloff(in1(3u), in1(4u), in1(5u)));
+        out1(2u, balance_heuristic(in1(6u), in1(7u)));
+        out1(3u, power_heuristic(in1(6u), in1(7u)));
+        out3(4u, triangle_point(in3(8u), in3(11u), in3(14u), in2(17u)));
+        break;
+    }
+    case 5u: {  // phase functions
+        out1(0u, henyey_greenstein(in1(0u), in1(1u)));
+        out1(1u, henyey_greenstein_sample(in1(1u), in1(3u)));
+        out1(2u, schlick_phase(in1(0u), in1(2u)));
+        out1(3u, schlick_phase_sample(in1(2u), in1(3u)));
+        out3(4u, phase_direction(in3(5u), in1(0u), in1(4u)));
+        break;
+    }
+    case 6u: {  // Phong
+        out3(0u, phong_eval(in3(0u), in1(3u), in3(4u), in3(7u)));
+        out1(3u, phong_pdf(in1(3u), in3(4u), in3(7u)));
+        out3(4u, phong_sample(in1(3u), in3(4u), in2(10u)));
+        break;
+    }
+    case 7u: {  // shading normals
+        out3(0u, adapt_shading_normal(in3(0u), in3(3u), in3(6u)));
+        out_bits(3u, sides_agree(in3(0u), in3(3u), in3(6u)) ? 1u : 0u);
+        out3(4u, mapped_normal(in3(0u), in4(9u), in3(13u), in1(16u)));
+        break;
+    }
+    case 8u: {  // ray starts
+        SurfacePoint p = surface_point(in3(0u), in3(3u), in3(6u), in2(9u), scene_reach(in3(0u), in3(11u), in3(14u)));
+        out3(0u, p.position);
+        out3(3u, p.error);
+        out3(6u, offset_ray_origin(p.position, p.error, in3(17u), in3(20u)));
+        vec3 start;
+        vec3 segment;
+        SurfacePoint to = SurfacePoint(in3(23u), in3(26u));
+        shadow_segment(p, in3(17u), to, vec3(0.0), start, segment);
+        out3(9u, start);
+        out3(12u, segment);
+        break;
+    }
+    case 9u: {  // spheres
+        vec2 t;
+        out_bits(0u, intersect_sphere(in3(0u), in3(3u), in3(6u), in1(9u), t) ? 1u : 0u);
+        out2(1u, t);
+        out2(3u, closest_approach(in3(0u), in3(3u), in3(6u)));
+        break;
+    }
+    case 10u: {  // triangles
+        TriangleHit hit;
+        out_bits(0u, intersect_triangle(ray_shear(in3(0u), in3(3u)), in3(6u), in3(9u), in3(12u), in1(15u), in1(16u), hit) ? 1u : 0u);
+        out1(1u, hit.t);
+        out2(2u, hit.barycentrics);
+        break;
+    }
+    case 11u: {  // sums in pairs
+        TwoFloat a = TwoFloat(in1(0u), in1(1u));
+        out_pair(0u, two_sum(in1(2u), in1(3u)));
+        out_pair(2u, split(in1(2u)));
+        out_pair(4u, two_product(in1(2u), in1(3u)));
+        out_pair(6u, two_float_add(a, in1(2u)));
+        out_pair(8u, two_float_add_two_float(a, TwoFloat(in1(4u), in1(5u))));
+        out_pair(10u, two_float_add_square(a, in1(2u)));
+        break;
+    }
+    }
+}

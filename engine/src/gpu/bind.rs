@@ -1,0 +1,133 @@
+//! Descriptor sets: allocated, written from typed resources, bound, and every use noted for the barrier checks.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::barrier::Access;
+use super::interface::{BindingInfo, BindingKind, BindingSet, BoundResource, ShaderInfo, Stage};
+use super::pipeline::descriptor_type;
+use super::recorder::Pass;
+use crate::{Error, Result};
+
+/// How the stage of a shader reads and writes a binding.
+fn access(stage: Stage, binding: &BindingInfo) -> Access {
+    let (read, write) = match stage {
+        Stage::Compute => (Access::COMPUTE_READ, Access::COMPUTE_WRITE),
+        Stage::Fragment => (Access::FRAGMENT_READ, Access::FRAGMENT_WRITE),
+        Stage::Vertex | Stage::Geometry => (Access::VERTEX_READ, Access::VERTEX_WRITE),
+    };
+    let read = if binding.reads { read } else { Access::NONE };
+    let write = if binding.writes { write } else { Access::NONE };
+    read | write
+}
+
+impl Pass<'_> {
+    /// Allocates, writes and binds the descriptor sets of the shaders of one pipeline. Shaders may share sets; several givers of one set
+    /// number make one set together.
+    pub(super) fn bind_sets(
+        &mut self,
+        shaders: &[&'static ShaderInfo],
+        point: vk::PipelineBindPoint,
+        layout: vk::PipelineLayout,
+        set_layouts: &[vk::DescriptorSetLayout],
+        sets: &[&dyn BindingSet<'_>],
+    ) -> Result<()> {
+        let inner = Arc::clone(&self.recorder.gpu.inner);
+        let numbers: BTreeSet<u32> = shaders
+            .iter()
+            .flat_map(|shader| shader.bindings)
+            .map(|binding| binding.set)
+            .collect();
+        for number in numbers {
+            let Some(set_layout) = set_layouts.get(number as usize) else {
+                continue;
+            };
+            let given: Vec<_> = sets
+                .iter()
+                .filter(|set| set.set() == number)
+                .flat_map(|set| set.resources())
+                .collect();
+            let raw = self.recorder.resources().descriptor_set(&inner, *set_layout)?;
+            for shader in shaders {
+                for binding in shader.bindings.iter().filter(|binding| binding.set == number) {
+                    let resource = given.iter().find(|(at, _)| *at == binding.binding);
+                    let (_, resource) = resource.ok_or_else(|| Error::Shader {
+                        name: shader.name.into(),
+                        message: format!(
+                            "{} (set {number}, binding {}) was not given",
+                            binding.name, binding.binding
+                        ),
+                    })?;
+                    self.write_descriptor(shader, raw, binding, *resource)?;
+                }
+            }
+            // SAFETY: the set was just allocated with the layout of this pipeline.
+            unsafe {
+                inner
+                    .device
+                    .cmd_bind_descriptor_sets(self.command_buffer, point, layout, number, &[raw], &[])
+            };
+        }
+        Ok(())
+    }
+
+    fn write_descriptor(
+        &mut self,
+        shader: &'static ShaderInfo,
+        set: vk::DescriptorSet,
+        binding: &BindingInfo,
+        resource: BoundResource<'_>,
+    ) -> Result<()> {
+        let descriptor = vk::WriteDescriptorSet::default()
+            .dst_set(set)
+            .dst_binding(binding.binding)
+            .descriptor_type(descriptor_type(binding.kind));
+        let inner = Arc::clone(&self.recorder.gpu.inner);
+        match (binding.kind, resource) {
+            (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
+                view.check(inner.caps.storage_buffer_alignment)?;
+                self.recorder
+                    .touch(self.name, view.buffer, access(shader.stage, binding))?;
+                let raw = [vk::DescriptorBufferInfo {
+                    buffer: view.buffer.raw(),
+                    offset: view.offset,
+                    range: view.bytes,
+                }];
+                // SAFETY: set and buffer are alive, and the set is not in use yet.
+                unsafe {
+                    inner
+                        .device
+                        .update_descriptor_sets(&[descriptor.buffer_info(&raw)], &[])
+                };
+            }
+            (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
+                self.recorder.keep(&image.inner);
+                let raw = [vk::DescriptorImageInfo::default()
+                    .image_view(image.view())
+                    .image_layout(vk::ImageLayout::GENERAL)];
+                // SAFETY: as above.
+                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
+            }
+            (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
+                self.recorder.keep(&view.image.inner);
+                self.recorder.keep(&view.sampler.inner);
+                let raw = [vk::DescriptorImageInfo::default()
+                    .image_view(view.image.view())
+                    .sampler(view.sampler.inner.raw)
+                    .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
+                // SAFETY: as above.
+                unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
+            }
+            _ => {
+                let message = format!("binding {} is not a {:?}", binding.name, binding.kind);
+                return Err(Error::Shader {
+                    name: shader.name.into(),
+                    message,
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,16 @@
+#!/bin/sh
+# Makes the pictures of samples/README.md anew, each by its sample; the viewer's on a virtual X server.
+set -eu
+cd "$(dirname "$0")/.."
+cargo build --release -p clerestory-samples --bins
+samples="${CARGO_TARGET_DIR:-target}/release"
+out=samples/pictures
+"$samples/hello_triangle_offscreen" "$out/hello_triangle_offscreen.png"
+"$samples/embed_headless" "$out/embed_headless.png" --size 240x180 --spp 256
+"$samples/embed_host_device" "$out/embed_host_device.png" --size 180x180 --spp 256
+beside=$(mktemp -d)
+trap 'rm -r "$beside"' EXIT
+"$samples/render_gltf" --output "$beside/render_gltf.png" --size 240x180 --spp 256
+cp "$beside/render_gltf.png" "$out/"
+xvfb-run -a "$samples/viewer" 'builtin:cornell-box?sphere=gold' --size 180x180 --exposure 0.5 --frames 400 --screenshot "$out/viewer.png"
+ls -l "$out"

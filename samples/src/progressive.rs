@@ -1,0 +1,115 @@
+//! What the viewer shows: a path-traced picture that grows better with every frame.
+
+use std::time::{Duration, Instant};
+
+use clerestory::Result;
+use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
+use clerestory::render::{RenderOptions, Renderer, Rendering};
+
+use crate::orbit::{Orbit, Pose};
+
+/// Time of work for one frame.
+const FRAME: Duration = Duration::from_millis(50);
+/// Samples a pixel after which a picture is left as it is.
+const SAMPLES: u32 = 1 << 20;
+
+/// A picture that follows a camera and a window's size.
+pub struct Progressive {
+    gpu: Gpu,
+    renderer: Renderer,
+    options: RenderOptions,
+    exposure: f32,
+    bgra: bool,
+    state: Option<State>,
+}
+
+struct State {
+    rendering: Rendering,
+    pixels: Buffer,
+    size: [u32; 2],
+    pose: Pose,
+    samples: f64,
+    rays: u64,
+}
+
+/// A picture as it is now.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Pixels of four bytes, rows from top to bottom; finished, and may be copied from.
+    pub pixels: Buffer,
+    /// Samples a pixel so far, on average.
+    pub samples: f64,
+    /// Rays traced for this frame.
+    pub rays: u64,
+    /// Seconds of rendering for this frame.
+    pub seconds: f64,
+}
+
+impl Progressive {
+    /// A picture of the renderer's scene, by the camera and with the settings of `options` (size and samples are the window's matter);
+    /// with bytes in the order blue, green, red, alpha where `bgra` says so, else red first. `exposure` is in stops.
+    pub fn new(gpu: &Gpu, renderer: Renderer, options: RenderOptions, exposure: f32, bgra: bool) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            renderer,
+            options: RenderOptions {
+                spp: SAMPLES,
+                ..options
+            },
+            exposure,
+            bgra,
+            state: None,
+        }
+    }
+
+    /// Renders for a twentieth of a second, and until every pixel has a sample; starts anew when camera or size changed.
+    ///
+    /// # Errors
+    /// The engine's.
+    pub fn frame(&mut self, orbit: &Orbit, size: [u32; 2]) -> Result<Frame> {
+        let begin = Instant::now();
+        // The old picture goes before a new one is made, so that they need no memory at once.
+        let mut state = match self.state.take().filter(|state| state.size == size) {
+            Some(state) => state,
+            None => self.start(orbit, size)?,
+        };
+        if state.pose != orbit.pose() {
+            state.rendering.set_camera(&orbit.camera())?;
+            (state.pose, state.samples) = (orbit.pose(), 0.0);
+        }
+        let rays_before = state.rays;
+        while state.samples < 1.0 || begin.elapsed() < FRAME {
+            let Some(progress) = state.rendering.step()? else { break };
+            state.samples = progress.fraction * f64::from(SAMPLES);
+            state.rays = progress.rays;
+        }
+        let frame = Frame {
+            pixels: state.pixels.clone(),
+            samples: state.samples,
+            rays: state.rays - rays_before,
+            seconds: begin.elapsed().as_secs_f64(),
+        };
+        state.rendering.display(&state.pixels, self.exposure, self.bgra)?;
+        self.state = Some(state);
+        Ok(frame)
+    }
+
+    fn start(&self, orbit: &Orbit, size: [u32; 2]) -> Result<State> {
+        let mut rendering = self.renderer.start(&RenderOptions {
+            size,
+            ..self.options.clone()
+        })?;
+        rendering.set_camera(&orbit.camera())?;
+        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+        Ok(State {
+            rendering,
+            pixels: self
+                .gpu
+                .buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
+            size,
+            pose: orbit.pose(),
+            samples: 0.0,
+            rays: 0,
+        })
+    }
+}

@@ -1,0 +1,258 @@
+//! Runs the samples as a reader would, under the validation layers, and looks at what they write.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// What the process said, for failures.
+fn said(output: &Output) -> String {
+    format!(
+        "{}\n{}{}",
+        output.status,
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    )
+}
+
+fn open(path: &Path) -> image::RgbImage {
+    image::open(path)
+        .unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+        .into_rgb8()
+}
+
+/// Mean of the display values, red, green and blue, of a part of a picture given by shares of its sides.
+fn mean(picture: &image::RgbImage, across: [f32; 2], down: [f32; 2]) -> [f32; 3] {
+    let (width, height) = picture.dimensions();
+    let range = |share: [f32; 2], side: u32| (share[0] * side as f32) as u32..(share[1] * side as f32) as u32;
+    let (mut sum, mut count) = ([0.0; 3], 0.0f32);
+    for y in range(down, height) {
+        for x in range(across, width) {
+            let pixel = picture.get_pixel(x, y).0;
+            (0..3).for_each(|c| sum[c] += f32::from(pixel[c]));
+            count += 1.0;
+        }
+    }
+    sum.map(|sum| sum / count.max(1.0))
+}
+
+/// The Cornell box as everybody knows it: a red wall at the left, a green one at the right, a lamp in the ceiling, light on the back wall.
+fn assert_cornell_box(picture: &image::RgbImage) {
+    let colours: std::collections::BTreeSet<_> = picture.pixels().map(|pixel| pixel.0).collect();
+    assert!(colours.len() > 100, "only {} colours", colours.len());
+    // Under the warm lamp (radiance 17, 12, 4) the red wall reflects red and green 13.7 : 1, a display ratio of 3.3, and the green wall
+    // 1 : 2.3, a display ratio of 1.45; light from the other walls makes both a little less pure.
+    let [red, green] = [[0.04, 0.18], [0.82, 0.96]].map(|across| mean(picture, across, [0.3, 0.7]));
+    assert!(red[0] > 2.0 * red[1], "red wall {red:?}");
+    assert!(green[1] > 1.2 * green[0], "green wall {green:?}");
+    let [left, right] = [[0.0, 1.0 / 3.0], [2.0 / 3.0, 1.0]].map(|across| mean(picture, across, [0.0, 1.0]));
+    assert!(
+        left[0] * right[1] > 1.2 * right[0] * left[1],
+        "thirds {left:?} {right:?}"
+    );
+    let lamp = mean(picture, [0.48, 0.52], [0.13, 0.155]);
+    assert!(lamp.iter().all(|value| *value > 200.0), "lamp {lamp:?}");
+    let back = mean(picture, [0.4, 0.6], [0.3, 0.4]);
+    assert!(back[0] > 30.0 && back[0] < 2.0 * back[1], "back wall {back:?}");
+}
+
+/// Runs a sample under the validation layers; fails when it does.
+fn run(program: &str, arguments: &[&str]) -> Output {
+    let output = Command::new(program)
+        .args(arguments)
+        .env("CLERESTORY_VALIDATION", "core")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    output
+}
+
+/// Runs a sample that writes one picture and takes its path as argument.
+fn picture_of(program: &str, arguments: &[&str]) -> image::RgbImage {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new folder/picture.png");
+    run(program, &[&[path.to_str().unwrap()], arguments].concat());
+    open(&path)
+}
+
+#[test]
+fn hello_triangle_offscreen_draws_its_corners() {
+    let picture = picture_of(env!("CARGO_BIN_EXE_hello_triangle_offscreen"), &[]);
+    assert_eq!(picture.dimensions(), (512, 512));
+    let dominant = |x, y| {
+        let pixel = picture.get_pixel(x, y).0;
+        (0..3).max_by_key(|channel| pixel[*channel]).unwrap()
+    };
+    // Near the corners red (top), green (right) and blue (left); outside of the triangle the background.
+    assert_eq!([dominant(256, 80), dominant(430, 395), dominant(80, 395)], [0, 1, 2]);
+    assert_eq!(picture.get_pixel(10, 10), picture.get_pixel(500, 500));
+    assert_ne!(picture.get_pixel(10, 10), picture.get_pixel(256, 256));
+}
+
+#[test]
+fn embed_headless_renders_its_balls() {
+    let options = ["--size", "64x48", "--spp", "8"];
+    let picture = picture_of(env!("CARGO_BIN_EXE_embed_headless"), &options);
+    assert_eq!(picture.dimensions(), (64, 48));
+    let sky = mean(&picture, [0.0, 1.0], [0.0, 0.15]);
+    assert!(sky[2] > 1.1 * sky[0] && sky[0] > 20.0, "sky {sky:?}");
+    let red = mean(&picture, [0.2, 0.35], [0.35, 0.6]);
+    assert!(red[0] > 2.0 * red[1], "red ball {red:?}");
+    // The metal is yellowish, and its own colour shows in the floor's reflection.
+    let metal = mean(&picture, [0.65, 0.8], [0.55, 0.7]);
+    assert!(metal[1] > 1.05 * metal[2], "metal ball {metal:?}");
+}
+
+#[test]
+fn embed_host_device_renders_the_cornell_box() {
+    let options = ["--size", "64x64", "--spp", "8"];
+    let picture = picture_of(env!("CARGO_BIN_EXE_embed_host_device"), &options);
+    assert_eq!(picture.dimensions(), (64, 64));
+    assert_cornell_box(&picture);
+}
+
+#[test]
+fn render_gltf_shows_its_own_file_with_the_texture() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a/picture.png");
+    let options = ["--output", path.to_str().unwrap(), "--size", "80x60", "--spp", "8"];
+    let output = run(env!("CARGO_BIN_EXE_render_gltf"), &options);
+    let text = String::from_utf8_lossy(&output.stdout);
+    for expected in [
+        "8 triangles",
+        "textures",
+        "left out:",
+        "8 samples per pixel",
+        "path: shade",
+        "picture.exr",
+    ] {
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+    let picture = open(&path);
+    assert_eq!(picture.dimensions(), (80, 60));
+    let pyramid = mean(&picture, [0.42, 0.58], [0.45, 0.65]);
+    assert!(pyramid[0] > 2.0 * pyramid[2], "pyramid {pyramid:?}");
+    assert_eq!(mean(&picture, [0.0, 1.0], [0.0, 0.2]), [0.0; 3]);
+    // The texture's squares along a row of the floor: blue ones and cream ones.
+    let row = |warm: bool| {
+        (0..80)
+            .filter(|x| {
+                let [r, _, b] = picture.get_pixel(*x, 56).0;
+                if warm { r > b && r > 60 } else { b > r && b > 30 }
+            })
+            .count()
+    };
+    assert!(row(true) > 20 && row(false) > 20, "{} {}", row(true), row(false));
+    let exr = clerestory::film::exr::read(&path.with_extension("exr")).unwrap();
+    assert_eq!((exr.width(), exr.height()), (80, 60));
+    assert!(exr.layer("radiance").is_some() && exr.metadata.spp == Some(8));
+}
+
+#[test]
+fn render_gltf_names_what_it_cannot_read() {
+    let output = Command::new(env!("CARGO_BIN_EXE_render_gltf"))
+        .arg("no/such/scene.gltf")
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(said(&output).contains("no/such/scene.gltf"), "{}", said(&output));
+}
+
+#[test]
+fn a_sample_that_cannot_write_says_so() {
+    let output = Command::new(env!("CARGO_BIN_EXE_embed_headless"))
+        .args(["/dev/null/picture.png", "--size", "8x8", "--spp", "1"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(error.contains("/dev/null"), "{error}");
+    assert!(!error.contains("panicked"), "{error}");
+}
+
+/// The viewer on a virtual X server.
+fn viewer(arguments: &[&str], screenshot: &Path) -> Output {
+    Command::new("xvfb-run")
+        .args(["-a", env!("CARGO_BIN_EXE_viewer")])
+        .args(arguments)
+        .arg("--screenshot")
+        .arg(screenshot)
+        .env("CLERESTORY_VALIDATION", "core")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .unwrap_or_else(|error| {
+            panic!("cannot run xvfb-run ({error}): install it (Debian: apt-get install xvfb xauth)")
+        })
+}
+
+#[test]
+fn the_viewer_shows_the_cornell_box_and_resizes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("first.png");
+    let output = viewer(&["--size", "160x160", "--frames", "6"], &path);
+    assert!(output.status.success(), "{}", said(&output));
+    let picture = open(&path);
+    assert_eq!(picture.dimensions(), (160, 160));
+    assert_cornell_box(&picture);
+
+    // Without a window manager a new size is there after some frames.
+    let path = folder.path().join("second.png");
+    let options = ["--size", "100x100", "--frames", "30", "--resize", "150x150"];
+    let output = viewer(&options, &path);
+    assert!(output.status.success(), "{}", said(&output));
+    let picture = open(&path);
+    assert_eq!(picture.dimensions(), (150, 150));
+    assert_cornell_box(&picture);
+}
+
+#[test]
+fn the_viewer_exposes_by_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    let back = |stops: &str| {
+        let output = viewer(&["--size", "64x64", "--frames", "2", "--exposure", stops], &path);
+        assert!(output.status.success(), "{}", said(&output));
+        mean(&open(&path), [0.4, 0.6], [0.3, 0.4])[0]
+    };
+    // Two stops are a factor of 4 in light, about 1.8 in display values.
+    let (dark, bright) = (back("-1"), back("1"));
+    assert!(bright > 1.5 * dark, "{dark} {bright}");
+}
+
+#[test]
+fn the_viewer_takes_orthographic_cameras_and_models_without_any() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    // A slab of glass in a uniform environment is invisible but for what is absorbed: all is bright.
+    let output = viewer(&["builtin:slab", "--size", "48x48", "--frames", "2"], &path);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(mean(&open(&path), [0.0, 1.0], [0.0, 1.0])[1] > 100.0);
+
+    // A triangle without camera and light gets both: the picture shows the model before a bright environment.
+    let model = folder.path().join("triangle.obj");
+    std::fs::write(&model, "v -1 0 0\nv 1 0 0\nv 0 1.5 0\nf 1 2 3\n").unwrap();
+    let output = viewer(&[model.to_str().unwrap(), "--size", "48x48", "--frames", "2"], &path);
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(said(&output).contains("no camera in the file"), "{}", said(&output));
+    let picture = open(&path);
+    assert_eq!(picture.get_pixel(1, 1).0, [255; 3]);
+    assert!(picture.get_pixel(24, 26).0[0] < 255, "{:?}", picture.get_pixel(24, 26));
+}
+
+#[test]
+fn the_viewer_refuses_what_it_does_not_know() {
+    for arguments in [
+        ["--frames", "many"],
+        ["--resize", "wide"],
+        ["--exposure", "bright"],
+        ["--colour", "red"],
+        ["builtin:nowhere", "--frames"],
+        ["builtin:cornell-box", "builtin:ring"],
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_viewer"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(error.contains(arguments[0]) || error.contains(arguments[1]), "{error}");
+    }
+}

@@ -1,0 +1,207 @@
+//! Small pictures by the path tracer, and what tests ask of them.
+
+use std::sync::Arc;
+
+use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
+use clerestory::gpu::Gpu;
+use clerestory::scene::{Camera, Material, Mesh, Projection, Scene};
+use clerestory::transport::path_tracer::PathCounters;
+use clerestory::transport::random::SamplerKind;
+use clerestory::transport::{GpuScene, PathSet, PathTracer, PathTracerSettings};
+use glam::{DVec3, Vec3};
+
+use crate::statistics::expect_mean;
+
+/// A finished picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rendered {
+    /// RGB a pixel.
+    pub radiance: Vec<f32>,
+    /// Variance of the means.
+    pub variance: Vec<f32>,
+    /// Finite samples a pixel.
+    pub samples: Vec<f32>,
+    /// Samples left out.
+    pub non_finite: u64,
+    /// What the device did.
+    pub counters: PathCounters,
+}
+
+impl Rendered {
+    /// Bits of radiance and variance: equal for equal pictures only.
+    pub fn bits(&self) -> Vec<u32> {
+        self.radiance
+            .iter()
+            .chain(&self.variance)
+            .map(|v| v.to_bits())
+            .collect()
+    }
+
+    /// 64-bit FNV-1a of [`Rendered::bits`].
+    pub fn hash(&self) -> u64 {
+        self.bits()
+            .iter()
+            .flat_map(|word| word.to_le_bytes())
+            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+            })
+    }
+
+    /// Mean over the picture and the variance of that mean, per channel.
+    pub fn mean(&self) -> [(f64, f64); 3] {
+        let pixels = (self.radiance.len() / 3) as f64;
+        let sum = |values: &[f32], c: usize| values.iter().skip(c).step_by(3).map(|v| f64::from(*v)).sum::<f64>();
+        [0, 1, 2].map(|c| {
+            (
+                sum(&self.radiance, c) / pixels,
+                sum(&self.variance, c) / (pixels * pixels),
+            )
+        })
+    }
+
+    /// Fails unless every sample was finite and each pixel has `samples` of them.
+    pub fn expect_sound(&self, what: &str, samples: u32) {
+        assert_eq!(self.non_finite, 0, "{what}: samples that are not finite");
+        assert!(
+            self.samples.iter().all(|n| *n == samples as f32),
+            "{what}: samples are missing"
+        );
+        assert!(
+            self.radiance.iter().all(|v| v.is_finite() && *v >= 0.0),
+            "{what}: radiance"
+        );
+    }
+
+    /// Fails unless the mean over the picture is `expected` and every pixel agrees with it, by z-tests; a relative difference of up to
+    /// `bias` is allowed for, besides that of f32 rounding.
+    ///
+    /// The mean's test has the rate of false alarms [`crate::statistics::FALSE_ALARM`] a channel, the pixels' one is
+    /// [`z_test`] at its [`SIGNIFICANCE`]; it is left out where a bias is allowed.
+    pub fn expect_uniform(&self, what: &str, expected: [f64; 3], bias: f64) {
+        for (c, (mean, variance)) in self.mean().into_iter().enumerate() {
+            let allowed = (bias + RELATIVE_DEVIATION_FLOOR) * expected[c];
+            expect_mean(&format!("{what}, channel {c}"), mean, variance, expected[c], allowed);
+        }
+        if bias == 0.0 {
+            let values: Vec<f32> = (0..self.radiance.len()).map(|i| expected[i % 3] as f32).collect();
+            self.expect_values(what, &values);
+        }
+    }
+
+    /// Fails unless pixels have the expectations `expected`, by [`z_test`] and its test of the sum of all differences.
+    pub fn expect_values(&self, what: &str, expected: &[f32]) {
+        self.expect_same_as(what, expected, &vec![0.0; expected.len()]);
+    }
+
+    /// Fails unless pixels have the same expectations as means `other` of the given variance.
+    pub fn expect_same_as(&self, what: &str, other: &[f32], other_variance: &[f32]) {
+        match z_test(&self.radiance, &self.variance, other, other_variance, SIGNIFICANCE) {
+            // The sum's z counts the three channels of a pixel as independent; they may be one and the same: √3 · 4.89.
+            Ok(test) => assert!(test.passes() && test.bias_z.abs() < 8.5, "{what}: {test}"),
+            Err(error) => panic!("{what}: {error}"),
+        }
+    }
+}
+
+/// A generated scene; the test fails when the address is wrong.
+pub fn builtin(address: &str) -> Scene {
+    match clerestory::scene::load(address) {
+        Ok(scene) => scene,
+        Err(error) => panic!("{address}: {error}"),
+    }
+}
+
+/// Settings of statistical tests: independent samples, so that z-scores are standard normal.
+pub fn independent() -> PathTracerSettings {
+    PathTracerSettings {
+        sampler: SamplerKind::Pcg,
+        seed: 7,
+        ..PathTracerSettings::default()
+    }
+}
+
+/// [`independent`] over a part of the paths.
+pub fn paths(set: &str) -> PathTracerSettings {
+    PathTracerSettings {
+        path_set: set.parse::<PathSet>().unwrap_or_else(|error| panic!("{error}")),
+        ..independent()
+    }
+}
+
+/// Uploads a scene; the test fails when it is refused.
+pub fn upload(gpu: &Gpu, scene: &Scene) -> Arc<GpuScene> {
+    match GpuScene::new(gpu, scene) {
+        Ok(scene) => Arc::new(scene),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Makes a tracer of the scene's first camera.
+pub fn tracer(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &PathTracerSettings) -> PathTracer {
+    match PathTracer::new(gpu, upload(gpu, scene), &scene.cameras[0], size, settings.clone()) {
+        Ok(tracer) => tracer,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Renders to the end and reads the picture.
+pub fn finish(tracer: &mut PathTracer, samples: u32) -> Rendered {
+    let picture = tracer.render(samples).and_then(|()| tracer.picture());
+    let (picture, non_finite) = picture.unwrap_or_else(|error| panic!("{error}"));
+    let layer = |name: &str| {
+        picture
+            .layer(name)
+            .map_or_else(Vec::new, |layer| layer.values().to_vec())
+    };
+    Rendered {
+        radiance: layer("radiance"),
+        variance: layer("variance"),
+        samples: layer("samples"),
+        non_finite,
+        counters: tracer.counters(),
+    }
+}
+
+/// Renders and checks that all samples are there and finite.
+pub fn render(gpu: &Gpu, scene: &Scene, size: [u32; 2], samples: u32, settings: &PathTracerSettings) -> Rendered {
+    let picture = finish(&mut tracer(gpu, scene, size, settings), samples);
+    picture.expect_sound(&scene.name, samples);
+    picture
+}
+
+/// A camera that looks straight down (−Y) at a square of the plane y = 0, from `height`.
+pub fn camera_down(half_height: f32, height: f64) -> Camera {
+    let eye = DVec3::Y * height;
+    let mut camera = Camera::look_at("down", eye, DVec3::ZERO, -DVec3::Z, 1.0);
+    camera.projection = Projection::Orthographic { half_height };
+    camera
+}
+
+/// The square [−half, half]² of the plane at `y`, facing up.
+pub fn floor(name: &str, material: u32, half: f32, y: f32) -> Mesh {
+    let corner = |x: f32, z: f32| Vec3::new(x * half, y, z * half);
+    Mesh {
+        name: name.into(),
+        positions: vec![
+            corner(-1.0, 1.0),
+            corner(1.0, 1.0),
+            corner(1.0, -1.0),
+            corner(-1.0, -1.0),
+        ],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        material: Some(material),
+        ..Mesh::default()
+    }
+}
+
+/// A triangle without area at `place`, of a material: it is never met, but the scene's profile has to count its material in.
+pub fn point_triangle(scene: &mut Scene, material: Material, place: Vec3) {
+    let material = scene.add_material(material);
+    scene.place(Mesh {
+        name: "no area".into(),
+        positions: vec![place; 3],
+        triangles: vec![[0, 1, 2]],
+        material: Some(material),
+        ..Mesh::default()
+    });
+}

@@ -1,0 +1,167 @@
+//! Same scene, settings, seed and driver: the same bits, however the work is cut up and whoever does it.
+
+use std::process::Command;
+
+use clerestory::gpu::Gpu;
+use clerestory::scene::{Environment, Material, Mesh, Scene};
+use clerestory::transport::PathTracerSettings;
+use clerestory::transport::random::SamplerKind;
+use clerestory_tests::random::Random;
+use clerestory_tests::render::{Rendered, builtin, finish, render, tracer};
+use clerestory_tests::{gpu, with_gpu};
+use glam::Vec3;
+
+const SIZE: [u32; 2] = [24, 16];
+const SAMPLES: u32 = 12;
+/// Set in the processes that only print their picture's hash.
+const CHILD: &str = "CLERESTORY_TEST_PRINT_HASH";
+const CHILD_TEST: &str = "prints_its_hash_when_asked";
+
+fn scene() -> Scene {
+    builtin("builtin:cornell-box")
+}
+
+fn picture(gpu: &Gpu, settings: &PathTracerSettings) -> Rendered {
+    render(gpu, &scene(), SIZE, SAMPLES, settings)
+}
+
+#[test]
+fn how_the_work_is_cut_up_never_shows() {
+    with_gpu(|gpu| {
+        let settings = PathTracerSettings::default();
+        let truth = picture(gpu, &settings);
+        assert!(truth.mean()[0].0 > 0.01);
+        assert_eq!(picture(gpu, &settings).bits(), truth.bits(), "two runs");
+        // Fewer paths than pixels, an odd number, several samples a wave.
+        for paths_in_flight in [64, 200, 1000, 4096] {
+            let split = picture(
+                gpu,
+                &PathTracerSettings {
+                    paths_in_flight,
+                    ..settings.clone()
+                },
+            );
+            assert_eq!(split.bits(), truth.bits(), "{paths_in_flight} paths in flight");
+            assert_eq!(
+                split.counters.extend_rays, truth.counters.extend_rays,
+                "{paths_in_flight}"
+            );
+            assert_eq!(
+                split.counters.shadow_rays, truth.counters.shadow_rays,
+                "{paths_in_flight}"
+            );
+        }
+        // Stopped and gone on with, one step at a time, with the picture read in between.
+        let mut steps = tracer(gpu, &scene(), SIZE, &settings);
+        for samples in [1, 2, 5, 6, SAMPLES] {
+            steps.render(samples).unwrap();
+            steps.picture().unwrap();
+        }
+        assert_eq!(finish(&mut steps, SAMPLES).bits(), truth.bits(), "in steps");
+        // A camera set anew begins anew.
+        steps.set_camera(&scene().cameras[0]).unwrap();
+        assert_eq!(finish(&mut steps, SAMPLES).bits(), truth.bits(), "after set_camera");
+        let seen = picture(
+            gpu,
+            &PathTracerSettings {
+                aovs: true,
+                ..settings.clone()
+            },
+        );
+        assert_eq!(seen.bits(), truth.bits(), "with AOVs");
+        for other in [
+            PathTracerSettings {
+                seed: 1,
+                ..settings.clone()
+            },
+            PathTracerSettings {
+                sampler: SamplerKind::Pcg,
+                ..settings
+            },
+        ] {
+            assert_ne!(
+                picture(gpu, &other).bits(),
+                truth.bits(),
+                "another seed or sampler is another picture"
+            );
+        }
+    });
+}
+
+#[test]
+fn rays_that_a_quota_stops_go_on_where_they_were() {
+    with_gpu(|gpu| {
+        // Long traversals: large triangles through each other, whose boxes nearly all hold each ray.
+        let mut random = Random(3);
+        let mut scene = Scene::default();
+        let material = scene.add_material(Material::lambert("grey", Vec3::splat(0.5)));
+        scene.place(Mesh {
+            positions: (0..3 * 600).map(|_| random.vector()).collect(),
+            triangles: (0..600).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            material: Some(material),
+            ..Mesh::default()
+        });
+        scene.environment = Some(Environment::uniform(Vec3::ONE));
+        scene.cameras = builtin("builtin:white-furnace").cameras;
+        let of = |ray_quota| {
+            let settings = PathTracerSettings {
+                ray_quota,
+                ..PathTracerSettings::default()
+            };
+            render(gpu, &scene, SIZE, 2, &settings)
+        };
+        let (whole, stopped) = (of(32_768), of(128));
+        assert_eq!(whole.counters.stalls, 0);
+        assert!(stopped.counters.stalls > 0, "{:?}", stopped.counters);
+        assert_eq!(stopped.bits(), whole.bits());
+        assert_eq!(stopped.counters.extend_rays, whole.counters.extend_rays);
+        assert_eq!(stopped.counters.shadow_rays, whole.counters.shadow_rays);
+        assert!(whole.mean()[0].0 > 0.0);
+    });
+}
+
+#[test]
+fn threads_of_the_driver_and_of_the_host_never_show() {
+    // Software drivers read their number of threads when a process begins, so each number has a process of its own.
+    let hash = |variables: &[(&str, &str)]| {
+        let output = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", CHILD_TEST, "--nocapture"])
+            .env(CHILD, "1")
+            .envs(variables.iter().copied())
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            output.status.success(),
+            "{variables:?}: {text}{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let line = text.lines().find_map(|line| line.split_once("hash "));
+        line.unwrap_or_else(|| panic!("{variables:?}: no hash in {text}"))
+            .1
+            .to_owned()
+    };
+    let truth = hash(&[("LP_NUM_THREADS", "1")]);
+    for variables in [
+        &[("LP_NUM_THREADS", "0")][..],
+        &[("LP_NUM_THREADS", "2")],
+        &[("LP_NUM_THREADS", "2"), ("RAYON_NUM_THREADS", "1")],
+        &[("RAYON_NUM_THREADS", "5")],
+    ] {
+        assert_eq!(hash(variables), truth, "{variables:?}");
+    }
+}
+
+#[test]
+fn prints_its_hash_when_asked() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    let gpu = gpu();
+    let settings = PathTracerSettings {
+        paths_in_flight: 1024,
+        ..PathTracerSettings::default()
+    };
+    println!("hash {:016x}", picture(&gpu, &settings).hash());
+    clerestory_tests::assert_no_messages(&gpu);
+}

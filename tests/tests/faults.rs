@@ -1,0 +1,220 @@
+//! Device loss and exhausted memory, by a dispatch table that fails on purpose: each must be an error with its cause, leave nothing behind
+//! and never crash, whatever is dropped in whatever order afterwards.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use clerestory::Error;
+use clerestory::gpu::ash::vk;
+use clerestory::gpu::fault::{FaultCall, FaultPlan};
+use clerestory::gpu::shaders::tests::{layout_probe, out_of_bounds};
+use clerestory::gpu::{BufferDesc, Category, Gpu, GpuOptions, ImageDesc, Submission, Validation};
+use clerestory_tests::{assert_no_messages, gpu_with};
+
+/// The fault count is process-wide.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+fn faulty(call: FaultCall, nth: u32, result: vk::Result) -> (MutexGuard<'static, ()>, Gpu) {
+    let guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let options = GpuOptions {
+        fault: Some(FaultPlan { call, nth, result }),
+        // GPU-assisted validation submits by another command than the one that fails here.
+        validation: match GpuOptions::default().validation {
+            Validation::GpuAssisted => Validation::Core,
+            other => other,
+        },
+        cache_folder: None,
+        ..GpuOptions::default()
+    };
+    (guard, gpu_with(&options))
+}
+
+/// Submits two passes that fill a buffer.
+fn submit_fills(gpu: &Gpu, names: [&str; 2]) -> clerestory::Result<Submission> {
+    let buffer = gpu.buffer(&BufferDesc::storage("filled", 1024, Category::Work))?;
+    let mut recorder = gpu.recorder("fills")?;
+    recorder.pass(names[0], |pass| pass.fill(buffer.slice(0, 512), 1))?;
+    recorder.pass(names[1], |pass| {
+        pass.memory_barrier(clerestory::gpu::Access::TRANSFER, clerestory::gpu::Access::TRANSFER);
+        pass.fill(buffer.slice(512, 512), 2)
+    })?;
+    recorder.submit()
+}
+
+fn last_pass<T>(result: clerestory::Result<T>) -> String {
+    match result {
+        Err(Error::DeviceLost { last_pass }) => last_pass,
+        Err(other) => panic!("expected a lost device, got {other}"),
+        Ok(_) => panic!("expected a lost device, got success"),
+    }
+}
+
+/// Every call on a lost device fails at once and with the same words.
+fn assert_lost(gpu: &Gpu, pass: &str) {
+    let desc = BufferDesc::storage("after", 64, Category::Work);
+    assert_eq!(last_pass(gpu.buffer(&desc)), pass);
+    assert_eq!(last_pass(gpu.recorder("after")), pass);
+    assert_eq!(last_pass(gpu.compute_pipeline::<out_of_bounds::Kernel>(&())), pass);
+    assert_eq!(last_pass(gpu.buffer_with("after", Category::Work, &[1u32])), pass);
+}
+
+#[test]
+fn device_lost_at_submission_names_the_last_pass_that_began() {
+    let (_guard, gpu) = faulty(FaultCall::QueueSubmit, 3, vk::Result::ERROR_DEVICE_LOST);
+    submit_fills(&gpu, ["a1", "a2"]).unwrap().wait().unwrap();
+    let second = submit_fills(&gpu, ["b1", "b2"]).unwrap();
+    while !second.is_done().unwrap() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(last_pass(submit_fills(&gpu, ["c1", "c2"])), "b2");
+    assert_eq!(last_pass(second.wait()), "b2");
+    assert_lost(&gpu, "b2");
+    assert_no_messages(&gpu);
+}
+
+#[test]
+fn device_lost_at_the_first_submission_says_so() {
+    let (_guard, gpu) = faulty(FaultCall::QueueSubmit, 1, vk::Result::ERROR_DEVICE_LOST);
+    assert_eq!(last_pass(submit_fills(&gpu, ["a1", "a2"])), "before the first pass");
+    assert_lost(&gpu, "before the first pass");
+}
+
+#[test]
+fn device_lost_after_finished_work_names_its_last_pass() {
+    let (_guard, gpu) = faulty(FaultCall::QueueSubmit, 2, vk::Result::ERROR_DEVICE_LOST);
+    submit_fills(&gpu, ["a1", "a2"]).unwrap().wait().unwrap();
+    assert_eq!(last_pass(submit_fills(&gpu, ["b1", "b2"])), "a2");
+}
+
+#[test]
+fn device_lost_while_waiting_names_the_last_pass_that_began() {
+    let (_guard, gpu) = faulty(FaultCall::WaitSemaphores, 2, vk::Result::ERROR_DEVICE_LOST);
+    let submission = submit_fills(&gpu, ["a1", "a2"]).unwrap();
+    // The first wait sees to it that the work is done, the second is told that the device is lost.
+    let watched = submit_fills(&gpu, ["b1", "b2"]).unwrap();
+    watched.wait().unwrap();
+    let (error, left) = submission.wait_for(Duration::from_secs(60)).unwrap_err();
+    assert!(left.is_none(), "a lost device gives nothing to wait for");
+    assert_eq!(last_pass::<()>(Err(error)), "a2");
+    assert_lost(&gpu, "a2");
+    assert_no_messages(&gpu);
+}
+
+#[test]
+fn a_lost_device_can_be_dropped_in_any_order() {
+    for order in 0..3 {
+        let (_guard, gpu) = faulty(FaultCall::WaitSemaphores, 1, vk::Result::ERROR_DEVICE_LOST);
+        let buffer = gpu.buffer(&BufferDesc::storage("kept", 4096, Category::Work)).unwrap();
+        let pipeline = gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).unwrap();
+        let recorder = gpu.recorder("given up").unwrap();
+        let submission = submit_fills(&gpu, ["a1", "a2"]).unwrap();
+        assert!(submission.is_done().is_err());
+        let log = gpu.validation_log();
+        match order {
+            0 => drop((gpu, buffer, pipeline, recorder, submission)),
+            1 => drop((submission, recorder, pipeline, buffer, gpu)),
+            _ => drop((recorder, gpu, submission, buffer, pipeline)),
+        }
+        let messages = log.take();
+        assert!(messages.is_empty(), "{messages:#?}");
+    }
+}
+
+/// `make` must fail with out-of-memory that names `name`, leave nothing behind, and work the second time.
+fn out_of_memory<T>(
+    call: FaultCall,
+    result: vk::Result,
+    (memory, name): (&str, &str),
+    make: impl Fn(&Gpu) -> clerestory::Result<T>,
+) {
+    let (_guard, gpu) = faulty(call, 1, result);
+    let before = gpu.memory_report();
+    match make(&gpu) {
+        Err(error @ Error::OutOfMemory { .. }) => {
+            let text = error.to_string();
+            let Error::OutOfMemory {
+                memory: which,
+                name: what,
+                cause,
+                ..
+            } = error
+            else {
+                return;
+            };
+            assert_eq!((which, what.as_str()), (memory, name), "{text}");
+            assert!(!cause.is_empty() && text.contains(&cause), "{text}");
+        }
+        Err(other) => panic!("expected out of memory, got {other}"),
+        Ok(_) => panic!("expected out of memory, got success"),
+    }
+    assert_eq!(gpu.memory_report(), before, "the failed call left memory behind");
+    make(&gpu).unwrap_or_else(|error| panic!("the call must work once there is memory again: {error}"));
+    assert_eq!(gpu.memory_report(), before);
+    let log = gpu.validation_log();
+    drop(gpu);
+    let messages = log.take();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+#[test]
+fn out_of_memory_is_an_error_with_its_cause() {
+    let device = vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
+    let host = vk::Result::ERROR_OUT_OF_HOST_MEMORY;
+    let buffer = |gpu: &Gpu| gpu.buffer(&BufferDesc::storage("big buffer", 1 << 16, Category::Work));
+    let image = |gpu: &Gpu| {
+        gpu.image(&ImageDesc {
+            name: "big image",
+            size: [64, 64],
+            layers: 1,
+            mips: 1,
+            format: vk::Format::R8G8B8A8_UNORM,
+            usage: vk::ImageUsageFlags::STORAGE,
+            category: Category::Film,
+        })
+    };
+    out_of_memory(FaultCall::AllocateMemory, device, ("device", "big buffer"), buffer);
+    out_of_memory(FaultCall::AllocateMemory, device, ("device", "big image"), image);
+    out_of_memory(FaultCall::CreateBuffer, device, ("device", "big buffer"), buffer);
+    out_of_memory(FaultCall::CreateBuffer, host, ("host", "big buffer"), buffer);
+    out_of_memory(FaultCall::CreateImage, device, ("device", "big image"), image);
+    out_of_memory(
+        FaultCall::CreateComputePipelines,
+        device,
+        ("device", "tests/out_of_bounds.comp"),
+        |gpu| gpu.compute_pipeline::<out_of_bounds::Kernel>(&()),
+    );
+    out_of_memory(
+        FaultCall::CreateCommandPool,
+        host,
+        ("host", "vkCreateCommandPool"),
+        |gpu| gpu.recorder("first").map(drop),
+    );
+}
+
+#[test]
+fn exhausted_descriptors_fail_the_pass_and_not_the_program() {
+    let (_guard, gpu) = faulty(
+        FaultCall::AllocateDescriptorSets,
+        1,
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+    );
+    let pipeline = gpu
+        .compute_pipeline::<layout_probe::Kernel>(&Default::default())
+        .unwrap();
+    let buffer = |name| gpu.buffer(&BufferDesc::storage(name, 4096, Category::Work)).unwrap();
+    let (output, input) = (buffer("output"), buffer("input"));
+    let set = layout_probe::Set0 {
+        probe_output: output.view(),
+        probe_input: input.view(),
+    };
+    let run = || {
+        let mut recorder = gpu.recorder("probe")?;
+        recorder.pass("probe", |pass| {
+            pass.dispatch(&pipeline, &[&set], &Default::default(), [1, 1, 1])
+        })?;
+        recorder.submit()?.wait()
+    };
+    assert!(matches!(run(), Err(Error::OutOfMemory { .. })));
+    run().unwrap();
+    assert_no_messages(&gpu);
+}

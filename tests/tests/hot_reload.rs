@@ -1,0 +1,86 @@
+//! Hot reload: a changed source takes effect, a faulty one or one with another interface is refused and the old kernel stays.
+#![cfg(feature = "hot-reload")]
+
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+
+use clerestory::Error;
+use clerestory::gpu::shaders::tests::out_of_bounds;
+use clerestory::gpu::{Category, ComputePipeline, Gpu, HotReload};
+use clerestory_tests::with_gpu;
+
+/// What the kernel writes into word 2 of 4 when it is told to write 5.
+fn written(gpu: &Gpu, pipeline: &ComputePipeline<out_of_bounds::Kernel>) -> u32 {
+    let words = gpu.buffer_with("words", Category::Work, &[0u32; 4]).unwrap();
+    let mut recorder = gpu.recorder("write").unwrap();
+    recorder
+        .pass("write", |pass| {
+            let set = out_of_bounds::Set0 { words: words.view() };
+            let push = out_of_bounds::Push { index: 2, value: 5 };
+            pass.dispatch(pipeline, &[&set], &push, [1, 1, 1])
+        })
+        .unwrap();
+    recorder.submit().unwrap().wait().unwrap();
+    gpu.read(words.view(), 4).unwrap()[2]
+}
+
+/// Writes a source with a time of change of its own, whatever the file system's resolution.
+fn save(path: &Path, text: &str, turn: u64) {
+    std::fs::write(path, text).unwrap();
+    let file = std::fs::File::options().write(true).open(path).unwrap();
+    file.set_modified(SystemTime::now() + Duration::from_secs(10 * turn))
+        .unwrap();
+}
+
+#[test]
+fn a_changed_source_takes_effect_and_a_faulty_one_does_not() {
+    let original = include_str!("../../engine/shaders/tests/out_of_bounds.comp");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("tests")).unwrap();
+    let source = folder.path().join("tests/out_of_bounds.comp");
+    save(&source, original, 0);
+    with_gpu(|gpu| {
+        let mut kernel = HotReload::<out_of_bounds::Kernel>::new(gpu, folder.path(), ()).unwrap();
+        assert!(!kernel.poll().unwrap());
+        assert_eq!(written(gpu, kernel.pipeline()), 5);
+
+        save(&source, &original.replace("= value", "= value + 1"), 1);
+        assert!(kernel.poll().unwrap());
+        assert!(!kernel.poll().unwrap());
+        assert_eq!(written(gpu, kernel.pipeline()), 6);
+
+        save(&source, &original.replace("= value", "= valeu"), 2);
+        match kernel.poll() {
+            Err(Error::Shader { name, message }) => {
+                assert_eq!(name, "tests/out_of_bounds.comp");
+                assert!(message.contains("valeu"), "{message}");
+            }
+            other => panic!("expected the compiler's words, got {other:?}"),
+        }
+        assert!(!kernel.poll().unwrap(), "the same faulty source is not tried twice");
+        assert_eq!(written(gpu, kernel.pipeline()), 6);
+
+        let changes = [
+            ("uint index;\n    uint value;", "uint value;\n    uint index;"),
+            ("binding = 0", "binding = 1"),
+            ("writeonly buffer", "buffer"),
+            ("local_size_x = 1", "local_size_x = 2"),
+        ];
+        for (turn, (from, to)) in (3..).zip(changes) {
+            assert!(original.contains(from));
+            save(&source, &original.replace(from, to), turn);
+            match kernel.poll() {
+                Err(Error::Shader { message, .. }) => assert!(message.contains("interface"), "{message}"),
+                other => panic!("{to}: expected another interface, got {other:?}"),
+            }
+            assert_eq!(written(gpu, kernel.pipeline()), 6);
+        }
+
+        save(&source, original, 9);
+        assert!(kernel.poll().unwrap());
+        assert_eq!(written(gpu, kernel.pipeline()), 5);
+        std::fs::remove_file(&source).unwrap();
+        assert!(matches!(kernel.poll(), Err(Error::Io { .. })));
+        assert_eq!(written(gpu, kernel.pipeline()), 5);
+    });
+}

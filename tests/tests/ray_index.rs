@@ -1,0 +1,312 @@
+//! The trace kernels against their Rust twin, bit for bit, and both against f64.
+//!
+//! Equality of bits is asked of software devices: Vulkan lets others divide with an error of 2.5 ULP, so there the hits are held to the
+//! f64 test alone.
+
+use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
+use clerestory::accel::triangle::moller_trumbore;
+use clerestory::accel::{Hit, Ray, RayIndex, TraversalCounters};
+use clerestory::gpu::shaders::accel::{trace_any, trace_closest};
+use clerestory::gpu::shaders::sets::Bvh2Set;
+use clerestory::gpu::{Buffer, Category, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute};
+use clerestory_tests::random::Random;
+use clerestory_tests::with_gpu;
+use glam::Vec3;
+
+/// What a kernel made of a buffer of rays.
+struct Traced {
+    hits: Vec<Hit>,
+    counters: TraversalCounters,
+    dispatches: u32,
+}
+
+/// Runs one kernel with a quota until every ray is finished. Macro, since each shader has types of its own.
+macro_rules! trace {
+    ($shader:ident, $gpu:expr, $bvh:expr, $rays:expr, $quota:expr) => {{
+        let (gpu, rays): (&Gpu, &[Ray]) = ($gpu, $rays);
+        let spec = $shader::Spec {
+            bvh2_quota: $quota,
+            bvh2_count: true,
+        };
+        let pipeline = gpu.compute_pipeline::<$shader::Kernel>(&spec).unwrap();
+        let parts: Vec<Buffer> = $bvh
+            .buffers()
+            .iter()
+            .map(|part| gpu.buffer_with(part.name, Category::Index, part.bytes).unwrap())
+            .collect();
+        let index = Bvh2Set {
+            bvh2_quarters: parts[0].view(),
+        };
+        let ray_buffer = gpu.buffer_with("rays", Category::Work, rays).unwrap();
+        let hits = gpu
+            .buffer_with("hits", Category::Work, &vec![0u32; rays.len() * 4])
+            .unwrap();
+        let resume = gpu
+            .buffer_with("resume", Category::Work, &vec![0u32; rays.len()])
+            .unwrap();
+        let status = gpu.buffer_with("status", Category::Work, &[0u32; 4]).unwrap();
+        let set = $shader::Set0 {
+            trace_rays: ray_buffer.view(),
+            trace_hits: hits.view(),
+            trace_resume: resume.view(),
+            trace_status: status.view(),
+        };
+        let mut traced = Traced {
+            hits: Vec::new(),
+            counters: TraversalCounters::default(),
+            dispatches: 0,
+        };
+        loop {
+            let mut recorder = gpu.recorder("trace").unwrap();
+            recorder
+                .pass("trace", |pass| {
+                    pass.fill(status.view(), 0)?;
+                    pass.barrier(&[transfer_to_compute(&status)]);
+                    // Two dispatches, so that `first_ray` is used.
+                    let half = rays.len() as u32 / 2;
+                    for (first_ray, ray_count) in [(0, half), (half, rays.len() as u32 - half)] {
+                        let push = $shader::Push { first_ray, ray_count };
+                        pass.dispatch(
+                            &pipeline,
+                            &[&set, &index],
+                            &push,
+                            [pipeline.groups_for(ray_count), 1, 1],
+                        )?;
+                        pass.barrier(&[
+                            rw_compute_to_compute(&hits),
+                            rw_compute_to_compute(&resume),
+                            rw_compute_to_compute(&status),
+                        ]);
+                    }
+                    pass.barrier(&[compute_to_transfer(&status)]);
+                    Ok(())
+                })
+                .unwrap();
+            recorder.submit().unwrap().wait().unwrap();
+            let s = gpu.read::<$shader::TraceStatus>(status.view(), 1).unwrap()[0];
+            traced.counters.nodes += u64::from(s.node_visits);
+            traced.counters.triangles += u64::from(s.triangle_tests);
+            traced.counters.iterations += u64::from(s.iterations);
+            traced.dispatches += 1;
+            if s.unfinished == 0 {
+                break;
+            }
+            assert!(traced.dispatches < 10_000, "rays never end");
+        }
+        traced.hits = gpu.read::<Hit>(hits.view(), rays.len()).unwrap();
+        traced
+    }};
+}
+
+/// The twin, with the same quota.
+fn twin(bvh: &Bvh2, rays: &[Ray], quota: u32, any: bool) -> Traced {
+    let mut traced = Traced {
+        hits: Vec::new(),
+        counters: TraversalCounters::default(),
+        dispatches: 1,
+    };
+    for ray in rays {
+        let mut traversal = if any {
+            Traversal::any(ray)
+        } else {
+            Traversal::closest(ray)
+        };
+        let mut runs = 0;
+        while traversal.resume != FINISHED {
+            traversal.run(bvh, ray, u64::from(quota), &mut |_, _| true, &mut traced.counters);
+            runs += 1;
+        }
+        traced.dispatches = traced.dispatches.max(runs);
+        traced.hits.push(traversal.hit);
+    }
+    traced
+}
+
+fn bits(hit: &Hit) -> [u32; 4] {
+    [
+        hit.t.to_bits(),
+        hit.barycentrics[0].to_bits(),
+        hit.barycentrics[1].to_bits(),
+        hit.triangle,
+    ]
+}
+
+/// A hit must be one in f64 up to rounding, and nothing clearly nearer may have been missed.
+fn check_against_f64(what: &str, triangles: &[[Vec3; 3]], ray: &Ray, hit: &Hit) {
+    let reach = triangles
+        .iter()
+        .flatten()
+        .map(|v| (*v - Vec3::from(ray.origin)).abs().max_element())
+        .filter(|d| d.is_finite())
+        .fold(0.0f32, f32::max);
+    // 44u of the reach is what boxes are grown for (accel/bvh2.rs); edges a ray passes within that may go either way.
+    let slack = f64::from(reach) * 64.0 / 16_777_216.0 / f64::from(Vec3::from(ray.direction).abs().max_element());
+    let nearest = (triangles.iter().enumerate())
+        .filter_map(|(i, t)| {
+            let hit = moller_trumbore(ray, t)?;
+            let [a, b, c] = t.map(|v| v.as_dvec3());
+            let height = (b - a).cross(c - a).length()
+                / [b - a, c - b, a - c]
+                    .map(|e| e.length())
+                    .into_iter()
+                    .fold(0.0, f64::max);
+            // Clear of the edges by the slack, and not so thin or grazing that the plane itself is uncertain.
+            let normal = (b - a).cross(c - a).normalize();
+            let cosine = normal.dot(Vec3::from(ray.direction).as_dvec3().normalize()).abs();
+            let margin = hit.u.min(hit.v).min(1.0 - hit.u - hit.v) * height * cosine;
+            (margin > 4.0 * slack && cosine > 0.01).then_some((i, hit.t))
+        })
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((i, t)) = nearest {
+        assert!(
+            hit.is_hit() && f64::from(hit.t) <= t + 100.0 * slack,
+            "{what}: {ray:?} meets triangle {i} at {t}, the kernel says {hit:?}"
+        );
+    }
+}
+
+fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[Ray], quotas: &[u32]) {
+    let exact = gpu.caps().kind == "cpu";
+    let bvh = Bvh2::build(triangles, &Bvh2Settings::default()).unwrap();
+    let mut first: Option<Vec<[u32; 4]>> = None;
+    for quota in quotas {
+        let closest = trace!(trace_closest, gpu, bvh, rays, *quota);
+        let any = trace!(trace_any, gpu, bvh, rays, *quota);
+        let same = first.get_or_insert_with(|| closest.hits.iter().map(bits).collect());
+        for (i, ray) in rays.iter().enumerate() {
+            assert_eq!(
+                bits(&closest.hits[i]),
+                same[i],
+                "{what}: quota {quota} changes the hit of {ray:?}"
+            );
+            assert_eq!(any.hits[i].is_hit(), closest.hits[i].is_hit(), "{what}: {ray:?}");
+            check_against_f64(what, triangles, ray, &closest.hits[i]);
+        }
+        if exact {
+            for (traced, any_hit) in [(&closest, false), (&any, true)] {
+                let twin = twin(&bvh, rays, *quota, any_hit);
+                for (i, ray) in rays.iter().enumerate() {
+                    assert_eq!(
+                        bits(&traced.hits[i]),
+                        bits(&twin.hits[i]),
+                        "{what}, quota {quota}, any {any_hit}: {ray:?}"
+                    );
+                }
+                assert_eq!(traced.counters, twin.counters, "{what}, quota {quota}, any {any_hit}");
+                assert_eq!(
+                    traced.dispatches, twin.dispatches,
+                    "{what}, quota {quota}, any {any_hit}"
+                );
+            }
+        }
+        if *quota < 50 && rays.len() > 1000 {
+            assert!(closest.dispatches > 1, "{what}: the quota {quota} stops nothing");
+        }
+    }
+}
+
+fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray {
+        origin: origin.into(),
+        t_min: 0.0,
+        direction: direction.into(),
+        t_max: f32::INFINITY,
+    }
+}
+
+#[test]
+fn kernels_are_their_twins_on_soups() {
+    with_gpu(|gpu| {
+        let mut random = Random(1);
+        let triangles: Vec<[Vec3; 3]> = (0..3000)
+            .map(|_| {
+                let centre = 10.0 * random.vector();
+                [0; 3].map(|_| centre + 0.5 * random.vector())
+            })
+            .collect();
+        let rays: Vec<Ray> = (0..2048)
+            .map(|i| {
+                let mut r = ray(
+                    12.0 * random.vector(),
+                    random.direction() * random.choose(&[1.0, 1e-3, 1e4]),
+                );
+                if i % 3 == 0 {
+                    (r.t_min, r.t_max) = (random.range(0.0, 5.0), random.range(3.0, 20.0));
+                }
+                r
+            })
+            .collect();
+        check(gpu, "soup", &triangles, &rays, &[32_768, 40]);
+    });
+}
+
+#[test]
+fn kernels_are_their_twins_on_hard_cases() {
+    with_gpu(|gpu| {
+        let mut random = Random(2);
+        let mut rays: Vec<Ray> = Vec::new();
+        // Along axes, through vertices and edges of a grid of integers, starting on its planes; directions of odd lengths.
+        for i in 0..600 {
+            let lattice = |random: &mut Random| {
+                Vec3::new(random.below(5) as f32, random.below(5) as f32, random.below(5) as f32) - 2.0
+            };
+            let (from, to) = (lattice(&mut random), lattice(&mut random));
+            let axis = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z][i % 6];
+            rays.push(ray(from, axis));
+            rays.push(ray(from, to - from));
+            rays.push(ray(from + axis * 7.0, -axis * 1e-20));
+        }
+        // What cannot be traced: zero, NaN, infinite, too far, too long.
+        for direction in [
+            Vec3::ZERO,
+            Vec3::NAN,
+            Vec3::new(f32::INFINITY, 0.0, 0.0),
+            Vec3::splat(1e30),
+            Vec3::new(0.0, 1e-38, 0.0),
+        ] {
+            rays.push(ray(Vec3::ZERO, direction));
+        }
+        rays.push(ray(Vec3::splat(f32::NAN), Vec3::X));
+        rays.push(ray(Vec3::splat(1e20), Vec3::NEG_ONE));
+
+        // A grid of unit cells in three planes, with duplicates, slivers, points, and triangles that are left out.
+        let mut grid = Vec::new();
+        for a in -2..2 {
+            for b in -2..2 {
+                let (a, b) = (a as f32, b as f32);
+                for k in [-1.0, 0.0, 2.0] {
+                    let corner = |i: f32, j: f32| Vec3::new(a + i, b + j, k);
+                    grid.push([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0)]);
+                    grid.push([corner(0.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
+                    grid.push([corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0)].map(|p| Vec3::new(p.z, p.x, p.y)));
+                }
+            }
+        }
+        grid.extend_from_within(..24);
+        grid.push([Vec3::ZERO; 3]);
+        grid.push([Vec3::ZERO, Vec3::X, Vec3::X * 0.5]);
+        grid.push([Vec3::ZERO, Vec3::X, Vec3::new(0.5, 1e-7, 0.0)]);
+        grid.push([Vec3::NAN, Vec3::X, Vec3::Y]);
+        grid.push([Vec3::splat(f32::INFINITY), Vec3::X, Vec3::Y]);
+        check(gpu, "grid", &grid, &rays, &[32_768, 40]);
+
+        // One triangle, none, and many in one place.
+        check(gpu, "one", &grid[..1], &rays, &[32_768]);
+        check(gpu, "none", &[], &rays, &[32_768]);
+        check(gpu, "stack", &[grid[0]; 500], &rays, &[32_768, 40]);
+
+        // Far from the origin and at both ends of the range of sizes.
+        for (scale, place) in [
+            (1e-4f32, Vec3::ZERO),
+            (1e5, Vec3::ZERO),
+            (1.0, Vec3::new(1e5, -1e5, 1e5)),
+        ] {
+            let moved: Vec<_> = grid.iter().map(|t| t.map(|v| v * scale + place)).collect();
+            let rays: Vec<_> = rays
+                .iter()
+                .map(|r| ray(Vec3::from(r.origin) * scale + place, Vec3::from(r.direction)))
+                .collect();
+            check(gpu, &format!("scale {scale}, place {place}"), &moved, &rays, &[32_768]);
+        }
+    });
+}

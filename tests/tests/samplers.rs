@@ -1,0 +1,262 @@
+//! What the device's samplers draw, against their densities: chi-square tests of 131,072 draws each from the device's own random numbers.
+//!
+//! Seeds are fixed. Each check has a false-alarm rate of 10⁻⁶ (`clerestory_tests::statistics`), some fifteen of them: below 2·10⁻⁵
+//! for a driver that was never seen before. Draws of one Sobol' pixel are stratified, so their counts are too even for the test; those are
+//! drawn one sample a pixel.
+
+use std::f64::consts::{PI, TAU};
+
+use clerestory::gpu::shaders::tests::twin_random;
+use clerestory::gpu::shaders::types::{RandomCase, RandomWords};
+use clerestory::gpu::{BufferDesc, Category, Gpu};
+use clerestory::transport::distribution::{build_distribution, build_distribution_2d, distribution_probability};
+use clerestory::transport::ggx::ggx_visible_pdf;
+use clerestory::transport::random::SamplerKind;
+use clerestory_tests::statistics::{FALSE_ALARM, chi_square_test, expect_counts};
+use clerestory_tests::twin::Case;
+use clerestory_tests::{twin_kernel, with_gpu};
+use glam::{DVec3, UVec2};
+
+twin_kernel!(twin_math);
+twin_kernel!(twin_tables);
+
+const DRAWS: usize = 1 << 17;
+/// Cells along each side of the square.
+const SIDE: usize = 32;
+
+/// Pairs of numbers from the device: of slot `dimension`, one a pixel, or many of one pixel.
+fn pairs(gpu: &Gpu, kind: SamplerKind, dimension: u32, one_pixel: bool) -> Vec<[f32; 2]> {
+    let spec = twin_random::Spec {
+        sampler_kind: kind as u32,
+    };
+    let pipeline = gpu.compute_pipeline::<twin_random::Kernel>(&spec).unwrap();
+    let cases: Vec<RandomCase> = (0..DRAWS as u32)
+        .map(|i| RandomCase {
+            pixel: if one_pixel { 17 } else { i },
+            sample_index: if one_pixel { i } else { 3 },
+            dimension,
+            seed: 2026,
+        })
+        .collect();
+    let input = gpu.buffer_with("cases", Category::Work, &cases).unwrap();
+    let bytes = (DRAWS * size_of::<RandomWords>()) as u64;
+    let output = gpu
+        .buffer(&BufferDesc::storage("results", bytes, Category::Work))
+        .unwrap();
+    let mut recorder = gpu.recorder("random").unwrap();
+    recorder
+        .pass("random", |pass| {
+            let set = twin_random::Set0 {
+                random_cases: input.view(),
+                random_results: output.view(),
+            };
+            let case_count = DRAWS as u32;
+            let push = twin_random::Push { case_count };
+            pass.dispatch(&pipeline, &[&set], &push, [pipeline.groups_for(case_count), 1, 1])
+        })
+        .unwrap();
+    recorder.submit().unwrap().wait().unwrap();
+    let words: Vec<RandomWords> = gpu.read(output.view(), DRAWS).unwrap();
+    words.iter().map(|w| w.two).collect()
+}
+
+/// Counts of points over an even grid of `rows` × `columns` cells of the unit square.
+fn grid(points: impl Iterator<Item = [f64; 2]>, rows: usize, columns: usize) -> Vec<f64> {
+    let mut counts = vec![0.0; rows * columns];
+    for [x, y] in points {
+        let cell = |v: f64, n: usize| ((v * n as f64) as usize).min(n - 1);
+        counts[cell(y, rows) * columns + cell(x, columns)] += 1.0;
+    }
+    counts
+}
+
+fn expect_even(what: &str, counts: &[f64]) {
+    let expected = vec![DRAWS as f64 / counts.len() as f64; counts.len()];
+    expect_counts(what, counts, &expected);
+}
+
+fn wide(points: &[[f32; 2]]) -> impl Iterator<Item = [f64; 2]> + '_ {
+    points.iter().map(|p| p.map(f64::from))
+}
+
+/// Azimuth of a vector as a share of the circle.
+fn turn(x: f64, y: f64) -> f64 {
+    (y.atan2(x) / TAU).rem_euclid(1.0)
+}
+
+#[test]
+fn pairs_fill_the_square_evenly() {
+    with_gpu(|gpu| {
+        for (what, kind, one_pixel) in [
+            ("sobol over pixels", SamplerKind::Sobol, false),
+            ("pcg over pixels", SamplerKind::Pcg, false),
+            ("pcg over samples", SamplerKind::Pcg, true),
+        ] {
+            let points = pairs(gpu, kind, 4, one_pixel);
+            assert!(points.iter().flatten().all(|x| (0.0..1.0).contains(x)), "{what}");
+            expect_even(what, &grid(wide(&points), SIDE, SIDE));
+            // Neighbours in the order of drawing, and slots, are independent of each other.
+            let next = pairs(gpu, kind, 5, one_pixel);
+            let across = points.iter().zip(&next).map(|(a, b)| [a[0], b[0]].map(f64::from));
+            expect_even(&format!("{what}, two slots"), &grid(across, SIDE, SIDE));
+            let along = points.windows(2).map(|w| [w[0][0], w[1][0]].map(f64::from));
+            let counts = grid(along.chain([[0.0; 2]]), SIDE, SIDE);
+            expect_even(&format!("{what}, neighbours"), &counts);
+        }
+    });
+}
+
+#[test]
+fn sobol_samples_of_a_pixel_are_stratified() {
+    with_gpu(|gpu| {
+        // 2¹⁷ points of a (0, 2)-sequence: exactly one in each elementary interval, whatever the scrambling; the 24 bits of the numbers
+        // resolve sides of 2⁻¹⁷.
+        let points = pairs(gpu, SamplerKind::Sobol, 4, true);
+        for log_rows in [0, 4, 8, 13, 17] {
+            let counts = grid(wide(&points), 1 << log_rows, DRAWS >> log_rows);
+            assert!(counts.iter().all(|n| *n == 1.0), "2^{log_rows} rows");
+        }
+    });
+}
+
+#[test]
+fn warps_keep_areas() {
+    with_gpu(|gpu| {
+        let points = pairs(gpu, SamplerKind::Pcg, 9, false);
+        let cases: Vec<Case> = points.iter().map(|p| Case::new(p)).collect();
+        let results = twin_math(gpu, 0, &cases, &[]);
+        // Each is brought back to an even square by its own closed form: radius², height and azimuth.
+        let disk = results.iter().map(|r| {
+            let [x, y] = [r.0[0], r.0[1]].map(f64::from);
+            [turn(x, y), x * x + y * y]
+        });
+        expect_even("disk", &grid(disk, 16, 32));
+        let cosine = results.iter().map(|r| {
+            let w = r.vector(2);
+            [turn(w.x, w.y), w.z * w.z]
+        });
+        expect_even("cosine hemisphere", &grid(cosine, 16, 32));
+        let sphere = results.iter().map(|r| {
+            let w = r.vector(5);
+            [turn(w.x, w.y), 0.5 * (w.z + 1.0)]
+        });
+        expect_even("sphere", &grid(sphere, 16, 32));
+        let triangle = results.iter().map(|r| {
+            // Uniform in the simplex: 1 − (1 − b₁)² and b₂ / (1 − b₁) are independent and even.
+            let b = r.vector(11);
+            [1.0 - (1.0 - b.y).powi(2), b.z / (1.0 - b.y).max(1e-12)]
+        });
+        expect_even("triangle", &grid(triangle, 16, 32));
+    });
+}
+
+#[test]
+fn visible_normals_follow_their_density() {
+    with_gpu(|gpu| {
+        const ROWS: usize = 16;
+        const COLUMNS: usize = 24;
+        const STEPS: usize = 16;
+        let points = pairs(gpu, SamplerKind::Pcg, 11, false);
+        for (cos_o, alpha) in [(1.0f64, 0.3f64), (0.5, 0.5), (0.1, 1.0), (0.7, 0.1)] {
+            let wo = DVec3::new((1.0 - cos_o * cos_o).sqrt(), 0.0, cos_o);
+            let [x, y, z] = wo.as_vec3().to_array();
+            let cases: Vec<Case> = points
+                .iter()
+                .map(|p| Case::new(&[x, y, z, alpha as f32, p[0], p[1]]))
+                .collect();
+            let results = twin_math(gpu, 3, &cases, &[]);
+            // Cells even in azimuth and in the GGX quantile of the height, where the density is smooth: tan²θ = α² q / (1 − q).
+            let quantile = |h: DVec3| {
+                let tan2 = (h.x * h.x + h.y * h.y) / (h.z * h.z);
+                tan2 / (tan2 + alpha * alpha)
+            };
+            let counts = grid(
+                results
+                    .iter()
+                    .map(|r| [turn(r.0[0].into(), r.0[1].into()), quantile(r.vector(0))]),
+                ROWS,
+                COLUMNS,
+            );
+            // ∫ over a cell by the midpoint rule; D cosθ sinθ dθ dφ = dq dφ / 2π. At grazing heights the rest grows as (1 − q)^(−½), which the
+            // variable s with 1 − q = s² takes away.
+            let expected: Vec<f64> = (0..ROWS * COLUMNS)
+                .map(|cell| {
+                    let (row, column) = (cell / COLUMNS, cell % COLUMNS);
+                    let edge = |row: usize| (1.0 - row as f64 / ROWS as f64).sqrt();
+                    let (s0, s1) = (edge(row + 1), edge(row));
+                    let sum: f64 = (0..STEPS * STEPS)
+                        .map(|i| {
+                            let s = s0 + (s1 - s0) * ((i / STEPS) as f64 + 0.5) / STEPS as f64;
+                            let phi =
+                                TAU * (column as f64 + ((i % STEPS) as f64 + 0.5) / STEPS as f64) / COLUMNS as f64;
+                            let tan = alpha * (1.0 - s * s).sqrt() / s;
+                            let h = DVec3::new(tan * phi.cos(), tan * phi.sin(), 1.0).normalize();
+                            let a2 = alpha * alpha;
+                            let d = a2 / (PI * (h.z * h.z * (a2 - 1.0) + 1.0).powi(2));
+                            ggx_visible_pdf(wo, h, alpha) / (d * h.z) * 2.0 * s
+                        })
+                        .sum();
+                    sum * (s1 - s0) / (STEPS * STEPS) as f64 * DRAWS as f64 / COLUMNS as f64
+                })
+                .collect();
+            let total: f64 = expected.iter().sum();
+            assert!(
+                (total / DRAWS as f64 - 1.0).abs() < 2e-3,
+                "the density integrates to one: {total}"
+            );
+            expect_counts(&format!("cos {cos_o}, alpha {alpha}"), &counts, &expected);
+        }
+    });
+}
+
+#[test]
+fn lights_are_chosen_by_their_power() {
+    with_gpu(|gpu| {
+        let powers: Vec<f64> = (0..50)
+            .map(|i| if i % 7 == 3 { 0.0 } else { f64::from(1 + i * i % 17) })
+            .collect();
+        let cdf = build_distribution("lights", &powers).unwrap();
+        let points = pairs(gpu, SamplerKind::Pcg, 13, false);
+        let cases: Vec<Case> = points.iter().map(|p| Case::new(&[f32::from_bits(50), p[0]])).collect();
+        let mut counts = vec![0.0; 50];
+        for result in twin_tables(gpu, 1, &cases, &cdf) {
+            counts[result.bits(0) as usize] += 1.0;
+        }
+        let total: f64 = powers.iter().sum();
+        let expected: Vec<f64> = powers.iter().map(|p| p / total * DRAWS as f64).collect();
+        expect_counts("lights", &counts, &expected);
+        // The test would see a choice that is even where it should not be.
+        assert!(chi_square_test(&counts, &vec![DRAWS as f64 / 50.0; 50]) < FALSE_ALARM);
+    });
+}
+
+#[test]
+fn environments_are_sampled_by_their_texels_and_evenly_within() {
+    with_gpu(|gpu| {
+        let size = UVec2::new(16, 8);
+        let weights: Vec<f64> = (0..128).map(|i| f64::from((i * 5) % 11)).collect();
+        let cdf = build_distribution_2d("environment", size, &weights).unwrap();
+        let (texel, within) = (
+            pairs(gpu, SamplerKind::Pcg, 15, false),
+            pairs(gpu, SamplerKind::Pcg, 16, false),
+        );
+        let cases: Vec<Case> = (texel.iter().zip(&within))
+            .map(|(t, w)| Case::new(&[f32::from_bits(16), f32::from_bits(8), t[0], t[1], w[0], w[1]]))
+            .collect();
+        // Four cells a texel: halves in azimuth, and in height, which is even over a texel's solid angle.
+        let mut counts = vec![0.0; 512];
+        for result in twin_tables(gpu, 2, &cases, &cdf) {
+            let w = result.vector(0);
+            let (column, row) = (result.bits(4) as usize, result.bits(5) as usize);
+            let u = turn(-w.z, w.x) + 0.5;
+            let right = ((u - column as f64 / 16.0) * 16.0).rem_euclid(16.0) >= 0.5;
+            let height = |r: usize| (PI * r as f64 / 8.0).cos();
+            let lower = w.y < 0.5 * (height(row) + height(row + 1));
+            counts[(row * 16 + column) * 4 + usize::from(right) * 2 + usize::from(lower)] += 1.0;
+        }
+        let rows: f64 = weights.iter().sum();
+        let expected: Vec<f64> = (0..512).map(|i| weights[i / 4] / rows / 4.0 * DRAWS as f64).collect();
+        assert!((distribution_probability(&cdf, 0, 0) - weights[..16].iter().sum::<f64>() / rows).abs() < 1e-6);
+        expect_counts("environment", &counts, &expected);
+    });
+}

@@ -1,0 +1,419 @@
+//! Agreement with an independent renderer: converged pictures of [`mitsuba::scenes`] by this engine and by Mitsuba 3, compared within their noise.
+//!
+//! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and Mitsuba's
+//! rough surfaces (single scattering, separable masking), and compared by [`film::z_test`]: value by value, by blocks of
+//! 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the same run the speed of both renderers is measured in turns.
+//! Guarantees: pictures depend on the options and the driver alone; times are wall-clock and processor seconds, medians of the rounds.
+//!
+//! [`mitsuba::scenes`]: crate::mitsuba::scenes
+//! [`film::z_test`]: clerestory::film::z_test
+
+mod peer;
+mod report;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE};
+use clerestory::film::{CompareOptions, Picture, ToneMap, compare, exr, png, z_test};
+use clerestory::gpu::{Gpu, GpuOptions};
+use clerestory::transport::random::SamplerKind;
+use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
+use clerestory::{Error, Result};
+
+use crate::mitsuba::export;
+use crate::mitsuba::scenes::{ComparedScene, scenes};
+use peer::{Peer, Variant};
+pub use report::{AgreementReport, Machine, SceneAgreement, Speed};
+
+/// What to compare, and how long to work at it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct AgreementOptions {
+    /// Names of the scenes; empty: all of them.
+    pub scenes: Vec<String>,
+    /// Width and height of the compared pictures, pixels.
+    pub size: u32,
+    /// Independent passes of Mitsuba: 100 or more, so that their variance is known well enough.
+    pub passes: u32,
+    /// Samples a pixel in each pass; this engine takes `passes` times as many.
+    pub samples_per_pass: u32,
+    /// Seed of both renderers.
+    pub seed: u32,
+    /// Rounds of the speed measurement, in each of which every renderer has its turn; 0 measures nothing.
+    pub timing_rounds: u32,
+    /// Width and height of the timed pictures, pixels.
+    pub timing_size: u32,
+    /// Samples a pixel of a timed picture.
+    pub timing_samples: u32,
+    /// The Python that has Mitsuba.
+    #[serde(skip)]
+    pub python: PathBuf,
+    /// `tools/mitsuba/reference.py`.
+    #[serde(skip)]
+    pub script: PathBuf,
+    /// Folder for scenes and pictures, made if need be.
+    #[serde(skip)]
+    pub output: PathBuf,
+    /// The report's files without their suffix (`.md`, `.json`); none when `None`.
+    #[serde(skip)]
+    pub results: Option<PathBuf>,
+}
+
+impl Default for AgreementOptions {
+    /// All scenes at 64², 128 passes of 16 samples. Python comes from `CLERESTORY_MITSUBA_PYTHON`, else `python3`; paths are relative to the
+    /// repository's root.
+    fn default() -> Self {
+        Self {
+            scenes: Vec::new(),
+            size: 64,
+            passes: 128,
+            samples_per_pass: 16,
+            seed: 2,
+            timing_rounds: 3,
+            timing_size: 128,
+            timing_samples: 16,
+            python: std::env::var_os("CLERESTORY_MITSUBA_PYTHON").map_or_else(|| "python3".into(), PathBuf::from),
+            script: "tools/mitsuba/reference.py".into(),
+            output: "out/agreement".into(),
+            results: Some("tools/mitsuba/results".into()),
+        }
+    }
+}
+
+/// First bounce of Russian roulette: that of Mitsuba's path integrator with `rr_depth` 5.
+const ROULETTE_START: u32 = 5;
+/// Edge of the blocks whose means are tested too, pixels.
+const BLOCK: u32 = 8;
+/// Radiance difference shown as full white in the difference pictures, in units of its standard deviation.
+const FULL_SCALE_Z: f32 = 5.0;
+
+/// Compares all wanted scenes, calling `progress` with a line before each and after each, and writes the report.
+///
+/// # Errors
+/// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the exporter and
+/// the files. A picture that disagrees is no error: see [`AgreementReport::passes`].
+pub fn run_with(options: &AgreementOptions, mut progress: impl FnMut(&str)) -> Result<AgreementReport> {
+    let wanted = selected(options)?;
+    let gpu = Gpu::headless(&GpuOptions::default())?;
+    let mut done = Vec::new();
+    let mut mitsuba = String::new();
+    for one in &wanted {
+        progress(&format!("{}: {}", one.name, one.shows));
+        let (scene, version) = compare_scene(&gpu, one, options)?;
+        progress(&scene.to_string());
+        mitsuba = version;
+        done.push(scene);
+        // Written after every scene, so that a run that is cut short leaves what it has found.
+        let report = AgreementReport {
+            machine: Machine::read(gpu.caps(), &mitsuba),
+            options: options.clone(),
+            scenes: done.clone(),
+        };
+        if let Some(prefix) = &options.results {
+            report.write(prefix)?;
+        }
+    }
+    Ok(AgreementReport {
+        machine: Machine::read(gpu.caps(), &mitsuba),
+        options: options.clone(),
+        scenes: done,
+    })
+}
+
+/// [`run_with`], in silence.
+///
+/// # Errors
+/// As [`run_with`].
+pub fn run(options: &AgreementOptions) -> Result<AgreementReport> {
+    run_with(options, |_| {})
+}
+
+fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
+    let refuse = |name: &str, value: String, cause: String| {
+        Err(Error::Setting {
+            name: name.into(),
+            value,
+            cause,
+        })
+    };
+    for (name, value, least) in [
+        ("size", options.size, BLOCK),
+        ("passes", options.passes, 2),
+        ("samples_per_pass", options.samples_per_pass, 1),
+        ("timing_size", options.timing_size, 1),
+        ("timing_samples", options.timing_samples, 1),
+    ] {
+        if value < least {
+            return refuse(name, value.to_string(), format!("is below {least}"));
+        }
+    }
+    if !options.size.is_multiple_of(BLOCK) {
+        return refuse(
+            "size",
+            options.size.to_string(),
+            format!("is not a multiple of {BLOCK}"),
+        );
+    }
+    let all = scenes()?;
+    let names: Vec<_> = all.iter().map(|one| one.name).collect();
+    if let Some(unknown) = options.scenes.iter().find(|name| !names.contains(&name.as_str())) {
+        let cause = format!("is not compared; there are: {}", names.join(", "));
+        return refuse("scenes", unknown.clone(), cause);
+    }
+    let is_wanted = |one: &ComparedScene| options.scenes.is_empty() || options.scenes.iter().any(|n| n == one.name);
+    Ok(all.into_iter().filter(is_wanted).collect())
+}
+
+fn settings(options: &AgreementOptions) -> PathTracerSettings {
+    PathTracerSettings {
+        // The variance within a pixel is that of its mean only where samples are independent.
+        sampler: SamplerKind::Pcg,
+        seed: options.seed,
+        roulette_start: ROULETTE_START,
+        multiple_scattering: false,
+        separable_masking: true,
+        ..PathTracerSettings::default()
+    }
+}
+
+fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> Result<(SceneAgreement, String)> {
+    let folder = options.output.join(one.name);
+    let size = [options.size; 2];
+    let exported = export(&one.scene, "", size, &folder)?;
+    let peer = Peer::new(options, &folder);
+    let theirs = peer.render(
+        &exported.scene,
+        "mitsuba",
+        Variant::Auto,
+        options.passes,
+        options.samples_per_pass,
+    )?;
+
+    let scene = Arc::new(GpuScene::new(gpu, &one.scene)?);
+    let camera = one.scene.camera(None).ok_or_else(|| Error::Setting {
+        name: "camera".into(),
+        value: one.name.into(),
+        cause: "has none".into(),
+    })?;
+    let mut tracer = PathTracer::new(gpu, scene.clone(), camera, size, settings(options))?;
+    tracer.render(options.passes * options.samples_per_pass)?;
+    let (ours, non_finite) = tracer.picture()?;
+    drop(tracer);
+    let reference = exr::read(&theirs.picture)?;
+    write_pictures(&folder, &ours, &reference)?;
+
+    let (a, a_var) = (ours.require("radiance")?.values(), ours.require("variance")?.values());
+    let (b, b_var) = (
+        reference.main_layer()?.values(),
+        reference.require("variance")?.values(),
+    );
+    let values = z_test(a, a_var, b, b_var, SIGNIFICANCE)?;
+    let [a_block, a_block_var, b_block, b_block_var] =
+        [(a, 1), (a_var, 2), (b, 1), (b_var, 2)].map(|(values, power)| block_means(values, options.size, power));
+    let blocks = z_test(&a_block, &a_block_var, &b_block, &b_block_var, SIGNIFICANCE)?;
+    let errors = compare(&ours, &reference, &CompareOptions::default())?;
+
+    let mut speed = None;
+    if options.timing_rounds > 0 {
+        let timed = export(&one.scene, "", [options.timing_size; 2], &folder.join("timed"))?;
+        let mut tracer = PathTracer::new(gpu, scene, camera, [options.timing_size; 2], settings(options))?;
+        speed = Some(measure(
+            &mut tracer,
+            &peer,
+            &timed.scene,
+            theirs.variant.starts_with("llvm"),
+            options,
+        )?);
+    }
+    Ok((
+        SceneAgreement {
+            name: one.name.into(),
+            shows: one.shows.into(),
+            triangles: exported.triangles as u64,
+            variant: theirs.variant,
+            mean_squared_z: mean_squared_z(a, a_var, b, b_var),
+            mean_squared_z_blocks: mean_squared_z(&a_block, &a_block_var, &b_block, &b_block_var),
+            relative_mse: errors.relative_mse,
+            relative_bias: errors.relative_bias,
+            values,
+            blocks,
+            non_finite,
+            speed,
+        },
+        theirs.renderer,
+    ))
+}
+
+/// Both pictures as EXR and PNG, and their difference in units of its standard deviation.
+fn write_pictures(folder: &Path, ours: &Picture, reference: &Picture) -> Result<()> {
+    exr::write(&folder.join("clerestory.exr"), ours)?;
+    let tone = ToneMap::default();
+    let show = |picture: &Picture, name: &str| {
+        let shown = png::tone_mapped(picture.main_layer()?, picture.width(), &tone);
+        png::write(&folder.join(name), &shown)
+    };
+    show(ours, "clerestory.png")?;
+    show(reference, "mitsuba.png")?;
+    let z = z_values(
+        ours.main_layer()?.values(),
+        ours.require("variance")?.values(),
+        reference.main_layer()?.values(),
+        reference.require("variance")?.values(),
+    );
+    let worst: Vec<f32> = z
+        .chunks(3)
+        .map(|pixel| pixel.iter().fold(0.0f64, |worst, z| worst.max(z.abs())) as f32)
+        .collect();
+    png::write(
+        &folder.join("z.png"),
+        &png::false_color(&worst, ours.width(), FULL_SCALE_Z)?,
+    )
+}
+
+/// z of each value, with the floor of [`z_test`].
+fn z_values(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> Vec<f64> {
+    let z = |i: usize| {
+        let [a, a_var, b, b_var] = [a[i], a_var[i], b[i], b_var[i]].map(f64::from);
+        let floor = RELATIVE_DEVIATION_FLOOR * a.abs().max(b.abs());
+        let deviation = (a_var + b_var).max(floor * floor).sqrt();
+        if a == b { 0.0 } else { (a - b) / deviation }
+    };
+    (0..a.len()).map(z).collect()
+}
+
+/// Mean of z² over the values that have noise: 1 for pictures that differ by noise alone, above 1 where differences are many but small, below 1
+/// where a variance is over-estimated. NaN without noise.
+fn mean_squared_z(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> f64 {
+    let z = z_values(a, a_var, b, b_var);
+    let noisy = |i: &usize| {
+        let floor = RELATIVE_DEVIATION_FLOOR * f64::from(a[*i].abs().max(b[*i].abs()));
+        f64::from(a_var[*i] + b_var[*i]) > floor * floor
+    };
+    let squares: Vec<f64> = (0..a.len()).filter(noisy).map(|i| z[i] * z[i]).collect();
+    squares.iter().sum::<f64>() / squares.len() as f64
+}
+
+/// Means of an RGB picture's blocks (`power` 1), or the variances of such means (`power` 2).
+fn block_means(values: &[f32], size: u32, power: i32) -> Vec<f32> {
+    let blocks = size / BLOCK;
+    let mut sums = vec![0.0f64; (blocks * blocks * 3) as usize];
+    for (i, value) in values.iter().enumerate() {
+        let (pixel, channel) = (i as u32 / 3, i as u32 % 3);
+        let block = (pixel / size / BLOCK) * blocks + pixel % size / BLOCK;
+        sums[(block * 3 + channel) as usize] += f64::from(*value);
+    }
+    let scale = f64::from(BLOCK * BLOCK).powi(power);
+    sums.iter().map(|sum| (sum / scale) as f32).collect()
+}
+
+/// Times in turns: this engine, Mitsuba's scalar variant, its LLVM variant where there is one.
+fn measure(
+    tracer: &mut PathTracer,
+    peer: &Peer<'_>,
+    scene: &Path,
+    has_llvm: bool,
+    options: &AgreementOptions,
+) -> Result<Speed> {
+    let mut samples = 0;
+    let mut wall = [Vec::new(), Vec::new(), Vec::new()];
+    let mut cpu = [Vec::new(), Vec::new(), Vec::new()];
+    // The first wave compiles the kernels.
+    tracer.step(1)?;
+    for round in 0..options.timing_rounds {
+        samples += if round == 0 { 1 } else { 0 } + options.timing_samples;
+        let (paths, processor, clock) = (tracer.counters().paths, cpu_seconds(), Instant::now());
+        tracer.render(samples)?;
+        let paths = (tracer.counters().paths - paths) as f64;
+        wall[0].push(paths / clock.elapsed().as_secs_f64());
+        cpu[0].extend(
+            processor
+                .zip(cpu_seconds())
+                .map(|(before, after)| paths / (after - before)),
+        );
+        for (i, variant) in [(1, Variant::Scalar), (2, Variant::Llvm)] {
+            if variant == Variant::Llvm && !has_llvm {
+                continue;
+            }
+            let timed = peer.render(scene, "timed", variant, 2, options.timing_samples)?;
+            wall[i].extend(timed.paths_per_second);
+            cpu[i].push(timed.paths_per_cpu_second);
+        }
+    }
+    let [ours, scalar, llvm] = wall.map(median);
+    let [ours_cpu, scalar_cpu, llvm_cpu] = cpu.map(median);
+    Ok(Speed {
+        ours,
+        scalar,
+        llvm,
+        ours_cpu,
+        scalar_cpu,
+        llvm_cpu,
+    })
+}
+
+/// Middle value; of an even number, the lower of the two in the middle. `None` of nothing.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len().saturating_sub(1) / 2).copied()
+}
+
+/// Processor seconds of this process so far, all threads; `None` where the system does not say.
+fn cpu_seconds() -> Option<f64> {
+    /// Clock ticks a second that Linux reports to programs.
+    const TICKS: f64 = 100.0;
+    /// User and system time, counted behind the program's name.
+    const FIELDS: std::ops::RangeInclusive<usize> = 11..=12;
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks: Option<Vec<f64>> = fields.get(FIELDS)?.iter().map(|field| field.parse().ok()).collect();
+    Some(ticks?.iter().sum::<f64>() / TICKS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_means_of_their_pixels() {
+        // Each value is its own block's number times 10 plus its channel.
+        let values: Vec<f32> = (0..16 * 16)
+            .flat_map(|pixel| {
+                let block = (pixel / 16 / 8) * 2 + pixel % 16 / 8;
+                [0, 1, 2].map(|channel| (block * 10 + channel) as f32)
+            })
+            .collect();
+        let expected: Vec<f32> = (0..4).flat_map(|b| [0, 1, 2].map(|c| (b * 10 + c) as f32)).collect();
+        assert_eq!(block_means(&values, 16, 1), expected);
+        // 64 equal variances v give the mean's variance v/64.
+        assert_eq!(block_means(&[64.0; 192], 8, 2), [1.0; 3]);
+    }
+
+    #[test]
+    fn medians_and_squared_z() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 3.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![]), None);
+        // z = 2 and 0 where there is noise; the value without noise does not count.
+        let (a, b) = ([3.0, 1.0, 5.0], [1.0, 1.0, 5.0]);
+        assert_eq!(mean_squared_z(&a, &[0.5, 0.5, 0.0], &b, &[0.5, 0.5, 0.0]), 2.0);
+    }
+
+    #[test]
+    fn wrong_options_are_refused() {
+        let refused = |options: AgreementOptions| selected(&options).is_err();
+        assert!(refused(AgreementOptions {
+            scenes: vec!["no such scene".into()],
+            ..Default::default()
+        }));
+        assert!(refused(AgreementOptions {
+            size: 60,
+            ..Default::default()
+        }));
+        assert!(refused(AgreementOptions {
+            passes: 1,
+            ..Default::default()
+        }));
+        assert!(!refused(AgreementOptions::default()));
+    }
+}

@@ -1,0 +1,95 @@
+//! `clerestory agreement`: pictures of this engine and of Mitsuba 3 compared within their noise.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use clerestory_tools::agreement::{AgreementOptions, run_with};
+use clerestory_tools::mitsuba::scenes::scenes;
+
+use crate::failure::{Code, Failure, Outcome};
+use crate::output;
+
+/// Compares converged pictures with those of Mitsuba 3, within their noise, and measures both renderers' speed
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Run it from the repository's root. It needs a Python that has the package `mitsuba`.
+
+Examples:
+  clerestory agreement --list
+  clerestory agreement --scene cornell --timing-rounds 0
+  clerestory agreement --python ~/mitsuba/bin/python --results results")]
+pub struct Arguments {
+    /// Only these scenes
+    #[arg(long = "scene", value_name = "NAME", value_delimiter = ',')]
+    scenes: Vec<String>,
+    /// Lists the scenes
+    #[arg(long)]
+    list: bool,
+    /// Width and height of the compared pictures, pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = AgreementOptions::default().size)]
+    size: u32,
+    /// Independent passes of Mitsuba
+    #[arg(long, default_value_t = AgreementOptions::default().passes)]
+    passes: u32,
+    /// Samples a pixel in each pass
+    #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().samples_per_pass)]
+    spp: u32,
+    /// Seed of both renderers
+    #[arg(long, default_value_t = AgreementOptions::default().seed)]
+    seed: u32,
+    /// Rounds of the speed measurement; 0 measures nothing
+    #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_rounds)]
+    timing_rounds: u32,
+    /// The Python that has Mitsuba; by default CLERESTORY_MITSUBA_PYTHON, else python3
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
+    /// Folder for scenes and pictures
+    #[arg(short, long, value_name = "FOLDER", default_value = "out/agreement")]
+    output: PathBuf,
+    /// Writes the report to NAME.md and NAME.json
+    #[arg(long, value_name = "NAME")]
+    results: Option<PathBuf>,
+    /// Prints the report as JSON, else as Markdown
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    if arguments.list {
+        let mut table = output::Table::new(&["scene", "shows"], &[1]);
+        for scene in scenes()? {
+            table.row([scene.name.to_string(), scene.shows.to_string()]);
+        }
+        output::print(&table.text())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let defaults = AgreementOptions::default();
+    let options = AgreementOptions {
+        scenes: arguments.scenes.clone(),
+        size: arguments.size,
+        passes: arguments.passes,
+        samples_per_pass: arguments.spp,
+        seed: arguments.seed,
+        timing_rounds: arguments.timing_rounds,
+        python: arguments.python.clone().unwrap_or(defaults.python.clone()),
+        output: arguments.output.clone(),
+        results: arguments.results.clone(),
+        ..defaults
+    };
+    let report = run_with(&options, |line| line.lines().for_each(output::note))?;
+    if arguments.json {
+        output::print_json(&report)?;
+    } else {
+        output::print(&report.to_markdown())?;
+    }
+    if report.passes() {
+        return Ok(ExitCode::SUCCESS);
+    }
+    Err(Failure {
+        code: Code::Differ,
+        message: "the renderers differ beyond their noise".into(),
+        hint: None,
+    })
+}

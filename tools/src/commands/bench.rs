@@ -1,0 +1,183 @@
+//! `clerestory bench`: paths and rays per second, medians of repeated runs with their spread.
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory::{Result, scene};
+
+use super::check_validation;
+use crate::failure::{Failure, Outcome};
+use crate::options::{DeviceOption, Global, Size, parse_size};
+use crate::output::{self, Table};
+
+/// Measures paths and rays per second of the path tracer: medians of repeated runs
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  clerestory bench
+  clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
+
+One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to
+the last; figures move with the load of the machine, so compare ratios of runs made together.")]
+pub struct Arguments {
+    /// Scenes
+    #[arg(long = "scene", value_name = "SCENE", default_values = ["builtin:cornell-box", "builtin:materials"])]
+    scenes: Vec<String>,
+    /// Measured runs of each scene
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=999))]
+    repeat: u32,
+    /// Samples a pixel
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: u32,
+    /// Pixels: WIDTHxHEIGHT, or the height alone
+    #[arg(long, default_value = "128", value_parser = parse_size)]
+    size: Size,
+    #[command(flatten)]
+    device: DeviceOption,
+    /// Prints JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Median and range of one quantity.
+#[derive(Debug, Clone, Copy, serde::Serialize)]
+struct Spread {
+    median: f64,
+    least: f64,
+    greatest: f64,
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let middle = values.len() / 2;
+        let median = match values.as_slice() {
+            [] => f64::NAN,
+            all if all.len() % 2 == 1 => all[middle],
+            all => 0.5 * (all[middle - 1] + all[middle]),
+        };
+        Self {
+            median,
+            least: values.first().copied().unwrap_or(f64::NAN),
+            greatest: values.last().copied().unwrap_or(f64::NAN),
+        }
+    }
+
+    /// Half the range over the median.
+    fn relative(&self) -> f64 {
+        0.5 * (self.greatest - self.least) / self.median
+    }
+}
+
+#[derive(Debug, serde::Serialize)]
+struct Measured {
+    scene: String,
+    size: [u32; 2],
+    spp: u32,
+    repeat: u32,
+    seconds: Spread,
+    gpu_seconds: Spread,
+    paths_per_second: Spread,
+    rays_per_second: Spread,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
+    let gpu = arguments.device.open(global)?;
+    let mut all = Vec::new();
+    for address in &arguments.scenes {
+        let scene = scene::load(address).map_err(Failure::scene)?;
+        let options = RenderOptions {
+            technique: Some("path".into()),
+            size: arguments.size.pixels(scene.defaults.aspect),
+            spp: arguments.spp,
+            ..RenderOptions::default()
+        };
+        let renderer = Renderer::new(&gpu, &scene)?;
+        all.push(measure(&renderer, address, &options, arguments.repeat)?);
+    }
+    let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
+    drop(gpu);
+    check_validation(&log)?;
+    if arguments.json {
+        output::print_json(&serde_json::json!({
+            "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "scenes": all,
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut table = Table::new(
+        &[
+            "scene", "pixels", "spp", "seconds", "GPU s", "paths/s", "rays/s", "spread",
+        ],
+        &[],
+    );
+    for one in &all {
+        table.row([
+            one.scene.clone(),
+            format!("{}x{}", one.size[0], one.size[1]),
+            one.spp.to_string(),
+            format!("{:.3}", one.seconds.median),
+            format!("{:.3}", one.gpu_seconds.median),
+            output::metric(one.paths_per_second.median),
+            output::metric(one.rays_per_second.median),
+            format!("±{:.1} %", 100.0 * one.rays_per_second.relative()),
+        ]);
+    }
+    let head = output::one_line(&format!(
+        "{}, driver {}; medians of {} runs",
+        caps.device, caps.driver, arguments.repeat
+    ));
+    output::print(&format!("{head}\n{}", table.text()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measure(renderer: &Renderer, address: &str, options: &RenderOptions, repeat: u32) -> Result<Measured> {
+    once(renderer, options)?;
+    let runs = (0..repeat)
+        .map(|seed| {
+            let options = RenderOptions {
+                seed,
+                ..options.clone()
+            };
+            once(renderer, &options)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let spread = |of: fn(&[f64; 4]) -> f64| Spread::of(runs.iter().map(of).collect());
+    Ok(Measured {
+        scene: address.into(),
+        size: options.size,
+        spp: options.spp,
+        repeat,
+        seconds: spread(|run| run[0]),
+        gpu_seconds: spread(|run| run[1]),
+        paths_per_second: spread(|run| run[2] / run[0]),
+        rays_per_second: spread(|run| run[3] / run[0]),
+    })
+}
+
+/// Seconds, GPU seconds, paths and rays of one run.
+fn once(renderer: &Renderer, options: &RenderOptions) -> Result<[f64; 4]> {
+    let mut rendering = renderer.start(options)?;
+    let start = Instant::now();
+    while rendering.step()?.is_some() {}
+    let seconds = start.elapsed().as_secs_f64();
+    let report = rendering.finish()?.report;
+    let count = |name: &str| report.counters.get(name).map_or(0.0, |count| *count as f64);
+    Ok([seconds, report.gpu_seconds, count("paths"), count("rays")])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians() {
+        let of = |values: &[f64]| Spread::of(values.to_vec());
+        assert_eq!(of(&[3.0, 1.0, 2.0]).median, 2.0);
+        assert_eq!(of(&[4.0, 1.0, 2.0, 3.0]).median, 2.5);
+        let one = of(&[5.0]);
+        assert_eq!((one.least, one.greatest, one.relative()), (5.0, 5.0, 0.0));
+    }
+}

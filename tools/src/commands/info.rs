@@ -1,0 +1,337 @@
+//! `clerestory info`: the devices of this machine, or what is in a scene and which techniques can render it.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use clap::Args;
+use clerestory::gpu::{Caps, DeviceSelection, DeviceSummary, Gpu, GpuOptions};
+use clerestory::scene::{self, Camera, Projection, Scene, SceneProfile};
+use clerestory::techniques;
+
+use crate::failure::{Code, Failure, Outcome};
+use crate::output::{self, Stream};
+
+/// Shows the devices of this machine; with a scene, what it holds and which techniques can render it
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  clerestory info                          devices, limits, and what each technique needs of them
+  clerestory info builtin:cornell-box      profile, cameras, notes of the reader, techniques
+  clerestory info --json | jq '.devices[].name'")]
+pub struct Arguments {
+    /// A scene file or `builtin:` address
+    scene: Option<String>,
+    /// Prints JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    match &arguments.scene {
+        Some(address) => {
+            let info = SceneInfo::of(&scene::load(address).map_err(Failure::scene)?);
+            if arguments.json {
+                output::print_json(&info)?;
+            } else {
+                output::print(&info.text())?;
+            }
+        }
+        None => {
+            let devices: Vec<DeviceInfo> = Gpu::list()?.into_iter().map(DeviceInfo::of).collect();
+            if arguments.json {
+                output::print_json(&serde_json::json!({ "devices": devices }))?;
+            } else {
+                let texts: Vec<String> = devices.iter().map(DeviceInfo::text).collect();
+                output::print(&texts.join("\n"))?;
+            }
+            if devices.is_empty() {
+                return Err(Failure {
+                    code: Code::NoDevice,
+                    message: "there is no Vulkan device".into(),
+                    hint: Some("install a driver (Debian: mesa-vulkan-drivers has one in software)".into()),
+                });
+            }
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A device and what can run on it.
+#[derive(serde::Serialize)]
+struct DeviceInfo {
+    #[serde(flatten)]
+    summary: DeviceSummary,
+    /// Why the engine cannot use it; `None` when it can.
+    unusable: Option<String>,
+    caps: Caps,
+    techniques: Vec<TechniqueNeeds>,
+}
+
+#[derive(serde::Serialize)]
+struct TechniqueNeeds {
+    id: &'static str,
+    needs: Vec<Need>,
+}
+
+#[derive(serde::Serialize)]
+struct Need {
+    feature: &'static str,
+    /// `None` when the program cannot tell.
+    present: Option<bool>,
+}
+
+impl DeviceInfo {
+    fn of((summary, caps): (DeviceSummary, Caps)) -> Self {
+        let options = GpuOptions {
+            device: DeviceSelection::Index(summary.index),
+            cache_folder: None,
+            ..GpuOptions::default()
+        };
+        let need = |feature: &&'static str| Need {
+            feature,
+            present: has(&caps, feature),
+        };
+        Self {
+            unusable: Gpu::headless(&options).err().map(|error| error.to_string()),
+            techniques: techniques::all()
+                .iter()
+                .map(|technique| TechniqueNeeds {
+                    id: technique.id,
+                    needs: technique.needs.iter().map(need).collect(),
+                })
+                .collect(),
+            summary,
+            caps,
+        }
+    }
+
+    fn text(&self) -> String {
+        let (summary, caps) = (&self.summary, &self.caps);
+        let mut lines = vec![
+            output::bold(&format!("{}: {}", summary.index, output::one_line(&summary.name))),
+            match &self.unusable {
+                None => "  usable       yes".into(),
+                Some(cause) => output::red(
+                    &format!("  usable       no: {}", output::one_line(cause)),
+                    Stream::Output,
+                ),
+            },
+            format!("  kind         {}", summary.kind),
+            format!("  driver       {}", output::one_line(&summary.driver)),
+            format!("  Vulkan       {}", summary.api),
+        ];
+        let operations = [
+            ("basic", caps.subgroup.basic),
+            ("vote", caps.subgroup.vote),
+            ("arithmetic", caps.subgroup.arithmetic),
+            ("ballot", caps.subgroup.ballot),
+            ("shuffle", caps.subgroup.shuffle),
+        ];
+        lines.push(format!(
+            "  subgroup     {} lanes: {}",
+            caps.subgroup_size,
+            names(&operations)
+        ));
+        let features = FEATURES.map(|(name, of)| (name, of(caps)));
+        lines.push(format!("  features     {}", names(&features)));
+        lines.push(format!(
+            "  memory       {} heap, {} an allocation, {} a storage buffer",
+            output::bytes(caps.device_heap),
+            output::bytes(caps.max_allocation_size),
+            output::bytes(caps.max_storage_buffer_range)
+        ));
+        lines.push(format!(
+            "  compute      {} invocations a workgroup, {} shared, {} workgroups, {} of push constants",
+            caps.max_workgroup_invocations,
+            output::bytes(u64::from(caps.max_shared_memory)),
+            caps.max_workgroups,
+            output::bytes(u64::from(caps.max_push_constants))
+        ));
+        lines.push(if caps.timestamp_period > 0.0 {
+            format!("  timestamps   {} ns", caps.timestamp_period)
+        } else {
+            "  timestamps   none: passes are not timed".into()
+        });
+        for technique in &self.techniques {
+            let needs: Vec<String> = technique
+                .needs
+                .iter()
+                .map(|need| {
+                    let answer = match need.present {
+                        Some(true) => "has it",
+                        Some(false) => "lacks it",
+                        None => "unknown",
+                    };
+                    format!("{} ({answer})", need.feature)
+                })
+                .collect();
+            let needs = if needs.is_empty() {
+                "nothing beyond the engine's baseline".into()
+            } else {
+                needs.join(", ")
+            };
+            lines.push(format!("  technique    {} needs {needs}", technique.id));
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+type Feature = (&'static str, fn(&Caps) -> bool);
+
+/// Device features by their Vulkan names.
+const FEATURES: [Feature; 10] = [
+    ("geometryShader", |caps| caps.geometry_shader),
+    ("shaderInt64", |caps| caps.int64),
+    ("shaderFloat64", |caps| caps.float64),
+    ("shaderBufferInt64Atomics", |caps| caps.int64_atomics),
+    ("robustBufferAccess", |caps| caps.robust_buffer_access),
+    ("pipelineStatisticsQuery", |caps| caps.pipeline_statistics),
+    ("fragmentStoresAndAtomics", |caps| caps.fragment_stores),
+    ("vertexPipelineStoresAndAtomics", |caps| caps.vertex_stores),
+    ("VK_KHR_ray_query", |caps| caps.ray_query),
+    ("runtimeDescriptorArray", |caps| caps.descriptor_indexing),
+];
+
+fn has(caps: &Caps, feature: &str) -> Option<bool> {
+    FEATURES
+        .iter()
+        .find(|(name, _)| *name == feature)
+        .map(|(_, of)| of(caps))
+}
+
+fn names(list: &[(&str, bool)]) -> String {
+    let there: Vec<&str> = list.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
+    if there.is_empty() {
+        "none".into()
+    } else {
+        there.join(", ")
+    }
+}
+
+/// A scene and who can render it.
+#[derive(serde::Serialize)]
+struct SceneInfo {
+    name: String,
+    source: String,
+    aspect: Option<f32>,
+    exposure: f32,
+    technique: Option<String>,
+    profile: SceneProfile,
+    cameras: Vec<CameraInfo>,
+    notes: Vec<scene::Note>,
+    techniques: Vec<TechniqueVerdict>,
+}
+
+#[derive(serde::Serialize)]
+struct CameraInfo {
+    name: String,
+    /// Metres.
+    position: [f64; 3],
+    /// Full vertical field of view, degrees; `None` for orthographic cameras.
+    fov_y: Option<f32>,
+    /// Half the height seen by an orthographic camera, metres.
+    half_height: Option<f32>,
+    /// Metres; 0 is a pinhole.
+    lens_radius: f32,
+    /// Metres.
+    focus_distance: f32,
+}
+
+#[derive(serde::Serialize)]
+struct TechniqueVerdict {
+    id: &'static str,
+    /// Why it cannot render the scene; empty when it can.
+    refusals: Vec<String>,
+}
+
+impl CameraInfo {
+    fn of(camera: &Camera) -> Self {
+        let (fov_y, half_height) = match camera.projection {
+            Projection::Perspective { fov_y } => (Some(fov_y.to_degrees()), None),
+            Projection::Orthographic { half_height } => (None, Some(half_height)),
+        };
+        Self {
+            name: camera.name.clone(),
+            position: camera.transform.translation.to_array(),
+            fov_y,
+            half_height,
+            lens_radius: camera.lens_radius,
+            focus_distance: camera.focus_distance,
+        }
+    }
+
+    fn text(&self) -> String {
+        let [x, y, z] = self.position;
+        let mut text = format!("{} at {x:.3} {y:.3} {z:.3} m", self.name);
+        // Writing to a string cannot fail.
+        let _ = match (self.fov_y, self.half_height) {
+            (Some(degrees), _) => write!(text, ", {degrees:.1}° high"),
+            (None, Some(half)) => write!(text, ", orthographic, {:.3} m high", 2.0 * half),
+            (None, None) => Ok(()),
+        };
+        if self.lens_radius > 0.0 {
+            let _ = write!(
+                text,
+                ", lens radius {} m, in focus at {} m",
+                self.lens_radius, self.focus_distance
+            );
+        }
+        text
+    }
+}
+
+impl SceneInfo {
+    fn of(scene: &Scene) -> Self {
+        let profile = SceneProfile::of(scene);
+        Self {
+            name: scene.name.clone(),
+            source: scene.source.clone(),
+            aspect: scene.defaults.aspect,
+            exposure: scene.defaults.exposure,
+            technique: scene.defaults.technique.clone(),
+            cameras: scene.cameras.iter().map(CameraInfo::of).collect(),
+            notes: scene.notes.clone(),
+            techniques: techniques::all()
+                .iter()
+                .map(|technique| TechniqueVerdict {
+                    id: technique.id,
+                    refusals: (technique.refusals)(&profile),
+                })
+                .collect(),
+            profile,
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut lines = vec![output::bold(&output::one_line(&self.source))];
+        lines.extend(self.profile.to_string().lines().map(str::to_owned));
+        if let Some(aspect) = self.aspect {
+            lines.push(format!("aspect        {aspect} (width over height)"));
+        }
+        if self.exposure != 0.0 {
+            lines.push(format!("exposure      {} stops", self.exposure));
+        }
+        lines.extend(
+            self.cameras
+                .iter()
+                .map(|camera| format!("camera        {}", output::one_line(&camera.text()))),
+        );
+        lines.extend(self.techniques.iter().map(|technique| {
+            if technique.refusals.is_empty() {
+                format!("technique     {} can render it", technique.id)
+            } else {
+                format!(
+                    "technique     {} cannot: {}",
+                    technique.id,
+                    technique.refusals.join("; ")
+                )
+            }
+        }));
+        lines.extend(self.notes.iter().map(|note| {
+            let text = format!("note          {} ({}): {}", note.feature, note.at, note.instead);
+            output::one_line(&text)
+        }));
+        lines.join("\n") + "\n"
+    }
+}

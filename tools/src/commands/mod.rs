@@ -1,0 +1,135 @@
+//! The command line: one file a command.
+
+mod agreement;
+mod bench;
+mod compare;
+mod info;
+mod list;
+mod render;
+mod scenes;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use clerestory::gpu::ValidationLog;
+use tracing_subscriber::EnvFilter;
+
+use crate::failure::{Code, Failure, Outcome};
+use crate::options::Global;
+
+/// Renders scenes on Vulkan and says how long each picture took and how wrong it is.
+#[derive(Debug, Parser)]
+#[command(name = "clerestory", version, max_term_width = 100, after_help = AFTER_HELP)]
+struct Program {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+const AFTER_HELP: &str = "\
+Examples:
+  clerestory render                     the Cornell box: out/cornell-box.exr, .png and .json
+  clerestory render model.glb --spp 256 --size 1280x720
+  clerestory info                       devices, and what each technique needs of them
+  clerestory scenes                     generated scenes and their parameters
+  clerestory compare picture.exr reference.exr --threshold rmse=1e-3
+
+Exit codes:
+  0    done
+  1    the run failed: device lost, out of memory, a file that cannot be read or written
+  2    the command line or a setting asks for what cannot be
+  3    the scene cannot be read, or the technique cannot render it
+  4    pictures differ beyond a --threshold, or renderers beyond their noise
+  5    no Vulkan device, or none that can do it
+  130  stopped by Ctrl-C or a request to end, after writing what was there";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(Box<render::Arguments>),
+    Info(info::Arguments),
+    Compare(compare::Arguments),
+    Scenes(scenes::Arguments),
+    List(list::Arguments),
+    Bench(bench::Arguments),
+    Agreement(agreement::Arguments),
+}
+
+/// Reads the command line, runs the command, reports its failure.
+pub fn main() -> ExitCode {
+    std::panic::set_hook(Box::new(|fault| {
+        let place = fault.location().map(|place| format!(" at {place}")).unwrap_or_default();
+        let payload = fault.payload();
+        let text = payload.downcast_ref::<&str>().copied();
+        let cause = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+        let cause = cause.unwrap_or("unknown cause");
+        Failure {
+            code: Code::Run,
+            message: format!("fault in the program{place}: {cause}"),
+            hint: Some("this is a defect; please report it with the command line".into()),
+        }
+        .report();
+    }));
+    std::panic::catch_unwind(start).unwrap_or(Code::Run.into())
+}
+
+fn start() -> ExitCode {
+    let program = match Program::try_parse() {
+        Ok(program) => program,
+        Err(error) => {
+            // Help and version are no failures, and a reader that has gone is none either.
+            let _ = error.print();
+            return ExitCode::from(error.exit_code() as u8);
+        }
+    };
+    listen(program.global.verbose);
+    match run(&program) {
+        Ok(code) => code,
+        Err(failure) => {
+            failure.report();
+            failure.code.into()
+        }
+    }
+}
+
+fn run(program: &Program) -> Outcome<ExitCode> {
+    let global = &program.global;
+    match &program.command {
+        Command::Render(arguments) => render::run(arguments, global),
+        Command::Info(arguments) => info::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
+        Command::Scenes(arguments) => scenes::run(arguments),
+        Command::List(arguments) => list::run(arguments),
+        Command::Bench(arguments) => bench::run(arguments, global),
+        Command::Agreement(arguments) => agreement::run(arguments),
+    }
+}
+
+/// Sends the engine's log to the error output: warnings, or as much as `-v` or `RUST_LOG` ask for.
+fn listen(verbose: u8) {
+    let filter = match verbose {
+        0 => EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn")),
+        1 => EnvFilter::new("info"),
+        2 => EnvFilter::new("debug"),
+        _ => EnvFilter::new("trace"),
+    };
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .without_time()
+        .init();
+}
+
+/// Errors of the validation layers, which the log has shown, fail the run. At best called after the device has gone.
+fn check_validation(log: &ValidationLog) -> Outcome {
+    match log.take().iter().filter(|message| message.error).count() {
+        0 => Ok(()),
+        count => Err(Failure {
+            code: Code::Run,
+            message: format!("the validation layers found {count} errors"),
+            hint: None,
+        }),
+    }
+}

@@ -1,0 +1,340 @@
+//! `clerestory render`: a scene to a picture, with a report of how it came about and, against a reference, how wrong it is.
+
+mod files;
+mod progress;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use clerestory::film::picture::{ALBEDO, DEPTH, NORMAL, SAMPLES, VARIANCE};
+use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
+use clerestory::render::{RenderOptions, Rendered, Renderer};
+use clerestory::scene::{self, Scene};
+use clerestory::techniques;
+use clerestory::transport::PathSet;
+use serde_json::{Map, Value};
+
+use super::check_validation;
+use super::compare::finite;
+use crate::failure::{Code, Failure, Outcome};
+use crate::options::{DeviceOption, Global, Size, parse_duration, parse_size};
+use crate::{output, pictures, statistics};
+use files::{Document, ErrorAgainst, Files};
+use progress::Watch;
+
+/// Renders a scene to an EXR picture, a PNG to look at and a JSON report
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  clerestory render                                          the Cornell box
+  clerestory render 'builtin:cornell-box?sphere=glass' --spp 256 -o out/glass.exr
+  clerestory render model.glb --camera front --size 1280x720 --time-budget 30s --tone neutral
+  clerestory render --path-set direct --aov normal,albedo,depth
+  clerestory render --spp 4096 -o reference.exr
+  clerestory render --spp 16 --seed 1 --reference reference.exr
+  clerestory render --settings '{\"roulette_start\": 8}' --stats json | jq .steady_rates
+
+Ctrl-C stops after the step at hand and writes what is there, with exit code 130; a second one stops
+at once and writes nothing. `clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
+pub struct Arguments {
+    /// A scene file (gltf, glb, ply, obj, toml) or `builtin:` address
+    #[arg(default_value = "builtin:cornell-box")]
+    scene: String,
+    /// The picture to write: NAME.exr with NAME.png and NAME.json beside it, or NAME.png with NAME.json; by default out/SCENE.exr
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Technique; by default the scene's, else `path`
+    #[arg(long, value_name = "ID")]
+    technique: Option<String>,
+    /// Samples a pixel
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    spp: u32,
+    /// Pixels: WIDTHxHEIGHT, or the height alone; by default the reference's size, else 512 high by the scene's aspect
+    #[arg(long, value_parser = parse_size)]
+    size: Option<Size>,
+    /// Seed of the random numbers; the same seed gives the same picture
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
+    /// Camera by name; by default the scene's first
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Which light paths: all, emitted, direct, indirect, bounces=1..3, with lobes=diffuse+glossy+… after a comma
+    #[arg(long, value_name = "SET")]
+    path_set: Option<PathSet>,
+    /// Random numbers
+    #[arg(long, value_enum)]
+    sampler: Option<Sampler>,
+    /// The technique's settings as JSON, or @FILE that holds them
+    #[arg(long, value_name = "JSON|@FILE")]
+    settings: Option<String>,
+    /// Layers of the EXR besides radiance
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,…")]
+    aov: Vec<Aov>,
+    /// Stops after about this time with the samples there are: 10s, 500ms, 2min
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    time_budget: Option<Duration>,
+    #[command(flatten)]
+    device: DeviceOption,
+    /// What to print about the run to standard output
+    #[arg(long, value_enum, default_value_t = Statistics::Table)]
+    stats: Statistics,
+    /// A picture of the same view: prints and reports the error against it
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Exposure of the PNG in stops; by default the scene's
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = finite)]
+    exposure: Option<f64>,
+    /// Tone curve of the PNG
+    #[arg(long, value_enum, default_value_t = Tone::Srgb)]
+    tone: Tone,
+}
+
+/// Tone curves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Tone {
+    /// Clipped: what lies in [0, 1] is shown exactly.
+    Srgb,
+    /// Khronos PBR Neutral: highlights roll off towards white.
+    Neutral,
+}
+
+impl From<Tone> for ToneCurve {
+    fn from(tone: Tone) -> Self {
+        match tone {
+            Tone::Srgb => Self::Srgb,
+            Tone::Neutral => Self::PbrNeutral,
+        }
+    }
+}
+
+/// Sequences of random numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Sampler {
+    /// Owen-scrambled Sobol' points, stratified over the samples of a pixel.
+    Sobol,
+    /// Independent samples.
+    Pcg,
+}
+
+/// Layers of the EXR.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Aov {
+    /// World-space shading normal at the first hit.
+    Normal,
+    /// Linear base colour at the first hit.
+    Albedo,
+    /// Distance to the first hit along the camera's axis, metres.
+    Depth,
+    /// Variance of the radiance's mean.
+    Variance,
+    /// Samples of each pixel.
+    Samples,
+}
+
+impl Aov {
+    fn layer(self) -> &'static str {
+        match self {
+            Self::Normal => NORMAL,
+            Self::Albedo => ALBEDO,
+            Self::Depth => DEPTH,
+            Self::Variance => VARIANCE,
+            Self::Samples => SAMPLES,
+        }
+    }
+
+    /// Whether it is gathered only when asked for.
+    fn extra(self) -> bool {
+        matches!(self, Self::Normal | Self::Albedo | Self::Depth)
+    }
+}
+
+/// What is printed at the end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Statistics {
+    /// The frame report as JSON.
+    Json,
+    /// The frame report as a table.
+    Table,
+    /// Nothing.
+    None,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
+    let scene = scene::load(&arguments.scene).map_err(Failure::scene)?;
+    for note in &scene.notes {
+        output::warn(&format!("{} ({}): {}", note.feature, note.at, note.instead));
+    }
+    let reference = arguments.reference.as_deref().map(pictures::read).transpose()?;
+    let options = options(arguments, &scene, reference.as_ref())?;
+    let files = Files::choose(arguments.output.as_deref(), &scene.name)?;
+    files.prepare()?;
+    let gpu = arguments.device.open(global)?;
+    tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
+    let watch = Watch::start()?;
+    let (rendered, interrupted) = watch.render(&Renderer::new(&gpu, &scene)?, &options)?;
+    let validation = gpu.validation_log();
+    drop(gpu);
+    let tone = ToneMap {
+        exposure: arguments.exposure.unwrap_or(f64::from(scene.defaults.exposure)),
+        curve: arguments.tone.into(),
+    };
+    let error = match &reference {
+        Some(reference) => Some(measure(arguments, &rendered, reference, tone)?),
+        None => None,
+    };
+    let document = Document {
+        report: &rendered.report,
+        interrupted,
+        tone,
+        error,
+    };
+    let layers: Vec<&str> = arguments.aov.iter().map(|aov| aov.layer()).collect();
+    files.write(&rendered.picture, &layers, &document)?;
+    conclude(arguments, &document, &files)?;
+    check_validation(&validation)?;
+    Ok(if interrupted {
+        Code::Interrupted.into()
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+fn options(arguments: &Arguments, scene: &Scene, reference: Option<&Picture>) -> Outcome<RenderOptions> {
+    let by_aspect = |size: Size| size.pixels(scene.defaults.aspect);
+    let size = match (arguments.size, reference) {
+        (Some(size), _) => by_aspect(size),
+        (None, Some(reference)) => [reference.width(), reference.height()],
+        (None, None) => by_aspect(Size::DEFAULT),
+    };
+    if let Some(reference) = reference {
+        reference.main_layer()?;
+        let of_reference = [reference.width(), reference.height()];
+        if of_reference != size {
+            let message = format!(
+                "the reference has {} × {} pixels, the picture would have {} × {}",
+                of_reference[0], of_reference[1], size[0], size[1]
+            );
+            return Err(Failure::usage(message).hint("without --size the picture takes the reference's size"));
+        }
+    }
+    Ok(RenderOptions {
+        technique: arguments.technique.clone(),
+        camera: arguments.camera.clone(),
+        size,
+        spp: arguments.spp,
+        seed: arguments.seed,
+        aovs: arguments.aov.iter().any(|aov| aov.extra()),
+        time_budget: arguments.time_budget,
+        settings: settings(arguments, scene)?,
+    })
+}
+
+/// The technique's settings: those given as JSON, changed by the options of their own.
+fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
+    let mut settings = match arguments.settings.as_deref() {
+        None => Map::new(),
+        Some(text) => read_settings(text)?,
+    };
+    let technique = arguments.technique.as_deref().or(scene.defaults.technique.as_deref());
+    let info = techniques::by_id(technique.unwrap_or("path"))?;
+    let known = (info.default_settings)();
+    let path_set = arguments.path_set.map(|set| set.to_string());
+    let sampler = arguments.sampler.map(|sampler| match sampler {
+        Sampler::Sobol => "sobol".to_owned(),
+        Sampler::Pcg => "pcg".to_owned(),
+    });
+    for (key, option, value) in [("path_set", "--path-set", path_set), ("sampler", "--sampler", sampler)] {
+        let Some(value) = value else { continue };
+        if known.get(key).is_none() {
+            return Err(Failure::usage(format!("technique {} has no {option}", info.id)));
+        }
+        settings.insert(key.to_owned(), Value::String(value));
+    }
+    Ok(if settings.is_empty() {
+        Value::Null
+    } else {
+        Value::Object(settings)
+    })
+}
+
+fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
+    let (text, from) = match text.strip_prefix('@') {
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .map_err(|cause| Failure::usage(format!("--settings: {path}: {cause}")))?;
+            (text, path)
+        }
+        None => (text.to_owned(), "the text"),
+    };
+    serde_json::from_str(&text).map_err(|cause| {
+        Failure::usage(format!("--settings: {from} is no JSON object: {cause}"))
+            .hint("`clerestory list` shows the settings")
+    })
+}
+
+fn measure(arguments: &Arguments, rendered: &Rendered, reference: &Picture, tone: ToneMap) -> Outcome<ErrorAgainst> {
+    if let Some(of_reference) = &reference.metadata.path_set
+        && *of_reference != rendered.report.path_set
+    {
+        output::warn(&format!(
+            "the reference holds the light paths {of_reference:?}, the picture {:?}: the error counts the difference",
+            rendered.report.path_set
+        ));
+    }
+    let options = CompareOptions {
+        tone,
+        ..CompareOptions::default()
+    };
+    Ok(ErrorAgainst {
+        reference: arguments.reference.clone().unwrap_or_default(),
+        metrics: compare(&rendered.picture, reference, &options)?,
+    })
+}
+
+/// Says what came out.
+fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Outcome {
+    match arguments.stats {
+        Statistics::None => {}
+        Statistics::Json => output::print_json(document)?,
+        Statistics::Table => {
+            let mut text = statistics::text(document.report);
+            if let Some(error) = &document.error {
+                text += &format!(
+                    "\n{}\n{}\n",
+                    output::bold(&output::one_line(&format!(
+                        "error against {}",
+                        error.reference.display()
+                    ))),
+                    error.metrics
+                );
+            }
+            output::print(&text)?;
+        }
+    }
+    let report = document.report;
+    if report.non_finite_samples > 0 && arguments.stats != Statistics::Table {
+        output::warn(&format!(
+            "{} samples were not finite and are left out",
+            report.non_finite_samples
+        ));
+    }
+    if report.stopped_early {
+        let [least, most] = report.samples;
+        let samples = if least == most {
+            format!("{most}")
+        } else {
+            format!("{least} to {most}")
+        };
+        let cause = if document.interrupted {
+            "interrupted"
+        } else {
+            "time is up"
+        };
+        output::warn(&format!("{cause}: {samples} of {} samples a pixel", report.spp));
+    }
+    output::note(&format!("wrote {}", files.names()));
+    Ok(())
+}

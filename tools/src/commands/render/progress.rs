@@ -1,0 +1,119 @@
+//! Watching a rendering: a bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is there.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use clerestory::render::{Progress, RenderOptions, Rendered, Renderer};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::failure::{Code, Failure, Outcome};
+use crate::output;
+
+/// Steps of the bar.
+const LENGTH: u64 = 1000;
+
+/// The bar and the wish to stop.
+pub struct Watch {
+    bar: ProgressBar,
+    stop: Arc<AtomicBool>,
+}
+
+impl Watch {
+    /// Begins to listen for Ctrl-C and requests to end. The bar shows itself only where the error output is a terminal.
+    pub fn start() -> Outcome<Self> {
+        let bar = ProgressBar::new(LENGTH);
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_bar} {percent:>3} %  {msg}") {
+            bar.set_style(style);
+        }
+        let stop = Arc::new(AtomicBool::new(false));
+        let (wish, shown) = (Arc::clone(&stop), bar.clone());
+        ctrlc::set_handler(move || {
+            if wish.swap(true, Ordering::SeqCst) {
+                std::process::exit(Code::Interrupted as i32);
+            }
+            let line = "stopping after this step; once more stops at once and writes nothing";
+            shown.suspend(|| output::note(line));
+        })
+        .map_err(|cause| Failure {
+            code: Code::Run,
+            message: format!("cannot listen for Ctrl-C: {cause}"),
+            hint: None,
+        })?;
+        Ok(Self { bar, stop })
+    }
+
+    /// Renders until done, out of time or told to stop; says whether it was told. The first step is always done.
+    pub fn render(&self, renderer: &Renderer, options: &RenderOptions) -> Outcome<(Rendered, bool)> {
+        let result = self.steps(renderer, options);
+        self.bar.finish_and_clear();
+        result
+    }
+
+    fn steps(&self, renderer: &Renderer, options: &RenderOptions) -> Outcome<(Rendered, bool)> {
+        tracing::info!("rendering; the first step compiles the kernels");
+        self.bar.set_message("compiling kernels…");
+        self.bar.enable_steady_tick(Duration::from_millis(120));
+        let mut rendering = renderer.start(options)?;
+        let mut first = None;
+        while let Some(progress) = rendering.step()? {
+            let first = *first.get_or_insert(progress);
+            self.bar.set_position((progress.fraction * LENGTH as f64) as u64);
+            self.bar.set_message(message(first, progress));
+            if self.stop.load(Ordering::SeqCst) {
+                break;
+            }
+        }
+        let rendered = rendering.finish()?;
+        // A wish that came when all samples were there has stopped nothing.
+        let interrupted = self.stop.load(Ordering::SeqCst) && rendered.report.stopped_early;
+        Ok((rendered, interrupted))
+    }
+}
+
+/// Rays per second and time left, both without the first step, which compiles the kernels.
+fn message(first: Progress, now: Progress) -> String {
+    let seconds = now.seconds - first.seconds;
+    let done = now.fraction - first.fraction;
+    if seconds <= 0.0 || done <= 0.0 {
+        return String::new();
+    }
+    let rate = now.rays.saturating_sub(first.rays) as f64 / seconds;
+    let left = (1.0 - now.fraction) * seconds / done;
+    format!("{}rays/s, {} left", output::metric(rate), time(left))
+}
+
+/// Seconds as `8 s`, `3:05` or `2:03:05`.
+fn time(seconds: f64) -> String {
+    let whole = seconds.ceil() as u64;
+    match (whole / 3600, whole / 60 % 60, whole % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m}:{s:02}"),
+        (h, m, s) => format!("{h}:{m:02}:{s:02}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_left() {
+        let shown = [0.2, 59.1, 185.0, 7385.0].map(time);
+        assert_eq!(shown, ["1 s", "1:00", "3:05", "2:03:05"]);
+    }
+
+    #[test]
+    fn rates_leave_compilation_out() {
+        let at = |fraction, seconds, rays| Progress {
+            fraction,
+            seconds,
+            rays,
+        };
+        assert_eq!(message(at(0.1, 20.0, 1000), at(0.1, 20.0, 1000)), "");
+        assert_eq!(
+            message(at(0.1, 20.0, 1000), at(0.55, 21.0, 3_001_000)),
+            "3.00 Mrays/s, 1 s left"
+        );
+    }
+}

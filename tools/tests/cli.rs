@@ -1,0 +1,401 @@
+//! Runs the program `clerestory` as a user or a script would, and looks at its files, its words and its exit codes.
+//!
+//! The commands that render need a Vulkan device and fail without one. Pictures are tiny and share their kernels.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use clerestory::film::{Picture, exr};
+use serde_json::Value;
+
+type Tested = Result<(), Box<dyn std::error::Error>>;
+
+fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_clerestory"))
+}
+
+fn run(arguments: &[&str]) -> Result<Output, std::io::Error> {
+    program().args(arguments).stdin(Stdio::null()).output()
+}
+
+/// What the process said, for failures.
+fn said(output: &Output) -> String {
+    format!(
+        "{}\n{}{}",
+        output.status,
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    )
+}
+
+fn succeed(arguments: &[&str]) -> Result<Output, std::io::Error> {
+    let output = run(arguments)?;
+    assert!(output.status.success(), "{arguments:?}: {}", said(&output));
+    Ok(output)
+}
+
+/// Runs and wants this exit code, `error:` first and every word somewhere in the error output, without a trace of a panic.
+fn refuse(arguments: &[&str], code: i32, words: &[&str]) -> Tested {
+    let output = run(arguments)?;
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}", said(&output));
+    assert!(stderr.starts_with("error:"), "{arguments:?}: {stderr}");
+    for word in words {
+        assert!(stderr.contains(word), "{arguments:?}: {word:?} is not in {stderr}");
+    }
+    assert!(
+        !stderr.contains("panicked") && !stderr.contains("fault in the program"),
+        "{stderr}"
+    );
+    Ok(())
+}
+
+fn json(bytes: &[u8]) -> Result<Value, serde_json::Error> {
+    serde_json::from_slice(bytes)
+}
+
+fn json_file(path: &Path) -> Result<Value, Box<dyn std::error::Error>> {
+    Ok(json(&std::fs::read(path)?)?)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap_or_default()
+}
+
+fn gray(path: &Path, size: u32, value: f32) -> Tested {
+    let picture = Picture::from_radiance(size, size, vec![value; (size * size * 3) as usize])?;
+    Ok(exr::write(path, &picture)?)
+}
+
+#[test]
+fn a_rendering_leaves_picture_preview_and_report() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("new/a.exr");
+    let output = succeed(&[
+        "render",
+        "--size",
+        "32x24",
+        "--spp",
+        "2",
+        "--aov",
+        "normal,depth,samples",
+        "-o",
+        text(&path),
+    ])?;
+    let picture = exr::read(&path)?;
+    let layers: Vec<&str> = picture.layers().iter().map(|layer| layer.name()).collect();
+    assert_eq!((picture.width(), picture.height()), (32, 24));
+    assert_eq!(layers.len(), 4, "{layers:?}");
+    for name in ["radiance", "normal", "depth", "samples"] {
+        assert!(layers.contains(&name), "{layers:?}");
+    }
+    assert!(picture.main_layer()?.values().iter().any(|value| *value > 0.0));
+    let shown = image::open(path.with_extension("png"))?;
+    assert_eq!((shown.width(), shown.height()), (32, 24));
+    let report = json_file(&path.with_extension("json"))?;
+    assert_eq!(report["samples"], serde_json::json!([2, 2]));
+    assert_eq!(report["interrupted"], Value::Bool(false));
+    assert!(report["counters"]["paths"].as_u64() == Some(2 * 32 * 24));
+    let table = String::from_utf8(output.stdout.clone())?;
+    for word in [
+        "path: extend",
+        "rays",
+        "total",
+        "depth",
+        "left out",
+        "builtin:cornell-box",
+    ] {
+        assert!(table.contains(word), "{word}: {table}");
+    }
+    for stream in [&output.stdout, &output.stderr] {
+        let control = String::from_utf8_lossy(stream)
+            .chars()
+            .find(|c| c.is_control() && *c != '\n');
+        assert_eq!(control, None, "{}", said(&output));
+    }
+    assert_eq!(std::fs::read_dir(folder.path().join("new"))?.count(), 3);
+    Ok(())
+}
+
+#[test]
+fn settings_reach_the_technique_and_the_reference_is_measured() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let (reference, settings) = (folder.path().join("r.exr"), folder.path().join("settings.json"));
+    std::fs::write(&settings, "{\"roulette_start\": 7}")?;
+    let with = |more: &[&'static str], files: &[&str]| -> Result<Output, std::io::Error> {
+        let direct = ["render", "--path-set", "direct", "--spp", "2", "--stats", "json"];
+        succeed(&[&direct[..], more, files].concat())
+    };
+    let from_file = format!("@{}", text(&settings));
+    let output = with(
+        &["--size", "32x32"],
+        &["-o", text(&reference), "--settings", &from_file],
+    )?;
+    let report = json(&output.stdout)?;
+    assert_eq!(report["path_set"], "direct");
+    assert_eq!(report["settings"]["roulette_start"], 7);
+
+    // The same picture again, at the reference's size, as a PNG alone.
+    let png = folder.path().join("only.png");
+    let output = with(
+        &["--tone", "neutral"],
+        &["-o", text(&png), "--reference", text(&reference)],
+    )?;
+    let report = json(&output.stdout)?;
+    assert_eq!(report["size"], serde_json::json!([32, 32]));
+    assert_eq!(report["error"]["mse"], 0.0);
+    assert!(png.exists() && png.with_extension("json").exists() && !png.with_extension("exr").exists());
+
+    // Independent samples are other samples, and other light paths are pointed out.
+    let output = succeed(&[
+        "render",
+        "--spp",
+        "2",
+        "--stats",
+        "none",
+        "--sampler",
+        "pcg",
+        "--reference",
+        text(&reference),
+        "-o",
+        text(&png),
+    ])?;
+    assert!(output.stdout.is_empty());
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("light paths"),
+        "{}",
+        said(&output)
+    );
+    let report = json_file(&png.with_extension("json"))?;
+    assert!(report["error"]["mse"].as_f64().is_some_and(|mse| mse > 0.0));
+    Ok(())
+}
+
+#[test]
+fn a_time_budget_stops_early_and_says_so() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("a.exr");
+    let output = succeed(&[
+        "render",
+        "--size",
+        "32x32",
+        "--spp",
+        "100000000",
+        "--time-budget",
+        "1ms",
+        "-o",
+        text(&path),
+    ])?;
+    let report = json_file(&path.with_extension("json"))?;
+    assert_eq!(report["stopped_early"], Value::Bool(true));
+    let most = report["samples"][1].as_u64().unwrap_or(0);
+    assert!((1..100_000_000).contains(&most), "{most}");
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("time is up"),
+        "{}",
+        said(&output)
+    );
+    assert_eq!(exr::read(&path)?.pixel_count(), 1024);
+    Ok(())
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_complete_files() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("a.exr");
+    let mut child = program()
+        .args([
+            "-v",
+            "render",
+            "--size",
+            "32x32",
+            "--spp",
+            "100000000",
+            "-o",
+            text(&path),
+        ])
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    // The program says at `-v` when it has begun to listen.
+    let mut stderr = std::io::BufReader::new(child.stderr.take().ok_or("no error output")?);
+    let mut heard = String::new();
+    while !heard.contains("rendering") {
+        if std::io::BufRead::read_line(&mut stderr, &mut heard)? == 0 {
+            return Err(format!("ended too early: {heard}").into());
+        }
+    }
+    let killed = Command::new("sh")
+        .args(["-c", &format!("kill -INT {}", child.id())])
+        .status()?;
+    assert!(killed.success());
+    std::io::Read::read_to_string(&mut stderr, &mut heard)?;
+    let status = child.wait()?;
+    assert_eq!(status.code(), Some(130), "{heard}");
+    assert!(
+        heard.contains("interrupted") && heard.contains("samples a pixel"),
+        "{heard}"
+    );
+    let report = json_file(&path.with_extension("json"))?;
+    assert_eq!(report["interrupted"], Value::Bool(true));
+    assert!(report["samples"][1].as_u64().is_some_and(|most| most >= 1));
+    assert_eq!(exr::read(&path)?.pixel_count(), 1024);
+    assert_eq!(image::open(path.with_extension("png"))?.width(), 32);
+    Ok(())
+}
+
+#[test]
+fn mistakes_have_their_exit_codes_and_words() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let out = folder.path().join("a.exr");
+    let out = text(&out);
+    let render = |more: &[&'static str], code, words: &[&str]| {
+        let arguments: Vec<&str> = ["render", "--size", "8", "--spp", "1", "-o", out]
+            .iter()
+            .chain(more)
+            .copied()
+            .collect();
+        refuse(&arguments, code, words)
+    };
+    render(&["builtin:nothing"], 3, &["nothing", "cornell-box"])?;
+    render(&["builtin:cornell-box?lihgt=1"], 3, &["lihgt", "allowed: light"])?;
+    render(&["no-such-file.glb"], 3, &["no-such-file.glb", "hint:"])?;
+    render(&["--camera", "nobody"], 2, &["nobody", "hint: there is: main"])?;
+    render(&["--technique", "magic"], 2, &["magic", "path"])?;
+    render(&["--device", "abacus"], 5, &["abacus", "there is"])?;
+    render(&["--device", "99"], 5, &["99"])?;
+    render(&["--path-set", "dirct"], 2, &["dirct", "indirect"])?;
+    render(&["--settings", "{\"roulete\": 1}"], 2, &["roulete", "roulette_start"])?;
+    render(&["--settings", "@no-such-file"], 2, &["no-such-file"])?;
+    render(&["--settings", "3"], 2, &["JSON object"])?;
+    render(&["--reference", "no-such.exr"], 1, &["no-such.exr"])?;
+    refuse(&["render", "--size", "0x4"], 2, &["WIDTHxHEIGHT"])?;
+    refuse(&["render", "--spp", "0"], 2, &["--spp"])?;
+    refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;
+    refuse(&["scenes", "nothing"], 2, &["ring"])?;
+    refuse(&["info", "builtin:nothing"], 3, &["cornell-box"])?;
+    refuse(&["list", "nothing"], 2, &["nothing"])?;
+    refuse(
+        &["agreement", "--scene", "nothing", "--python", "true"],
+        2,
+        &["nothing"],
+    )?;
+    refuse(&["rendre"], 2, &["render"])?;
+    Ok(())
+}
+
+#[test]
+fn comparisons() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let at = |name: &str| folder.path().join(name);
+    let (a, b, small, broken) = (at("a.exr"), at("b.exr"), at("small.exr"), at("broken.exr"));
+    gray(&a, 16, 0.5)?;
+    gray(&b, 16, 0.75)?;
+    gray(&small, 8, 0.5)?;
+    let bytes = std::fs::read(&a)?;
+    std::fs::write(&broken, &bytes[..bytes.len() / 2])?;
+    let [a, b, small, broken] = [&a, &b, &small, &broken].map(|path| text(path));
+
+    let output = succeed(&["compare", a, a, "--threshold", "rmse=0,flip=0"])?;
+    assert!(String::from_utf8_lossy(&output.stdout).contains("RMSE"));
+    refuse(&["compare", a, b, "--threshold", "rmse=0.1"], 4, &["rmse", "2.500e-1"])?;
+    succeed(&["compare", a, b, "--threshold", "rmse=0.26"])?;
+    let difference = at("difference.png");
+    let output = succeed(&["compare", a, b, "--json", "--diff", text(&difference)])?;
+    assert_eq!(json(&output.stdout)?["metrics"]["bias"], -0.25);
+    // Too dark everywhere, by the whole scale.
+    assert_eq!(image::open(&difference)?.into_rgb8().get_pixel(3, 3).0, [0, 0, 255]);
+
+    refuse(&["compare", a, small], 1, &["16×16", "8×8"])?;
+    refuse(&["compare", a, broken], 1, &["broken.exr"])?;
+    refuse(&["compare", a, "picture.gif"], 1, &["gif"])?;
+    refuse(&["compare", a, b, "--threshold", "ssim=1"], 2, &["flip"])?;
+
+    // sRGB code 188 is linear 0.5029; the nearest code to 0.5 errs by less than half a code's width, 0.5 · 0.0061.
+    let png = at("a.png");
+    image::RgbImage::from_pixel(16, 16, image::Rgb([188; 3])).save(&png)?;
+    succeed(&["compare", text(&png), a, "--threshold", "max_error=0.0031"])?;
+    Ok(())
+}
+
+#[test]
+fn lists_are_readable_by_people_and_programs() -> Tested {
+    let scenes = json(&succeed(&["scenes", "--json"])?.stdout)?;
+    let names: Vec<_> = scenes
+        .as_array()
+        .ok_or("no list")?
+        .iter()
+        .map(|scene| &scene["name"])
+        .collect();
+    assert!(names.iter().any(|name| *name == "cornell-box"), "{names:?}");
+    let list = json(&succeed(&["list", "--json"])?.stdout)?;
+    assert_eq!(list["techniques"][0]["id"], "path");
+    assert!(list["techniques"][0]["default_settings"]["roulette_start"].is_u64());
+    assert!(
+        list["catalogue"]
+            .as_array()
+            .is_some_and(|rows| rows.iter().any(|row| row["id"] == "BG-3"))
+    );
+    let row = String::from_utf8(succeed(&["list", "bg-3"])?.stdout)?;
+    assert!(row.contains("engine/src/transport/path_tracer.rs"), "{row}");
+    let devices = json(&succeed(&["info", "--json"])?.stdout)?;
+    assert!(devices["devices"][0]["caps"]["subgroup_size"].is_u64());
+    let scene = json(&succeed(&["info", "builtin:ring", "--json"])?.stdout)?;
+    assert_eq!(scene["cameras"][0]["name"], "main");
+    assert_eq!(scene["techniques"][0]["refusals"], serde_json::json!([]));
+    for command in [
+        &["scenes"][..],
+        &["list"],
+        &["info"],
+        &["info", "builtin:ring"],
+        &["--help"],
+    ] {
+        let stdout = String::from_utf8(succeed(command)?.stdout)?;
+        assert!(
+            stdout.lines().count() > 3 && !stdout.contains('\x1b'),
+            "{command:?}: {stdout}"
+        );
+    }
+    Ok(())
+}
+
+#[test]
+fn a_reader_that_goes_is_no_error() -> Tested {
+    let mut child = program()
+        .arg("scenes")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    drop(child.stdout.take());
+    let output = child.wait_with_output()?;
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", said(&output));
+    Ok(())
+}
+
+#[test]
+fn a_benchmark_counts_its_runs() -> Tested {
+    let arguments = [
+        "bench",
+        "--scene",
+        "builtin:cornell-box",
+        "--size",
+        "32",
+        "--spp",
+        "2",
+        "--repeat",
+        "3",
+        "--json",
+    ];
+    let report = json(&succeed(&arguments)?.stdout)?;
+    let scene = &report["scenes"][0];
+    assert_eq!(scene["repeat"], 3);
+    let rates = &scene["rays_per_second"];
+    let of = |name: &str| rates[name].as_f64().unwrap_or(0.0);
+    assert!(
+        of("least") > 0.0 && of("least") <= of("median") && of("median") <= of("greatest"),
+        "{rates}"
+    );
+    Ok(())
+}
