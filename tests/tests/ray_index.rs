@@ -8,7 +8,7 @@ use clerestory::accel::triangle::moller_trumbore;
 use clerestory::accel::{Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::shaders::accel::{trace_any, trace_closest};
 use clerestory::gpu::shaders::sets::Bvh2Set;
-use clerestory::gpu::{Buffer, Category, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute};
+use clerestory::gpu::{Category, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute};
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
 use glam::Vec3;

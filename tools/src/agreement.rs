@@ -6,7 +6,7 @@
 //! Guarantees: pictures depend on the options and the driver alone; times are wall-clock and processor seconds, medians of the rounds.
 //!
 //! [`mitsuba::scenes`]: crate::mitsuba::scenes
-//! [`film::z_test`]: clerestory::film::z_test
+//! [`film::z_test`]: fn@clerestory::film::z_test
 
 mod peer;
 mod report;
