@@ -104,9 +104,9 @@ pub struct FrameReport {
     pub time: String,
     /// Seconds of wall clock: upload and index of the scene.
     pub upload_seconds: f64,
-    /// Seconds of wall clock: rendering, with the compilation of kernels by the driver.
+    /// Wall-clock seconds since the technique was ready, with the compilation of kernels by the driver in the first step.
     pub render_seconds: f64,
-    /// Seconds of wall clock after the first step, and the share of all work that was done in them: speed without compilation.
+    /// Wall-clock seconds after the first step, which compiles the kernels.
     pub steady_seconds: f64,
     /// Work units (see the technique's counters) per second of steady time.
     pub steady_rates: BTreeMap<String, f64>,
@@ -300,13 +300,14 @@ impl Rendering {
         }))
     }
 
-    /// Looks through another camera, from the first sample on.
+    /// Looks through another camera, from the first sample and second on.
     ///
     /// # Errors
     /// [`Error::Setting`], [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &crate::scene::Camera) -> Result<()> {
         self.camera.clone_from(&camera.name);
-        self.finished = false;
+        (self.start, self.first_step, self.finished) = (Instant::now(), None, false);
+        self.passes.clear();
         self.technique.set_camera(camera)
     }
 

@@ -60,7 +60,7 @@ void main() {
     if (hit.triangle == NO_HIT) {
         if (HAS_ENVIRONMENT && counted) {
             vec3 local = world_to_environment(ray.direction);
-            float weight = path.pdf > 0.0 ? emission_weight(path.pdf, environment_light_pdf(local)) : 1.0;
+            float weight = emission_weight(path.pdf, environment_light_pdf(local));
             paths[slot].radiance += path.throughput * environment_radiance(local) * weight;
         }
         return;
@@ -159,7 +159,7 @@ void main() {
         path.throughput /= survival;
     }
     vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
-    if (HAS_ATTENUATION && m.thickness > 0.0 && m.transmission > 0.0 && dot(wi, s.geometric_normal) < 0.0) {
+    if (HAS_ATTENUATION && solid && dot(wi, s.geometric_normal) < 0.0) {
         // The way through the body that the offset of the start leaves out.
         path.throughput *= exp(m.attenuation * (distance(start, s.point.position) / dot(wi, s.geometric_normal)));
     }

@@ -9,11 +9,11 @@ use crate::{Error, Result};
 
 /// Linear RGB radiance, W·m⁻²·sr⁻¹ (or relative units, where the metadata says so).
 pub const RADIANCE: &str = "radiance";
-/// World-space shading normal at the first hit, unit length; zero where nothing is hit.
+/// World-space shading normal at the first hit, mean over the samples; zero where nothing is hit.
 pub const NORMAL: &str = "normal";
 /// Linear base colour at the first hit.
 pub const ALBEDO: &str = "albedo";
-/// Distance along the camera's axis to the first hit, metres.
+/// Mean distance from the camera to the first hit, metres.
 pub const DEPTH: &str = "depth";
 /// World-space position of the first hit, metres.
 pub const POSITION: &str = "position";

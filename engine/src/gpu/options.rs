@@ -75,7 +75,11 @@ impl Default for GpuOptions {
         let validation = match std::env::var("CLERESTORY_VALIDATION").as_deref() {
             Ok("core") => Validation::Core,
             Ok("gpu") => Validation::GpuAssisted,
-            _ => Validation::Off,
+            Ok("off" | "") | Err(_) => Validation::Off,
+            Ok(other) => {
+                tracing::warn!("CLERESTORY_VALIDATION is {other:?}; it can be off, core or gpu");
+                Validation::Off
+            }
         };
         let cache = std::env::var_os("XDG_CACHE_HOME")
             .map(PathBuf::from)

@@ -8,6 +8,8 @@ use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place.
 pub const MAX_PLACED_TRIANGLES: u64 = 1 << 28;
+/// Greatest width and height of an image: texture records hold each in 16 bits.
+pub const MAX_IMAGE_SIDE: u32 = 65_535;
 /// Greatest number of instances.
 pub const MAX_INSTANCES: usize = 1 << 22;
 
@@ -50,6 +52,15 @@ impl Scene {
         }
         for (i, image) in self.images.iter().enumerate() {
             let texels = u64::from(image.width) * u64::from(image.height);
+            if image.width.max(image.height) > MAX_IMAGE_SIDE {
+                return fail(
+                    format!("images[{i}]"),
+                    format!(
+                        "is {} × {}; sides are at most {MAX_IMAGE_SIDE}",
+                        image.width, image.height
+                    ),
+                );
+            }
             if texels == 0 || texels != image.texels.len() as u64 {
                 return fail(
                     format!("images[{i}]"),

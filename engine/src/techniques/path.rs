@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::{Bias, Skipped, Technique, TechniqueInfo, settings_from_json};
 use crate::Result;
 use crate::film::picture::Picture;
+use crate::gpu::shaders::transport::path_shade;
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
 use crate::transport::PathSet;
@@ -23,13 +24,13 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     prepare: |gpu, scene, view, settings| {
         let mut settings: PathTracerSettings = settings_from_json(settings)?;
         settings.seed = view.seed;
-        settings.aovs |= view.aovs;
+        settings.aovs = view.aovs;
         Ok(Box::new(PathTracer::new(gpu, scene, view.camera, view.size, settings)?))
     },
 };
 
 /// What each specialization constant of the shading stage stands for, and why it may be off.
-const FEATURES: [(&str, &str, &str); 13] = [
+const FEATURES: [(&str, &str, &str); 16] = [
     ("has_metal", "metal lobes", "no material is metal"),
     (
         "has_conductor",
@@ -54,6 +55,9 @@ const FEATURES: [(&str, &str, &str); 13] = [
     ("has_attenuation", "absorption in solids", "no solid absorbs"),
     ("has_environment", "environment light", "the scene has none"),
     ("has_area_lights", "area lights", "no material emits"),
+    ("has_unlit", "unlit surfaces", "no material is unlit"),
+    ("has_alpha", "alpha tests", "no material has alpha"),
+    ("write_aovs", "albedo, normal and depth", "they were not asked for"),
     (
         "has_punctual_lights",
         "point, spot and directional lights",
@@ -105,7 +109,9 @@ impl Technique for PathTracer {
     fn skipped(&self) -> Vec<Skipped> {
         let pipelines = PathTracer::pipelines(self);
         let off = |name: &str| {
-            let shade = pipelines.iter().filter(|pipeline| pipeline.shader.contains("shade"));
+            let shade = pipelines
+                .iter()
+                .filter(|pipeline| pipeline.shader == path_shade::INFO.name);
             shade
                 .flat_map(|pipeline| &pipeline.specialization)
                 .any(|(known, value)| *known == name && *value == 0)

@@ -99,7 +99,7 @@ impl GpuScene {
         };
         let index = gpu.texels_with(part.name, Category::Index, vk::Format::R32G32B32A32_UINT, part.bytes)?;
         let bounds = geometry.bounds();
-        let bsdf = BsdfFeatures::of_materials(placed_materials(scene));
+        let bsdf = BsdfFeatures::of_materials(placed_materials(scene, &Material::default()));
         let (buffers, light_kinds) = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
         Ok(Self {
             profile,
@@ -177,16 +177,17 @@ impl GpuScene {
 }
 
 /// The materials that some instance places, in index order; the default one where a mesh has none.
-fn placed_materials(scene: &Scene) -> Vec<&Material> {
-    let mut used = vec![false; scene.materials.len()];
+fn placed_materials<'a>(scene: &'a Scene, default: &'a Material) -> Vec<&'a Material> {
+    // The last place stands for the default.
+    let mut used = vec![false; scene.materials.len() + 1];
     for instance in &scene.instances {
-        if let Some(material) = scene.meshes[instance.mesh as usize].material {
-            used[material as usize] = true;
-        }
+        let material = scene.meshes[instance.mesh as usize].material;
+        used[material.map_or(scene.materials.len(), |index| index as usize)] = true;
     }
     scene
         .materials
         .iter()
+        .chain([default])
         .zip(used)
         .filter_map(|(material, used)| used.then_some(material))
         .collect()

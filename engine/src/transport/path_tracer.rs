@@ -41,6 +41,9 @@ const SAMPLES_A_WAVE: u32 = 1024;
 const COMPACT_CHUNK: u32 = 32;
 /// Invocations of a workgroup of every stage (`PATH_GROUP`).
 const PATH_GROUP: u32 = 64;
+/// Bounds of the roulette's settings, so that every path ends.
+const ROULETTE_CAP_MAX: f32 = 0.999;
+const ROULETTE_START_MAX: u32 = 4096;
 /// `STALLED_SHADOW` of `path_buffers.glsl`.
 const STALLED_SHADOW: u32 = 2;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
@@ -55,11 +58,12 @@ pub struct PathTracerSettings {
     pub path_set: PathSet,
     /// Random numbers: Owen-scrambled Sobol' or PCG.
     pub sampler: SamplerKind,
-    /// Seed of the random numbers.
+    /// Seed of the random numbers; the view's, where settings come as text.
+    #[serde(skip)]
     pub seed: u32,
-    /// First bounce at which Russian roulette may end a path.
+    /// First bounce at which Russian roulette may end a path, at most 4096.
     pub roulette_start: u32,
-    /// Largest probability to survive a round of roulette, in (0, 1]: with 1, paths in lossless scenes would never end.
+    /// Largest probability to survive a round of roulette, in (0, 0.999]: with 1, paths in lossless scenes would never end.
     pub roulette_cap: f32,
     /// Compensation of rough metals for scattering among microfacets; off for comparison with single-scattering renderers.
     pub multiple_scattering: bool,
@@ -69,7 +73,8 @@ pub struct PathTracerSettings {
     pub paths_in_flight: u32,
     /// Loop iterations after which a ray goes on in a later dispatch. Never changes the picture.
     pub ray_quota: u32,
-    /// Also gathers albedo, normal and depth of what is seen first.
+    /// Also gathers albedo, normal and depth of what is seen first; the view's, where settings come as text.
+    #[serde(skip)]
     pub aovs: bool,
 }
 
@@ -99,8 +104,12 @@ impl PathTracerSettings {
                 cause: cause.into(),
             })
         };
-        if !(self.roulette_cap > 0.0 && self.roulette_cap <= 1.0) {
-            return fail("roulette_cap", self.roulette_cap.to_string(), "is not in (0, 1]");
+        // Paths in scenes that lose nothing end by roulette alone.
+        if !(self.roulette_cap > 0.0 && self.roulette_cap <= ROULETTE_CAP_MAX) {
+            return fail("roulette_cap", self.roulette_cap.to_string(), "is not in (0, 0.999]");
+        }
+        if self.roulette_start > ROULETTE_START_MAX {
+            return fail("roulette_start", self.roulette_start.to_string(), "is more than 4096");
         }
         // A traversal makes progress only with a quota above twice the depth of the deepest tree.
         if self.ray_quota < 128 || self.ray_quota > 60_000 {
@@ -314,10 +323,12 @@ impl PathTracer {
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         let wanted = u64::from(samples) * u64::from(self.size[0]) * u64::from(self.size[1]);
-        let Some(wave) = self.next_wave(samples) else {
+        let Some((wave, next)) = self.next_wave(samples) else {
             return Ok(None);
         };
+        // A wave that fails is rendered again by the next step.
         let timings = self.run(&wave)?;
+        self.cursor = next;
         Ok(Some(Step {
             timings,
             done: self.cursor.done,
@@ -452,8 +463,9 @@ impl PathTracer {
         Ok(())
     }
 
-    fn next_wave(&mut self, samples: u32) -> Option<Wave> {
-        let c = self.cursor;
+    /// The next wave, and where the one after it begins.
+    fn next_wave(&self, samples: u32) -> Option<(Wave, Cursor)> {
+        let mut c = self.cursor;
         if c.sample >= samples {
             return None;
         }
@@ -473,16 +485,17 @@ impl PathTracer {
             first_sample: c.sample,
             samples: wave_samples,
         };
-        self.cursor.pixel_in_band += pixels;
-        if self.cursor.pixel_in_band == band.pixels {
-            self.cursor.pixel_in_band = 0;
-            self.cursor.band += 1;
+        c.pixel_in_band += pixels;
+        if c.pixel_in_band == band.pixels {
+            c.pixel_in_band = 0;
+            c.band += 1;
         }
-        if self.cursor.band == self.bands.len() {
-            self.cursor.band = 0;
-            self.cursor.sample += wave_samples;
+        if c.band == self.bands.len() {
+            c.band = 0;
+            c.sample += wave_samples;
         }
-        Some(wave)
+        c.done += u64::from(pixels) * u64::from(wave_samples);
+        Some((wave, c))
     }
 
     fn run(&mut self, wave: &Wave) -> Result<Vec<Timings>> {
@@ -496,8 +509,8 @@ impl PathTracer {
         let mut stalls_in_a_row = 0;
         while first || status.active_count > 0 {
             let mut recorder = self.gpu.recorder("path wave")?;
-            if let Some(pending) = self.pending.take() {
-                self.record_resolve(&mut recorder, &pending)?;
+            if let Some(pending) = &self.pending {
+                self.record_resolve(&mut recorder, pending)?;
             }
             let resume_shadow = status.stalled == STALLED_SHADOW;
             // A stalled round leaves no groups to dispatch.
@@ -527,6 +540,7 @@ impl PathTracer {
                 )
             })?;
             timings.push(recorder.submit()?.wait()?);
+            self.pending = None;
             let before = status.rounds;
             status = self.buffers.readback.read::<Status>(0, 1)?[0];
             if status.stalled != 0 {
@@ -553,7 +567,6 @@ impl PathTracer {
         self.counters.extend_rays += wide(status.extend_rays);
         self.counters.shadow_rays += wide(status.shadow_rays);
         self.counters.waves += 1;
-        self.cursor.done += u64::from(paths);
         self.pending = Some(*wave);
         Ok(timings)
     }

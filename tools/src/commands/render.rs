@@ -125,7 +125,7 @@ enum Aov {
     Normal,
     /// Linear base colour at the first hit.
     Albedo,
-    /// Distance to the first hit along the camera's axis, metres.
+    /// Distance from the camera to the first hit, metres.
     Depth,
     /// Variance of the radiance's mean.
     Variance,
