@@ -460,3 +460,75 @@ fn unlit_surfaces_show_their_colour_exactly() {
         assert!(picture.variance.iter().all(|v| *v == 0.0));
     });
 }
+
+/// A closed box, seen from outside counter-clockwise.
+fn solid_box(scene: &mut Scene, material: Material, lower: Vec3, upper: Vec3) {
+    let corner = |i: u32| Vec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), upper, lower);
+    let faces = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let material = scene.add_material(material);
+    scene.place(clerestory::scene::Mesh {
+        name: "box".into(),
+        positions: (0..8).map(corner).collect(),
+        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        material: Some(material),
+        ..Default::default()
+    });
+}
+
+/// A floor and a point light inside an absorbing body that does not refract: exp(−σ (h + r)) of what they are in the clear, with r from
+/// the light to the floor and h from there to the body's top, under the camera.
+#[test]
+fn light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way() {
+    with_gpu(|gpu| {
+        let place = DVec3::new(0.3, 0.8, -0.2);
+        let (sigma, top) = (0.9, 1.25);
+        let mut scene = lambert_floor();
+        let kind = LightKind::Point {
+            position: place.as_vec3(),
+            intensity: Vec3::splat(2.0),
+        };
+        scene.add_light("inside", kind);
+        let body = Material {
+            attenuation_color: Vec3::splat((-sigma as f32).exp()),
+            attenuation_distance: 1.0,
+            ..Material::glass("body", 1.0)
+        };
+        solid_box(
+            &mut scene,
+            body,
+            Vec3::new(-6.0, -0.5, -6.0),
+            Vec3::new(6.0, top as f32, 6.0),
+        );
+        let irradiance = |x: f64, z: f64| {
+            let to = place - DVec3::new(x, 0.0, z);
+            let r = to.length();
+            2.0 * to.y / r.powi(3) * (-sigma * (r + top)).exp()
+        };
+        let picture = render(gpu, &scene, SMALL, 512, &independent());
+        picture.expect_values("inside", &floor_picture(16, irradiance));
+    });
+}
+
+#[test]
+fn meshes_without_a_material_have_the_default_one() {
+    with_gpu(|gpu| {
+        let mut explicit = lambert_floor();
+        explicit.environment = Some(Environment::uniform(Vec3::ONE));
+        explicit.materials[0] = Material::default();
+        let mut none = explicit.clone();
+        none.meshes[0].material = None;
+        none.materials.clear();
+        let settings = independent();
+        assert_eq!(
+            render(gpu, &none, SMALL, 16, &settings).bits(),
+            render(gpu, &explicit, SMALL, 16, &settings).bits()
+        );
+    });
+}

@@ -29,6 +29,7 @@ void main() {
         total += uvec2(chunk_counts[2u * chunk], chunk_counts[2u * chunk + 1u]);
     }
     totals[lane] = total;
+    memoryBarrierBuffer();
     barrier();
     uvec2 before = uvec2(0u);
     for (uint other = 0u; other < lane; ++other) {

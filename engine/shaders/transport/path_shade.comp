@@ -71,9 +71,9 @@ void main() {
     vec3 wo = -ray.direction;
     bool front = dot(wo, s.geometric_normal) > 0.0;
     bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
+    // A camera inside a solid does not know it until it looks out.
+    uint interior = path.interior == OUTSIDE && solid && !front ? s.material : path.interior;
     if (HAS_ATTENUATION) {
-        // A camera inside a solid does not know it until it looks out.
-        uint interior = path.interior == OUTSIDE && solid && !front ? s.material : path.interior;
         if (interior != OUTSIDE) {
             path.throughput *= exp(-scene_materials[interior].attenuation * hit.t);
         }
@@ -131,8 +131,15 @@ void main() {
                     ray_to_light.ray = Ray(start, 0.0, segment, 1.0);
                 }
                 ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
+                uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : OUTSIDE) : interior;
+                if (HAS_ATTENUATION && passed != OUTSIDE && !light.infinite) {
+                    float way = distance(s.point.position, light.point.position);
+                    ray_to_light.contribution *= exp(-scene_materials[passed].attenuation * way);
+                }
                 shadow[place] = ray_to_light;
                 flags[place] = FLAG_SHADOW;
+                // Part of the key by which the shadow stage draws the coverage of blended surfaces.
+                paths[slot].bounce = bounce + 1u;
             }
         }
     }
@@ -153,7 +160,8 @@ void main() {
     if (path.bounce >= push.roulette_start) {
         vec3 t = path.throughput * path.eta_scale;
         float survival = min(max(t.x, max(t.y, t.z)), push.roulette_cap);
-        if (lobe.y >= survival) {
+        // Also ends a path whose throughput is not a number.
+        if (!(lobe.y < survival)) {
             return;
         }
         path.throughput /= survival;

@@ -99,7 +99,11 @@ impl GpuScene {
         };
         let index = gpu.texels_with(part.name, Category::Index, vk::Format::R32G32B32A32_UINT, part.bytes)?;
         let bounds = geometry.bounds();
-        let bsdf = BsdfFeatures::of_materials(placed_materials(scene, &Material::default()));
+        let default = Material::default();
+        let placed = materials_by_use(scene, &default)
+            .into_iter()
+            .filter(|(_, placed)| *placed);
+        let bsdf = BsdfFeatures::of_materials(placed.map(|(material, _)| material));
         let (buffers, light_kinds) = SceneBuffers::upload(gpu, scene, &profile, bsdf, geometry, bounds)?;
         Ok(Self {
             profile,
@@ -176,21 +180,14 @@ impl GpuScene {
     }
 }
 
-/// The materials that some instance places, in index order; the default one where a mesh has none.
-fn placed_materials<'a>(scene: &'a Scene, default: &'a Material) -> Vec<&'a Material> {
-    // The last place stands for the default.
+/// All materials with whether some instance places them; last the default one, for meshes that have none.
+fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> Vec<(&'a Material, bool)> {
     let mut used = vec![false; scene.materials.len() + 1];
     for instance in &scene.instances {
         let material = scene.meshes[instance.mesh as usize].material;
         used[material.map_or(scene.materials.len(), |index| index as usize)] = true;
     }
-    scene
-        .materials
-        .iter()
-        .chain([default])
-        .zip(used)
-        .filter_map(|(material, used)| used.then_some(material))
-        .collect()
+    scene.materials.iter().chain([default]).zip(used).collect()
 }
 
 /// All instances flattened to world space.
@@ -326,12 +323,17 @@ impl SceneBuffers {
         bounds: [Vec3; 2],
     ) -> Result<(Self, LightKinds)> {
         let mut textures = Textures::default();
-        let mut materials: Vec<_> = scene
-            .materials
-            .iter()
-            .map(|material| textures.material(scene, material))
-            .collect();
-        materials.push(textures.material(scene, &Material::default()));
+        let default = Material::default();
+        let placed = materials_by_use(scene, &default);
+        let record = |(material, placed): (&Material, bool)| {
+            // What nothing shows needs no texels either.
+            if placed {
+                textures.material(scene, material)
+            } else {
+                SceneMaterial::default()
+            }
+        };
+        let materials: Vec<_> = placed.into_iter().map(record).collect();
         let lights = Lights::collect(scene, profile, &mut geometry, &materials, bounds)?;
         let absent = gpu.buffer_with("absent", Category::Material, &[0u8; 16])?;
         let optional = |name: &str, category, bytes: &[u8]| {
@@ -517,7 +519,8 @@ impl Lights {
                 .unwrap_or(index);
             if first != index {
                 let other = geometry.triangles[first];
-                if other.material == triangle.material {
+                // A blended copy is met by itself too, which light sampling knows nothing of: its emission then counts in full.
+                if other.material == triangle.material && material.flags & (MATERIAL_MASK | MATERIAL_BLEND) == 0 {
                     geometry.triangles[index].light = other.light;
                 }
                 continue;

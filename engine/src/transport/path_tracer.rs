@@ -275,6 +275,7 @@ impl PathTracer {
             0 => 1 << 20,
             wanted => wanted.next_multiple_of(PATH_GROUP),
         };
+        let slots = slots.min(slots_of_device(gpu));
         let view = View::new(camera, size)?;
         let pipelines = Pipelines::new(gpu, &scene, &settings, &view, camera)?;
         let buffers = WaveBuffers::new(gpu, slots, settings.aovs)?;
@@ -777,7 +778,10 @@ impl View {
             && half_height > 0.0
             && camera.transform.is_finite()
             && camera.lens_radius >= 0.0
-            && camera.focus_distance > 0.0;
+            && camera.lens_radius.is_finite()
+            && camera.focus_distance > 0.0
+            && camera.focus_distance.is_finite()
+            && camera.transform.translation.as_vec3().is_finite();
         if !usable {
             return Err(Error::Setting {
                 name: "camera".into(),
@@ -798,6 +802,15 @@ impl View {
             orthographic,
         })
     }
+}
+
+/// Slots that one dispatch reaches and whose largest buffer can be bound, in whole workgroups.
+fn slots_of_device(gpu: &Gpu) -> u32 {
+    let slot_bytes = size_of::<PathState>().max(size_of::<ShadowRay>()) as u64;
+    let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
+    let by_groups = u64::from(gpu.caps().max_workgroups) * u64::from(PATH_GROUP);
+    let slots = by_range.min(by_groups).min(1 << 22) as u32;
+    slots - slots % PATH_GROUP
 }
 
 fn camera_pipeline(
