@@ -29,3 +29,8 @@ pub mod techniques;
 pub mod transport;
 
 pub use error::{Error, Result};
+
+/// The examples of the README, compiled as doc tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
