@@ -8,6 +8,8 @@ use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place.
 pub const MAX_PLACED_TRIANGLES: u64 = 1 << 28;
+/// Most texels along a side of an image: texture records on the device hold both sides in 16 bits each.
+pub const MAX_IMAGE_SIDE: u32 = u16::MAX as u32;
 /// Greatest number of instances.
 pub const MAX_INSTANCES: usize = 1 << 22;
 
@@ -50,6 +52,15 @@ impl Scene {
         }
         for (i, image) in self.images.iter().enumerate() {
             let texels = u64::from(image.width) * u64::from(image.height);
+            if image.width.max(image.height) > MAX_IMAGE_SIDE {
+                return fail(
+                    format!("images[{i}]"),
+                    format!(
+                        "is {} × {}; at most {MAX_IMAGE_SIDE} a side are allowed",
+                        image.width, image.height
+                    ),
+                );
+            }
             if texels == 0 || texels != image.texels.len() as u64 {
                 return fail(
                     format!("images[{i}]"),
@@ -291,6 +302,14 @@ mod tests {
         assert!(refusal(|s| s.instances[0].mesh = 999).contains("instances[0].mesh"));
         assert!(refusal(|s| s.instances[0].transform.translation.x = f64::INFINITY).contains("transform"));
         assert!(refusal(|s| s.images[0].width += 1).contains("images[0]"));
+        assert!(
+            refusal(|s| {
+                s.images[0].width = 65_536;
+                s.images[0].height = 1;
+                s.images[0].texels = vec![[0; 4]; 65_536];
+            })
+            .contains("at most 65535 a side")
+        );
         assert!(refusal(|s| s.materials[0].roughness = 2.0).contains("roughness"));
         assert!(refusal(|s| s.materials[0].roughness = f32::NAN).contains("roughness"));
         assert!(refusal(|s| s.materials[0].emission.x = -1.0).contains("emission"));
