@@ -177,6 +177,23 @@ pub fn camera_down(half_height: f32, height: f64) -> Camera {
     camera
 }
 
+/// Averages of a function of (x, z) over each pixel of a square picture of [−half, half]² seen by [`camera_down`], by a 16 × 16 midpoint
+/// rule a pixel.
+pub fn pixel_averages(size: u32, half: f64, function: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    const STEPS: u32 = 16;
+    let at = |i: u32, sub: u32| {
+        half * (2.0 * (f64::from(i) + (f64::from(sub) + 0.5) / f64::from(STEPS)) / f64::from(size) - 1.0)
+    };
+    (0..size * size)
+        .map(|pixel| {
+            let sum: f64 = (0..STEPS * STEPS)
+                .map(|s| function(at(pixel % size, s % STEPS), at(pixel / size, s / STEPS)))
+                .sum();
+            sum / f64::from(STEPS * STEPS)
+        })
+        .collect()
+}
+
 /// The square [−half, half]² of the plane at `y`, facing up.
 pub fn floor(name: &str, material: u32, half: f32, y: f32) -> Mesh {
     let corner = |x: f32, z: f32| Vec3::new(x * half, y, z * half);

@@ -11,7 +11,7 @@ use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, LOBE_ALL, bsdf_sample};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{
-    builtin, camera_down, finish, floor, independent, paths, point_triangle, render, tracer,
+    builtin, camera_down, finish, floor, independent, paths, pixel_averages, point_triangle, render, tracer,
 };
 use clerestory_tests::statistics::expect_mean;
 use clerestory_tests::with_gpu;
@@ -197,16 +197,9 @@ const FLOOR: Vec3 = Vec3::new(0.75, 0.5, 0.25);
 
 /// Pixel values of [`lambert_floor`] whose irradiance at (x, z) is `irradiance`, averaged over each pixel by a 16 × 16 midpoint rule.
 fn floor_picture(size: u32, irradiance: impl Fn(f64, f64) -> f64) -> Vec<f32> {
-    const STEPS: u32 = 16;
-    let at =
-        |i: u32, sub: u32| 2.0 * (f64::from(i) + (f64::from(sub) + 0.5) / f64::from(STEPS)) / f64::from(size) - 1.0;
     let mut values = Vec::new();
-    for pixel in 0..size * size {
-        let sum: f64 = (0..STEPS * STEPS)
-            .map(|s| irradiance(at(pixel % size, s % STEPS), at(pixel / size, s / STEPS)))
-            .sum();
-        let mean = sum / f64::from(STEPS * STEPS) / PI;
-        values.extend(FLOOR.to_array().map(|rho| (f64::from(rho) * mean) as f32));
+    for mean in pixel_averages(size, 1.0, irradiance) {
+        values.extend(FLOOR.to_array().map(|rho| (f64::from(rho) * mean / PI) as f32));
     }
     values
 }

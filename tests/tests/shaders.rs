@@ -12,6 +12,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Matrix columns of three rows without padding: naga knows the standard layouts only, not the scalar one.
     ("tests/layout_probe.comp", "UnsupportedMatrixStride"),
     // Arrays of structs of 32-bit words whose stride is no multiple of 16: the scalar layout again.
+    ("tests/twin_texture.comp", "ArrayStride"),
     ("transport/path_resolve.comp", "ArrayStride"),
     // Texel buffers.
     ("accel/trace_any.comp", "SampledBuffer"),

@@ -8,8 +8,8 @@ use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place.
 pub const MAX_PLACED_TRIANGLES: u64 = 1 << 28;
-/// Greatest width and height of an image: texture records hold each in 16 bits.
-pub const MAX_IMAGE_SIDE: u32 = 65_535;
+/// Most texels along a side of an image: texture records on the device hold both sides in 16 bits each.
+pub const MAX_IMAGE_SIDE: u32 = u16::MAX as u32;
 /// Greatest number of instances.
 pub const MAX_INSTANCES: usize = 1 << 22;
 
@@ -56,7 +56,7 @@ impl Scene {
                 return fail(
                     format!("images[{i}]"),
                     format!(
-                        "is {} × {}; sides are at most {MAX_IMAGE_SIDE}",
+                        "is {} × {}; at most {MAX_IMAGE_SIDE} a side are allowed",
                         image.width, image.height
                     ),
                 );
@@ -302,6 +302,14 @@ mod tests {
         assert!(refusal(|s| s.instances[0].mesh = 999).contains("instances[0].mesh"));
         assert!(refusal(|s| s.instances[0].transform.translation.x = f64::INFINITY).contains("transform"));
         assert!(refusal(|s| s.images[0].width += 1).contains("images[0]"));
+        assert!(
+            refusal(|s| {
+                s.images[0].width = 65_536;
+                s.images[0].height = 1;
+                s.images[0].texels = vec![[0; 4]; 65_536];
+            })
+            .contains("at most 65535 a side")
+        );
         assert!(refusal(|s| s.materials[0].roughness = 2.0).contains("roughness"));
         assert!(refusal(|s| s.materials[0].roughness = f32::NAN).contains("roughness"));
         assert!(refusal(|s| s.materials[0].emission.x = -1.0).contains("emission"));

@@ -13,6 +13,7 @@ mod ply;
 mod profile;
 pub mod sidecar;
 pub mod tangents;
+pub mod texture;
 
 pub use files::load;
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, SceneProfile, TransmissionUse};

@@ -36,6 +36,7 @@ const LIGHT_POINT: u32 = 1;
 const LIGHT_SPOT: u32 = 2;
 const LIGHT_DIRECTIONAL: u32 = 3;
 const LIGHT_ENVIRONMENT: u32 = 4;
+const LIGHT_DARK: u32 = 5;
 const TEXTURE_SRGB: u32 = 1;
 const TEXTURE_NEAREST: u32 = 2;
 const TEXTURE_UV1: u32 = 4;
@@ -489,6 +490,8 @@ struct Lights {
     cdf: Vec<f32>,
     /// The environment's block: header and texels.
     environment: Vec<u8>,
+    /// Some surface shines that is not among the records.
+    has_unsampled: bool,
 }
 
 impl Lights {
@@ -506,27 +509,30 @@ impl Lights {
             material.emission.iter().any(|e| *e > 0.0) && material.flags & MATERIAL_UNLIT == 0
         };
         let first_copies = geometry.first_copies(emits);
+        let mut has_unsampled = false;
         for index in 0..geometry.triangles.len() {
             let triangle = geometry.triangles[index];
             if !emits(&triangle) {
                 continue;
             }
             let material = &materials[triangle.material as usize];
-            // Of triangles in one place rays meet the first, so only that one may be a light.
+            let [a, b, c] = geometry.corners_of(&triangle).map(|p| p.as_dvec3());
+            let area = 0.5 * (b - a).cross(c - a).length();
+            // Of triangles in one place rays meet the first that is there, so only the first one may be a light. What is behind one
+            // with alpha shines too, but light sampling cannot tell how much of it: its hits alone count, in full.
             let first = first_copies
                 .get(&geometry.place_of(&triangle))
                 .copied()
                 .unwrap_or(index);
             if first != index {
                 let other = geometry.triangles[first];
-                // A blended copy is met by itself too, which light sampling knows nothing of: its emission then counts in full.
-                if other.material == triangle.material && material.flags & (MATERIAL_MASK | MATERIAL_BLEND) == 0 {
+                if materials[other.material as usize].flags & (MATERIAL_MASK | MATERIAL_BLEND) != 0 {
+                    has_unsampled |= area > 0.0;
+                } else if other.material == triangle.material {
                     geometry.triangles[index].light = other.light;
                 }
                 continue;
             }
-            let [a, b, c] = geometry.corners_of(&triangle).map(|p| p.as_dvec3());
-            let area = 0.5 * (b - a).cross(c - a).length();
             if area > 0.0 && area.is_finite() {
                 let emission = DVec3::from_array(material.emission.map(f64::from));
                 let double_sided = material.flags & MATERIAL_DOUBLE_SIDED != 0;
@@ -559,6 +565,14 @@ impl Lights {
             // The lights' table has one more entry than there are lights; the texels' begins behind it.
             environment = environment_block(map, records.len() as u32 + 1);
         }
+        if has_unsampled && records.is_empty() {
+            // Kernels that know of emission also sample lights: a dark one to choose.
+            powers.push(0.0);
+            records.push(SceneLight {
+                kind: LIGHT_DARK,
+                ..SceneLight::default()
+            });
+        }
         let mut cdf = if records.is_empty() {
             Vec::new()
         } else {
@@ -569,13 +583,14 @@ impl Lights {
             records,
             cdf,
             environment,
+            has_unsampled,
         })
     }
 
     fn kinds(&self) -> LightKinds {
         let some = |wanted: &[u32]| self.records.iter().any(|light| wanted.contains(&light.kind));
         LightKinds {
-            area: some(&[LIGHT_TRIANGLE]),
+            area: self.has_unsampled || some(&[LIGHT_TRIANGLE]),
             punctual: some(&[LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL]),
             environment: some(&[LIGHT_ENVIRONMENT]),
         }

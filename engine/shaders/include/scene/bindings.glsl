@@ -19,6 +19,7 @@ const uint LIGHT_POINT = 1u;
 const uint LIGHT_SPOT = 2u;
 const uint LIGHT_DIRECTIONAL = 3u;
 const uint LIGHT_ENVIRONMENT = 4u;
+const uint LIGHT_DARK = 5u;  // stands alone where no light can be chosen
 
 struct SceneTriangle {
     uvec3 vertices;

@@ -1,8 +1,11 @@
-// Base colour and coverage of materials. Expects the bool constants HAS_TEXTURES and HAS_VERTEX_COLORS.
+// Vertex attributes, base colour and coverage of materials. Expects the bool constants HAS_TEXTURES and HAS_VERTEX_COLORS.
 #ifndef CLERESTORY_SCENE_MATERIAL_GLSL
 #define CLERESTORY_SCENE_MATERIAL_GLSL
 
 #include "scene/texture.glsl"
+
+// Exact where all corners are equal: white vertex colours change no bit.
+vec4 interpolate(vec4 a, vec4 b, vec4 c, vec3 w) { return a + (w.y * (b - a) + w.z * (c - a)); }
 
 vec4 material_texture(uint texture_index, vec4 uvs) {
     return HAS_TEXTURES && texture_index != NO_TEXTURE ? sample_texture(texture_index, uvs) : vec4(1.0);

@@ -1,5 +1,5 @@
 // Texture look-ups in f32, without mip levels: exact on every driver, since nothing is left to a sampler's fixed-point weights.
-// Twin of clerestory::transport::texture.
+// Twin of clerestory::scene::texture.
 #ifndef CLERESTORY_SCENE_TEXTURE_GLSL
 #define CLERESTORY_SCENE_TEXTURE_GLSL
 

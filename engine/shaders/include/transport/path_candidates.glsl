@@ -43,11 +43,11 @@ bool accept_candidate(uint triangle, vec2 barycentrics) {
     vec3 w = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
     vec4 uvs = vec4(0.0);
     if (HAS_TEXTURES) {
-        uvs = w.x * scene_uvs[t.vertices.x] + w.y * scene_uvs[t.vertices.y] + w.z * scene_uvs[t.vertices.z];
+        uvs = interpolate(scene_uvs[t.vertices.x], scene_uvs[t.vertices.y], scene_uvs[t.vertices.z], w);
     }
     vec4 color = vec4(1.0);
     if (HAS_VERTEX_COLORS) {
-        color = w.x * scene_colors[t.vertices.x] + w.y * scene_colors[t.vertices.y] + w.z * scene_colors[t.vertices.z];
+        color = interpolate(scene_colors[t.vertices.x], scene_colors[t.vertices.y], scene_colors[t.vertices.z], w);
     }
     float coverage = material_coverage(m, material_base_color(m, uvs, color).a);
     uint bits = pcg4d(pcg4d(candidate_key) + uvec4(triangle, 0u, 0u, 0u)).w;

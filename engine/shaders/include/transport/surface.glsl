@@ -24,8 +24,6 @@ struct Surface {
 };
 
 vec3 interpolate(vec3 a, vec3 b, vec3 c, vec3 w) { return w.x * a + w.y * b + w.z * c; }
-// Exact where all corners are equal: white vertex colours change no bit.
-vec4 interpolate(vec4 a, vec4 b, vec4 c, vec3 w) { return a + (w.y * (b - a) + w.z * (c - a)); }
 
 Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     SceneTriangle triangle = scene_triangles[hit.triangle];

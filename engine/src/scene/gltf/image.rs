@@ -167,6 +167,8 @@ impl Reader<'_> {
 }
 
 /// Translation · rotation · scale as in KHR_texture_transform; its rotation is counter-clockwise with v downwards.
+///
+/// So say the extension's text and its example; its GLSL listing turns the other way, an erratum of the listing (KhronosGroup/glTF 1563).
 pub fn transform_rows(offset: [f32; 2], rotation: f32, scale: [f32; 2]) -> [[f32; 3]; 2] {
     let (sin, cos) = rotation.sin_cos();
     [

@@ -313,6 +313,10 @@ fn textures_have_samplers_and_transforms() {
             "{x} {y}"
         );
     }
+    // Counter-clockwise as seen with v down: u turns towards −v. Rotation follows an unequal scale and precedes the offset.
+    let m = transform_rows([0.25, 0.5], std::f32::consts::FRAC_PI_6, [2.0, 4.0]);
+    let (sin, cos) = std::f32::consts::FRAC_PI_6.sin_cos();
+    assert_eq!(m, [[2.0 * cos, 4.0 * sin, 0.25], [-2.0 * sin, 4.0 * cos, 0.5]]);
 }
 
 #[test]
