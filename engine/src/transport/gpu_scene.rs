@@ -325,16 +325,12 @@ impl SceneBuffers {
     ) -> Result<(Self, LightKinds)> {
         let mut textures = Textures::default();
         let default = Material::default();
-        let placed = materials_by_use(scene, &default);
-        let record = |(material, placed): (&Material, bool)| {
-            // What nothing shows needs no texels either.
-            if placed {
-                textures.material(scene, material)
-            } else {
-                SceneMaterial::default()
-            }
-        };
-        let materials: Vec<_> = placed.into_iter().map(record).collect();
+        let materials: Vec<_> = scene
+            .materials
+            .iter()
+            .chain([&default])
+            .map(|material| textures.material(scene, material))
+            .collect();
         let lights = Lights::collect(scene, profile, &mut geometry, &materials, bounds)?;
         let absent = gpu.buffer_with("absent", Category::Material, &[0u8; 16])?;
         let optional = |name: &str, category, bytes: &[u8]| {
