@@ -66,7 +66,7 @@ impl Tested {
                         IDENTITY,
                         [[-2.0, 0.0, 0.5], [0.0, 4.0, -0.25]],
                         // A rotation by 0.7 radians with unequal scales.
-                        [[1.300_231, -0.386_531, 0.3], [-1.095_170, -0.458_905, -7.1]],
+                        [[1.300_231, -0.386_531, 0.3], [-1.095_17, -0.458_905, -7.1]],
                     ];
                     for transform in transforms {
                         let texture = Texture {
