@@ -144,6 +144,11 @@ impl Bvh2 {
         &self.nodes
     }
 
+    /// Nodes and triangles as the kernels read them, in units of 16 bytes: the one buffer of their set.
+    pub fn packed(&self) -> &[[u32; 4]] {
+        &self.packed
+    }
+
     /// Triangles in leaf order.
     pub fn positions(&self) -> &[[Vec3; 3]] {
         &self.positions

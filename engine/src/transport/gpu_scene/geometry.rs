@@ -1,0 +1,136 @@
+//! All instances of a scene flattened to world space: vertices with what the profile says is used of them, and triangles.
+//!
+//! Transforms are applied in f64 and rounded once; a mirroring one swaps two corners, so that front faces stay front faces. Triangles
+//! keep the order of instances.
+
+use std::collections::BTreeMap;
+
+use glam::{DMat3, Vec3};
+
+use super::NONE;
+use crate::gpu::shaders::types::SceneTriangle;
+use crate::scene::{Scene, SceneProfile};
+use crate::{Error, Result};
+
+/// All instances flattened to world space.
+#[derive(Default)]
+pub(super) struct Geometry {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) normals: Vec<Vec3>,
+    pub(super) uvs: Vec<[f32; 4]>,
+    pub(super) tangents: Vec<[f32; 4]>,
+    pub(super) colors: Vec<[f32; 4]>,
+    pub(super) triangles: Vec<SceneTriangle>,
+}
+
+impl Geometry {
+    pub(super) fn flatten(scene: &Scene, profile: &SceneProfile) -> Result<Self> {
+        let mut all = Self::default();
+        let default_material = scene.materials.len() as u32;
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let base = u32::try_from(all.positions.len() + mesh.positions.len())
+                .map(|end| end - mesh.positions.len() as u32)
+                .map_err(|_| Error::scene(&scene.source, "instances", "place more than 2^32 vertices"))?;
+            let linear = instance.transform.matrix3;
+            // Cofactors transform normals without dividing by a determinant that may be zero.
+            let cofactors = DMat3::from_cols(
+                linear.y_axis.cross(linear.z_axis),
+                linear.z_axis.cross(linear.x_axis),
+                linear.x_axis.cross(linear.y_axis),
+            );
+            let flipped = linear.determinant() < 0.0;
+            let orientation = if flipped { -1.0 } else { 1.0 };
+            let count = mesh.positions.len();
+            all.positions.extend(
+                mesh.positions
+                    .iter()
+                    .map(|p| instance.transform.transform_point3(p.as_dvec3()).as_vec3()),
+            );
+            if profile.has_shading_normals {
+                let normal = |n: &Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3();
+                all.normals.extend(mesh.normals.iter().map(normal));
+                // Zero stands for "flat" in the shader.
+                all.normals.resize(all.positions.len(), Vec3::ZERO);
+            }
+            if profile.has_textures {
+                let uv = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
+                all.uvs.extend((0..count).map(|i| {
+                    let (a, b) = (uv(&mesh.uv0, i), uv(&mesh.uv1, i));
+                    [a.x, a.y, b.x, b.y]
+                }));
+            }
+            if profile.has_normal_maps {
+                let tangent = |t: &glam::Vec4| {
+                    let world = (linear * t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+                    world.extend(t.w * orientation as f32).to_array()
+                };
+                all.tangents.extend(mesh.tangents.iter().map(tangent));
+                all.tangents.resize(all.positions.len(), [0.0; 4]);
+            }
+            if profile.has_vertex_colors {
+                all.colors.extend(mesh.colors.iter().map(|c| c.to_array()));
+                all.colors.resize(all.positions.len(), [1.0; 4]);
+            }
+            let material = mesh.material.unwrap_or(default_material);
+            all.triangles.extend(mesh.triangles.iter().map(|&[a, b, c]| {
+                let (b, c) = if flipped { (c, b) } else { (b, c) };
+                SceneTriangle {
+                    vertices: [base + a, base + b, base + c],
+                    material,
+                    light: NONE,
+                }
+            }));
+        }
+        Ok(all)
+    }
+
+    pub(super) fn corners_of(&self, triangle: &SceneTriangle) -> [Vec3; 3] {
+        triangle.vertices.map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// The corners' bits, whatever their order: equal for triangles that cover the same points.
+    pub(super) fn coincidence_key(&self, triangle: &SceneTriangle) -> [[u32; 3]; 3] {
+        // Adding zero makes both zeros one.
+        let mut place = self
+            .corners_of(triangle)
+            .map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
+        place.sort_unstable();
+        place
+    }
+
+    /// The first triangle in each place where some triangle `emits`.
+    pub(super) fn first_copies(&self, emits: impl Fn(&SceneTriangle) -> bool) -> BTreeMap<[[u32; 3]; 3], usize> {
+        let emitters = self.triangles.iter().filter(|triangle| emits(triangle));
+        let mut first: BTreeMap<_, _> = emitters
+            .map(|triangle| (self.coincidence_key(triangle), self.triangles.len()))
+            .collect();
+        if !first.is_empty() {
+            for (index, triangle) in self.triangles.iter().enumerate() {
+                if let Some(known) = first.get_mut(&self.coincidence_key(triangle)) {
+                    *known = index.min(*known);
+                }
+            }
+        }
+        first
+    }
+
+    pub(super) fn corners(&self) -> Vec<[Vec3; 3]> {
+        self.triangles
+            .iter()
+            .map(|triangle| self.corners_of(triangle))
+            .collect()
+    }
+
+    pub(super) fn bounds(&self) -> [Vec3; 2] {
+        let finite = self.positions.iter().filter(|p| p.is_finite());
+        let (lower, upper) = finite.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
+            (lower.min(*p), upper.max(*p))
+        });
+        if lower.x <= upper.x {
+            [lower, upper]
+        } else {
+            [Vec3::ZERO; 2]
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! Everything that light sampling chooses among, and the probabilities of the choice: by power, as [`lights`](crate::transport::lights)
+//! has it, then by texel of the environment.
+
+use glam::{DVec3, UVec2, Vec3};
+
+use super::LightKinds;
+use super::geometry::Geometry;
+use super::materials::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT};
+use crate::Result;
+use crate::gpu::shaders::transport::path_shade::SceneEnvironment;
+use crate::gpu::shaders::types::{SceneLight, SceneMaterial, SceneTriangle};
+use crate::scene::{Environment, LightKind, Scene, SceneProfile};
+use crate::transport::distribution::build_distribution;
+use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
+use crate::transport::lights::{light_power, triangle_power};
+
+// Kinds of `scene/bindings.glsl`.
+const LIGHT_TRIANGLE: u32 = 0;
+const LIGHT_POINT: u32 = 1;
+const LIGHT_SPOT: u32 = 2;
+const LIGHT_DIRECTIONAL: u32 = 3;
+const LIGHT_ENVIRONMENT: u32 = 4;
+const LIGHT_DARK: u32 = 5;
+
+/// Everything that light sampling chooses among: emissive triangles, lights without area, the environment last.
+pub(super) struct Lights {
+    pub(super) records: Vec<SceneLight>,
+    /// Cumulative probabilities of the lights, then of the environment's texels.
+    pub(super) cdf: Vec<f32>,
+    /// The environment's block: header and texels.
+    pub(super) environment: Vec<u8>,
+    /// Some surface shines that is not among the records.
+    has_unsampled: bool,
+}
+
+impl Lights {
+    pub(super) fn collect(
+        scene: &Scene,
+        profile: &SceneProfile,
+        geometry: &mut Geometry,
+        materials: &[SceneMaterial],
+        [lower, upper]: [Vec3; 2],
+    ) -> Result<Self> {
+        let mut records = Vec::new();
+        let mut powers = Vec::new();
+        let emits = |triangle: &SceneTriangle| {
+            let material = &materials[triangle.material as usize];
+            material.emission.iter().any(|e| *e > 0.0) && material.flags & MATERIAL_UNLIT == 0
+        };
+        let first_copies = geometry.first_copies(emits);
+        let mut has_unsampled = false;
+        for index in 0..geometry.triangles.len() {
+            let triangle = geometry.triangles[index];
+            if !emits(&triangle) {
+                continue;
+            }
+            let material = &materials[triangle.material as usize];
+            let [a, b, c] = geometry.corners_of(&triangle).map(|p| p.as_dvec3());
+            let area = 0.5 * (b - a).cross(c - a).length();
+            // Of triangles in one place rays meet the first that is there, so only the first one may be a light. What is behind one
+            // with alpha shines too, but light sampling cannot tell how much of it: its hits alone count, in full.
+            let first = first_copies
+                .get(&geometry.coincidence_key(&triangle))
+                .copied()
+                .unwrap_or(index);
+            if first != index {
+                let other = geometry.triangles[first];
+                if materials[other.material as usize].flags & (MATERIAL_MASK | MATERIAL_BLEND) != 0 {
+                    has_unsampled |= area > 0.0;
+                } else if other.material == triangle.material {
+                    geometry.triangles[index].light = other.light;
+                }
+                continue;
+            }
+            if area > 0.0 && area.is_finite() {
+                let emission = DVec3::from_array(material.emission.map(f64::from));
+                let double_sided = material.flags & MATERIAL_DOUBLE_SIDED != 0;
+                geometry.triangles[index].light = records.len() as u32;
+                powers.push(luminance(triangle_power(emission, area, double_sided)));
+                records.push(SceneLight {
+                    kind: LIGHT_TRIANGLE,
+                    triangle: index as u32,
+                    ..SceneLight::default()
+                });
+            }
+        }
+        let radius = 0.5 * (upper - lower).as_dvec3().length();
+        for light in &scene.lights {
+            let power = luminance(light_power(&light.kind, radius));
+            if power > 0.0 {
+                powers.push(power);
+                records.push(light_record(&light.kind));
+            }
+        }
+        let mut environment = Vec::new();
+        let mut environment_cdf = Vec::new();
+        if let Some(map) = scene.environment.as_ref().filter(|_| profile.has_environment()) {
+            environment_cdf = environment_distribution(map)?;
+            powers.push(environment_power(map, radius));
+            records.push(SceneLight {
+                kind: LIGHT_ENVIRONMENT,
+                ..SceneLight::default()
+            });
+            // The lights' table has one more entry than there are lights; the texels' begins behind it.
+            environment = environment_block(map, records.len() as u32 + 1);
+        }
+        if has_unsampled && records.is_empty() {
+            // Kernels that know of emission also sample lights: a dark one to choose.
+            powers.push(0.0);
+            records.push(SceneLight {
+                kind: LIGHT_DARK,
+                ..SceneLight::default()
+            });
+        }
+        let mut cdf = if records.is_empty() {
+            Vec::new()
+        } else {
+            build_distribution("lights", &powers)?
+        };
+        cdf.extend(environment_cdf);
+        Ok(Self {
+            records,
+            cdf,
+            environment,
+            has_unsampled,
+        })
+    }
+
+    pub(super) fn kinds(&self) -> LightKinds {
+        let some = |wanted: &[u32]| self.records.iter().any(|light| wanted.contains(&light.kind));
+        LightKinds {
+            area: self.has_unsampled || some(&[LIGHT_TRIANGLE]),
+            punctual: some(&[LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL]),
+            environment: some(&[LIGHT_ENVIRONMENT]),
+        }
+    }
+}
+
+fn light_record(kind: &LightKind) -> SceneLight {
+    match *kind {
+        LightKind::Point { position, intensity } => SceneLight {
+            kind: LIGHT_POINT,
+            position: position.to_array(),
+            strength: intensity.to_array(),
+            ..SceneLight::default()
+        },
+        LightKind::Spot {
+            position,
+            direction,
+            intensity,
+            inner,
+            outer,
+        } => SceneLight {
+            kind: LIGHT_SPOT,
+            position: position.to_array(),
+            direction: direction.to_array(),
+            strength: intensity.to_array(),
+            cos_inner: inner.cos(),
+            cos_outer: outer.cos(),
+            ..SceneLight::default()
+        },
+        LightKind::Directional { direction, irradiance } => SceneLight {
+            kind: LIGHT_DIRECTIONAL,
+            direction: direction.to_array(),
+            strength: irradiance.to_array(),
+            ..SceneLight::default()
+        },
+    }
+}
+
+/// Flux of an environment through the disk of the scene's bounding sphere, as for directional lights.
+fn environment_power(map: &Environment, radius: f64) -> f64 {
+    let mut integral = 0.0;
+    for (row, texels) in map.radiance.chunks(map.width as usize).enumerate() {
+        let solid_angle = environment_texel_solid_angle(UVec2::new(map.width, map.height), row as u32);
+        integral += texels.iter().map(|texel| luminance(texel.as_dvec3())).sum::<f64>() * solid_angle;
+    }
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    integral * f64::from(map.strength) * std::f64::consts::PI * radius * radius
+}
+
+/// The block `SceneEnvironment`: axes, size, where its table begins, texels scaled by the strength.
+fn environment_block(map: &Environment, cdf_base: u32) -> Vec<u8> {
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (map.rotation * axis).to_array());
+    let header = SceneEnvironment {
+        environment_right: axes[0],
+        environment_width: map.width,
+        environment_up: axes[1],
+        environment_height: map.height,
+        environment_back: axes[2],
+        environment_cdf_base: cdf_base,
+    };
+    let mut block = bytemuck::bytes_of(&header).to_vec();
+    for texel in &map.radiance {
+        block.extend_from_slice(bytemuck::bytes_of(&(*texel * map.strength)));
+    }
+    block
+}

@@ -1,0 +1,72 @@
+//! Material records: factors, absorption, and where the textures are.
+
+use super::textures::Textures;
+use crate::gpu::shaders::types::SceneMaterial;
+use crate::scene::{AlphaMode, Material, Scene};
+use crate::transport::fresnel::fresnel_conductor_average;
+
+// Flags of `scene/bindings.glsl`.
+pub(super) const MATERIAL_DOUBLE_SIDED: u32 = 1;
+pub(super) const MATERIAL_UNLIT: u32 = 2;
+const MATERIAL_CONDUCTOR: u32 = 4;
+pub(super) const MATERIAL_MASK: u32 = 8;
+pub(super) const MATERIAL_BLEND: u32 = 16;
+
+/// All materials with whether some instance places them; last the default one, for meshes that have none.
+pub(super) fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> Vec<(&'a Material, bool)> {
+    let mut used = vec![false; scene.materials.len() + 1];
+    for instance in &scene.instances {
+        let material = scene.meshes[instance.mesh as usize].material;
+        used[material.map_or(scene.materials.len(), |index| index as usize)] = true;
+    }
+    scene.materials.iter().chain([default]).zip(used).collect()
+}
+
+/// A material as the kernels read it; its textures join the others.
+pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Material) -> SceneMaterial {
+    let conductor = m.conductor;
+    let flag = |on: bool, bit| if on { bit } else { 0 };
+    let (cutoff, alpha_flag) = match m.alpha_mode {
+        AlphaMode::Opaque => (0.0, 0),
+        AlphaMode::Mask { cutoff } => (cutoff, MATERIAL_MASK),
+        AlphaMode::Blend => (0.0, MATERIAL_BLEND),
+    };
+    let attenuation = m
+        .attenuation_color
+        .as_dvec3()
+        .map(|c| -c.clamp(f64::from(f32::MIN_POSITIVE), 1.0).ln());
+    let attenuation = attenuation / f64::from(m.attenuation_distance);
+    SceneMaterial {
+        base_color: m.base_color.truncate().to_array(),
+        base_alpha: m.base_color.w,
+        emission: m.emission.to_array(),
+        metallic: m.metallic,
+        specular_color: m.specular_color.to_array(),
+        roughness: m.roughness,
+        conductor_eta: conductor.map_or([1.0; 3], |c| c.eta.to_array()),
+        transmission: m.transmission,
+        conductor_k: conductor.map_or([0.0; 3], |c| c.k.to_array()),
+        ior: m.ior,
+        conductor_average: conductor.map_or([0.0; 3], |c| {
+            fresnel_conductor_average(c.eta.as_dvec3(), c.k.as_dvec3())
+                .as_vec3()
+                .to_array()
+        }),
+        specular: m.specular,
+        attenuation: attenuation.as_vec3().to_array(),
+        thickness: m.thickness,
+        alpha_cutoff: cutoff,
+        normal_scale: m.normal_scale,
+        flags: flag(m.double_sided, MATERIAL_DOUBLE_SIDED)
+            | flag(m.unlit, MATERIAL_UNLIT)
+            | flag(conductor.is_some(), MATERIAL_CONDUCTOR)
+            | alpha_flag,
+        base_color_texture: textures.record(scene, m.base_color_texture, true),
+        metallic_roughness_texture: textures.record(scene, m.metallic_roughness_texture, false),
+        emission_texture: textures.record(scene, m.emission_texture, true),
+        normal_texture: textures.record(scene, m.normal_texture, false),
+        specular_texture: textures.record(scene, m.specular_texture, false),
+        specular_color_texture: textures.record(scene, m.specular_color_texture, true),
+        transmission_texture: textures.record(scene, m.transmission_texture, false),
+    }
+}
