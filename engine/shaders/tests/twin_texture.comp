@@ -20,7 +20,7 @@ void main() {
         out4(0u, sample_texture(in_bits(0u), in4(1u)));
         break;
     case 1u:
-        out4(0u, fetch_texel(scene_textures[in_bits(0u)], ivec2(int(in_bits(1u)), int(in_bits(2u)))));
+        out4(0u, fetch_texel(load_texture(in_bits(0u)), ivec2(int(in_bits(1u)), int(in_bits(2u)))));
         break;
     case 2u:
         out_bits(0u, wrap_texel(int(in_bits(0u)), in_bits(1u), in_bits(2u)));

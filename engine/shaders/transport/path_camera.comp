@@ -55,12 +55,10 @@ void main() {
         origin += offset;
         direction = direction * push.focus_distance - offset;
     }
-    rays[slot] = Ray(origin, 0.0, normalize(direction), FAR_AWAY);
-    paths[slot] = PathState(vec3(1.0), 0.0, vec3(0.0), 0u, 1.0, OUTSIDE);
+    store_path(slot, PathState(origin, 0.0, normalize(direction), 0u, vec3(1.0), 1.0));
+    store_gathered(slot, PathGathered(vec3(0.0), OUTSIDE));
     if (WRITE_AOVS) {
-        aovs[slot].filled = 0u;
+        path_aovs[slot].filled = 0u;
     }
-    queue_in[slot] = slot;
-    resume_words[2u * slot] = 0u;
-    resume_words[2u * slot + 1u] = 0u;
+    imageStore(path_queue_in, int(slot), uvec4(slot));
 }

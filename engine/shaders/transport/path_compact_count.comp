@@ -1,5 +1,5 @@
 #version 460
-// Queue compaction, first stage: how many paths of each chunk are alive, and how many shadow rays it traced.
+// Queue compaction, first stage: how many paths of each chunk are alive, and how many have a shadow ray.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -13,12 +13,9 @@ void main() {
         return;
     }
     uvec2 range = chunk_range(chunk, status.active_count);
-    uint alive = 0u;
-    uint shadows = 0u;
+    uvec2 counts = uvec2(0u);
     for (uint place = range.x; place < range.y; ++place) {
-        alive += flags[place] & FLAG_ALIVE;
-        shadows += (flags[place] & FLAG_SHADOW) / FLAG_SHADOW;
+        counts += flagged(place);
     }
-    chunk_counts[2u * chunk] = alive;
-    chunk_counts[2u * chunk + 1u] = shadows;
+    path_chunks[chunk] = counts;
 }

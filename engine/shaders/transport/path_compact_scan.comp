@@ -26,7 +26,7 @@ void main() {
     uint last = min(first + each, chunks);
     uvec2 total = uvec2(0u);
     for (uint chunk = first; chunk < last; ++chunk) {
-        total += uvec2(chunk_counts[2u * chunk], chunk_counts[2u * chunk + 1u]);
+        total += path_chunks[chunk];
     }
     totals[lane] = total;
     memoryBarrierBuffer();
@@ -35,23 +35,27 @@ void main() {
     for (uint other = 0u; other < lane; ++other) {
         before += totals[other];
     }
-    uint offset = before.x;
+    uvec2 offset = before;
     for (uint chunk = first; chunk < last; ++chunk) {
-        uint alive = chunk_counts[2u * chunk];
-        chunk_counts[2u * chunk] = offset;
-        offset += alive;
+        uvec2 counts = path_chunks[chunk];
+        path_chunks[chunk] = offset;
+        offset += counts;
     }
     if (lane == PATH_GROUP - 1u && stalled) {
         // What is recorded for later rounds has the queues in the wrong roles: it must find nothing to do. The host sets these again.
         status.item_groups[0] = 0u;
         status.chunk_groups[0] = 0u;
         status.scatter_groups[0] = 0u;
+        status.shadow_groups[0] = 0u;
     }
     if (lane == PATH_GROUP - 1u && !stalled) {
         uvec2 all = before + total;
         status.scatter_groups[0] = status.chunk_groups[0];
         status.previous_count = count;
         status.active_count = all.x;
+        status.shadow_count = all.y;
+        status.shadow_groups[0] = groups_for(all.y);
+        status.resuming = STALLED_NOT;
         status.item_groups[0] = groups_for(all.x);
         status.chunk_groups[0] = groups_for(chunks_for(all.x));
         status.rounds += count > 0u ? 1u : 0u;

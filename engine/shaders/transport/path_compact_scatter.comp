@@ -1,5 +1,5 @@
 #version 460
-// Queue compaction, third stage: the paths that are alive, in order, to the other queue.
+// Queue compaction, third stage: the paths that are alive to the other queue, and the places with shadow rays to theirs, in order.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -13,10 +13,15 @@ void main() {
         return;
     }
     uvec2 range = chunk_range(chunk, status.previous_count);
-    uint target = chunk_counts[2u * chunk];
+    uvec2 target = path_chunks[chunk];
     for (uint place = range.x; place < range.y; ++place) {
-        if ((flags[place] & FLAG_ALIVE) != 0u) {
-            queue_out[target++] = queue_in[place];
+        uvec2 one = flagged(place);
+        if (one.x != 0u) {
+            imageStore(path_queue_out, int(target.x), imageLoad(path_queue_in, int(place)));
         }
+        if (one.y != 0u) {
+            imageStore(path_shadow_queue, int(target.y), uvec4(place));
+        }
+        target += one;
     }
 }

@@ -43,47 +43,39 @@ vec2 bounce_sample(uint slot, uint bounce, uint dimension) {
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
 
-void main() {
-    uint place = gl_GlobalInvocationID.x;
-    if (status.stalled != STALLED_NOT || place >= status.active_count) {
-        return;
-    }
-    uint slot = queue_in[place];
-    resume_words[2u * place] = 0u;
-    resume_words[2u * place + 1u] = 0u;
-    flags[place] = 0u;
-    Hit hit = hits[place];
-    Ray ray = rays[slot];
-    PathState path = paths[slot];
+// Shades the hit of the path in a slot; true when the path goes on. What it gathers is added to `gathered`.
+bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, inout uint flags) {
+    Hit hit = load_hit(place);
     bool counted = path_set_contains(push.path_set, path.bounce);
 
     if (hit.triangle == NO_HIT) {
         if (HAS_ENVIRONMENT && counted) {
-            vec3 local = world_to_environment(ray.direction);
-            float weight = emission_weight(path.pdf, environment_light_pdf(local));
-            paths[slot].radiance += path.throughput * environment_radiance(local) * weight;
+            SceneEnvironment e = load_environment();
+            vec3 local = world_to_environment(e, path.direction);
+            float weight = emission_weight(path.pdf, environment_light_pdf(e, local));
+            gathered.radiance += path.throughput * environment_radiance(e, local) * weight;
         }
-        return;
+        return false;
     }
 
     Surface s = surface_at(hit, push.scene_lower, push.scene_upper);
-    SceneMaterial m = scene_materials[s.material];
-    vec3 wo = -ray.direction;
+    SceneMaterial m = load_material(s.material);
+    vec3 wo = -path.direction;
     bool front = dot(wo, s.geometric_normal) > 0.0;
     bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
     // A camera inside a solid does not know it until it looks out.
-    uint interior = path.interior == OUTSIDE && solid && !front ? s.material : path.interior;
+    uint interior = gathered.interior == OUTSIDE && solid && !front ? s.material : gathered.interior;
     if (HAS_ATTENUATION) {
         if (interior != OUTSIDE) {
-            path.throughput *= exp(-scene_materials[interior].attenuation * hit.t);
+            path.throughput *= exp(-load_material(interior).attenuation * hit.t);
         }
     }
 
     if ((HAS_AREA_LIGHTS || HAS_UNLIT) && counted) {
         vec3 emission = surface_emission(m, s, wo);
         if (emission != vec3(0.0)) {
-            float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? triangle_light_pdf(s, ray.direction, hit.t) : 0.0;
-            paths[slot].radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
+            float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? triangle_light_pdf(s, path.direction, hit.t) : 0.0;
+            gathered.radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
         }
     }
 
@@ -96,11 +88,11 @@ void main() {
     }
     if (WRITE_AOVS && path.bounce == 0u) {
         vec3 albedo = HAS_CONDUCTOR && (bsdf.flags & BSDF_CONDUCTOR) != 0u ? bsdf.conductor_average : bsdf.base_color;
-        aovs[slot] = PathAov(albedo, hit.t, normal, 1u);
+        path_aovs[slot] = PathAov(albedo, hit.t, normal, 1u);
     }
     bool ends = (HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u) || !path_set_continues(push.path_set, path.bounce);
     if (ends) {
-        return;
+        return false;
     }
     // z of the scattering frame points out of a solid body, and towards the viewer elsewhere.
     vec3 z = dot(outward, facing) < 0.0 ? -normal : normal;
@@ -123,6 +115,8 @@ void main() {
             if (f.rgb != vec3(0.0)) {
                 float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, f.a) : 1.0;
                 ShadowRay ray_to_light;
+                ray_to_light.slot = slot;
+                ray_to_light.bounce = bounce + 1u;
                 vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
                 ray_to_light.ray = Ray(start, 0.0, wi, FAR_AWAY);
                 if (!light.infinite) {
@@ -134,12 +128,10 @@ void main() {
                 uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : OUTSIDE) : interior;
                 if (HAS_ATTENUATION && passed != OUTSIDE && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
-                    ray_to_light.contribution *= exp(-scene_materials[passed].attenuation * way);
+                    ray_to_light.contribution *= exp(-load_material(passed).attenuation * way);
                 }
-                shadow[place] = ray_to_light;
-                flags[place] = FLAG_SHADOW;
-                // Part of the key by which the shadow stage draws the coverage of blended surfaces.
-                paths[slot].bounce = bounce + 1u;
+                store_shadow_ray(place, ray_to_light);
+                flags |= FLAG_SHADOW;
             }
         }
     }
@@ -147,14 +139,14 @@ void main() {
     vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
     BsdfSample scattered = bsdf_sample(bsdf, wo_local, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), mask);
     vec3 wi = scattered.wi.x * x + scattered.wi.y * y + scattered.wi.z * z;
-    if (scattered.flags == 0u || !sides_agree(z, outward, wi)) {
-        return;
-    }
     path.throughput *= scattered.weight;
+    if (scattered.flags == 0u || !sides_agree(z, outward, wi) || path.throughput == vec3(0.0)) {
+        return false;
+    }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
         float eta = wo_local.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
         path.eta_scale *= eta * eta;
-        path.interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
+        gathered.interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
     }
     path.bounce = bounce + 1u;
     if (path.bounce >= push.roulette_start) {
@@ -162,22 +154,33 @@ void main() {
         float survival = min(max(t.x, max(t.y, t.z)), push.roulette_cap);
         // Also ends a path whose throughput is not a number.
         if (!(lobe.y < survival)) {
-            return;
+            return false;
         }
         path.throughput /= survival;
     }
-    vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
+    path.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
     if (HAS_ATTENUATION && solid && dot(wi, s.geometric_normal) < 0.0) {
         // The way through the body that the offset of the start leaves out.
-        path.throughput *= exp(m.attenuation * (distance(start, s.point.position) / dot(wi, s.geometric_normal)));
+        path.throughput *= exp(m.attenuation * (distance(path.origin, s.point.position) / dot(wi, s.geometric_normal)));
     }
-    rays[slot] = Ray(start, 0.0, normalize(wi), FAR_AWAY);
-    paths[slot].throughput = path.throughput;
-    paths[slot].pdf = scattered.pdf;
-    paths[slot].bounce = path.bounce;
-    if (HAS_TRANSMISSION) {
-        paths[slot].eta_scale = path.eta_scale;
-        paths[slot].interior = path.interior;
+    path.direction = normalize(wi);
+    path.pdf = scattered.pdf;
+    store_path(slot, path);
+    return true;
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled != STALLED_NOT || place >= status.active_count) {
+        return;
     }
-    flags[place] |= FLAG_ALIVE;
+    uint slot = imageLoad(path_queue_in, int(place)).x;
+    PathGathered before = load_gathered(slot);
+    PathGathered gathered = before;
+    uint flags = 0u;
+    flags |= shade(slot, place, load_path(slot), gathered, flags) ? FLAG_ALIVE : 0u;
+    if (gathered != before) {
+        store_gathered(slot, gathered);
+    }
+    imageStore(path_flags, int(place), uvec4(flags));
 }

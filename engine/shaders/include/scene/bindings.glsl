@@ -1,101 +1,88 @@
-// The scene on the device: set 2, filled by clerestory::transport::GpuScene. What a scene lacks is a buffer of 16 bytes that no
+// The scene on the device: set 2, filled by clerestory::transport::GpuScene. What a scene lacks is a buffer of one texel that no
 // specialized kernel reads. Triangles are in world space and keep their order in the scene.
+//
+// Everything is read by texel fetches, which software drivers gather for all lanes at once, where they load storage buffers lane by lane and
+// word by word. Records are in quarters (four words); the load functions name their fields, and scene/records.comp tells the host.
 #ifndef CLERESTORY_SCENE_BINDINGS_GLSL
 #define CLERESTORY_SCENE_BINDINGS_GLSL
 
+#extension GL_EXT_samplerless_texture_functions : require
+
+#include "scene/records.glsl"
+
 // descriptor set 2: SceneSet
 
-const uint NO_LIGHT = 0xFFFFFFFFu;
-const uint NO_TEXTURE = 0xFFFFFFFFu;
+layout(set = 2, binding = 0) uniform utextureBuffer scene_triangles;
+layout(set = 2, binding = 1) uniform utextureBuffer scene_vertices;  // by triangle: its vertices' places in the attributes
+layout(set = 2, binding = 2) uniform textureBuffer scene_normals;    // by vertex: xyz
+layout(set = 2, binding = 3) uniform textureBuffer scene_uvs;        // set 0, set 1
+layout(set = 2, binding = 4) uniform textureBuffer scene_tangents;
+layout(set = 2, binding = 5) uniform textureBuffer scene_colors;
+layout(set = 2, binding = 6) uniform utextureBuffer scene_materials;
+layout(set = 2, binding = 7) uniform utextureBuffer scene_textures;
+layout(set = 2, binding = 8) uniform utextureBuffer scene_texels;    // RGBA8
+layout(set = 2, binding = 9) uniform utextureBuffer scene_lights;
+// Cumulative probabilities: of the lights, then (from the environment's cdf_base on) of the environment's texels.
+layout(set = 2, binding = 10) uniform textureBuffer scene_cdf;
+// ENVIRONMENT_HEADER_QUARTERS, then RGB radiance by texel.
+layout(set = 2, binding = 11) uniform textureBuffer scene_environment;
+layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
 
-const uint MATERIAL_DOUBLE_SIDED = 1u;
-const uint MATERIAL_UNLIT = 2u;
-const uint MATERIAL_CONDUCTOR = 4u;
-const uint MATERIAL_MASK = 8u;
-const uint MATERIAL_BLEND = 16u;
+float distribution_cdf(uint index) { return texelFetch(scene_cdf, int(index)).x; }
+float albedo_table(uint index) { return texelFetch(scene_albedo_table, int(index)).x; }
 
-const uint LIGHT_TRIANGLE = 0u;
-const uint LIGHT_POINT = 1u;
-const uint LIGHT_SPOT = 2u;
-const uint LIGHT_DIRECTIONAL = 3u;
-const uint LIGHT_ENVIRONMENT = 4u;
-const uint LIGHT_DARK = 5u;  // stands alone where no light can be chosen
+uvec4 material_quarter(uint material, uint quarter) { return texelFetch(scene_materials, int(MATERIAL_QUARTERS * material + quarter)); }
 
-struct SceneTriangle {
-    uvec3 vertices;
-    uint material;
-    uint light;  // index of its light, or NO_LIGHT
-};
+uint light_count() { return uint(textureSize(scene_lights)) / LIGHT_QUARTERS; }
 
-struct SceneMaterial {
-    vec3 base_color;
-    float base_alpha;
-    vec3 emission;
-    float metallic;
-    vec3 specular_color;
-    float roughness;
-    vec3 conductor_eta;
-    float transmission;
-    vec3 conductor_k;
-    float ior;
-    vec3 conductor_average;
-    float specular;
-    vec3 attenuation;  // absorption coefficient inside, 1/m
-    float thickness;
-    float alpha_cutoff;
-    float normal_scale;
-    uint flags;
-    uint base_color_texture;
-    uint metallic_roughness_texture;
-    uint emission_texture;
-    uint normal_texture;
-    uint specular_texture;
-    uint specular_color_texture;
-    uint transmission_texture;
-};
+SceneTriangle load_triangle(uint index) {
+    int first = int(TRIANGLE_QUARTERS * index);
+    uvec4 q0 = texelFetch(scene_triangles, first);
+    uvec4 q1 = texelFetch(scene_triangles, first + 1);
+    uvec4 q2 = texelFetch(scene_triangles, first + 2);
+    return SceneTriangle(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), q2.w);
+}
 
-struct SceneTexture {
-    vec3 transform_u;  // uv' = (dot(row, (u, v, 1)))
-    uint first_texel;
-    vec3 transform_v;
-    uint size;   // width | height << 16
-    uint flags;  // TEXTURE_*
-};
+// Vertices of a triangle, for its attributes.
+uvec3 load_vertices(uint index) { return texelFetch(scene_vertices, int(index)).xyz; }
 
-struct SceneLight {
-    vec3 position;      // point, spot
-    uint kind;
-    vec3 direction;     // spot axis, direction of travel
-    uint triangle;
-    vec3 strength;      // W/sr, W/m2; unused for triangles and the environment
-    float cos_inner;
-    float cos_outer;
-};
+SceneMaterial load_material(uint index) {
+    vec4 f0 = uintBitsToFloat(material_quarter(index, 0u));
+    vec4 f1 = uintBitsToFloat(material_quarter(index, 1u));
+    vec4 f2 = uintBitsToFloat(material_quarter(index, 2u));
+    vec4 f3 = uintBitsToFloat(material_quarter(index, 3u));
+    vec4 f4 = uintBitsToFloat(material_quarter(index, 4u));
+    vec4 f5 = uintBitsToFloat(material_quarter(index, 5u));
+    vec4 f6 = uintBitsToFloat(material_quarter(index, 6u));
+    uvec4 q7 = material_quarter(index, 7u);
+    uvec4 q8 = material_quarter(index, 8u);
+    uvec4 q9 = material_quarter(index, 9u);
+    return SceneMaterial(f0.xyz, f0.w, f1.xyz, f1.w, f2.xyz, f2.w, f3.xyz, f3.w, f4.xyz, f4.w, f5.xyz, f5.w, f6.xyz, f6.w,
+                         uintBitsToFloat(q7.x), uintBitsToFloat(q7.y), q7.z, q7.w, q8.x, q8.y, q8.z, q8.w, q9.x, q9.y, q9.zw);
+}
 
-layout(set = 2, binding = 0, scalar) restrict readonly buffer ScenePositions { vec3 scene_positions[]; };
-layout(set = 2, binding = 1, scalar) restrict readonly buffer SceneTriangles { SceneTriangle scene_triangles[]; };
-layout(set = 2, binding = 2, scalar) restrict readonly buffer SceneNormals { vec3 scene_normals[]; };
-layout(set = 2, binding = 3, scalar) restrict readonly buffer SceneUvs { vec4 scene_uvs[]; };  // set 0, set 1
-layout(set = 2, binding = 4, scalar) restrict readonly buffer SceneTangents { vec4 scene_tangents[]; };
-layout(set = 2, binding = 5, scalar) restrict readonly buffer SceneColors { vec4 scene_colors[]; };
-layout(set = 2, binding = 6, scalar) restrict readonly buffer SceneMaterials { SceneMaterial scene_materials[]; };
-layout(set = 2, binding = 7, scalar) restrict readonly buffer SceneTextures { SceneTexture scene_textures[]; };
-layout(set = 2, binding = 8, scalar) restrict readonly buffer SceneTexels { uint scene_texels[]; };  // RGBA8
-layout(set = 2, binding = 9, scalar) restrict readonly buffer SceneLights { SceneLight scene_lights[]; };
-// Cumulative probabilities: of the lights, then (from environment_cdf_base on) of the environment's texels.
-layout(set = 2, binding = 10, scalar) restrict readonly buffer SceneCdf { float scene_cdf[]; };
-layout(set = 2, binding = 11, scalar) restrict readonly buffer SceneEnvironment {
-    vec3 environment_right;  // the environment's axes in world space
-    uint environment_width;
-    vec3 environment_up;
-    uint environment_height;
-    vec3 environment_back;
-    uint environment_cdf_base;
-    float environment_texels[];  // RGB radiance
-};
-layout(set = 2, binding = 12, scalar) restrict readonly buffer SceneAlbedoTable { float scene_albedo_table[]; };
+SceneTexture load_texture(uint index) {
+    int first = int(TEXTURE_QUARTERS * index);
+    uvec4 q0 = texelFetch(scene_textures, first);
+    uvec4 q1 = texelFetch(scene_textures, first + 1);
+    uvec4 q2 = texelFetch(scene_textures, first + 2);
+    return SceneTexture(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), q1.w, q2.x, q2.yzw);
+}
 
-float distribution_cdf(uint index) { return scene_cdf[index]; }
-float albedo_table(uint index) { return scene_albedo_table[index]; }
+SceneLight load_light(uint index) {
+    int first = int(LIGHT_QUARTERS * index);
+    uvec4 q0 = texelFetch(scene_lights, first);
+    vec4 q1 = uintBitsToFloat(texelFetch(scene_lights, first + 1));
+    vec4 q2 = uintBitsToFloat(texelFetch(scene_lights, first + 2));
+    vec4 q3 = uintBitsToFloat(texelFetch(scene_lights, first + 3));
+    return SceneLight(q0.x, q0.y, q0.zw, q1.xyz, q1.w, q2.xyz, q2.w, q3.xyz, q3.w);
+}
+
+SceneEnvironment load_environment() {
+    vec4 q0 = texelFetch(scene_environment, 0);
+    vec4 q1 = texelFetch(scene_environment, 1);
+    vec4 q2 = texelFetch(scene_environment, 2);
+    return SceneEnvironment(q0.xyz, floatBitsToUint(q0.w), q1.xyz, floatBitsToUint(q1.w), q2.xyz, floatBitsToUint(q2.w));
+}
 
 #endif

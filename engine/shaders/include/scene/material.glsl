@@ -7,6 +7,10 @@
 // Exact where all corners are equal: white vertex colours change no bit.
 vec4 interpolate(vec4 a, vec4 b, vec4 c, vec3 w) { return a + (w.y * (b - a) + w.z * (c - a)); }
 
+#define interpolate_attribute(ATTRIBUTE, VERTICES, WEIGHTS) \
+    interpolate(texelFetch(ATTRIBUTE, int((VERTICES).x)), texelFetch(ATTRIBUTE, int((VERTICES).y)), \
+                texelFetch(ATTRIBUTE, int((VERTICES).z)), WEIGHTS)
+
 vec4 material_texture(uint texture_index, vec4 uvs) {
     return HAS_TEXTURES && texture_index != NO_TEXTURE ? sample_texture(texture_index, uvs) : vec4(1.0);
 }

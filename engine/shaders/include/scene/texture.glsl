@@ -38,13 +38,13 @@ vec4 fetch_texel(SceneTexture t, ivec2 p) {
     uvec2 size = uvec2(t.size & 0xFFFFu, t.size >> 16u);
     uint x = wrap_texel(p.x, size.x, (t.flags >> TEXTURE_WRAP_U_SHIFT) & WRAP_MASK);
     uint y = wrap_texel(p.y, size.y, (t.flags >> TEXTURE_WRAP_V_SHIFT) & WRAP_MASK);
-    vec4 c = unpackUnorm4x8(scene_texels[t.first_texel + y * size.x + x]);
+    vec4 c = unpackUnorm4x8(texelFetch(scene_texels, int(t.first_texel + y * size.x + x)).x);
     return (t.flags & TEXTURE_SRGB) != 0u ? vec4(linear_from_srgb(c.rgb), c.a) : c;
 }
 
 // The texture at the vertex coordinates `uvs` (set 0, set 1). Coordinates are kept where texel numbers are exact integers.
 vec4 sample_texture(uint index, vec4 uvs) {
-    SceneTexture t = scene_textures[index];
+    SceneTexture t = load_texture(index);
     vec3 uv = vec3((t.flags & TEXTURE_UV1) != 0u ? uvs.zw : uvs.xy, 1.0);
     vec2 size = vec2(float(t.size & 0xFFFFu), float(t.size >> 16u));
     const float limit = 16777216.0;

@@ -20,32 +20,34 @@ struct LightSample {
     bool infinite;       // the far end is a direction only
 };
 
-vec3 world_to_environment(vec3 w) { return vec3(dot(environment_right, w), dot(environment_up, w), dot(environment_back, w)); }
+vec3 world_to_environment(SceneEnvironment e, vec3 w) { return vec3(dot(e.right, w), dot(e.up, w), dot(e.back, w)); }
 
-vec3 environment_texel_radiance(uvec2 texel) {
-    uint i = 3u * (texel.y * environment_width + texel.x);
-    return vec3(environment_texels[i], environment_texels[i + 1u], environment_texels[i + 2u]);
+vec3 environment_to_world(SceneEnvironment e, vec3 local) { return e.right * local.x + e.up * local.y + e.back * local.z; }
+
+uvec2 environment_size(SceneEnvironment e) { return uvec2(e.width, e.height); }
+
+vec3 environment_texel_radiance(SceneEnvironment e, uvec2 texel) {
+    return texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + texel.y * e.width + texel.x)).rgb;
 }
 
 // Bilinear, around in u and clamped at the poles; `local` is in the environment's frame.
-vec3 environment_radiance(vec3 local) {
-    vec2 p = environment_uv(local) * vec2(float(environment_width), float(environment_height)) - 0.5;
+vec3 environment_radiance(SceneEnvironment e, vec3 local) {
+    vec2 p = environment_uv(local) * vec2(environment_size(e)) - 0.5;
     vec2 base = floor(p);
     vec2 w = p - base;
-    int width = int(environment_width);
+    int width = int(e.width);
     uvec2 x = uvec2((ivec2(int(base.x)) + ivec2(width, width + 1)) % width);
-    uvec2 y = uvec2(clamp(ivec2(int(base.y)) + ivec2(0, 1), ivec2(0), ivec2(int(environment_height) - 1)));
-    return mix(mix(environment_texel_radiance(uvec2(x.x, y.x)), environment_texel_radiance(uvec2(x.y, y.x)), w.x),
-               mix(environment_texel_radiance(uvec2(x.x, y.y)), environment_texel_radiance(uvec2(x.y, y.y)), w.x), w.y);
+    uvec2 y = uvec2(clamp(ivec2(int(base.y)) + ivec2(0, 1), ivec2(0), ivec2(int(e.height) - 1)));
+    return mix(mix(environment_texel_radiance(e, uvec2(x.x, y.x)), environment_texel_radiance(e, uvec2(x.y, y.x)), w.x),
+               mix(environment_texel_radiance(e, uvec2(x.x, y.y)), environment_texel_radiance(e, uvec2(x.y, y.y)), w.x), w.y);
 }
 
 // The environment is the last light.
-float environment_choice_probability() { return distribution_probability(0u, scene_lights.length() - 1u); }
+float environment_choice_probability() { return distribution_probability(0u, light_count() - 1u); }
 
 // Density with which light sampling finds a direction in which the environment is seen.
-float environment_light_pdf(vec3 local) {
-    return environment_choice_probability()
-        * environment_pdf(environment_cdf_base, uvec2(environment_width, environment_height), local);
+float environment_light_pdf(SceneEnvironment e, vec3 local) {
+    return environment_choice_probability() * environment_pdf(e.cdf_base, environment_size(e), local);
 }
 
 // Density with which light sampling finds the point of a triangle light that a ray has hit at distance t.
@@ -58,15 +60,15 @@ float triangle_light_pdf(Surface s, vec3 direction, float t) {
 LightSample sample_light(vec3 from, float choice, vec2 u, vec2 within, vec3 scene_lower, vec3 scene_upper) {
     LightSample result = LightSample(vec3(0.0), vec3(0.0), 0.0, SurfacePoint(vec3(0.0), vec3(0.0)), vec3(0.0), false);
     float probability;
-    SceneLight light = scene_lights[distribution_sample(0u, scene_lights.length(), choice, probability)];
+    SceneLight light = load_light(distribution_sample(0u, light_count(), choice, probability));
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         uvec2 texel;
         float pdf;
-        uvec2 size = uvec2(environment_width, environment_height);
-        vec3 local = environment_sample(environment_cdf_base, size, u, within, texel, pdf);
-        result.direction = environment_right * local.x + environment_up * local.y + environment_back * local.z;
+        SceneEnvironment e = load_environment();
+        vec3 local = environment_sample(e.cdf_base, environment_size(e), u, within, texel, pdf);
+        result.direction = environment_to_world(e, local);
         result.pdf = pdf * probability;
-        result.radiance = environment_radiance(local) / result.pdf;
+        result.radiance = environment_radiance(e, local) / result.pdf;
         result.infinite = true;
         return result;
     }
@@ -91,7 +93,7 @@ LightSample sample_light(vec3 from, float choice, vec2 u, vec2 within, vec3 scen
     result.direction = to * inversesqrt(squared);
     if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
         result.pdf = area_to_solid_angle(2.0 * probability / s.double_area, squared, abs(dot(result.normal, result.direction)));
-        SceneMaterial m = scene_materials[s.material];
+        SceneMaterial m = load_material(s.material);
         if (result.pdf > 0.0) {
             result.radiance = surface_emission(m, s, -result.direction) / result.pdf;
         }

@@ -6,6 +6,7 @@
 #define CLERESTORY_TRANSPORT_PATH_CANDIDATES_GLSL
 
 #include "transport/path_buffers.glsl"
+#include "transport/path_dimensions.glsl"
 
 const uint CANDIDATES_EXTEND = 0u;
 const uint CANDIDATES_SHADOW = 1u;
@@ -29,25 +30,27 @@ layout(push_constant, scalar) uniform Push {
 // (pixel, sample, bounce and kind, seed) of the ray under way.
 uvec4 candidate_key;
 
-void begin_candidates(uint slot, uint kind) {
+void begin_candidates(uint slot, uint bounce, uint kind) {
     candidate_key = uvec4(push.first_pixel + slot % push.pixel_count, push.first_sample + slot / push.pixel_count,
-                          paths[slot].bounce * 2u + kind, push.seed);
+                          bounce * 2u + kind, push.seed);
 }
 
 bool accept_candidate(uint triangle, vec2 barycentrics) {
-    SceneTriangle t = scene_triangles[triangle];
-    SceneMaterial m = scene_materials[t.material];
+    SceneMaterial m = load_material(load_triangle(triangle).material);
     if ((m.flags & (MATERIAL_MASK | MATERIAL_BLEND)) == 0u) {
         return true;
     }
     vec3 w = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
     vec4 uvs = vec4(0.0);
-    if (HAS_TEXTURES) {
-        uvs = interpolate(scene_uvs[t.vertices.x], scene_uvs[t.vertices.y], scene_uvs[t.vertices.z], w);
-    }
     vec4 color = vec4(1.0);
-    if (HAS_VERTEX_COLORS) {
-        color = interpolate(scene_colors[t.vertices.x], scene_colors[t.vertices.y], scene_colors[t.vertices.z], w);
+    if (HAS_TEXTURES || HAS_VERTEX_COLORS) {
+        uvec3 v = load_vertices(triangle);
+        if (HAS_TEXTURES) {
+            uvs = interpolate_attribute(scene_uvs, v, w);
+        }
+        if (HAS_VERTEX_COLORS) {
+            color = interpolate_attribute(scene_colors, v, w);
+        }
     }
     float coverage = material_coverage(m, material_base_color(m, uvs, color).a);
     uint bits = pcg4d(pcg4d(candidate_key) + uvec4(triangle, 0u, 0u, 0u)).w;
@@ -55,11 +58,11 @@ bool accept_candidate(uint triangle, vec2 barycentrics) {
 }
 
 #define CLERESTORY_CANDIDATE_FILTER
-#define BEGIN_CANDIDATES(SLOT, KIND) begin_candidates(SLOT, KIND);
+#define BEGIN_CANDIDATES(SLOT, BOUNCE, KIND) begin_candidates(SLOT, BOUNCE, KIND);
 
 #else
 
-#define BEGIN_CANDIDATES(SLOT, KIND)
+#define BEGIN_CANDIDATES(SLOT, BOUNCE, KIND)
 
 #endif
 

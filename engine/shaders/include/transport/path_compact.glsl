@@ -1,5 +1,5 @@
-// Compaction of the path queue in three stages: counts of chunks, a scan of the counts by one workgroup, scatter. Keeps the order, so
-// the queue is the same on every run. Each invocation of the first and last stage walks COMPACT_CHUNK places.
+// Compaction of the path queue, and of the shadow rays, in three stages: counts of chunks, a scan of the counts by one workgroup, scatter. Keeps the order, so
+// the queues are the same on every run. Each invocation of the first and last stage walks COMPACT_CHUNK places.
 #ifndef CLERESTORY_TRANSPORT_PATH_COMPACT_GLSL
 #define CLERESTORY_TRANSPORT_PATH_COMPACT_GLSL
 
@@ -9,6 +9,12 @@
 uvec2 chunk_range(uint chunk, uint count) {
     uint first = min(chunk * COMPACT_CHUNK, count);
     return uvec2(first, min(first + COMPACT_CHUNK, count));
+}
+
+// One each for a path that is alive, and for one with a shadow ray.
+uvec2 flagged(uint place) {
+    uint flags = imageLoad(path_flags, int(place)).x;
+    return uvec2((flags & FLAG_ALIVE) != 0u, (flags & FLAG_SHADOW) != 0u);
 }
 
 uint chunks_for(uint count) { return (count + COMPACT_CHUNK - 1u) / COMPACT_CHUNK; }

@@ -12,19 +12,18 @@ void main() {
     if (status.stalled == STALLED_SHADOW || place >= status.active_count) {
         return;
     }
-    uint resume = resume_words[2u * place];
-    if (resume == BVH2_FINISHED) {
-        return;
+    uint slot = imageLoad(path_queue_in, int(place)).x;
+    PathState path = load_path(slot);
+    BEGIN_CANDIDATES(slot, path.bounce, CANDIDATES_EXTEND)
+    Hit hit = no_hit(FAR_AWAY);
+    uint resume = BVH2_START;
+    if (status.resuming == STALLED_EXTEND) {
+        hit = load_hit(place);
+        resume = imageLoad(path_resume, int(place)).x;
     }
-    Ray ray = rays[queue_in[place]];
-    Hit hit = no_hit(ray.t_max);
-    BEGIN_CANDIDATES(queue_in[place], CANDIDATES_EXTEND)
-    if (resume != BVH2_START) {
-        hit = hits[place];
-    }
-    resume = closest_hit(ray, resume, hit);
-    hits[place] = hit;
-    resume_words[2u * place] = resume;
+    resume = closest_hit(Ray(path.origin, 0.0, path.direction, FAR_AWAY), resume, hit);
+    store_hit(place, hit);
+    imageStore(path_resume, int(place), uvec4(resume));
     if (resume != BVH2_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_EXTEND);

@@ -8,23 +8,26 @@
 
 void main() {
     uint place = gl_GlobalInvocationID.x;
-    if (status.stalled == STALLED_EXTEND || place >= status.active_count || (flags[place] & FLAG_SHADOW) == 0u) {
+    if (status.stalled == STALLED_EXTEND || place >= status.shadow_count) {
         return;
     }
-    uint resume = resume_words[2u * place + 1u];
-    if (resume == BVH2_FINISHED) {
-        return;
-    }
-    ShadowRay s = shadow[place];
+    ShadowRay s = load_shadow_ray(imageLoad(path_shadow_queue, int(place)).x);
+    BEGIN_CANDIDATES(s.slot, s.bounce, CANDIDATES_SHADOW)
     Hit hit = no_hit(s.ray.t_max);
-    BEGIN_CANDIDATES(queue_in[place], CANDIDATES_SHADOW)
+    uint resume = BVH2_START;
+    if (status.resuming == STALLED_SHADOW) {
+        resume = imageLoad(path_resume, int(place)).x;
+    }
+    bool ended = resume == BVH2_FINISHED;
     resume = any_hit(s.ray, resume, hit);
-    resume_words[2u * place + 1u] = resume;
+    imageStore(path_resume, int(place), uvec4(resume));
     if (resume != BVH2_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_SHADOW);
-    } else if (hit.triangle == NO_HIT) {
-        paths[queue_in[place]].radiance += s.contribution;
+    } else if (!ended && hit.triangle == NO_HIT) {
+        PathGathered gathered = load_gathered(s.slot);
+        gathered.radiance += s.contribution;
+        store_gathered(s.slot, gathered);
     }
 }
 

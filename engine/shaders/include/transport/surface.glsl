@@ -11,6 +11,10 @@
 #include "transport/bsdf.glsl"
 #include "transport/shading_normal.glsl"
 
+const uint EXPONENT_BITS = 0x7F800000u;
+// Sum of the exponent bits of a power of two and of its reciprocal.
+const uint RECIPROCAL_EXPONENTS = 0x7F000000u;
+
 struct Surface {
     SurfacePoint point;
     vec3 geometric_normal;  // unit, to the front
@@ -26,20 +30,30 @@ struct Surface {
 vec3 interpolate(vec3 a, vec3 b, vec3 c, vec3 w) { return w.x * a + w.y * b + w.z * c; }
 
 Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
-    SceneTriangle triangle = scene_triangles[hit.triangle];
-    uvec3 v = triangle.vertices;
-    vec3 a = scene_positions[v.x];
-    vec3 b = scene_positions[v.y];
-    vec3 c = scene_positions[v.z];
+    SceneTriangle triangle = load_triangle(hit.triangle);
+    vec3 a = triangle.a;
+    vec3 b = triangle.b;
+    vec3 c = triangle.c;
     vec3 w = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
     Surface s;
     s.point = surface_point(a, b, c, hit.barycentrics, scene_reach(interpolate(a, b, c, w), scene_lower, scene_upper));
-    vec3 normal = cross(b - a, c - a);
-    s.double_area = length(normal);
-    s.geometric_normal = normal / s.double_area;
+    // Scaled by a power of two, so that the squares of small edges do not vanish.
+    vec3 e1 = b - a;
+    vec3 e2 = c - a;
+    float longest = largest_component(max(abs(e1), abs(e2)));
+    float scale = uintBitsToFloat(RECIPROCAL_EXPONENTS - (floatBitsToUint(longest) & EXPONENT_BITS));
+    vec3 normal = cross(scale * e1, scale * e2);
+    float size = length(normal);
+    s.double_area = size / scale / scale;
+    s.geometric_normal = size > 0.0 ? normal / size : vec3(0.0, 0.0, 1.0);
     s.shading_normal = s.geometric_normal;
+    uvec3 v = uvec3(0u);
+    if (HAS_SHADING_NORMALS || HAS_TEXTURES || HAS_NORMAL_MAPS || HAS_VERTEX_COLORS) {
+        v = load_vertices(hit.triangle);
+    }
     if (HAS_SHADING_NORMALS) {
-        vec3 n = interpolate(scene_normals[v.x], scene_normals[v.y], scene_normals[v.z], w);
+        vec3 n = interpolate(texelFetch(scene_normals, int(v.x)).xyz, texelFetch(scene_normals, int(v.y)).xyz,
+                             texelFetch(scene_normals, int(v.z)).xyz, w);
         float squared = dot(n, n);
         if (squared > 0.0) {
             n *= inversesqrt(squared);
@@ -48,15 +62,15 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     }
     s.uvs = vec4(0.0);
     if (HAS_TEXTURES) {
-        s.uvs = interpolate(scene_uvs[v.x], scene_uvs[v.y], scene_uvs[v.z], w);
+        s.uvs = interpolate_attribute(scene_uvs, v, w);
     }
     s.tangent = vec4(0.0);
     if (HAS_NORMAL_MAPS) {
-        s.tangent = interpolate(scene_tangents[v.x], scene_tangents[v.y], scene_tangents[v.z], w);
+        s.tangent = interpolate_attribute(scene_tangents, v, w);
     }
     s.color = vec4(1.0);
     if (HAS_VERTEX_COLORS) {
-        s.color = interpolate(scene_colors[v.x], scene_colors[v.y], scene_colors[v.z], w);
+        s.color = interpolate_attribute(scene_colors, v, w);
     }
     s.material = triangle.material;
     s.light = triangle.light;

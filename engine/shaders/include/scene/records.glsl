@@ -1,0 +1,95 @@
+// Records of a scene in device memory, all of whole quarters (four words), so that four-word texels hold them.
+#ifndef CLERESTORY_SCENE_RECORDS_GLSL
+#define CLERESTORY_SCENE_RECORDS_GLSL
+
+const uint NO_LIGHT = 0xFFFFFFFFu;
+const uint NO_TEXTURE = 0xFFFFFFFFu;
+
+const uint MATERIAL_DOUBLE_SIDED = 1u;
+const uint MATERIAL_UNLIT = 2u;
+const uint MATERIAL_CONDUCTOR = 4u;
+const uint MATERIAL_MASK = 8u;
+const uint MATERIAL_BLEND = 16u;
+
+const uint LIGHT_TRIANGLE = 0u;
+const uint LIGHT_POINT = 1u;
+const uint LIGHT_SPOT = 2u;
+const uint LIGHT_DIRECTIONAL = 3u;
+const uint LIGHT_ENVIRONMENT = 4u;
+const uint LIGHT_DARK = 5u;  // stands alone where no light can be chosen
+
+const uint TRIANGLE_QUARTERS = 3u;
+const uint MATERIAL_QUARTERS = 10u;
+const uint TEXTURE_QUARTERS = 3u;
+const uint LIGHT_QUARTERS = 4u;
+const uint ENVIRONMENT_HEADER_QUARTERS = 3u;
+
+struct SceneTriangle {
+    vec3 a;
+    uint material;
+    vec3 b;
+    uint light;  // index of its light, or NO_LIGHT
+    vec3 c;
+    uint spare;
+};
+
+struct SceneMaterial {
+    vec3 base_color;
+    float base_alpha;
+    vec3 emission;
+    float metallic;
+    vec3 specular_color;
+    float roughness;
+    vec3 conductor_eta;
+    float transmission;
+    vec3 conductor_k;
+    float ior;
+    vec3 conductor_average;
+    float specular;
+    vec3 attenuation;  // absorption coefficient inside, 1/m
+    float thickness;
+    float alpha_cutoff;
+    float normal_scale;
+    uint flags;
+    uint base_color_texture;
+    uint metallic_roughness_texture;
+    uint emission_texture;
+    uint normal_texture;
+    uint specular_texture;
+    uint specular_color_texture;
+    uint transmission_texture;
+    uvec2 spare;
+};
+
+struct SceneTexture {
+    vec3 transform_u;  // uv' = (dot(row, (u, v, 1)))
+    uint first_texel;
+    vec3 transform_v;
+    uint size;   // width | height << 16
+    uint flags;  // TEXTURE_*
+    uvec3 spare;
+};
+
+struct SceneLight {
+    uint kind;
+    uint triangle;
+    uvec2 spare;
+    vec3 position;      // point, spot
+    float cos_inner;
+    vec3 direction;     // spot axis, direction of travel
+    float cos_outer;
+    vec3 strength;      // W/sr, W/m2; unused for triangles and the environment
+    float spare_strength;
+};
+
+// What stands before an environment's texels: its axes in world space, its size, where its probabilities begin.
+struct SceneEnvironment {
+    vec3 right;
+    uint width;
+    vec3 up;
+    uint height;
+    vec3 back;
+    uint cdf_base;
+};
+
+#endif

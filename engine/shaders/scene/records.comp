@@ -1,0 +1,25 @@
+#version 460
+// The layout of the scene's records, for the host: from these blocks the Rust structs are made. Dispatched by a test only, which shows that
+// the load functions find every word of a record where the host writes it.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 1) in;
+
+#include "scene/bindings.glsl"
+
+layout(set = 0, binding = 0, scalar) restrict writeonly buffer SceneRecords {
+    SceneTriangle triangle;
+    SceneMaterial material;
+    SceneTexture texture_record;
+    SceneLight light;
+    SceneEnvironment environment;
+} records;
+
+void main() {
+    records.triangle = load_triangle(0u);
+    records.material = load_material(0u);
+    records.texture_record = load_texture(0u);
+    records.light = load_light(0u);
+    records.environment = load_environment();
+}
