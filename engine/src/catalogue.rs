@@ -104,7 +104,7 @@ const ROWS: &[Row] = &[
             "BG-3",
             "path tracer, surfaces: technique `path`",
             "Kajiya 1986; Veach 1997, chapters 9 and 10; Laine, Karras and Aila 2013",
-            "src/transport/path_tracer.rs",
+            "src/transport/path_tracer/mod.rs",
             PATH_TRACER,
         ))
     },
@@ -199,7 +199,7 @@ const ROWS: &[Row] = &[
         "MET-B8",
         "path estimation: light sampling, BRDF sampling, Russian roulette",
         "Kajiya 1986; Veach 1997, chapters 9 and 10",
-        "src/transport/path_tracer.rs",
+        "src/transport/path_tracer/mod.rs",
         PATH_TRACER,
     )),
     part(

@@ -169,6 +169,15 @@ impl Error {
         }
     }
 
+    /// An error of a setting: the value as given, and why it cannot be.
+    pub fn setting(name: impl Into<String>, value: impl ToString, cause: impl Into<String>) -> Self {
+        Self::Setting {
+            name: name.into(),
+            value: value.to_string(),
+            cause: cause.into(),
+        }
+    }
+
     /// A scene error with its place.
     pub fn scene(file: impl Into<String>, at: impl Into<String>, cause: impl Into<String>) -> Self {
         Self::Scene {

@@ -8,10 +8,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool WRITE_AOVS = true;
 
 #include "transport/path_buffers.glsl"
-#include "film/film_pixel.glsl"
-
-layout(set = 1, binding = 0, scalar) restrict buffer FilmPixels { FilmPixel film_pixels[]; };
-layout(set = 1, binding = 1, scalar) restrict buffer FilmAovs { FilmAov film_aovs[]; };
+#include "film/film_bindings.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first_film_pixel;  // of the wave, within this buffer

@@ -2,6 +2,7 @@
 
 pub mod accumulate;
 pub mod exr;
+pub mod gpu_film;
 pub mod hdr;
 pub mod metrics;
 pub mod picture;
@@ -12,6 +13,7 @@ pub mod z_test;
 mod atomic;
 
 pub use accumulate::{Accumulator, TwoFloat};
+pub use gpu_film::{FilmBand, GpuFilm, Step};
 pub use metrics::{CompareOptions, ErrorReport, compare};
 pub use picture::{Layer, Metadata, NonFinite, Picture};
 pub use tone::{ToneCurve, ToneMap};

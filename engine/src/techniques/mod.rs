@@ -8,10 +8,10 @@ mod path;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::film::Step;
 use crate::film::picture::Picture;
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
-use crate::transport::path_tracer::Step;
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 

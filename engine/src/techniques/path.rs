@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use super::{Bias, Skipped, Technique, TechniqueInfo, settings_from_json};
 use crate::Result;
+use crate::film::Step;
 use crate::film::picture::Picture;
 use crate::gpu::shaders::transport::path_shade;
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
 use crate::transport::PathSet;
-use crate::transport::path_tracer::{PathTracer, PathTracerSettings, Step};
+use crate::transport::path_tracer::{PathTracer, PathTracerSettings};
 
 /// The catalogue's entry.
 pub(super) const INFO: TechniqueInfo = TechniqueInfo {

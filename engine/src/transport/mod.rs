@@ -20,5 +20,7 @@ pub use gpu_scene::GpuScene;
 pub use path_set::PathSet;
 pub use path_tracer::{PathTracer, PathTracerSettings};
 
+mod camera_frame;
+
 #[cfg(test)]
 mod testing;

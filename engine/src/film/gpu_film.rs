@@ -1,0 +1,238 @@
+//! The film on the device: per pixel the sums of radiance, of its square and of the AOVs, which every technique adds to.
+//!
+//! Kernels bind it as set 3 (`shaders/include/film/film_bindings.glsl`) and add in pairs of floats (see [`accumulate`](super::accumulate)),
+//! so sums stay exact for millions of samples. Pixels are split into bands of rows of memory, each with buffers of its own, so that no
+//! picture's size meets `maxStorageBufferRange`. Deterministic as long as each pixel is added to by one invocation at a time, in order.
+
+use super::accumulate::TwoFloat;
+use super::picture::{ALBEDO, DEPTH, NORMAL, Picture, RADIANCE, SAMPLES, VARIANCE};
+use crate::gpu::shaders::film::display;
+use crate::gpu::shaders::sets::FilmSet;
+use crate::gpu::shaders::types::{FilmAov, FilmPixel};
+use crate::gpu::{Buffer, BufferDesc, Category, Gpu, Timings, rw_compute_to_compute};
+use crate::{Error, Result};
+
+/// Pixels of one band.
+const BAND_PIXELS: u32 = 1 << 20;
+
+/// What one step of accumulation has done.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// GPU times of its passes.
+    pub timings: Vec<Timings>,
+    /// Pixel samples finished so far, and wanted in all.
+    pub done: u64,
+    /// See `done`.
+    pub wanted: u64,
+}
+
+/// Sums of samples on the device.
+#[derive(Debug)]
+pub struct GpuFilm {
+    gpu: Gpu,
+    size: [u32; 2],
+    aovs: bool,
+    bands: Vec<FilmBand>,
+}
+
+/// Consecutive pixels, by rows from the top, that share buffers.
+#[derive(Debug)]
+pub struct FilmBand {
+    first_pixel: u32,
+    pixels: u32,
+    sums: Buffer,
+    aovs: Buffer,
+}
+
+impl GpuFilm {
+    /// A cleared film of `size` pixels; `aovs` says whether it also keeps albedo, normal and depth.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a size without pixels or with 2³² or more, [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, size: [u32; 2], aovs: bool) -> Result<Self> {
+        let pixels = match u32::try_from(u64::from(size[0]) * u64::from(size[1])) {
+            Ok(pixels) if pixels > 0 => pixels,
+            _ => {
+                let value = format!("{}x{}", size[0], size[1]);
+                return Err(Error::setting("size", value, "has no pixels, or 2^32 and more"));
+            }
+        };
+        let bands = (0..pixels.div_ceil(BAND_PIXELS))
+            .map(|band| {
+                let first_pixel = band * BAND_PIXELS;
+                FilmBand::new(gpu, first_pixel, (pixels - first_pixel).min(BAND_PIXELS), aovs)
+            })
+            .collect::<Result<_>>()?;
+        let film = Self {
+            gpu: gpu.clone(),
+            size,
+            aovs,
+            bands,
+        };
+        film.clear()?;
+        Ok(film)
+    }
+
+    /// Pixels across and down.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Whether albedo, normal and depth are kept.
+    pub fn has_aovs(&self) -> bool {
+        self.aovs
+    }
+
+    /// The bands, in the order of their pixels.
+    pub fn bands(&self) -> &[FilmBand] {
+        &self.bands
+    }
+
+    /// Forgets all samples.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn clear(&self) -> Result<()> {
+        let mut recorder = self.gpu.recorder("film")?;
+        recorder.pass("film: clear", |pass| {
+            for band in &self.bands {
+                pass.fill(band.sums.view(), 0)?;
+                if self.aovs {
+                    pass.fill(band.aovs.view(), 0)?;
+                }
+            }
+            Ok(())
+        })?;
+        recorder.submit()?.wait()?;
+        Ok(())
+    }
+
+    /// Reads the picture: layers `radiance`, `variance` (of the mean), `samples`, and the AOVs that were asked for; with the number of
+    /// samples that were left out because they were not finite.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn picture(&self) -> Result<(Picture, u64)> {
+        let mut film = Vec::new();
+        let mut aovs: Vec<FilmAov> = Vec::new();
+        for band in &self.bands {
+            film.extend(self.gpu.read::<FilmPixel>(band.sums.view(), band.pixels as usize)?);
+            if self.aovs {
+                aovs.extend(self.gpu.read::<FilmAov>(band.aovs.view(), band.pixels as usize)?);
+            }
+        }
+        let mut picture = Picture::new(self.size[0], self.size[1])?;
+        picture.add_layer(RADIANCE, 3, film.iter().flat_map(|pixel| statistics(pixel).0).collect())?;
+        picture.add_layer(VARIANCE, 3, film.iter().flat_map(|pixel| statistics(pixel).1).collect())?;
+        picture.add_layer(SAMPLES, 1, film.iter().map(|pixel| pixel.samples as f32).collect())?;
+        if self.aovs {
+            let mean = |aov: &FilmAov, i: usize| {
+                let sum = TwoFloat {
+                    hi: aov.sum[i].hi,
+                    lo: aov.sum[i].lo,
+                }
+                .to_f64();
+                (sum / f64::from(aov.hits.max(1))) as f32
+            };
+            let layer = |first: usize| {
+                aovs.iter()
+                    .flat_map(|a| [0, 1, 2].map(|i| mean(a, first + i)))
+                    .collect::<Vec<_>>()
+            };
+            picture.add_layer(ALBEDO, 3, layer(0))?;
+            picture.add_layer(NORMAL, 3, layer(3))?;
+            picture.add_layer(DEPTH, 1, aovs.iter().map(|a| mean(a, 6)).collect())?;
+        }
+        Ok((picture, film.iter().map(|pixel| u64::from(pixel.non_finite)).sum()))
+    }
+
+    /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
+    /// and sRGB-encoded, blue first where `bgra` says so.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
+    pub fn display(&self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        let bytes = 4 * u64::from(self.size[0]) * u64::from(self.size[1]);
+        if target.bytes() < bytes {
+            let cause = format!("has {} bytes; the picture needs {bytes}", target.bytes());
+            return Err(Error::setting("target", target.name(), cause));
+        }
+        let kernel = self.gpu.compute_pipeline::<display::Kernel>(&())?;
+        let mut recorder = self.gpu.recorder("display")?;
+        recorder.pass("film: display", |pass| {
+            for band in &self.bands {
+                let push = display::Push {
+                    first_pixel: band.first_pixel,
+                    pixel_count: band.pixels,
+                    scale: exposure.exp2(),
+                    bgra: bgra.into(),
+                };
+                let set = display::Set0 {
+                    film_pixels: band.sums.view(),
+                    display_pixels: target.view(),
+                };
+                pass.dispatch(&kernel, &[&set], &push, [kernel.groups_for(band.pixels), 1, 1])?;
+                pass.barrier(&[rw_compute_to_compute(target)]);
+            }
+            Ok(())
+        })?;
+        recorder.submit()?.wait()?;
+        Ok(())
+    }
+}
+
+impl FilmBand {
+    fn new(gpu: &Gpu, first_pixel: u32, pixels: u32, aovs: bool) -> Result<Self> {
+        let buffer = |name: &str, bytes: u64| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Film));
+        let aov_bytes = if aovs {
+            u64::from(pixels) * size_of::<FilmAov>() as u64
+        } else {
+            0
+        };
+        Ok(Self {
+            first_pixel,
+            pixels,
+            sums: buffer("film", u64::from(pixels) * size_of::<FilmPixel>() as u64)?,
+            aovs: buffer("film aovs", aov_bytes)?,
+        })
+    }
+
+    /// The picture's pixel that is the band's first.
+    pub fn first_pixel(&self) -> u32 {
+        self.first_pixel
+    }
+
+    /// Number of pixels.
+    pub fn pixels(&self) -> u32 {
+        self.pixels
+    }
+
+    /// Set 3.
+    pub fn set(&self) -> FilmSet<'_> {
+        FilmSet {
+            film_pixels: self.sums.view(),
+            film_aovs: self.aovs.view(),
+        }
+    }
+}
+
+/// Mean and variance of the mean, per channel; zero for a pixel without samples.
+fn statistics(pixel: &FilmPixel) -> ([f32; 3], [f32; 3]) {
+    let n = f64::from(pixel.samples);
+    let value = |pair: &crate::gpu::shaders::types::TwoFloat| {
+        TwoFloat {
+            hi: pair.hi,
+            lo: pair.lo,
+        }
+        .to_f64()
+    };
+    let mean = |c: usize| if n > 0.0 { value(&pixel.sum[c]) / n } else { 0.0 };
+    let variance = |c: usize| {
+        if n > 1.0 {
+            ((value(&pixel.square[c]) / n - mean(c) * mean(c)).max(0.0) / (n - 1.0)) as f32
+        } else {
+            0.0
+        }
+    };
+    ([0, 1, 2].map(|c| mean(c) as f32), [0, 1, 2].map(variance))
+}

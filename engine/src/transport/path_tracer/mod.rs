@@ -1,0 +1,272 @@
+//! The reference path tracer: unidirectional, with next-event estimation and multiple importance sampling, in wavefront stages.
+//!
+//! Sources: BG-2 and BG-3; Kajiya, "The Rendering Equation" (SIGGRAPH 1986); Veach, "Robust Monte Carlo Methods for Light Transport
+//! Simulation" (1997), chapters 9 and 10; wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013).
+//!
+//! Unbiased: paths end by Russian roulette or by the [`PathSet`] alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
+//! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
+//! later dispatch, and samples that are not finite are counted and left out.
+
+mod pipelines;
+mod record;
+mod settings;
+mod wave;
+
+use std::sync::Arc;
+
+use self::pipelines::{Pipelines, camera_pipeline};
+pub use self::settings::PathTracerSettings;
+use self::wave::{Cursor, PATH_GROUP, Status, Wave, WaveBuffers, group_counts, slots_of_device};
+use super::camera_frame::CameraFrame;
+use super::gpu_scene::GpuScene;
+use crate::film::picture::Picture;
+use crate::film::{GpuFilm, Step};
+use crate::gpu::{Access, Buffer, Gpu, PipelineInfo, Timings};
+use crate::scene::Camera;
+use crate::{Error, Result};
+
+/// Bounces recorded into one command buffer; a wave that needs more is submitted again.
+const BOUNCES_PER_SUBMISSION: usize = 12;
+/// `STALLED_SHADOW` of `path_buffers.glsl`.
+const STALLED_SHADOW: u32 = 2;
+/// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
+/// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
+const STALLS_MAX: u32 = 1 << 16;
+
+/// Exact counts of what the device did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct PathCounters {
+    /// Paths begun.
+    pub paths: u64,
+    /// Closest-hit rays.
+    pub extend_rays: u64,
+    /// Shadow rays.
+    pub shadow_rays: u64,
+    /// Waves rendered.
+    pub waves: u64,
+    /// Submissions that ended with rays stopped by the quota, which then went on.
+    pub stalls: u64,
+}
+
+/// A progressive rendering of one view.
+pub struct PathTracer {
+    gpu: Gpu,
+    scene: Arc<GpuScene>,
+    settings: PathTracerSettings,
+    frame: CameraFrame,
+    pipelines: Pipelines,
+    buffers: WaveBuffers,
+    film: GpuFilm,
+    slots: u32,
+    pending: Option<Wave>,
+    cursor: Cursor,
+    counters: PathCounters,
+}
+
+impl PathTracer {
+    /// Prepares a rendering of `size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a setting or size out of range, [`Error::OutOfMemory`], [`Error::MissingFeature`].
+    pub fn new(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: PathTracerSettings,
+    ) -> Result<Self> {
+        settings.check()?;
+        let film = GpuFilm::new(gpu, size, settings.aovs)?;
+        let slots = match settings.paths_in_flight {
+            // A software device works best while a wave's memory stays in the processor's caches.
+            0 if gpu.caps().kind == "cpu" => 1 << 16,
+            0 => 1 << 20,
+            wanted => wanted.next_multiple_of(PATH_GROUP),
+        };
+        let slots = slots.min(slots_of_device(gpu));
+        let frame = CameraFrame::new(camera, size)?;
+        let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
+        let buffers = WaveBuffers::new(gpu, slots, settings.aovs)?;
+        Ok(Self {
+            gpu: gpu.clone(),
+            scene,
+            settings,
+            frame,
+            pipelines,
+            buffers,
+            film,
+            slots,
+            pending: None,
+            cursor: Cursor::default(),
+            counters: PathCounters::default(),
+        })
+    }
+
+    /// Forgets everything gathered so far and looks through another camera.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        let frame = CameraFrame::new(camera, self.film.size())?;
+        self.pipelines.camera = camera_pipeline(&self.gpu, &self.settings, &frame, camera)?;
+        self.frame = frame;
+        self.clear()
+    }
+
+    /// Renders one more wave towards `samples` samples a pixel; `None` when all are there. The first wave also compiles the kernels.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
+    pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        let [width, height] = self.film.size();
+        let wanted = u64::from(samples) * u64::from(width) * u64::from(height);
+        let Some((wave, next)) = self.cursor.next_wave(&self.film, self.slots, samples) else {
+            return Ok(None);
+        };
+        // A wave that fails is rendered again by the next step.
+        let timings = self.run(&wave)?;
+        self.cursor = next;
+        Ok(Some(Step {
+            timings,
+            done: self.cursor.done,
+            wanted,
+        }))
+    }
+
+    /// Renders until every pixel has `samples` samples.
+    ///
+    /// # Errors
+    /// As [`PathTracer::step`].
+    pub fn render(&mut self, samples: u32) -> Result<()> {
+        while self.step(samples)?.is_some() {}
+        Ok(())
+    }
+
+    /// Exact counts since the tracer was made.
+    pub fn counters(&self) -> PathCounters {
+        self.counters
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &PathTracerSettings {
+        &self.settings
+    }
+
+    /// Pixels across and down.
+    pub fn size(&self) -> [u32; 2] {
+        self.film.size()
+    }
+
+    /// The kernels with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.pipelines.info()
+    }
+
+    /// Reads the picture: layers `radiance`, `variance` (of the mean), `samples`, and the AOVs that were asked for; with the number of
+    /// samples that were left out because they were not finite.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn picture(&mut self) -> Result<(Picture, u64)> {
+        self.flush()?;
+        self.film.picture()
+    }
+
+    /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
+    /// and sRGB-encoded, blue first where `bgra` says so.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
+    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        self.flush()?;
+        self.film.display(target, exposure, bgra)
+    }
+
+    fn run(&mut self, wave: &Wave) -> Result<Vec<Timings>> {
+        let paths = wave.pixels * wave.samples;
+        let mut timings = Vec::new();
+        let mut status = Status {
+            active_count: paths,
+            ..Status::default()
+        };
+        let mut first = true;
+        let mut stalls_in_a_row = 0;
+        while first || status.active_count > 0 {
+            let mut recorder = self.gpu.recorder("path wave")?;
+            if let Some(pending) = &self.pending {
+                self.record_resolve(&mut recorder, pending)?;
+            }
+            let resume_shadow = status.stalled == STALLED_SHADOW;
+            // A stalled round leaves no groups to dispatch.
+            let groups = group_counts(status.active_count);
+            (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
+            (status.stalled, status.unfinished) = (0, 0);
+            recorder.pass("path: begin", |pass| {
+                pass.update(self.buffers.status.view(), &[status])?;
+                pass.memory_barrier(
+                    Access::TRANSFER_WRITE | Access::COMPUTE,
+                    Access::COMPUTE | Access::INDIRECT_READ,
+                );
+                Ok(())
+            })?;
+            if first {
+                self.record_camera(&mut recorder, wave)?;
+            }
+            for bounce in 0..BOUNCES_PER_SUBMISSION {
+                let parity = (status.rounds as usize + bounce) % 2;
+                self.record_bounce(&mut recorder, wave, parity, bounce == 0 && resume_shadow)?;
+            }
+            recorder.pass("path: read status", |pass| {
+                pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
+                pass.copy(
+                    self.buffers.status.slice(0, size_of::<Status>() as u64),
+                    self.buffers.readback.view(),
+                )
+            })?;
+            timings.push(recorder.submit()?.wait()?);
+            self.pending = None;
+            let before = status.rounds;
+            status = self.buffers.readback.read::<Status>(0, 1)?[0];
+            if status.stalled != 0 {
+                self.counters.stalls += 1;
+                stalls_in_a_row = if status.rounds == before {
+                    stalls_in_a_row + 1
+                } else {
+                    0
+                };
+                if stalls_in_a_row > STALLS_MAX {
+                    return Err(Error::Overflow {
+                        kernel: "path_extend".into(),
+                        what: "iterations of a ray".into(),
+                        needed: u64::from(stalls_in_a_row) * u64::from(self.settings.ray_quota),
+                        capacity: u64::from(STALLS_MAX) * u64::from(self.settings.ray_quota),
+                        instead: "rebuild the index".into(),
+                    });
+                }
+            }
+            first = false;
+        }
+        let wide = |words: [u32; 2]| u64::from(words[0]) | u64::from(words[1]) << 32;
+        self.counters.paths += u64::from(paths);
+        self.counters.extend_rays += wide(status.extend_rays);
+        self.counters.shadow_rays += wide(status.shadow_rays);
+        self.counters.waves += 1;
+        self.pending = Some(*wave);
+        Ok(timings)
+    }
+
+    /// Adds the last wave to the film.
+    fn flush(&mut self) -> Result<()> {
+        let Some(wave) = self.pending.take() else { return Ok(()) };
+        let mut recorder = self.gpu.recorder("path film")?;
+        self.record_resolve(&mut recorder, &wave)?;
+        recorder.submit()?.wait()?;
+        Ok(())
+    }
+
+    fn clear(&mut self) -> Result<()> {
+        self.pending = None;
+        self.cursor = Cursor::default();
+        self.film.clear()
+    }
+}

@@ -1,0 +1,151 @@
+//! The path tracer's kernels, specialized to what a scene needs.
+
+use super::settings::PathTracerSettings;
+use crate::Result;
+use crate::gpu::shaders::transport::{
+    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_extend_alpha,
+    path_resolve, path_shade, path_shadow, path_shadow_alpha,
+};
+use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
+use crate::scene::Camera;
+use crate::transport::GpuScene;
+use crate::transport::camera_frame::CameraFrame;
+
+/// One kernel a stage.
+pub(super) struct Pipelines {
+    pub camera: ComputePipeline<path_camera::Kernel>,
+    pub trace: TracePipelines,
+    pub shade: ComputePipeline<path_shade::Kernel>,
+    pub count: ComputePipeline<path_compact_count::Kernel>,
+    pub scan: ComputePipeline<path_compact_scan::Kernel>,
+    pub scatter: ComputePipeline<path_compact_scatter::Kernel>,
+    pub resolve: ComputePipeline<path_resolve::Kernel>,
+}
+
+/// Ray kernels, with the alpha test only where a scene has alpha.
+pub(super) enum TracePipelines {
+    Opaque {
+        extend: ComputePipeline<path_extend::Kernel>,
+        shadow: ComputePipeline<path_shadow::Kernel>,
+    },
+    Alpha {
+        extend: ComputePipeline<path_extend_alpha::Kernel>,
+        shadow: ComputePipeline<path_shadow_alpha::Kernel>,
+    },
+}
+
+/// The first stage; it alone depends on the camera.
+pub(super) fn camera_pipeline(
+    gpu: &Gpu,
+    settings: &PathTracerSettings,
+    view: &CameraFrame,
+    camera: &Camera,
+) -> Result<ComputePipeline<path_camera::Kernel>> {
+    gpu.compute_pipeline(&path_camera::Spec {
+        sampler_kind: settings.sampler as u32,
+        has_lens: camera.lens_radius > 0.0 && !view.orthographic,
+        orthographic: view.orthographic,
+        write_aovs: settings.aovs,
+    })
+}
+
+impl Pipelines {
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        settings: &PathTracerSettings,
+        view: &CameraFrame,
+        camera: &Camera,
+    ) -> Result<Self> {
+        let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
+        let shade = path_shade::Spec {
+            has_metal: bsdf.metal,
+            has_conductor: bsdf.conductor,
+            has_specular_layer: bsdf.specular_layer,
+            has_transmission: bsdf.transmission,
+            has_multiple_scattering: bsdf.multiple_scattering && settings.multiple_scattering,
+            separable_masking: settings.separable_masking && (bsdf.metal || bsdf.specular_layer || bsdf.transmission),
+            has_textures: profile.has_textures,
+            has_shading_normals: profile.has_shading_normals,
+            has_normal_maps: profile.has_normal_maps,
+            has_vertex_colors: profile.has_vertex_colors,
+            has_attenuation: profile.has_attenuation,
+            has_unlit: profile.has_unlit,
+            has_environment: profile.has_environment(),
+            has_area_lights: scene.has_area_lights(),
+            has_punctual_lights: scene.has_punctual_lights(),
+            sampler_kind: settings.sampler as u32,
+            write_aovs: settings.aovs,
+            has_alpha: profile.has_alpha(),
+        };
+        Ok(Self {
+            camera: camera_pipeline(gpu, settings, view, camera)?,
+            trace: TracePipelines::new(gpu, scene, settings.ray_quota)?,
+            shade: gpu.compute_pipeline(&shade)?,
+            count: gpu.compute_pipeline(&())?,
+            scan: gpu.compute_pipeline(&())?,
+            scatter: gpu.compute_pipeline(&())?,
+            resolve: gpu.compute_pipeline(&path_resolve::Spec {
+                write_aovs: settings.aovs,
+            })?,
+        })
+    }
+
+    /// The kernels with their specialization.
+    pub fn info(&self) -> Vec<PipelineInfo> {
+        let p = self;
+        let [extend, shadow] = p.trace.info();
+        vec![
+            p.camera.info(),
+            extend,
+            shadow,
+            p.shade.info(),
+            p.count.info(),
+            p.scan.info(),
+            p.scatter.info(),
+            p.resolve.info(),
+        ]
+    }
+}
+
+impl TracePipelines {
+    fn new(gpu: &Gpu, scene: &GpuScene, bvh2_quota: u32) -> Result<Self> {
+        let profile = scene.profile();
+        if !profile.has_alpha() {
+            return Ok(Self::Opaque {
+                extend: gpu.compute_pipeline(&path_extend::Spec {
+                    bvh2_quota,
+                    ..Default::default()
+                })?,
+                shadow: gpu.compute_pipeline(&path_shadow::Spec {
+                    bvh2_quota,
+                    ..Default::default()
+                })?,
+            });
+        }
+        let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
+        let extend = path_extend_alpha::Spec {
+            has_textures,
+            has_vertex_colors,
+            bvh2_quota,
+            ..Default::default()
+        };
+        let shadow = path_shadow_alpha::Spec {
+            has_textures,
+            has_vertex_colors,
+            bvh2_quota,
+            ..Default::default()
+        };
+        Ok(Self::Alpha {
+            extend: gpu.compute_pipeline(&extend)?,
+            shadow: gpu.compute_pipeline(&shadow)?,
+        })
+    }
+
+    fn info(&self) -> [PipelineInfo; 2] {
+        match self {
+            Self::Opaque { extend, shadow } => [extend.info(), shadow.info()],
+            Self::Alpha { extend, shadow } => [extend.info(), shadow.info()],
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! The passes of a wave: what each stage reads, and the barriers between them.
+
+use super::PathTracer;
+use super::pipelines::TracePipelines;
+use super::wave::{Status, Wave};
+use crate::Result;
+use crate::gpu::shaders::transport::{path_camera, path_extend_alpha, path_resolve, path_shade, path_shadow_alpha};
+use crate::gpu::{Access, Pass, Recorder};
+
+impl PathTracer {
+    pub(super) fn record_camera(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {
+        let v = &self.frame;
+        let push = path_camera::Push {
+            origin: v.origin,
+            half_width: v.half_width,
+            right: v.right,
+            half_height: v.half_height,
+            up: v.up,
+            lens_radius: v.lens_radius,
+            forward: v.forward,
+            focus_distance: v.focus_distance,
+            width: self.film.size()[0],
+            height: self.film.size()[1],
+            first_pixel: wave.first_pixel,
+            pixel_count: wave.pixels,
+            first_sample: wave.first_sample,
+            sample_count: wave.samples,
+            seed: self.settings.seed,
+        };
+        recorder.pass("path: camera", |pass| {
+            let groups = self.pipelines.camera.groups_for(wave.pixels * wave.samples);
+            pass.dispatch(&self.pipelines.camera, &[&self.buffers.set(0)], &push, [groups, 1, 1])?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    pub(super) fn record_bounce(
+        &self,
+        recorder: &mut Recorder,
+        wave: &Wave,
+        parity: usize,
+        resume_shadow: bool,
+    ) -> Result<()> {
+        let p = &self.pipelines;
+        let paths = self.buffers.set(parity);
+        let index = self.scene.index_set();
+        let scene = self.scene.scene_set();
+        let (first_pixel, pixel_count, first_sample, seed) =
+            (wave.first_pixel, wave.pixels, wave.first_sample, self.settings.seed);
+        let status = &self.buffers.status;
+        let items = status.slice(std::mem::offset_of!(Status, item_groups) as u64, 12);
+        let chunks = status.slice(std::mem::offset_of!(Status, chunk_groups) as u64, 12);
+        let scatter = status.slice(std::mem::offset_of!(Status, scatter_groups) as u64, 12);
+        if !resume_shadow {
+            recorder.pass("path: extend", |pass| {
+                match &p.trace {
+                    TracePipelines::Opaque { extend, .. } => {
+                        pass.dispatch_indirect(extend, &[&paths, &index], &(), items)?;
+                    }
+                    TracePipelines::Alpha { extend, .. } => {
+                        let push = path_extend_alpha::Push {
+                            first_pixel,
+                            pixel_count,
+                            first_sample,
+                            seed,
+                        };
+                        pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
+                    }
+                }
+                stage_barrier(pass);
+                Ok(())
+            })?;
+            let [lower, upper] = self.scene.bounds();
+            let push = path_shade::Push {
+                scene_lower: lower.to_array(),
+                first_pixel,
+                scene_upper: upper.to_array(),
+                pixel_count,
+                first_sample,
+                seed,
+                path_set: self.settings.path_set.packed(),
+                roulette_start: self.settings.roulette_start,
+                roulette_cap: self.settings.roulette_cap,
+            };
+            recorder.pass("path: shade", |pass| {
+                pass.dispatch_indirect(&p.shade, &[&paths, &scene], &push, items)?;
+                stage_barrier(pass);
+                Ok(())
+            })?;
+        }
+        if self.scene.has_lights() {
+            recorder.pass("path: shadow", |pass| {
+                match &p.trace {
+                    TracePipelines::Opaque { shadow, .. } => {
+                        pass.dispatch_indirect(shadow, &[&paths, &index], &(), items)?;
+                    }
+                    TracePipelines::Alpha { shadow, .. } => {
+                        let push = path_shadow_alpha::Push {
+                            first_pixel,
+                            pixel_count,
+                            first_sample,
+                            seed,
+                        };
+                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, items)?;
+                    }
+                }
+                stage_barrier(pass);
+                Ok(())
+            })?;
+        }
+        recorder.pass("path: compact", |pass| {
+            pass.dispatch_indirect(&p.count, &[&paths], &(), chunks)?;
+            stage_barrier(pass);
+            pass.dispatch(&p.scan, &[&paths], &(), [1, 1, 1])?;
+            stage_barrier(pass);
+            pass.dispatch_indirect(&p.scatter, &[&paths], &(), scatter)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    pub(super) fn record_resolve(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {
+        let band = &self.film.bands()[wave.band];
+        let push = path_resolve::Push {
+            first_film_pixel: wave.first_pixel - band.first_pixel(),
+            pixel_count: wave.pixels,
+            sample_count: wave.samples,
+        };
+        recorder.pass("path: resolve", |pass| {
+            let groups = self.pipelines.resolve.groups_for(wave.pixels);
+            pass.dispatch(
+                &self.pipelines.resolve,
+                &[&self.buffers.set(0), &band.set()],
+                &push,
+                [groups, 1, 1],
+            )?;
+            pass.memory_barrier(
+                Access::COMPUTE,
+                Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,
+            );
+            Ok(())
+        })
+    }
+}
+
+/// What every stage leaves behind is for the next one to read, write or take its arguments from.
+fn stage_barrier(pass: &mut Pass<'_>) {
+    pass.memory_barrier(
+        Access::COMPUTE | Access::INDIRECT_READ,
+        Access::COMPUTE | Access::INDIRECT_READ,
+    );
+}
