@@ -75,6 +75,8 @@ pub enum BindingKind {
     SampledImage,
     /// Uniform texel buffer.
     TexelBuffer,
+    /// Storage texel buffer.
+    StorageTexelBuffer,
 }
 
 /// One specialization constant.

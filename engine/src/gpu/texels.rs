@@ -1,7 +1,8 @@
-//! Texel buffers: buffers that shaders read by typed fetches.
+//! Texel buffers: buffers that shaders read, and write, by typed texels.
 //!
-//! What is gathered at addresses that differ from lane to lane is best read this way: software drivers vectorise texel fetches, but load
-//! storage buffers lane by lane, and the size limit is `maxTexelBufferElements` instead of `maxStorageBufferRange`.
+//! What is gathered at addresses that differ from lane to lane is best kept this way: software drivers vectorise texel fetches and stores,
+//! but access storage buffers lane by lane and word by word, and the size limit is `maxTexelBufferElements` instead of
+//! `maxStorageBufferRange`.
 
 use std::sync::Arc;
 
@@ -32,7 +33,8 @@ pub(super) struct TexelViewInner {
 }
 
 impl Gpu {
-    /// A texel buffer in device memory with the given contents; `data` is rounded up to whole texels.
+    /// A texel buffer in device memory with the given contents, for kernels to read; `data` is rounded up to whole texels, and at least
+    /// one.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] past `maxTexelBufferElements`, and as [`Gpu::buffer`] and [`Gpu::upload`].
@@ -44,26 +46,47 @@ impl Gpu {
         data: &[T],
     ) -> Result<TexelView> {
         let texel = texel_bytes(format).unwrap_or(1);
-        let bytes = (size_of_val(data) as u64).next_multiple_of(texel).max(texel);
+        let texels = (size_of_val(data) as u64).div_ceil(texel);
+        let view = self.texel_view(name, category, format, texels, vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER)?;
+        if !data.is_empty() {
+            self.upload(view.buffer(), 0, data)?;
+        }
+        Ok(view)
+    }
+
+    /// A texel buffer in device memory for kernels to read and write; at least one texel. Its contents are undefined.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] past `maxTexelBufferElements`, and as [`Gpu::buffer`].
+    pub fn storage_texels(&self, name: &str, category: Category, format: vk::Format, texels: u64) -> Result<TexelView> {
+        self.texel_view(name, category, format, texels, vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER)
+    }
+
+    fn texel_view(
+        &self,
+        name: &str,
+        category: Category,
+        format: vk::Format,
+        texels: u64,
+        usage: vk::BufferUsageFlags,
+    ) -> Result<TexelView> {
+        let texels = texels.max(1);
         let limit = self.caps().max_texel_buffer_elements;
-        if bytes / texel > limit {
+        if texels > limit {
             return Err(Error::LimitExceeded {
                 name: name.into(),
-                bytes: bytes / texel,
+                bytes: texels,
                 limit_name: "maxTexelBufferElements",
                 limit,
             });
         }
         let buffer = self.buffer(&BufferDesc {
             name,
-            bytes,
+            bytes: texels * texel_bytes(format).unwrap_or(1),
             residency: Residency::Device,
             category,
-            usage: vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
-                | vk::BufferUsageFlags::TRANSFER_SRC
-                | vk::BufferUsageFlags::TRANSFER_DST,
+            usage: usage | vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST,
         })?;
-        self.upload(&buffer, 0, data)?;
         let gpu = &self.inner;
         let info = vk::BufferViewCreateInfo::default()
             .buffer(buffer.raw())

@@ -25,7 +25,7 @@ layout(set = 2, binding = 9) uniform utextureBuffer scene_lights;
 // Cumulative probabilities: of the lights, then (from the environment's cdf_base on) of the environment's texels.
 layout(set = 2, binding = 10) uniform textureBuffer scene_cdf;
 // ENVIRONMENT_HEADER_QUARTERS, then RGB radiance by texel.
-layout(set = 2, binding = 11) uniform textureBuffer scene_environment;
+layout(set = 2, binding = 11) uniform utextureBuffer scene_environment;
 layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
 
 float distribution_cdf(uint index) { return texelFetch(scene_cdf, int(index)).x; }
@@ -79,10 +79,10 @@ SceneLight load_light(uint index) {
 }
 
 SceneEnvironment load_environment() {
-    vec4 q0 = texelFetch(scene_environment, 0);
-    vec4 q1 = texelFetch(scene_environment, 1);
-    vec4 q2 = texelFetch(scene_environment, 2);
-    return SceneEnvironment(q0.xyz, floatBitsToUint(q0.w), q1.xyz, floatBitsToUint(q1.w), q2.xyz, floatBitsToUint(q2.w));
+    uvec4 q0 = texelFetch(scene_environment, 0);
+    uvec4 q1 = texelFetch(scene_environment, 1);
+    uvec4 q2 = texelFetch(scene_environment, 2);
+    return SceneEnvironment(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), q2.w);
 }
 
 #endif

@@ -27,7 +27,7 @@ vec3 environment_to_world(SceneEnvironment e, vec3 local) { return e.right * loc
 uvec2 environment_size(SceneEnvironment e) { return uvec2(e.width, e.height); }
 
 vec3 environment_texel_radiance(SceneEnvironment e, uvec2 texel) {
-    return texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + texel.y * e.width + texel.x)).rgb;
+    return uintBitsToFloat(texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + texel.y * e.width + texel.x)).rgb);
 }
 
 // Bilinear, around in u and clamped at the poles; `local` is in the environment's frame.

@@ -15,8 +15,9 @@ use crate::{Error, Result};
 /// All instances flattened to world space.
 #[derive(Default)]
 pub(super) struct Geometry {
-    pub(super) positions: Vec<Vec3>,
-    pub(super) normals: Vec<Vec3>,
+    /// Attributes of vertices, and where those of each triangle's corners are; empty without any.
+    pub(super) vertices: Vec<[u32; 4]>,
+    pub(super) normals: Vec<[f32; 4]>,
     pub(super) uvs: Vec<[f32; 4]>,
     pub(super) tangents: Vec<[f32; 4]>,
     pub(super) colors: Vec<[f32; 4]>,
@@ -27,11 +28,19 @@ impl Geometry {
     pub(super) fn flatten(scene: &Scene, profile: &SceneProfile) -> Result<Self> {
         let mut all = Self::default();
         let default_material = scene.materials.len() as u32;
+        let has_attributes = profile.has_shading_normals
+            || profile.has_textures
+            || profile.has_normal_maps
+            || profile.has_vertex_colors;
+        let mut placed = 0u32;
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];
-            let base = u32::try_from(all.positions.len() + mesh.positions.len())
-                .map(|end| end - mesh.positions.len() as u32)
-                .map_err(|_| Error::scene(&scene.source, "instances", "place more than 2^32 vertices"))?;
+            let base = placed;
+            placed = u32::try_from(mesh.positions.len())
+                .ok()
+                .and_then(|count| base.checked_add(count))
+                .ok_or_else(|| Error::scene(&scene.source, "instances", "place more than 2^32 vertices"))?;
+            let end = placed as usize;
             let linear = instance.transform.matrix3;
             // Cofactors transform normals without dividing by a determinant that may be zero.
             let cofactors = DMat3::from_cols(
@@ -41,21 +50,20 @@ impl Geometry {
             );
             let flipped = linear.determinant() < 0.0;
             let orientation = if flipped { -1.0 } else { 1.0 };
-            let count = mesh.positions.len();
-            all.positions.extend(
-                mesh.positions
-                    .iter()
-                    .map(|p| instance.transform.transform_point3(p.as_dvec3()).as_vec3()),
-            );
+            let positions: Vec<_> = mesh
+                .positions
+                .iter()
+                .map(|p| instance.transform.transform_point3(p.as_dvec3()).as_vec3())
+                .collect();
             if profile.has_shading_normals {
                 let normal = |n: &Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3();
-                all.normals.extend(mesh.normals.iter().map(normal));
+                all.normals.extend(mesh.normals.iter().map(|n| normal(n).extend(0.0).to_array()));
                 // Zero stands for "flat" in the shader.
-                all.normals.resize(all.positions.len(), Vec3::ZERO);
+                all.normals.resize(end, [0.0; 4]);
             }
             if profile.has_textures {
                 let uv = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
-                all.uvs.extend((0..count).map(|i| {
+                all.uvs.extend((0..positions.len()).map(|i| {
                     let (a, b) = (uv(&mesh.uv0, i), uv(&mesh.uv1, i));
                     [a.x, a.y, b.x, b.y]
                 }));
@@ -66,35 +74,35 @@ impl Geometry {
                     world.extend(t.w * orientation as f32).to_array()
                 };
                 all.tangents.extend(mesh.tangents.iter().map(tangent));
-                all.tangents.resize(all.positions.len(), [0.0; 4]);
+                all.tangents.resize(end, [0.0; 4]);
             }
             if profile.has_vertex_colors {
                 all.colors.extend(mesh.colors.iter().map(|c| c.to_array()));
-                all.colors.resize(all.positions.len(), [1.0; 4]);
+                all.colors.resize(end, [1.0; 4]);
             }
             let material = mesh.material.unwrap_or(default_material);
-            all.triangles.extend(mesh.triangles.iter().map(|&[a, b, c]| {
+            for &[a, b, c] in &mesh.triangles {
                 let (b, c) = if flipped { (c, b) } else { (b, c) };
-                SceneTriangle {
-                    vertices: [base + a, base + b, base + c],
+                all.triangles.push(SceneTriangle {
+                    a: positions[a as usize].to_array(),
                     material,
+                    b: positions[b as usize].to_array(),
                     light: NONE,
+                    c: positions[c as usize].to_array(),
+                    spare: 0,
+                });
+                if has_attributes {
+                    all.vertices.push([base + a, base + b, base + c, 0]);
                 }
-            }));
+            }
         }
         Ok(all)
     }
 
-    pub(super) fn corners_of(&self, triangle: &SceneTriangle) -> [Vec3; 3] {
-        triangle.vertices.map(|vertex| self.positions[vertex as usize])
-    }
-
     /// The corners' bits, whatever their order: equal for triangles that cover the same points.
-    pub(super) fn coincidence_key(&self, triangle: &SceneTriangle) -> [[u32; 3]; 3] {
+    pub(super) fn coincidence_key(triangle: &SceneTriangle) -> [[u32; 3]; 3] {
         // Adding zero makes both zeros one.
-        let mut place = self
-            .corners_of(triangle)
-            .map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
+        let mut place = corners_of(triangle).map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
         place.sort_unstable();
         place
     }
@@ -103,11 +111,11 @@ impl Geometry {
     pub(super) fn first_copies(&self, emits: impl Fn(&SceneTriangle) -> bool) -> BTreeMap<[[u32; 3]; 3], usize> {
         let emitters = self.triangles.iter().filter(|triangle| emits(triangle));
         let mut first: BTreeMap<_, _> = emitters
-            .map(|triangle| (self.coincidence_key(triangle), self.triangles.len()))
+            .map(|triangle| (Self::coincidence_key(triangle), self.triangles.len()))
             .collect();
         if !first.is_empty() {
             for (index, triangle) in self.triangles.iter().enumerate() {
-                if let Some(known) = first.get_mut(&self.coincidence_key(triangle)) {
+                if let Some(known) = first.get_mut(&Self::coincidence_key(triangle)) {
                     *known = index.min(*known);
                 }
             }
@@ -116,16 +124,13 @@ impl Geometry {
     }
 
     pub(super) fn corners(&self) -> Vec<[Vec3; 3]> {
-        self.triangles
-            .iter()
-            .map(|triangle| self.corners_of(triangle))
-            .collect()
+        self.triangles.iter().map(corners_of).collect()
     }
 
     pub(super) fn bounds(&self) -> [Vec3; 2] {
-        let finite = self.positions.iter().filter(|p| p.is_finite());
-        let (lower, upper) = finite.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
-            (lower.min(*p), upper.max(*p))
+        let corners = self.triangles.iter().flat_map(corners_of).filter(|p| p.is_finite());
+        let (lower, upper) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
+            (lower.min(p), upper.max(p))
         });
         if lower.x <= upper.x {
             [lower, upper]
@@ -133,4 +138,9 @@ impl Geometry {
             [Vec3::ZERO; 2]
         }
     }
+}
+
+/// The corners of a triangle, metres.
+pub(super) fn corners_of(triangle: &SceneTriangle) -> [Vec3; 3] {
+    [triangle.a, triangle.b, triangle.c].map(Vec3::from_array)
 }

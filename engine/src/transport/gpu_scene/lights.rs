@@ -4,11 +4,10 @@
 use glam::{DVec3, UVec2, Vec3};
 
 use super::LightKinds;
-use super::geometry::Geometry;
+use super::geometry::{Geometry, corners_of};
 use super::materials::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT};
 use crate::Result;
-use crate::gpu::shaders::transport::path_shade::SceneEnvironment;
-use crate::gpu::shaders::types::{SceneLight, SceneMaterial, SceneTriangle};
+use crate::gpu::shaders::types::{SceneEnvironment, SceneLight, SceneMaterial, SceneTriangle};
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
 use crate::transport::distribution::build_distribution;
 use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
@@ -55,12 +54,12 @@ impl Lights {
                 continue;
             }
             let material = &materials[triangle.material as usize];
-            let [a, b, c] = geometry.corners_of(&triangle).map(|p| p.as_dvec3());
+            let [a, b, c] = corners_of(&triangle).map(|p| p.as_dvec3());
             let area = 0.5 * (b - a).cross(c - a).length();
             // Of triangles in one place rays meet the first that is there, so only the first one may be a light. What is behind one
             // with alpha shines too, but light sampling cannot tell how much of it: its hits alone count, in full.
             let first = first_copies
-                .get(&geometry.coincidence_key(&triangle))
+                .get(&Geometry::coincidence_key(&triangle))
                 .copied()
                 .unwrap_or(index);
             if first != index {
@@ -183,16 +182,16 @@ fn environment_power(map: &Environment, radius: f64) -> f64 {
 fn environment_block(map: &Environment, cdf_base: u32) -> Vec<u8> {
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (map.rotation * axis).to_array());
     let header = SceneEnvironment {
-        environment_right: axes[0],
-        environment_width: map.width,
-        environment_up: axes[1],
-        environment_height: map.height,
-        environment_back: axes[2],
-        environment_cdf_base: cdf_base,
+        right: axes[0],
+        width: map.width,
+        up: axes[1],
+        height: map.height,
+        back: axes[2],
+        cdf_base: cdf_base,
     };
     let mut block = bytemuck::bytes_of(&header).to_vec();
     for texel in &map.radiance {
-        block.extend_from_slice(bytemuck::bytes_of(&(*texel * map.strength)));
+        block.extend_from_slice(bytemuck::bytes_of(&(*texel * map.strength).extend(0.0)));
     }
     block
 }

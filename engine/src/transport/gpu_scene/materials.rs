@@ -68,5 +68,6 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         specular_texture: textures.record(scene, m.specular_texture, false),
         specular_color_texture: textures.record(scene, m.specular_color_texture, true),
         transmission_texture: textures.record(scene, m.transmission_texture, false),
+        spare: [0; 2],
     }
 }

@@ -1,6 +1,6 @@
 //! A scene on the device: world-space triangles, materials, textures, lights and a ray index, in the buffers of sets 1 and 2.
 //!
-//! What a scene lacks is not allocated: its binding holds a shared buffer of 16 bytes that no specialized kernel reads. Deterministic:
+//! What a scene lacks is not allocated: its binding holds one texel that no specialized kernel reads. Deterministic:
 //! equal scenes give equal bytes.
 
 mod geometry;
@@ -22,7 +22,7 @@ use crate::accel::{IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::sets::{Bvh2Set, SceneSet};
 use crate::gpu::shaders::types::SceneMaterial;
-use crate::gpu::{Buffer, Category, Gpu, TexelView};
+use crate::gpu::{Category, Gpu, TexelView};
 use crate::scene::{Material, Scene, SceneProfile};
 
 /// No light, no texture (`NO_LIGHT`, `NO_TEXTURE` of `scene/bindings.glsl`).
@@ -50,19 +50,19 @@ struct LightKinds {
 
 #[derive(Debug)]
 struct SceneBuffers {
-    positions: Buffer,
-    triangles: Buffer,
-    normals: Buffer,
-    uvs: Buffer,
-    tangents: Buffer,
-    colors: Buffer,
-    materials: Buffer,
-    textures: Buffer,
-    texels: Buffer,
-    lights: Buffer,
-    cdf: Buffer,
-    environment: Buffer,
-    albedo_table: Buffer,
+    triangles: TexelView,
+    vertices: TexelView,
+    normals: TexelView,
+    uvs: TexelView,
+    tangents: TexelView,
+    colors: TexelView,
+    materials: TexelView,
+    textures: TexelView,
+    texels: TexelView,
+    lights: TexelView,
+    cdf: TexelView,
+    environment: TexelView,
+    albedo_table: TexelView,
 }
 
 impl GpuScene {
@@ -151,19 +151,19 @@ impl GpuScene {
     pub fn scene_set(&self) -> SceneSet<'_> {
         let b = &self.buffers;
         SceneSet {
-            scene_positions: b.positions.view(),
-            scene_triangles: b.triangles.view(),
-            scene_normals: b.normals.view(),
-            scene_uvs: b.uvs.view(),
-            scene_tangents: b.tangents.view(),
-            scene_colors: b.colors.view(),
-            scene_materials: b.materials.view(),
-            scene_textures: b.textures.view(),
-            scene_texels: b.texels.view(),
-            scene_lights: b.lights.view(),
-            scene_cdf: b.cdf.view(),
-            scene_environment: b.environment.view(),
-            scene_albedo_table: b.albedo_table.view(),
+            scene_triangles: &b.triangles,
+            scene_vertices: &b.vertices,
+            scene_normals: &b.normals,
+            scene_uvs: &b.uvs,
+            scene_tangents: &b.tangents,
+            scene_colors: &b.colors,
+            scene_materials: &b.materials,
+            scene_textures: &b.textures,
+            scene_texels: &b.texels,
+            scene_lights: &b.lights,
+            scene_cdf: &b.cdf,
+            scene_environment: &b.environment,
+            scene_albedo_table: &b.albedo_table,
         }
     }
 }
@@ -177,48 +177,43 @@ impl SceneBuffers {
         lights: &Lights,
         albedo: &[f32],
     ) -> Result<Self> {
-        let absent = gpu.buffer_with("absent", Category::Material, &[0u8; 16])?;
-        let optional = |name: &str, category, bytes: &[u8]| {
-            if bytes.is_empty() {
+        // One for each kind of component, since a fetch must agree with its format.
+        let [no_words, no_floats] = [vk::Format::R32_UINT, vk::Format::R32_SFLOAT]
+            .map(|format| gpu.texels_with::<u32>("absent", Category::Material, format, &[]));
+        let (no_words, no_floats) = (no_words?, no_floats?);
+        let optional = |name: &str, category, format, data: &[u8], absent: &TexelView| {
+            if data.is_empty() {
                 Ok(absent.clone())
             } else {
-                gpu.buffer_with(name, category, bytes)
+                gpu.texels_with(name, category, format, data)
             }
         };
+        let words = |name: &str, category, data: &[u8]| optional(name, category, vk::Format::R32_UINT, data, &no_words);
+        let quarters = |name: &str, category, data: &[u8]| {
+            optional(name, category, vk::Format::R32G32B32A32_UINT, data, &no_words)
+        };
+        let floats = |name: &str, category, data: &[f32]| {
+            optional(name, category, vk::Format::R32_SFLOAT, bytemuck::cast_slice(data), &no_floats)
+        };
+        let vectors = |name: &str, data: &[[f32; 4]]| {
+            let format = vk::Format::R32G32B32A32_SFLOAT;
+            optional(name, Category::Geometry, format, bytemuck::cast_slice(data), &no_floats)
+        };
+        let [a, b, c] = [Category::Geometry, Category::Material, Category::Light];
         Ok(Self {
-            positions: optional(
-                "positions",
-                Category::Geometry,
-                bytemuck::cast_slice(&geometry.positions),
-            )?,
-            triangles: optional(
-                "triangles",
-                Category::Geometry,
-                bytemuck::cast_slice(&geometry.triangles),
-            )?,
-            normals: optional("normals", Category::Geometry, bytemuck::cast_slice(&geometry.normals))?,
-            uvs: optional(
-                "texture coordinates",
-                Category::Geometry,
-                bytemuck::cast_slice(&geometry.uvs),
-            )?,
-            tangents: optional("tangents", Category::Geometry, bytemuck::cast_slice(&geometry.tangents))?,
-            colors: optional(
-                "vertex colours",
-                Category::Geometry,
-                bytemuck::cast_slice(&geometry.colors),
-            )?,
-            materials: optional("materials", Category::Material, bytemuck::cast_slice(materials))?,
-            textures: optional("textures", Category::Material, bytemuck::cast_slice(&textures.records))?,
-            texels: optional("texels", Category::Material, bytemuck::cast_slice(&textures.texels))?,
-            lights: optional("lights", Category::Light, bytemuck::cast_slice(&lights.records))?,
-            cdf: optional(
-                "light probabilities",
-                Category::Light,
-                bytemuck::cast_slice(&lights.cdf),
-            )?,
-            environment: optional("environment", Category::Light, &lights.environment)?,
-            albedo_table: optional("albedo table", Category::Material, bytemuck::cast_slice(albedo))?,
+            triangles: quarters("triangles", a, bytemuck::cast_slice(&geometry.triangles))?,
+            vertices: quarters("vertices of triangles", a, bytemuck::cast_slice(&geometry.vertices))?,
+            normals: vectors("normals", &geometry.normals)?,
+            uvs: vectors("texture coordinates", &geometry.uvs)?,
+            tangents: vectors("tangents", &geometry.tangents)?,
+            colors: vectors("vertex colours", &geometry.colors)?,
+            materials: quarters("materials", b, bytemuck::cast_slice(materials))?,
+            textures: quarters("textures", b, bytemuck::cast_slice(&textures.records))?,
+            texels: words("texels", b, bytemuck::cast_slice(&textures.texels))?,
+            lights: quarters("lights", c, bytemuck::cast_slice(&lights.records))?,
+            cdf: floats("light probabilities", c, &lights.cdf)?,
+            environment: quarters("environment", c, &lights.environment)?,
+            albedo_table: floats("albedo table", b, albedo)?,
         })
     }
 }

@@ -50,6 +50,7 @@ impl Textures {
             transform_v: texture.transform[1],
             size: image.width | image.height << 16,
             flags,
+            spare: [0; 3],
         };
         let known = self.records.iter().position(|other| *other == record);
         known.unwrap_or_else(|| {

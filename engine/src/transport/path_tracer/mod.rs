@@ -27,7 +27,8 @@ use crate::{Error, Result};
 
 /// Bounces recorded into one command buffer; a wave that needs more is submitted again.
 const BOUNCES_PER_SUBMISSION: usize = 12;
-/// `STALLED_SHADOW` of `path_buffers.glsl`.
+/// `STALLED_NOT` and `STALLED_SHADOW` of `path_buffers.glsl`.
+const STALLED_NOT: u32 = 0;
 const STALLED_SHADOW: u32 = 2;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
 /// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
@@ -86,7 +87,7 @@ impl PathTracer {
         let slots = slots.min(slots_of_device(gpu));
         let frame = CameraFrame::new(camera, size)?;
         let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
-        let buffers = WaveBuffers::new(gpu, slots, settings.aovs)?;
+        let buffers = WaveBuffers::new(gpu, slots, scene.has_lights(), settings.aovs)?;
         Ok(Self {
             gpu: gpu.clone(),
             scene,
@@ -191,16 +192,16 @@ impl PathTracer {
         };
         let mut first = true;
         let mut stalls_in_a_row = 0;
-        while first || status.active_count > 0 {
+        while first || status.active_count > 0 || status.stalled != STALLED_NOT {
             let mut recorder = self.gpu.recorder("path wave")?;
             if let Some(pending) = &self.pending {
                 self.record_resolve(&mut recorder, pending)?;
             }
-            let resume_shadow = status.stalled == STALLED_SHADOW;
             // A stalled round leaves no groups to dispatch.
             let groups = group_counts(status.active_count);
             (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
-            (status.stalled, status.unfinished) = (0, 0);
+            status.shadow_groups = group_counts(status.shadow_count)[0];
+            (status.resuming, status.stalled, status.unfinished) = (status.stalled, STALLED_NOT, 0);
             recorder.pass("path: begin", |pass| {
                 pass.update(self.buffers.status.view(), &[status])?;
                 pass.memory_barrier(
@@ -212,9 +213,11 @@ impl PathTracer {
             if first {
                 self.record_camera(&mut recorder, wave)?;
             }
+            if status.resuming == STALLED_SHADOW {
+                self.record_shadow(&mut recorder, wave, status.rounds as usize % 2)?;
+            }
             for bounce in 0..BOUNCES_PER_SUBMISSION {
-                let parity = (status.rounds as usize + bounce) % 2;
-                self.record_bounce(&mut recorder, wave, parity, bounce == 0 && resume_shadow)?;
+                self.record_bounce(&mut recorder, wave, (status.rounds as usize + bounce) % 2)?;
             }
             recorder.pass("path: read status", |pass| {
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
@@ -227,7 +230,7 @@ impl PathTracer {
             self.pending = None;
             let before = status.rounds;
             status = self.buffers.readback.read::<Status>(0, 1)?[0];
-            if status.stalled != 0 {
+            if status.stalled != STALLED_NOT {
                 self.counters.stalls += 1;
                 stalls_in_a_row = if status.rounds == before {
                     stalls_in_a_row + 1

@@ -5,7 +5,7 @@ use super::pipelines::TracePipelines;
 use super::wave::{Status, Wave};
 use crate::Result;
 use crate::gpu::shaders::transport::{path_camera, path_extend_alpha, path_resolve, path_shade, path_shadow_alpha};
-use crate::gpu::{Access, Pass, Recorder};
+use crate::gpu::{Access, BufferView, Pass, Recorder};
 
 impl PathTracer {
     pub(super) fn record_camera(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {
@@ -35,81 +35,50 @@ impl PathTracer {
         })
     }
 
-    pub(super) fn record_bounce(
-        &self,
-        recorder: &mut Recorder,
-        wave: &Wave,
-        parity: usize,
-        resume_shadow: bool,
-    ) -> Result<()> {
+    /// One bounce: rays, what happens where they arrive, the next queue, and the shadow rays, which decide nothing but what is gathered.
+    pub(super) fn record_bounce(&self, recorder: &mut Recorder, wave: &Wave, parity: usize) -> Result<()> {
         let p = &self.pipelines;
         let paths = self.buffers.set(parity);
-        let index = self.scene.index_set();
-        let scene = self.scene.scene_set();
-        let (first_pixel, pixel_count, first_sample, seed) =
-            (wave.first_pixel, wave.pixels, wave.first_sample, self.settings.seed);
-        let status = &self.buffers.status;
-        let items = status.slice(std::mem::offset_of!(Status, item_groups) as u64, 12);
-        let chunks = status.slice(std::mem::offset_of!(Status, chunk_groups) as u64, 12);
-        let scatter = status.slice(std::mem::offset_of!(Status, scatter_groups) as u64, 12);
-        if !resume_shadow {
-            recorder.pass("path: extend", |pass| {
-                match &p.trace {
-                    TracePipelines::Opaque { extend, .. } => {
-                        pass.dispatch_indirect(extend, &[&paths, &index], &(), items)?;
-                    }
-                    TracePipelines::Alpha { extend, .. } => {
-                        let push = path_extend_alpha::Push {
-                            first_pixel,
-                            pixel_count,
-                            first_sample,
-                            seed,
-                        };
-                        pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
-                    }
+        let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
+        let items = self.groups(std::mem::offset_of!(Status, item_groups));
+        recorder.pass("path: extend", |pass| {
+            match &p.trace {
+                TracePipelines::Opaque { extend, .. } => {
+                    pass.dispatch_indirect(extend, &[&paths, &index], &(), items)?;
                 }
-                stage_barrier(pass);
-                Ok(())
-            })?;
-            let [lower, upper] = self.scene.bounds();
-            let push = path_shade::Push {
-                scene_lower: lower.to_array(),
-                first_pixel,
-                scene_upper: upper.to_array(),
-                pixel_count,
-                first_sample,
-                seed,
-                path_set: self.settings.path_set.packed(),
-                roulette_start: self.settings.roulette_start,
-                roulette_cap: self.settings.roulette_cap,
-            };
-            recorder.pass("path: shade", |pass| {
-                pass.dispatch_indirect(&p.shade, &[&paths, &scene], &push, items)?;
-                stage_barrier(pass);
-                Ok(())
-            })?;
-        }
-        if self.scene.has_lights() {
-            recorder.pass("path: shadow", |pass| {
-                match &p.trace {
-                    TracePipelines::Opaque { shadow, .. } => {
-                        pass.dispatch_indirect(shadow, &[&paths, &index], &(), items)?;
-                    }
-                    TracePipelines::Alpha { shadow, .. } => {
-                        let push = path_shadow_alpha::Push {
-                            first_pixel,
-                            pixel_count,
-                            first_sample,
-                            seed,
-                        };
-                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, items)?;
-                    }
+                TracePipelines::Alpha { extend, .. } => {
+                    let push = path_extend_alpha::Push {
+                        first_pixel: wave.first_pixel,
+                        pixel_count: wave.pixels,
+                        first_sample: wave.first_sample,
+                        seed: self.settings.seed,
+                    };
+                    pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
                 }
-                stage_barrier(pass);
-                Ok(())
-            })?;
-        }
+            }
+            stage_barrier(pass);
+            Ok(())
+        })?;
+        let [lower, upper] = self.scene.bounds();
+        let push = path_shade::Push {
+            scene_lower: lower.to_array(),
+            first_pixel: wave.first_pixel,
+            scene_upper: upper.to_array(),
+            pixel_count: wave.pixels,
+            first_sample: wave.first_sample,
+            seed: self.settings.seed,
+            path_set: self.settings.path_set.packed(),
+            roulette_start: self.settings.roulette_start,
+            roulette_cap: self.settings.roulette_cap,
+        };
+        recorder.pass("path: shade", |pass| {
+            pass.dispatch_indirect(&p.shade, &[&paths, &scene], &push, items)?;
+            stage_barrier(pass);
+            Ok(())
+        })?;
         recorder.pass("path: compact", |pass| {
+            let chunks = self.groups(std::mem::offset_of!(Status, chunk_groups));
+            let scatter = self.groups(std::mem::offset_of!(Status, scatter_groups));
             pass.dispatch_indirect(&p.count, &[&paths], &(), chunks)?;
             stage_barrier(pass);
             pass.dispatch(&p.scan, &[&paths], &(), [1, 1, 1])?;
@@ -117,7 +86,41 @@ impl PathTracer {
             pass.dispatch_indirect(&p.scatter, &[&paths], &(), scatter)?;
             stage_barrier(pass);
             Ok(())
+        })?;
+        self.record_shadow(recorder, wave, parity)
+    }
+
+    /// The shadow rays of the last bounce.
+    pub(super) fn record_shadow(&self, recorder: &mut Recorder, wave: &Wave, parity: usize) -> Result<()> {
+        if !self.scene.has_lights() {
+            return Ok(());
+        }
+        let paths = self.buffers.set(parity);
+        let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
+        let rays = self.groups(std::mem::offset_of!(Status, shadow_groups));
+        recorder.pass("path: shadow", |pass| {
+            match &self.pipelines.trace {
+                TracePipelines::Opaque { shadow, .. } => {
+                    pass.dispatch_indirect(shadow, &[&paths, &index], &(), rays)?;
+                }
+                TracePipelines::Alpha { shadow, .. } => {
+                    let push = path_shadow_alpha::Push {
+                        first_pixel: wave.first_pixel,
+                        pixel_count: wave.pixels,
+                        first_sample: wave.first_sample,
+                        seed: self.settings.seed,
+                    };
+                    pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, rays)?;
+                }
+            }
+            stage_barrier(pass);
+            Ok(())
         })
+    }
+
+    /// Indirect arguments at an offset of the status.
+    fn groups(&self, offset: usize) -> BufferView<'_> {
+        self.buffers.status.slice(offset as u64, size_of::<[u32; 3]>() as u64)
     }
 
     pub(super) fn record_resolve(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {

@@ -7,14 +7,18 @@ use crate::Result;
 use crate::film::GpuFilm;
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::shaders::transport::path_camera;
-use crate::gpu::shaders::types::{Hit, PathAov, PathState, Ray, ShadowRay};
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu};
+use crate::gpu::ash::vk;
+use crate::gpu::shaders::types::PathAov;
+use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 
 /// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
 /// iterations in all.
 const SAMPLES_A_WAVE: u32 = 1024;
 /// Places that one invocation of the compaction kernels handles (`COMPACT_CHUNK`).
 const COMPACT_CHUNK: u32 = 32;
+/// Four-word texels of a slot and of a shadow ray (`PATH_SLOT_QUARTERS`, `PATH_SHADOW_QUARTERS`).
+const PATH_SLOT_QUARTERS: u32 = 4;
+const PATH_SHADOW_QUARTERS: u32 = 3;
 /// Invocations of a workgroup of every stage (`PATH_GROUP`).
 pub(super) const PATH_GROUP: u32 = 64;
 
@@ -43,13 +47,13 @@ pub(super) type Status = path_camera::PathStatusBlock;
 /// Working memory of a wave.
 pub(super) struct WaveBuffers {
     pub status: Buffer,
-    pub queues: [Buffer; 2],
-    pub rays: Buffer,
-    pub states: Buffer,
-    pub hits: Buffer,
-    pub shadow: Buffer,
-    pub flags: Buffer,
-    pub resume: Buffer,
+    pub queues: [TexelView; 2],
+    pub slots: TexelView,
+    pub hits: TexelView,
+    pub shadow_rays: TexelView,
+    pub shadow_queue: TexelView,
+    pub flags: TexelView,
+    pub resume: TexelView,
     pub chunks: Buffer,
     pub aovs: Buffer,
     pub readback: Buffer,
@@ -95,8 +99,7 @@ impl Cursor {
 
 /// Slots that one dispatch reaches and whose largest buffer can be bound, in whole workgroups.
 pub(super) fn slots_of_device(gpu: &Gpu) -> u32 {
-    let slot_bytes = size_of::<PathState>().max(size_of::<ShadowRay>()) as u64;
-    let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
+    let by_range = gpu.caps().max_texel_buffer_elements / u64::from(PATH_SLOT_QUARTERS.max(PATH_SHADOW_QUARTERS));
     let by_groups = u64::from(gpu.caps().max_workgroups) * u64::from(PATH_GROUP);
     let slots = by_range.min(by_groups).min(1 << 22) as u32;
     slots - slots % PATH_GROUP
@@ -108,7 +111,7 @@ pub(super) fn group_counts(places: u32) -> [[u32; 3]; 2] {
 }
 
 impl WaveBuffers {
-    pub fn new(gpu: &Gpu, slots: u32, aovs: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, slots: u32, lights: bool, aovs: bool) -> Result<Self> {
         let work = |name: &str, bytes: usize, count: u32| {
             gpu.buffer(&BufferDesc::storage(
                 name,
@@ -116,20 +119,24 @@ impl WaveBuffers {
                 Category::Work,
             ))
         };
-        let word = size_of::<u32>();
+        let words = |name: &str, count| gpu.storage_texels(name, Category::Work, vk::Format::R32_UINT, u64::from(count));
+        let quarters = |name: &str, each: u32, count: u32| {
+            let texels = u64::from(each) * u64::from(count);
+            gpu.storage_texels(name, Category::Work, vk::Format::R32G32B32A32_UINT, texels)
+        };
+        let lit_slots = if lights { slots } else { 0 };
         let chunks = slots.div_ceil(COMPACT_CHUNK);
         Ok(Self {
             status: work("path status", size_of::<Status>(), 1)?,
-            queues: [work("path queue a", word, slots)?, work("path queue b", word, slots)?],
-            rays: work("path rays", size_of::<Ray>(), slots)?,
-            states: work("path states", size_of::<PathState>(), slots)?,
-            hits: work("path hits", size_of::<Hit>(), slots)?,
-            shadow: work("path shadow rays", size_of::<ShadowRay>(), slots)?,
-            flags: work("path flags", word, slots)?,
-            // One word for the extend and one for the shadow stage.
-            resume: work("path resume", 2 * word, slots)?,
-            // Of each chunk the paths that are alive and the shadow rays.
-            chunks: work("path chunks", 2 * word, chunks)?,
+            queues: [words("path queue a", slots)?, words("path queue b", slots)?],
+            slots: quarters("path slots", PATH_SLOT_QUARTERS, slots)?,
+            hits: quarters("path hits", 1, slots)?,
+            shadow_rays: quarters("path shadow rays", PATH_SHADOW_QUARTERS, lit_slots)?,
+            shadow_queue: words("path shadow queue", lit_slots)?,
+            flags: words("path flags", slots)?,
+            resume: words("path resume", slots)?,
+            // Of each chunk the paths that are alive and those with shadow rays.
+            chunks: work("path chunks", 2 * size_of::<u32>(), chunks)?,
             aovs: work("path aovs", size_of::<PathAov>(), if aovs { slots } else { 0 })?,
             readback: gpu.buffer(&BufferDesc::readback(
                 "path status readback",
@@ -142,14 +149,14 @@ impl WaveBuffers {
     pub fn set(&self, parity: usize) -> PathBuffers<'_> {
         PathBuffers {
             status: self.status.view(),
-            path_queue_in: self.queues[parity].view(),
-            path_queue_out: self.queues[1 - parity].view(),
-            path_rays: self.rays.view(),
-            path_states: self.states.view(),
-            path_hits: self.hits.view(),
-            path_shadow_rays: self.shadow.view(),
-            path_flags: self.flags.view(),
-            path_resume: self.resume.view(),
+            path_queue_in: &self.queues[parity],
+            path_queue_out: &self.queues[1 - parity],
+            path_slots: &self.slots,
+            path_hits: &self.hits,
+            path_shadow_rays: &self.shadow_rays,
+            path_shadow_queue: &self.shadow_queue,
+            path_flags: &self.flags,
+            path_resume: &self.resume,
             path_chunks: self.chunks.view(),
             path_aovs: self.aovs.view(),
         }
