@@ -1,5 +1,6 @@
 #version 460
-// Wavefront path tracer, first stage: camera rays of a wave of pixels × samples, one slot each (slot = sample × pixels + pixel).
+// Wavefront path tracer, first stage: camera rays of a wave of pixels × samples, one slot each (slot = pixel × samples + sample, so that the rays of a subgroup
+// stay together).
 //
 // Pixel filter: a box of one pixel. Thin lens of a disk aperture. Deterministic in (seed, pixel, sample).
 #extension GL_GOOGLE_include_directive : require
@@ -40,8 +41,8 @@ void main() {
     if (slot >= push.pixel_count * push.sample_count) {
         return;
     }
-    uint pixel = push.first_pixel + slot % push.pixel_count;
-    Sampler s = Sampler(pixel, push.first_sample + slot / push.pixel_count, DIMENSION_PIXEL, push.seed);
+    uint pixel = push.first_pixel + slot / push.sample_count;
+    Sampler s = Sampler(pixel, push.first_sample + slot % push.sample_count, DIMENSION_PIXEL, push.seed);
     vec2 position = vec2(float(pixel % push.width), float(pixel / push.width)) + sample_2d(s);
     vec2 plane = vec2(2.0 * position.x / float(push.width) - 1.0, 1.0 - 2.0 * position.y / float(push.height))
         * vec2(push.half_width, push.half_height);

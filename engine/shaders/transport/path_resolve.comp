@@ -24,7 +24,7 @@ void main() {
     uint target = push.first_film_pixel + pixel;
     FilmPixel film = film_pixels[target];
     for (uint i = 0u; i < push.sample_count; ++i) {
-        vec3 radiance = load_gathered(i * push.pixel_count + pixel).radiance;
+        vec3 radiance = load_gathered(pixel * push.sample_count + i).radiance;
         if (any(isnan(radiance)) || any(isinf(radiance))) {
             film.non_finite += 1u;
             continue;
@@ -39,7 +39,7 @@ void main() {
     if (WRITE_AOVS) {
         FilmAov aov = film_aovs[target];
         for (uint i = 0u; i < push.sample_count; ++i) {
-            PathAov a = path_aovs[i * push.pixel_count + pixel];
+            PathAov a = path_aovs[pixel * push.sample_count + i];
             if (a.filled == 0u) {
                 continue;
             }

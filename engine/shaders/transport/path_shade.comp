@@ -20,8 +20,8 @@ layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
     uint first_pixel;
     vec3 scene_upper;
-    uint pixel_count;
     uint first_sample;
+    uint sample_count;
     uint seed;
     uint path_set;          // PathSet, packed
     uint roulette_start;    // first bounce at which Russian roulette may end a path
@@ -31,8 +31,8 @@ layout(push_constant, scalar) uniform Push {
 // Draws of the current bounce.
 Sampler bounce_sampler(uint slot, uint bounce, uint dimension) {
     uint first = DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_A_BOUNCE;
-    uint pixel = push.first_pixel + slot % push.pixel_count;
-    return Sampler(pixel, push.first_sample + slot / push.pixel_count, first + dimension, push.seed);
+    uint pixel = push.first_pixel + slot / push.sample_count;
+    return Sampler(pixel, push.first_sample + slot % push.sample_count, first + dimension, push.seed);
 }
 
 vec2 bounce_sample(uint slot, uint bounce, uint dimension) {

@@ -22,8 +22,8 @@ layout(constant_id = 9) const bool HAS_VERTEX_COLORS = true;
 
 layout(push_constant, scalar) uniform Push {
     uint first_pixel;
-    uint pixel_count;
     uint first_sample;
+    uint sample_count;
     uint seed;
 } push;
 
@@ -31,7 +31,7 @@ layout(push_constant, scalar) uniform Push {
 uvec4 candidate_key;
 
 void begin_candidates(uint slot, uint bounce, uint kind) {
-    candidate_key = uvec4(push.first_pixel + slot % push.pixel_count, push.first_sample + slot / push.pixel_count,
+    candidate_key = uvec4(push.first_pixel + slot / push.sample_count, push.first_sample + slot % push.sample_count,
                           bounce * 2u + kind, push.seed);
 }
 

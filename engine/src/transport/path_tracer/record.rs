@@ -49,8 +49,8 @@ impl PathTracer {
                 TracePipelines::Alpha { extend, .. } => {
                     let push = path_extend_alpha::Push {
                         first_pixel: wave.first_pixel,
-                        pixel_count: wave.pixels,
                         first_sample: wave.first_sample,
+                        sample_count: wave.samples,
                         seed: self.settings.seed,
                     };
                     pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
@@ -64,8 +64,8 @@ impl PathTracer {
             scene_lower: lower.to_array(),
             first_pixel: wave.first_pixel,
             scene_upper: upper.to_array(),
-            pixel_count: wave.pixels,
             first_sample: wave.first_sample,
+            sample_count: wave.samples,
             seed: self.settings.seed,
             path_set: self.settings.path_set.packed(),
             roulette_start: self.settings.roulette_start,
@@ -106,8 +106,8 @@ impl PathTracer {
                 TracePipelines::Alpha { shadow, .. } => {
                     let push = path_shadow_alpha::Push {
                         first_pixel: wave.first_pixel,
-                        pixel_count: wave.pixels,
                         first_sample: wave.first_sample,
+                        sample_count: wave.samples,
                         seed: self.settings.seed,
                     };
                     pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, rays)?;

@@ -14,6 +14,8 @@ use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 /// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
 /// iterations in all.
 const SAMPLES_A_WAVE: u32 = 1024;
+/// Samples of a pixel that are best under way together, in neighbouring lanes.
+const SAMPLES_TOGETHER: u32 = 8;
 /// Places that one invocation of the compaction kernels handles (`COMPACT_CHUNK`).
 const COMPACT_CHUNK: u32 = 32;
 /// Four-word texels of a slot and of a shadow ray (`PATH_SLOT_QUARTERS`, `PATH_SHADOW_QUARTERS`).
@@ -38,6 +40,8 @@ pub(super) struct Cursor {
     pub band: usize,
     pub pixel_in_band: u32,
     pub sample: u32,
+    /// Samples of each pixel in the waves of this pass over the picture.
+    pub samples: u32,
     pub done: u64,
 }
 
@@ -68,20 +72,18 @@ impl Cursor {
         }
         let bands = film.bands();
         let band = &bands[c.band];
-        let pixels = (band.pixels() - c.pixel_in_band).min(slots);
-        // Several samples of a pixel share a wave only where all of the picture fits.
-        let whole = bands.len() == 1 && pixels == band.pixels();
-        let wave_samples = if whole {
-            (slots / pixels).clamp(1, SAMPLES_A_WAVE).min(samples - c.sample)
-        } else {
-            1
-        };
+        if c.band == 0 && c.pixel_in_band == 0 {
+            // As many as fit with the whole picture, else as many as there are already, so that a picture is complete early.
+            let whole = if bands.len() == 1 { slots / band.pixels() } else { 0 };
+            c.samples = whole.max(c.sample.clamp(1, SAMPLES_TOGETHER)).min(SAMPLES_A_WAVE).min(samples - c.sample);
+        }
+        let pixels = (band.pixels() - c.pixel_in_band).min(slots / c.samples);
         let wave = Wave {
             band: c.band,
             first_pixel: band.first_pixel() + c.pixel_in_band,
             pixels,
             first_sample: c.sample,
-            samples: wave_samples,
+            samples: c.samples,
         };
         c.pixel_in_band += pixels;
         if c.pixel_in_band == band.pixels() {
@@ -90,9 +92,9 @@ impl Cursor {
         }
         if c.band == bands.len() {
             c.band = 0;
-            c.sample += wave_samples;
+            c.sample += c.samples;
         }
-        c.done += u64::from(pixels) * u64::from(wave_samples);
+        c.done += u64::from(pixels) * u64::from(wave.samples);
         Some((wave, c))
     }
 }
