@@ -188,7 +188,6 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
             Resource::StorageImage { .. } => "StorageImage",
             Resource::SampledImage => "SampledImage",
             Resource::TexelBuffer => "TexelBuffer",
-            Resource::StorageTexelBuffer { .. } => "StorageTexelBuffer",
         };
         let (reads, writes) = access(&binding.resource);
         let _ = writeln!(
@@ -333,7 +332,7 @@ fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {
             Resource::Uniform { block } => ("BufferView<'a>", block.name.clone()),
             Resource::StorageImage { .. } => ("&'a Image", "storage image".into()),
             Resource::SampledImage => ("SampledView<'a>", "sampled image".into()),
-            Resource::TexelBuffer | Resource::StorageTexelBuffer { .. } => ("&'a TexelView", "texel buffer".into()),
+            Resource::TexelBuffer => ("&'a TexelView", "texel buffer".into()),
         };
         let mode = match access(&binding.resource) {
             (true, false) => "read",
@@ -356,7 +355,7 @@ fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {
             Resource::Storage { .. } | Resource::Uniform { .. } => "Buffer",
             Resource::StorageImage { .. } => "StorageImage",
             Resource::SampledImage => "Sampled",
-            Resource::TexelBuffer | Resource::StorageTexelBuffer { .. } => "Texels",
+            Resource::TexelBuffer => "Texels",
         };
         let _ = writeln!(
             text,

@@ -82,11 +82,6 @@ pub enum Resource {
     SampledImage,
     /// A buffer read texel by texel (`utextureBuffer`).
     TexelBuffer,
-    /// A buffer read and written texel by texel (`uimageBuffer`).
-    StorageTexelBuffer {
-        reads: bool,
-        writes: bool,
-    },
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -286,15 +281,11 @@ impl Reader {
             (StorageClass::Uniform, Op::TypeStruct) => Resource::Uniform {
                 block: self.structure(pointee)?,
             },
-            (_, Op::TypeImage) => {
-                let reads = self.decoration(id, Decoration::NonReadable).is_none();
-                let writes = self.decoration(id, Decoration::NonWritable).is_none();
-                match (self.is_buffer_image(pointee), self.is_storage_image(pointee)) {
-                    (true, true) => Resource::StorageTexelBuffer { reads, writes },
-                    (true, false) => Resource::TexelBuffer,
-                    (false, _) => Resource::StorageImage { reads, writes },
-                }
-            }
+            (_, Op::TypeImage) if self.is_texel_buffer(pointee) => Resource::TexelBuffer,
+            (_, Op::TypeImage) => Resource::StorageImage {
+                reads: self.decoration(id, Decoration::NonReadable).is_none(),
+                writes: self.decoration(id, Decoration::NonWritable).is_none(),
+            },
             (_, Op::TypeSampledImage) => Resource::SampledImage,
             (_, other) => return Err(format!("{name}: a binding of kind {other:?} is not supported")),
         };
@@ -312,15 +303,10 @@ impl Reader {
         })
     }
 
-    fn is_buffer_image(&self, image: u32) -> bool {
+    /// An image of dimension `Buffer` that is read through texel fetches.
+    fn is_texel_buffer(&self, image: u32) -> bool {
         self.definition(image)
             .is_ok_and(|definition| definition.operands.contains(&Operand::Dim(Dim::DimBuffer)))
-    }
-
-    /// The operand `Sampled`, the sixth, is 2 for an image that is used without a sampler and may be written.
-    fn is_storage_image(&self, image: u32) -> bool {
-        self.definition(image)
-            .is_ok_and(|definition| definition.operands.get(5) == Some(&Operand::LiteralBit32(2)))
     }
 
     fn structure(&self, id: u32) -> Result<Struct, String> {

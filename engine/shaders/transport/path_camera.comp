@@ -56,10 +56,9 @@ void main() {
         origin += offset;
         direction = direction * push.focus_distance - offset;
     }
-    store_path(slot, PathState(origin, 0.0, normalize(direction), 0u, vec3(1.0), 1.0));
-    store_gathered(slot, PathGathered(vec3(0.0), OUTSIDE));
+    path_states_out[slot] = PathState(origin, 0.0, normalize(direction), 0u, vec3(1.0), 1.0);
+    path_gathered[slot] = GatheredLight(vec3(0.0), OUTSIDE);
     if (WRITE_AOVS) {
         path_aovs[slot].filled = 0u;
     }
-    imageStore(path_queue_in, int(slot), uvec4(slot));
 }

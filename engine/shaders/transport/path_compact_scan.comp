@@ -55,7 +55,6 @@ void main() {
         status.active_count = all.x;
         status.shadow_count = all.y;
         status.shadow_groups[0] = groups_for(all.y);
-        status.resuming = STALLED_NOT;
         status.item_groups[0] = groups_for(all.x);
         status.chunk_groups[0] = groups_for(chunks_for(all.x));
         status.rounds += count > 0u ? 1u : 0u;

@@ -13,14 +13,16 @@ void main() {
         return;
     }
     uvec2 range = chunk_range(chunk, status.previous_count);
+    // The scan has counted this bounce already.
+    bool first_bounce = status.rounds == 1u;
     uvec2 target = path_chunks[chunk];
     for (uint place = range.x; place < range.y; ++place) {
         uvec2 one = flagged(place);
         if (one.x != 0u) {
-            imageStore(path_queue_out, int(target.x), imageLoad(path_queue_in, int(place)));
+            path_queue_out[target.x] = first_bounce ? place : texelFetch(path_queue_in, int(place)).x;
         }
         if (one.y != 0u) {
-            imageStore(path_shadow_queue, int(target.y), uvec4(place));
+            path_shadow_queue_out[target.y] = place;
         }
         target += one;
     }

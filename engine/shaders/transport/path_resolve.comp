@@ -24,7 +24,7 @@ void main() {
     uint target = push.first_film_pixel + pixel;
     FilmPixel film = film_pixels[target];
     for (uint i = 0u; i < push.sample_count; ++i) {
-        vec3 radiance = load_gathered(pixel * push.sample_count + i).radiance;
+        vec3 radiance = path_gathered[pixel * push.sample_count + i].radiance;
         if (any(isnan(radiance)) || any(isinf(radiance))) {
             film.non_finite += 1u;
             continue;

@@ -43,8 +43,8 @@ vec2 bounce_sample(uint slot, uint bounce, uint dimension) {
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
 
-// Shades the hit of the path in a slot; true when the path goes on. What it gathers is added to `gathered`.
-bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, inout uint flags) {
+// Shades the hit of the path in a slot; true when the path goes on. What it meets is added to `radiance`.
+bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uint flags) {
     Hit hit = load_hit(place);
     bool counted = path_set_contains(push.path_set, path.bounce);
 
@@ -53,7 +53,7 @@ bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, i
             SceneEnvironment e = load_environment();
             vec3 local = world_to_environment(e, path.direction);
             float weight = emission_weight(path.pdf, environment_light_pdf(e, local));
-            gathered.radiance += path.throughput * environment_radiance(e, local) * weight;
+            radiance += path.throughput * environment_radiance(e, local) * weight;
         }
         return false;
     }
@@ -64,7 +64,8 @@ bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, i
     bool front = dot(wo, s.geometric_normal) > 0.0;
     bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
     // A camera inside a solid does not know it until it looks out.
-    uint interior = gathered.interior == OUTSIDE && solid && !front ? s.material : gathered.interior;
+    uint interior = HAS_TRANSMISSION ? path_gathered[slot].interior : OUTSIDE;
+    interior = interior == OUTSIDE && solid && !front ? s.material : interior;
     if (HAS_ATTENUATION) {
         if (interior != OUTSIDE) {
             path.throughput *= exp(-load_material(interior).attenuation * hit.t);
@@ -75,7 +76,7 @@ bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, i
         vec3 emission = surface_emission(m, s, wo);
         if (emission != vec3(0.0)) {
             float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? triangle_light_pdf(s, path.direction, hit.t) : 0.0;
-            gathered.radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
+            radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
         }
     }
 
@@ -118,19 +119,20 @@ bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, i
                 ray_to_light.slot = slot;
                 ray_to_light.bounce = bounce + 1u;
                 vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
-                ray_to_light.ray = Ray(start, 0.0, wi, FAR_AWAY);
+                ray_to_light.t_max = FAR_AWAY;
+                ray_to_light.direction = wi;
                 if (!light.infinite) {
-                    vec3 segment;
-                    shadow_segment(s.point, s.geometric_normal, light.point, light.normal, start, segment);
-                    ray_to_light.ray = Ray(start, 0.0, segment, 1.0);
+                    ray_to_light.t_max = 1.0;
+                    shadow_segment(s.point, s.geometric_normal, light.point, light.normal, start, ray_to_light.direction);
                 }
+                ray_to_light.origin = start;
                 ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
                 uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : OUTSIDE) : interior;
                 if (HAS_ATTENUATION && passed != OUTSIDE && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
                     ray_to_light.contribution *= exp(-load_material(passed).attenuation * way);
                 }
-                store_shadow_ray(place, ray_to_light);
+                path_shadow_rays_out[place] = ray_to_light;
                 flags |= FLAG_SHADOW;
             }
         }
@@ -146,7 +148,7 @@ bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, i
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
         float eta = wo_local.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
         path.eta_scale *= eta * eta;
-        gathered.interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
+        path_gathered[slot].interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
     }
     path.bounce = bounce + 1u;
     if (path.bounce >= push.roulette_start) {
@@ -165,7 +167,7 @@ bool shade(uint slot, uint place, PathState path, inout PathGathered gathered, i
     }
     path.direction = normalize(wi);
     path.pdf = scattered.pdf;
-    store_path(slot, path);
+    path_states_out[slot] = path;
     return true;
 }
 
@@ -174,13 +176,12 @@ void main() {
     if (status.stalled != STALLED_NOT || place >= status.active_count) {
         return;
     }
-    uint slot = imageLoad(path_queue_in, int(place)).x;
-    PathGathered before = load_gathered(slot);
-    PathGathered gathered = before;
+    uint slot = load_slot(place);
+    vec3 radiance = vec3(0.0);
     uint flags = 0u;
-    flags |= shade(slot, place, load_path(slot), gathered, flags) ? FLAG_ALIVE : 0u;
-    if (gathered != before) {
-        store_gathered(slot, gathered);
+    flags |= shade(slot, place, load_path(slot), radiance, flags) ? FLAG_ALIVE : 0u;
+    if (radiance != vec3(0.0)) {
+        path_gathered[slot].radiance += radiance;
     }
-    imageStore(path_flags, int(place), uvec4(flags));
+    path_flags_out[place] = flags;
 }

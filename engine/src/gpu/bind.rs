@@ -102,7 +102,7 @@ impl Pass<'_> {
                         .update_descriptor_sets(&[descriptor.buffer_info(&raw)], &[])
                 };
             }
-            (BindingKind::TexelBuffer | BindingKind::StorageTexelBuffer, BoundResource::Texels(view)) => {
+            (BindingKind::TexelBuffer, BoundResource::Texels(view)) => {
                 self.recorder.keep(&view.inner);
                 self.recorder
                     .touch(self.name, view.buffer(), access(shader.stage, binding))?;

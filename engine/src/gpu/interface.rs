@@ -75,8 +75,6 @@ pub enum BindingKind {
     SampledImage,
     /// Uniform texel buffer.
     TexelBuffer,
-    /// Storage texel buffer.
-    StorageTexelBuffer,
 }
 
 /// One specialization constant.

@@ -155,7 +155,6 @@ fn descriptor_pool(inner: &Inner) -> Result<vk::DescriptorPool> {
         size(vk::DescriptorType::STORAGE_IMAGE),
         size(vk::DescriptorType::COMBINED_IMAGE_SAMPLER),
         size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER),
-        size(vk::DescriptorType::STORAGE_TEXEL_BUFFER),
     ];
     let info = vk::DescriptorPoolCreateInfo::default()
         .max_sets(SETS_PER_POOL)

@@ -1,8 +1,7 @@
-//! Texel buffers: buffers that shaders read, and write, by typed texels.
+//! Texel buffers: buffers that shaders read by typed texels.
 //!
-//! What is gathered at addresses that differ from lane to lane is best kept this way: software drivers vectorise texel fetches and stores,
-//! but access storage buffers lane by lane and word by word, and the size limit is `maxTexelBufferElements` instead of
-//! `maxStorageBufferRange`.
+//! What is gathered at addresses that differ from lane to lane is best read this way: software drivers vectorise texel fetches, but load
+//! storage buffers lane by lane and word by word. The size limit is `maxTexelBufferElements` instead of `maxStorageBufferRange`.
 
 use std::sync::Arc;
 
@@ -54,12 +53,14 @@ impl Gpu {
         Ok(view)
     }
 
-    /// A texel buffer in device memory for kernels to read and write; at least one texel. Its contents are undefined.
+    /// A texel buffer in device memory that kernels write as a storage buffer and later dispatches read by texels; at least one texel. Its
+    /// contents are undefined.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] past `maxTexelBufferElements`, and as [`Gpu::buffer`].
     pub fn storage_texels(&self, name: &str, category: Category, format: vk::Format, texels: u64) -> Result<TexelView> {
-        self.texel_view(name, category, format, texels, vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER)
+        let usage = vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
+        self.texel_view(name, category, format, texels, usage)
     }
 
     fn texel_view(

@@ -4,8 +4,9 @@
 // flags) is indexed by the place in the queue. Nothing a path computes depends on its slot or place, so queue order and wave size
 // never reach the picture.
 //
-// What all paths read and write is in texel buffers of whole quarters (four words): software drivers load and store those for all lanes
-// at once, but storage buffers lane by lane and word by word.
+// What is handed on is written as a storage buffer and read, by a later dispatch, as a texel buffer over the same memory: software drivers fetch
+// texels for all lanes at once, but load storage buffers lane by lane and word by word. No dispatch reads by one what it writes by the
+// other: queues and slots alternate between two buffers.
 #ifndef CLERESTORY_TRANSPORT_PATH_BUFFERS_GLSL
 #define CLERESTORY_TRANSPORT_PATH_BUFFERS_GLSL
 
@@ -22,9 +23,9 @@ const uint FLAG_SHADOW = 2u;
 
 const uint OUTSIDE = 0xFFFFFFFFu;
 
-// Quarters of a slot, of a hit and of a shadow ray.
-const uint PATH_SLOT_QUARTERS = 4u;
-const uint PATH_SHADOW_QUARTERS = 3u;
+// Four-word texels of a path's state and of a shadow ray.
+const uint PATH_STATE_QUARTERS = 3u;
+const uint SHADOW_RAY_QUARTERS = 3u;
 // Places of the queue that one invocation of the compaction kernels handles.
 const uint COMPACT_CHUNK = 32u;
 // Invocations of a workgroup of every stage.
@@ -39,15 +40,17 @@ struct PathState {
     float eta_scale;  // undoes the radiance scaling of refractions for Russian roulette
 };
 
-struct PathGathered {
+struct GatheredLight {
     vec3 radiance;
     uint interior;  // material of the solid that the path is inside of, or OUTSIDE
 };
 
 struct ShadowRay {
-    Ray ray;            // its t_min is 0
-    vec3 contribution;  // radiance if nothing is in between
+    vec3 origin;
+    float t_max;        // from t = 0
+    vec3 direction;
     uint slot;
+    vec3 contribution;  // radiance if nothing is in between
     uint bounce;        // scattering events with the one at the light
 };
 
@@ -67,69 +70,51 @@ layout(set = 0, binding = 0, scalar) restrict buffer PathStatusBlock {
     uint previous_count;     // as it was before the last scan
     uint shadow_count;       // shadow rays of the bounce that the last scan ended
     uint stalled;            // STALLED_*; every later stage leaves at once
-    uint resuming;           // STALLED_*: that stage goes on with rays that a quota stopped
     uint unfinished;         // rays that a quota stopped
     uint rounds;             // bounces finished in this wave
     uint extend_rays[2];     // 64-bit counters, low word first
     uint shadow_rays[2];
 } status;
-layout(set = 0, binding = 1, r32ui) uniform restrict uimageBuffer path_queue_in;
-layout(set = 0, binding = 2, r32ui) uniform restrict uimageBuffer path_queue_out;
-layout(set = 0, binding = 3, rgba32ui) uniform restrict uimageBuffer path_slots;
-layout(set = 0, binding = 4, rgba32ui) uniform restrict uimageBuffer path_hits;          // by place
-layout(set = 0, binding = 5, rgba32ui) uniform restrict uimageBuffer path_shadow_rays;   // by place
-layout(set = 0, binding = 6, r32ui) uniform restrict uimageBuffer path_shadow_queue;     // places
-layout(set = 0, binding = 7, r32ui) uniform restrict uimageBuffer path_flags;            // by place
-layout(set = 0, binding = 8, r32ui) uniform restrict uimageBuffer path_resume;           // by place in the stage's queue
-layout(set = 0, binding = 9, scalar) restrict buffer PathChunks { uvec2 path_chunks[]; };  // alive, with a shadow ray
-layout(set = 0, binding = 10, scalar) restrict buffer PathAovs { PathAov path_aovs[]; };   // by slot
+layout(set = 0, binding = 1) uniform utextureBuffer path_queue_in;
+layout(set = 0, binding = 2, scalar) restrict writeonly buffer PathQueueOut { uint path_queue_out[]; };
+layout(set = 0, binding = 3) uniform utextureBuffer path_states_in;  // by slot
+layout(set = 0, binding = 4, scalar) restrict writeonly buffer PathStatesOut { PathState path_states_out[]; };
+layout(set = 0, binding = 5, scalar) restrict buffer PathGathered { GatheredLight path_gathered[]; };  // by slot
+layout(set = 0, binding = 6) uniform utextureBuffer path_hits_in;  // by place
+layout(set = 0, binding = 7, scalar) restrict buffer PathHitsOut { Hit path_hits_out[]; };
+layout(set = 0, binding = 8) uniform utextureBuffer path_shadow_rays_in;  // by place
+layout(set = 0, binding = 9, scalar) restrict writeonly buffer PathShadowRaysOut { ShadowRay path_shadow_rays_out[]; };
+layout(set = 0, binding = 10) uniform utextureBuffer path_shadow_queue_in;  // places
+layout(set = 0, binding = 11, scalar) restrict writeonly buffer PathShadowQueueOut { uint path_shadow_queue_out[]; };
+layout(set = 0, binding = 12) uniform utextureBuffer path_flags_in;  // by place
+layout(set = 0, binding = 13, scalar) restrict writeonly buffer PathFlagsOut { uint path_flags_out[]; };
+// Where stopped rays go on, by place in the queue of the stage that stalled.
+layout(set = 0, binding = 14, scalar) restrict buffer PathResume { uint path_resume[]; };
+layout(set = 0, binding = 15, scalar) restrict buffer PathChunks { uvec2 path_chunks[]; };  // paths alive, shadow rays
+layout(set = 0, binding = 16, scalar) restrict buffer PathAovs { PathAov path_aovs[]; };    // by slot
 
 PathState load_path(uint slot) {
-    int first = int(PATH_SLOT_QUARTERS * slot);
-    vec4 q0 = uintBitsToFloat(imageLoad(path_slots, first));
-    uvec4 q1 = imageLoad(path_slots, first + 1);
-    vec4 q2 = uintBitsToFloat(imageLoad(path_slots, first + 2));
+    int first = int(PATH_STATE_QUARTERS * slot);
+    vec4 q0 = uintBitsToFloat(texelFetch(path_states_in, first));
+    uvec4 q1 = texelFetch(path_states_in, first + 1);
+    vec4 q2 = uintBitsToFloat(texelFetch(path_states_in, first + 2));
     return PathState(q0.xyz, q0.w, uintBitsToFloat(q1.xyz), q1.w, q2.xyz, q2.w);
 }
 
-void store_path(uint slot, PathState path) {
-    int first = int(PATH_SLOT_QUARTERS * slot);
-    imageStore(path_slots, first, floatBitsToUint(vec4(path.origin, path.pdf)));
-    imageStore(path_slots, first + 1, uvec4(floatBitsToUint(path.direction), path.bounce));
-    imageStore(path_slots, first + 2, floatBitsToUint(vec4(path.throughput, path.eta_scale)));
-}
-
-PathGathered load_gathered(uint slot) {
-    uvec4 q = imageLoad(path_slots, int(PATH_SLOT_QUARTERS * slot + 3u));
-    return PathGathered(uintBitsToFloat(q.xyz), q.w);
-}
-
-void store_gathered(uint slot, PathGathered gathered) {
-    imageStore(path_slots, int(PATH_SLOT_QUARTERS * slot + 3u), uvec4(floatBitsToUint(gathered.radiance), gathered.interior));
-}
-
 Hit load_hit(uint place) {
-    uvec4 q = imageLoad(path_hits, int(place));
+    uvec4 q = texelFetch(path_hits_in, int(place));
     return Hit(uintBitsToFloat(q.x), uintBitsToFloat(q.yz), q.w);
 }
 
-void store_hit(uint place, Hit hit) {
-    imageStore(path_hits, int(place), uvec4(floatBitsToUint(vec3(hit.t, hit.barycentrics)), hit.triangle));
-}
-
 ShadowRay load_shadow_ray(uint place) {
-    int first = int(PATH_SHADOW_QUARTERS * place);
-    vec4 q0 = uintBitsToFloat(imageLoad(path_shadow_rays, first));
-    uvec4 q1 = imageLoad(path_shadow_rays, first + 1);
-    uvec4 q2 = imageLoad(path_shadow_rays, first + 2);
-    return ShadowRay(Ray(q0.xyz, 0.0, uintBitsToFloat(q1.xyz), q0.w), uintBitsToFloat(q2.xyz), q1.w, q2.w);
+    int first = int(SHADOW_RAY_QUARTERS * place);
+    vec4 q0 = uintBitsToFloat(texelFetch(path_shadow_rays_in, first));
+    uvec4 q1 = texelFetch(path_shadow_rays_in, first + 1);
+    uvec4 q2 = texelFetch(path_shadow_rays_in, first + 2);
+    return ShadowRay(q0.xyz, q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), q2.w);
 }
 
-void store_shadow_ray(uint place, ShadowRay s) {
-    int first = int(PATH_SHADOW_QUARTERS * place);
-    imageStore(path_shadow_rays, first, floatBitsToUint(vec4(s.ray.origin, s.ray.t_max)));
-    imageStore(path_shadow_rays, first + 1, uvec4(floatBitsToUint(s.ray.direction), s.slot));
-    imageStore(path_shadow_rays, first + 2, uvec4(floatBitsToUint(s.contribution), s.bounce));
-}
+// The slot at a place: in the first bounce, the place.
+uint load_slot(uint place) { return status.rounds == 0u ? place : texelFetch(path_queue_in, int(place)).x; }
 
 #endif

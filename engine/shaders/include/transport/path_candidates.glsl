@@ -8,6 +8,9 @@
 #include "transport/path_buffers.glsl"
 #include "transport/path_dimensions.glsl"
 
+// Goes on with rays that the quota stopped in an earlier dispatch.
+layout(constant_id = 18) const bool RESUMES = false;
+
 const uint CANDIDATES_EXTEND = 0u;
 const uint CANDIDATES_SHADOW = 1u;
 

@@ -13,7 +13,7 @@ uvec2 chunk_range(uint chunk, uint count) {
 
 // One each for a path that is alive, and for one with a shadow ray.
 uvec2 flagged(uint place) {
-    uint flags = imageLoad(path_flags, int(place)).x;
+    uint flags = texelFetch(path_flags_in, int(place)).x;
     return uvec2((flags & FLAG_ALIVE) != 0u, (flags & FLAG_SHADOW) != 0u);
 }
 

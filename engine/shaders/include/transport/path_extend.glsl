@@ -12,18 +12,18 @@ void main() {
     if (status.stalled == STALLED_SHADOW || place >= status.active_count) {
         return;
     }
-    uint slot = imageLoad(path_queue_in, int(place)).x;
+    uint slot = load_slot(place);
     PathState path = load_path(slot);
     BEGIN_CANDIDATES(slot, path.bounce, CANDIDATES_EXTEND)
     Hit hit = no_hit(FAR_AWAY);
     uint resume = BVH2_START;
-    if (status.resuming == STALLED_EXTEND) {
-        hit = load_hit(place);
-        resume = imageLoad(path_resume, int(place)).x;
+    if (RESUMES) {
+        hit = path_hits_out[place];
+        resume = path_resume[place];
     }
     resume = closest_hit(Ray(path.origin, 0.0, path.direction, FAR_AWAY), resume, hit);
-    store_hit(place, hit);
-    imageStore(path_resume, int(place), uvec4(resume));
+    path_hits_out[place] = hit;
+    path_resume[place] = resume;
     if (resume != BVH2_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_EXTEND);

@@ -11,23 +11,21 @@ void main() {
     if (status.stalled == STALLED_EXTEND || place >= status.shadow_count) {
         return;
     }
-    ShadowRay s = load_shadow_ray(imageLoad(path_shadow_queue, int(place)).x);
+    ShadowRay s = load_shadow_ray(texelFetch(path_shadow_queue_in, int(place)).x);
     BEGIN_CANDIDATES(s.slot, s.bounce, CANDIDATES_SHADOW)
-    Hit hit = no_hit(s.ray.t_max);
+    Hit hit = no_hit(s.t_max);
     uint resume = BVH2_START;
-    if (status.resuming == STALLED_SHADOW) {
-        resume = imageLoad(path_resume, int(place)).x;
+    if (RESUMES) {
+        resume = path_resume[place];
     }
     bool ended = resume == BVH2_FINISHED;
-    resume = any_hit(s.ray, resume, hit);
-    imageStore(path_resume, int(place), uvec4(resume));
+    resume = any_hit(Ray(s.origin, 0.0, s.direction, s.t_max), resume, hit);
+    path_resume[place] = resume;
     if (resume != BVH2_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_SHADOW);
     } else if (!ended && hit.triangle == NO_HIT) {
-        PathGathered gathered = load_gathered(s.slot);
-        gathered.radiance += s.contribution;
-        store_gathered(s.slot, gathered);
+        path_gathered[s.slot].radiance += s.contribution;
     }
 }
 

@@ -14,7 +14,7 @@ mod wave;
 
 use std::sync::Arc;
 
-use self::pipelines::{Pipelines, camera_pipeline};
+use self::pipelines::{Pipelines, TracePipelines, camera_pipeline};
 pub use self::settings::PathTracerSettings;
 use self::wave::{Cursor, PATH_GROUP, Status, Wave, WaveBuffers, group_counts, slots_of_device};
 use super::camera_frame::CameraFrame;
@@ -29,6 +29,7 @@ use crate::{Error, Result};
 const BOUNCES_PER_SUBMISSION: usize = 12;
 /// `STALLED_NOT` and `STALLED_SHADOW` of `path_buffers.glsl`.
 const STALLED_NOT: u32 = 0;
+const STALLED_EXTEND: u32 = 1;
 const STALLED_SHADOW: u32 = 2;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
 /// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
@@ -201,7 +202,13 @@ impl PathTracer {
             let groups = group_counts(status.active_count);
             (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
             status.shadow_groups = group_counts(status.shadow_count)[0];
-            (status.resuming, status.stalled, status.unfinished) = (status.stalled, STALLED_NOT, 0);
+            let stalled = status.stalled;
+            (status.stalled, status.unfinished) = (STALLED_NOT, 0);
+            if stalled != STALLED_NOT && self.pipelines.resume.is_none() {
+                let quota = self.settings.ray_quota;
+                self.pipelines.resume = Some(TracePipelines::new(&self.gpu, &self.scene, quota, true)?);
+            }
+            let resume = self.pipelines.resume.as_ref().filter(|_| stalled != STALLED_NOT);
             recorder.pass("path: begin", |pass| {
                 pass.update(self.buffers.status.view(), &[status])?;
                 pass.memory_barrier(
@@ -213,11 +220,13 @@ impl PathTracer {
             if first {
                 self.record_camera(&mut recorder, wave)?;
             }
-            if status.resuming == STALLED_SHADOW {
-                self.record_shadow(&mut recorder, wave, status.rounds as usize % 2)?;
+            if let Some(resume) = resume.filter(|_| stalled == STALLED_SHADOW) {
+                self.record_shadow(&mut recorder, wave, status.rounds as usize % 2, resume)?;
             }
             for bounce in 0..BOUNCES_PER_SUBMISSION {
-                self.record_bounce(&mut recorder, wave, (status.rounds as usize + bounce) % 2)?;
+                let resumed = resume.filter(|_| stalled == STALLED_EXTEND && bounce == 0);
+                let trace = resumed.unwrap_or(&self.pipelines.trace);
+                self.record_bounce(&mut recorder, wave, (status.rounds as usize + bounce) % 2, trace)?;
             }
             recorder.pass("path: read status", |pass| {
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);

@@ -15,6 +15,8 @@ use crate::transport::camera_frame::CameraFrame;
 pub(super) struct Pipelines {
     pub camera: ComputePipeline<path_camera::Kernel>,
     pub trace: TracePipelines,
+    /// The same for rays that a quota stopped; made when the first one is.
+    pub resume: Option<TracePipelines>,
     pub shade: ComputePipeline<path_shade::Kernel>,
     pub count: ComputePipeline<path_compact_count::Kernel>,
     pub scan: ComputePipeline<path_compact_scan::Kernel>,
@@ -80,7 +82,8 @@ impl Pipelines {
         };
         Ok(Self {
             camera: camera_pipeline(gpu, settings, view, camera)?,
-            trace: TracePipelines::new(gpu, scene, settings.ray_quota)?,
+            trace: TracePipelines::new(gpu, scene, settings.ray_quota, false)?,
+            resume: None,
             shade: gpu.compute_pipeline(&shade)?,
             count: gpu.compute_pipeline(&())?,
             scan: gpu.compute_pipeline(&())?,
@@ -109,16 +112,18 @@ impl Pipelines {
 }
 
 impl TracePipelines {
-    fn new(gpu: &Gpu, scene: &GpuScene, bvh2_quota: u32) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, bvh2_quota: u32, resumes: bool) -> Result<Self> {
         let profile = scene.profile();
         if !profile.has_alpha() {
             return Ok(Self::Opaque {
                 extend: gpu.compute_pipeline(&path_extend::Spec {
                     bvh2_quota,
+                    resumes,
                     ..Default::default()
                 })?,
                 shadow: gpu.compute_pipeline(&path_shadow::Spec {
                     bvh2_quota,
+                    resumes,
                     ..Default::default()
                 })?,
             });
@@ -128,12 +133,14 @@ impl TracePipelines {
             has_textures,
             has_vertex_colors,
             bvh2_quota,
+            resumes,
             ..Default::default()
         };
         let shadow = path_shadow_alpha::Spec {
             has_textures,
             has_vertex_colors,
             bvh2_quota,
+            resumes,
             ..Default::default()
         };
         Ok(Self::Alpha {

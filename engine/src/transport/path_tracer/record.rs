@@ -29,20 +29,27 @@ impl PathTracer {
         };
         recorder.pass("path: camera", |pass| {
             let groups = self.pipelines.camera.groups_for(wave.pixels * wave.samples);
-            pass.dispatch(&self.pipelines.camera, &[&self.buffers.set(0)], &push, [groups, 1, 1])?;
+            // Its output is the input of the first bounce, whose parity is 0.
+            pass.dispatch(&self.pipelines.camera, &[&self.buffers.set(1)], &push, [groups, 1, 1])?;
             stage_barrier(pass);
             Ok(())
         })
     }
 
     /// One bounce: rays, what happens where they arrive, the next queue, and the shadow rays, which decide nothing but what is gathered.
-    pub(super) fn record_bounce(&self, recorder: &mut Recorder, wave: &Wave, parity: usize) -> Result<()> {
+    pub(super) fn record_bounce(
+        &self,
+        recorder: &mut Recorder,
+        wave: &Wave,
+        parity: usize,
+        trace: &TracePipelines,
+    ) -> Result<()> {
         let p = &self.pipelines;
         let paths = self.buffers.set(parity);
         let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
         let items = self.groups(std::mem::offset_of!(Status, item_groups));
         recorder.pass("path: extend", |pass| {
-            match &p.trace {
+            match trace {
                 TracePipelines::Opaque { extend, .. } => {
                     pass.dispatch_indirect(extend, &[&paths, &index], &(), items)?;
                 }
@@ -87,11 +94,17 @@ impl PathTracer {
             stage_barrier(pass);
             Ok(())
         })?;
-        self.record_shadow(recorder, wave, parity)
+        self.record_shadow(recorder, wave, parity, &p.trace)
     }
 
     /// The shadow rays of the last bounce.
-    pub(super) fn record_shadow(&self, recorder: &mut Recorder, wave: &Wave, parity: usize) -> Result<()> {
+    pub(super) fn record_shadow(
+        &self,
+        recorder: &mut Recorder,
+        wave: &Wave,
+        parity: usize,
+        trace: &TracePipelines,
+    ) -> Result<()> {
         if !self.scene.has_lights() {
             return Ok(());
         }
@@ -99,7 +112,7 @@ impl PathTracer {
         let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
         let rays = self.groups(std::mem::offset_of!(Status, shadow_groups));
         recorder.pass("path: shadow", |pass| {
-            match &self.pipelines.trace {
+            match trace {
                 TracePipelines::Opaque { shadow, .. } => {
                     pass.dispatch_indirect(shadow, &[&paths, &index], &(), rays)?;
                 }

@@ -8,7 +8,7 @@ use crate::film::GpuFilm;
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::shaders::transport::path_camera;
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::types::PathAov;
+use crate::gpu::shaders::types::{Hit, PathAov, GatheredLight, PathState, ShadowRay};
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 
 /// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
@@ -18,11 +18,10 @@ const SAMPLES_A_WAVE: u32 = 1024;
 const SAMPLES_TOGETHER: u32 = 8;
 /// Places that one invocation of the compaction kernels handles (`COMPACT_CHUNK`).
 const COMPACT_CHUNK: u32 = 32;
-/// Four-word texels of a slot and of a shadow ray (`PATH_SLOT_QUARTERS`, `PATH_SHADOW_QUARTERS`).
-const PATH_SLOT_QUARTERS: u32 = 4;
-const PATH_SHADOW_QUARTERS: u32 = 3;
 /// Invocations of a workgroup of every stage (`PATH_GROUP`).
 pub(super) const PATH_GROUP: u32 = 64;
+/// Bytes of a texel of four words.
+const TEXEL_BYTES: u64 = 16;
 
 /// One wave: consecutive pixels of a band × consecutive samples.
 #[derive(Debug, Clone, Copy)]
@@ -52,12 +51,13 @@ pub(super) type Status = path_camera::PathStatusBlock;
 pub(super) struct WaveBuffers {
     pub status: Buffer,
     pub queues: [TexelView; 2],
-    pub slots: TexelView,
+    pub states: [TexelView; 2],
+    pub gathered: Buffer,
     pub hits: TexelView,
     pub shadow_rays: TexelView,
     pub shadow_queue: TexelView,
     pub flags: TexelView,
-    pub resume: TexelView,
+    pub resume: Buffer,
     pub chunks: Buffer,
     pub aovs: Buffer,
     pub readback: Buffer,
@@ -101,9 +101,11 @@ impl Cursor {
 
 /// Slots that one dispatch reaches and whose largest buffer can be bound, in whole workgroups.
 pub(super) fn slots_of_device(gpu: &Gpu) -> u32 {
-    let by_range = gpu.caps().max_texel_buffer_elements / u64::from(PATH_SLOT_QUARTERS.max(PATH_SHADOW_QUARTERS));
+    let slot_bytes = size_of::<PathState>().max(size_of::<ShadowRay>()) as u64;
+    let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
+    let by_texels = gpu.caps().max_texel_buffer_elements * TEXEL_BYTES / slot_bytes;
     let by_groups = u64::from(gpu.caps().max_workgroups) * u64::from(PATH_GROUP);
-    let slots = by_range.min(by_groups).min(1 << 22) as u32;
+    let slots = by_range.min(by_texels).min(by_groups).min(1 << 22) as u32;
     slots - slots % PATH_GROUP
 }
 
@@ -122,21 +124,23 @@ impl WaveBuffers {
             ))
         };
         let words = |name: &str, count| gpu.storage_texels(name, Category::Work, vk::Format::R32_UINT, u64::from(count));
-        let quarters = |name: &str, each: u32, count: u32| {
-            let texels = u64::from(each) * u64::from(count);
+        let quarters = |name: &str, bytes: usize, count: u32| {
+            let texels = bytes as u64 / TEXEL_BYTES * u64::from(count);
             gpu.storage_texels(name, Category::Work, vk::Format::R32G32B32A32_UINT, texels)
         };
+        let states = |name: &str| quarters(name, size_of::<PathState>(), slots);
         let lit_slots = if lights { slots } else { 0 };
         let chunks = slots.div_ceil(COMPACT_CHUNK);
         Ok(Self {
             status: work("path status", size_of::<Status>(), 1)?,
             queues: [words("path queue a", slots)?, words("path queue b", slots)?],
-            slots: quarters("path slots", PATH_SLOT_QUARTERS, slots)?,
-            hits: quarters("path hits", 1, slots)?,
-            shadow_rays: quarters("path shadow rays", PATH_SHADOW_QUARTERS, lit_slots)?,
+            states: [states("path states a")?, states("path states b")?],
+            gathered: work("path gathered", size_of::<GatheredLight>(), slots)?,
+            hits: quarters("path hits", size_of::<Hit>(), slots)?,
+            shadow_rays: quarters("path shadow rays", size_of::<ShadowRay>(), lit_slots)?,
             shadow_queue: words("path shadow queue", lit_slots)?,
             flags: words("path flags", slots)?,
-            resume: words("path resume", slots)?,
+            resume: work("path resume", size_of::<u32>(), slots)?,
             // Of each chunk the paths that are alive and those with shadow rays.
             chunks: work("path chunks", 2 * size_of::<u32>(), chunks)?,
             aovs: work("path aovs", size_of::<PathAov>(), if aovs { slots } else { 0 })?,
@@ -152,13 +156,19 @@ impl WaveBuffers {
         PathBuffers {
             status: self.status.view(),
             path_queue_in: &self.queues[parity],
-            path_queue_out: &self.queues[1 - parity],
-            path_slots: &self.slots,
-            path_hits: &self.hits,
-            path_shadow_rays: &self.shadow_rays,
-            path_shadow_queue: &self.shadow_queue,
-            path_flags: &self.flags,
-            path_resume: &self.resume,
+            path_queue_out: self.queues[1 - parity].buffer().view(),
+            path_states_in: &self.states[parity],
+            path_states_out: self.states[1 - parity].buffer().view(),
+            path_gathered: self.gathered.view(),
+            path_hits_in: &self.hits,
+            path_hits_out: self.hits.buffer().view(),
+            path_shadow_rays_in: &self.shadow_rays,
+            path_shadow_rays_out: self.shadow_rays.buffer().view(),
+            path_shadow_queue_in: &self.shadow_queue,
+            path_shadow_queue_out: self.shadow_queue.buffer().view(),
+            path_flags_in: &self.flags,
+            path_flags_out: self.flags.buffer().view(),
+            path_resume: self.resume.view(),
             path_chunks: self.chunks.view(),
             path_aovs: self.aovs.view(),
         }
