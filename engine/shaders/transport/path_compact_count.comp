@@ -12,10 +12,13 @@ void main() {
     if (status.stalled != STALLED_NOT || chunk >= chunks_for(status.active_count)) {
         return;
     }
-    uvec2 range = chunk_range(chunk, status.active_count);
-    uvec2 counts = uvec2(0u);
-    for (uint place = range.x; place < range.y; ++place) {
-        counts += flagged(place);
+    uvec2 range = chunk_texels(chunk, status.active_count);
+    uvec4 alive = uvec4(0u);
+    uvec4 shadows = uvec4(0u);
+    for (uint texel = range.x; texel < range.y; ++texel) {
+        uvec4 flags = load_flags(texel, status.active_count);
+        alive += flagged(flags, FLAG_ALIVE);
+        shadows += flagged(flags, FLAG_SHADOW);
     }
-    path_chunks[chunk] = counts;
+    path_chunks[chunk] = uvec2(alive.x + alive.y + alive.z + alive.w, shadows.x + shadows.y + shadows.z + shadows.w);
 }

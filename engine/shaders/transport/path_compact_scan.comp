@@ -8,7 +8,11 @@ layout(local_size_x = 64) in;
 
 #include "transport/path_compact.glsl"
 
+// Lanes whose totals are summed before the sums are.
+const uint SCAN_BLOCK = 8u;
+
 shared uvec2 totals[PATH_GROUP];
+shared uvec2 block_totals[PATH_GROUP / SCAN_BLOCK];
 
 void add_64(inout uint low, inout uint high, uint amount) {
     uint carry;
@@ -31,8 +35,19 @@ void main() {
     totals[lane] = total;
     memoryBarrierBuffer();
     barrier();
+    if (lane < PATH_GROUP / SCAN_BLOCK) {
+        uvec2 sum = uvec2(0u);
+        for (uint other = 0u; other < SCAN_BLOCK; ++other) {
+            sum += totals[SCAN_BLOCK * lane + other];
+        }
+        block_totals[lane] = sum;
+    }
+    barrier();
     uvec2 before = uvec2(0u);
-    for (uint other = 0u; other < lane; ++other) {
+    for (uint block = 0u; block < lane / SCAN_BLOCK; ++block) {
+        before += block_totals[block];
+    }
+    for (uint other = lane / SCAN_BLOCK * SCAN_BLOCK; other < lane; ++other) {
         before += totals[other];
     }
     uvec2 offset = before;

@@ -12,18 +12,20 @@ void main() {
     if (status.stalled != STALLED_NOT || chunk >= chunks_for(status.previous_count)) {
         return;
     }
-    uvec2 range = chunk_range(chunk, status.previous_count);
     // The scan has counted this bounce already.
     bool first_bounce = status.rounds == 1u;
+    uvec2 range = chunk_texels(chunk, status.previous_count);
     uvec2 target = path_chunks[chunk];
-    for (uint place = range.x; place < range.y; ++place) {
-        uvec2 one = flagged(place);
-        if (one.x != 0u) {
-            path_queue_out[target.x] = first_bounce ? place : texelFetch(path_queue_in, int(place)).x;
+    for (uint texel = range.x; texel < range.y; ++texel) {
+        uvec4 flags = load_flags(texel, status.previous_count);
+        for (uint i = 0u; i < FLAGS_A_TEXEL; ++i) {
+            uint place = FLAGS_A_TEXEL * texel + i;
+            if ((flags[i] & FLAG_ALIVE) != 0u) {
+                path_queue_out[target.x++] = first_bounce ? place : texelFetch(path_queue_in, int(place)).x;
+            }
+            if ((flags[i] & FLAG_SHADOW) != 0u) {
+                path_shadow_queue_out[target.y++] = place;
+            }
         }
-        if (one.y != 0u) {
-            path_shadow_queue_out[target.y] = place;
-        }
-        target += one;
     }
 }

@@ -26,6 +26,8 @@ const uint OUTSIDE = 0xFFFFFFFFu;
 // Four-word texels of a path's state and of a shadow ray.
 const uint PATH_STATE_QUARTERS = 3u;
 const uint SHADOW_RAY_QUARTERS = 3u;
+// Places whose flags one texel holds.
+const uint FLAGS_A_TEXEL = 4u;
 // Places of the queue that one invocation of the compaction kernels handles.
 const uint COMPACT_CHUNK = 32u;
 // Invocations of a workgroup of every stage.
@@ -86,7 +88,7 @@ layout(set = 0, binding = 8) uniform utextureBuffer path_shadow_rays_in;  // by 
 layout(set = 0, binding = 9, scalar) restrict writeonly buffer PathShadowRaysOut { ShadowRay path_shadow_rays_out[]; };
 layout(set = 0, binding = 10) uniform utextureBuffer path_shadow_queue_in;  // places
 layout(set = 0, binding = 11, scalar) restrict writeonly buffer PathShadowQueueOut { uint path_shadow_queue_out[]; };
-layout(set = 0, binding = 12) uniform utextureBuffer path_flags_in;  // by place
+layout(set = 0, binding = 12) uniform utextureBuffer path_flags_in;  // four places a texel
 layout(set = 0, binding = 13, scalar) restrict writeonly buffer PathFlagsOut { uint path_flags_out[]; };
 // Where stopped rays go on, by place in the queue of the stage that stalled.
 layout(set = 0, binding = 14, scalar) restrict buffer PathResume { uint path_resume[]; };

@@ -1,21 +1,23 @@
 // Compaction of the path queue, and of the shadow rays, in three stages: counts of chunks, a scan of the counts by one workgroup, scatter. Keeps the order, so
-// the queues are the same on every run. Each invocation of the first and last stage walks COMPACT_CHUNK places.
+// the queues are the same on every run. Each invocation of the first and last stage walks COMPACT_CHUNK places, four at a time.
 #ifndef CLERESTORY_TRANSPORT_PATH_COMPACT_GLSL
 #define CLERESTORY_TRANSPORT_PATH_COMPACT_GLSL
 
 #include "transport/path_buffers.glsl"
 
-// The places of a chunk that lie in a queue of `count`.
-uvec2 chunk_range(uint chunk, uint count) {
-    uint first = min(chunk * COMPACT_CHUNK, count);
-    return uvec2(first, min(first + COMPACT_CHUNK, count));
+// The texels of the flags of a chunk.
+uvec2 chunk_texels(uint chunk, uint count) {
+    uint first = chunk * (COMPACT_CHUNK / FLAGS_A_TEXEL);
+    return uvec2(first, min(first + COMPACT_CHUNK / FLAGS_A_TEXEL, (count + FLAGS_A_TEXEL - 1u) / FLAGS_A_TEXEL));
 }
 
-// One each for a path that is alive, and for one with a shadow ray.
-uvec2 flagged(uint place) {
-    uint flags = texelFetch(path_flags_in, int(place)).x;
-    return uvec2((flags & FLAG_ALIVE) != 0u, (flags & FLAG_SHADOW) != 0u);
+// Flags of the four places of a texel; none past the end of the queue.
+uvec4 load_flags(uint texel, uint count) {
+    uvec4 places = FLAGS_A_TEXEL * texel + uvec4(0u, 1u, 2u, 3u);
+    return mix(uvec4(0u), texelFetch(path_flags_in, int(texel)), lessThan(places, uvec4(count)));
 }
+
+uvec4 flagged(uvec4 flags, uint flag) { return mix(uvec4(0u), uvec4(1u), notEqual(flags & flag, uvec4(0u))); }
 
 uint chunks_for(uint count) { return (count + COMPACT_CHUNK - 1u) / COMPACT_CHUNK; }
 uint groups_for(uint count) { return (count + PATH_GROUP - 1u) / PATH_GROUP; }

@@ -80,8 +80,8 @@ impl PathTracer {
         settings.check()?;
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let slots = match settings.paths_in_flight {
-            // A software device works best while a wave's memory stays in the processor's caches.
-            0 if gpu.caps().kind == "cpu" => 1 << 16,
+            // Enough for a dispatch to be worth its overhead, few enough for the caches of a processor.
+            0 if gpu.caps().kind == "cpu" => 1 << 17,
             0 => 1 << 20,
             wanted => wanted.next_multiple_of(PATH_GROUP),
         };

@@ -125,7 +125,7 @@ impl WaveBuffers {
         };
         let words = |name: &str, count| gpu.storage_texels(name, Category::Work, vk::Format::R32_UINT, u64::from(count));
         let quarters = |name: &str, bytes: usize, count: u32| {
-            let texels = bytes as u64 / TEXEL_BYTES * u64::from(count);
+            let texels = (bytes as u64 * u64::from(count)).div_ceil(TEXEL_BYTES);
             gpu.storage_texels(name, Category::Work, vk::Format::R32G32B32A32_UINT, texels)
         };
         let states = |name: &str| quarters(name, size_of::<PathState>(), slots);
@@ -139,7 +139,7 @@ impl WaveBuffers {
             hits: quarters("path hits", size_of::<Hit>(), slots)?,
             shadow_rays: quarters("path shadow rays", size_of::<ShadowRay>(), lit_slots)?,
             shadow_queue: words("path shadow queue", lit_slots)?,
-            flags: words("path flags", slots)?,
+            flags: quarters("path flags", size_of::<u32>(), slots)?,
             resume: work("path resume", size_of::<u32>(), slots)?,
             // Of each chunk the paths that are alive and those with shadow rays.
             chunks: work("path chunks", 2 * size_of::<u32>(), chunks)?,
