@@ -5,6 +5,8 @@
 
 #[path = "build/compile.rs"]
 mod compile;
+#[path = "build/constants.rs"]
+mod constants;
 #[path = "build/generate.rs"]
 mod generate;
 #[path = "build/reflect.rs"]
@@ -36,6 +38,6 @@ fn run(root: &Path, out: &Path) -> Result<(), String> {
                 .map_err(|message| format!("{}: {message}", shader.name))
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let rust = generate::generate(&shaders, &interfaces)?;
+    let rust = generate::generate(&shaders, &interfaces)? + &constants::generate(&root.join("shaders"))?;
     std::fs::write(out.join("shaders.rs"), rust).map_err(|error| format!("cannot write shaders.rs: {error}"))
 }

@@ -3,6 +3,7 @@
 //! The split into waves never reaches the picture: each path depends on (seed, pixel, sample) alone, and samples are added to their pixel
 //! in order.
 
+use super::settings::SLOTS_MAX;
 use crate::Result;
 use crate::film::GpuFilm;
 use crate::gpu::shaders::sets::PathBuffers;
@@ -98,7 +99,7 @@ pub(super) fn slots_of_device(gpu: &Gpu) -> u32 {
     let slot_bytes = size_of::<PathState>().max(size_of::<ShadowRay>()) as u64;
     let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
     let by_groups = u64::from(gpu.caps().max_workgroups) * u64::from(PATH_GROUP);
-    let slots = by_range.min(by_groups).min(1 << 22) as u32;
+    let slots = by_range.min(by_groups).min(u64::from(SLOTS_MAX)) as u32;
     slots - slots % PATH_GROUP
 }
 
