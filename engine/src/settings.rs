@@ -53,7 +53,6 @@ fn shown(value: &Value) -> String {
 ///
 /// # Errors
 /// The serializer's.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
 pub fn serialize_f32<S: Serializer>(value: &f32, serializer: S) -> Result<S::Ok, S::Error> {
     // The shortest decimal that reads back as this f32.
     match value.to_string().parse::<f64>() {

@@ -6,12 +6,13 @@
 
 use bytemuck::{Pod, Zeroable};
 use clerestory::gpu::interface::{ComputeShader, SpecConstants};
+use clerestory::gpu::shaders::constants;
 use clerestory::gpu::{BufferDesc, Category, ComputePipeline, Gpu};
 
-/// Numbers of a case (`TWIN_INPUTS`).
-pub const INPUTS: usize = 32;
-/// Numbers of its results (`TWIN_OUTPUTS`).
-pub const OUTPUTS: usize = 16;
+/// Numbers of a case.
+pub const INPUTS: usize = constants::TWIN_INPUTS as usize;
+/// Numbers of its results.
+pub const OUTPUTS: usize = constants::TWIN_OUTPUTS as usize;
 
 /// Unit roundoff of f32, 2⁻²⁴.
 pub const U: f64 = 1.0 / 16_777_216.0;

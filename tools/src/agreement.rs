@@ -247,11 +247,11 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
 
 /// Both pictures as EXR and PNG, and their difference in units of its standard deviation.
 fn write_pictures(folder: &Path, ours: &Picture, reference: &Picture) -> Result<()> {
-    exr::write(&folder.join("clerestory.exr"), ours)?;
+    exr::write(folder.join("clerestory.exr"), ours)?;
     let tone = ToneMap::default();
     let show = |picture: &Picture, name: &str| {
         let shown = png::tone_mapped(picture.main_layer()?, picture.width(), &tone);
-        png::write(&folder.join(name), &shown)
+        png::write(folder.join(name), &shown)
     };
     show(ours, "clerestory.png")?;
     show(reference, "mitsuba.png")?;
@@ -266,7 +266,7 @@ fn write_pictures(folder: &Path, ours: &Picture, reference: &Picture) -> Result<
         .map(|pixel| pixel.iter().fold(0.0f64, |worst, z| worst.max(z.abs())) as f32)
         .collect();
     png::write(
-        &folder.join("z.png"),
+        folder.join("z.png"),
         &png::false_color(&worst, ours.width(), FULL_SCALE_Z)?,
     )
 }

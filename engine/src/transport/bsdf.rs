@@ -18,29 +18,30 @@ use super::albedo::{AlbedoTable, albedo_average, albedo_layer, albedo_lookup};
 use super::fresnel::{fresnel_conductor, fresnel_conductor_average, fresnel_dielectric, fresnel_f0, fresnel_schlick};
 use super::ggx::{ALPHA_MIN, ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
 use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
+use crate::gpu::shaders::constants;
 use crate::scene::{ConductorIor, Material};
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_1_PI;
 
 /// The diffuse base.
-pub const LOBE_DIFFUSE: u32 = 1;
+pub const LOBE_DIFFUSE: u32 = constants::LOBE_DIFFUSE;
 /// GGX lobes of width [`ALPHA_MIN`] and more, with what compensates them.
-pub const LOBE_GLOSSY: u32 = 2;
+pub const LOBE_GLOSSY: u32 = constants::LOBE_GLOSSY;
 /// Dirac deltas: mirrors and clear refraction.
-pub const LOBE_SPECULAR: u32 = 4;
+pub const LOBE_SPECULAR: u32 = constants::LOBE_SPECULAR;
 /// Scattering to the side of ωo.
-pub const LOBE_REFLECTION: u32 = 8;
+pub const LOBE_REFLECTION: u32 = constants::LOBE_REFLECTION;
 /// Scattering to the other side.
-pub const LOBE_TRANSMISSION: u32 = 16;
+pub const LOBE_TRANSMISSION: u32 = constants::LOBE_TRANSMISSION;
 /// Every class on both sides. A mask allows a lobe when it has the bits of both its class and its side.
-pub const LOBE_ALL: u32 = 31;
+pub const LOBE_ALL: u32 = constants::LOBE_ALL;
 
 /// Transmission goes straight through a thin wall.
-pub const BSDF_THIN: u32 = 1;
+pub const BSDF_THIN: u32 = constants::BSDF_THIN;
 /// The metal is `conductor_eta` + i `conductor_k`, not `base_color`.
-pub const BSDF_CONDUCTOR: u32 = 2;
+pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
 /// ωo is where particles come from: refraction is not scaled by 1/η².
-pub const BSDF_IMPORTANCE: u32 = 4;
+pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
 
 /// A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
 pub const ETA_MATCHED: f64 = 1.001;

@@ -4,16 +4,17 @@
 //! packed form is that of `transport/path_set.glsl`.
 
 use super::bsdf::{LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION};
+use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use std::fmt;
 use std::str::FromStr;
 
 /// The class of scattering in media, beside the `LOBE_…` bits of surfaces.
-pub const LOBE_VOLUME: u32 = 32;
+pub const LOBE_VOLUME: u32 = constants::LOBE_VOLUME;
 /// Every lobe and the media.
-pub const PATH_SET_LOBES: u32 = 63;
+pub const PATH_SET_LOBES: u32 = constants::PATH_SET_LOBES;
 /// Packed greatest number of bounces that stands for no bound.
-pub const PATH_SET_UNBOUNDED: u32 = 0xfff;
+pub const PATH_SET_UNBOUNDED: u32 = constants::PATH_SET_UNBOUNDED;
 
 /// The setting's name in errors.
 const NAME: &str = "path set";

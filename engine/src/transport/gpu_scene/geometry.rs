@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, Vec3};
 
-use super::NONE;
+use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::scene::{Scene, SceneProfile};
 use crate::{Error, Result};
@@ -78,7 +78,7 @@ impl Geometry {
                 SceneTriangle {
                     vertices: [base + a, base + b, base + c],
                     material,
-                    light: NONE,
+                    light: NO_LIGHT,
                 }
             }));
         }

@@ -5,22 +5,17 @@ use glam::{DVec3, UVec2, Vec3};
 
 use super::LightKinds;
 use super::geometry::Geometry;
-use super::materials::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT};
 use crate::Result;
+use crate::gpu::shaders::constants::{
+    LIGHT_DARK, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE, MATERIAL_BLEND,
+    MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
+};
 use crate::gpu::shaders::transport::path_shade::SceneEnvironment;
 use crate::gpu::shaders::types::{SceneLight, SceneMaterial, SceneTriangle};
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
 use crate::transport::distribution::build_distribution;
 use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
 use crate::transport::lights::{light_power, triangle_power};
-
-// Kinds of `scene/bindings.glsl`.
-const LIGHT_TRIANGLE: u32 = 0;
-const LIGHT_POINT: u32 = 1;
-const LIGHT_SPOT: u32 = 2;
-const LIGHT_DIRECTIONAL: u32 = 3;
-const LIGHT_ENVIRONMENT: u32 = 4;
-const LIGHT_DARK: u32 = 5;
 
 /// Everything that light sampling chooses among: emissive triangles, lights without area, the environment last.
 pub(super) struct Lights {

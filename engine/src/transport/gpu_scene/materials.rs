@@ -1,16 +1,12 @@
 //! Material records: factors, absorption, and where the textures are.
 
 use super::textures::Textures;
+use crate::gpu::shaders::constants::{
+    MATERIAL_BLEND, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
+};
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::scene::{AlphaMode, Material, Scene};
 use crate::transport::fresnel::fresnel_conductor_average;
-
-// Flags of `scene/bindings.glsl`.
-pub(super) const MATERIAL_DOUBLE_SIDED: u32 = 1;
-pub(super) const MATERIAL_UNLIT: u32 = 2;
-const MATERIAL_CONDUCTOR: u32 = 4;
-pub(super) const MATERIAL_MASK: u32 = 8;
-pub(super) const MATERIAL_BLEND: u32 = 16;
 
 /// All materials with whether some instance places them; last the default one, for meshes that have none.
 pub(super) fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> Vec<(&'a Material, bool)> {

@@ -25,9 +25,6 @@ use crate::gpu::shaders::types::SceneMaterial;
 use crate::gpu::{Buffer, Category, Gpu, TexelView};
 use crate::scene::{Material, Scene, SceneProfile};
 
-/// No light, no texture (`NO_LIGHT`, `NO_TEXTURE` of `scene/bindings.glsl`).
-const NONE: u32 = u32::MAX;
-
 /// A scene in device memory. Make it once and render it with any technique.
 #[derive(Debug)]
 pub struct GpuScene {

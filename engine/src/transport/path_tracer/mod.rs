@@ -16,19 +16,18 @@ use std::sync::Arc;
 
 use self::pipelines::{Pipelines, camera_pipeline};
 pub use self::settings::PathTracerSettings;
-use self::wave::{Cursor, PATH_GROUP, Status, Wave, WaveBuffers, group_counts, slots_of_device};
+use self::wave::{Cursor, Status, Wave, WaveBuffers, group_counts, slots_of_device};
 use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
 use crate::film::picture::Picture;
 use crate::film::{GpuFilm, Step};
+use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_NOT, STALLED_SHADOW};
 use crate::gpu::{Access, Buffer, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
 
 /// Bounces recorded into one command buffer; a wave that needs more is submitted again.
 const BOUNCES_PER_SUBMISSION: usize = 12;
-/// `STALLED_SHADOW` of `path_buffers.glsl`.
-const STALLED_SHADOW: u32 = 2;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
 /// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
 const STALLS_MAX: u32 = 1 << 16;
@@ -200,7 +199,7 @@ impl PathTracer {
             // A stalled round leaves no groups to dispatch.
             let groups = group_counts(status.active_count);
             (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
-            (status.stalled, status.unfinished) = (0, 0);
+            (status.stalled, status.unfinished) = (STALLED_NOT, 0);
             recorder.pass("path: begin", |pass| {
                 pass.update(self.buffers.status.view(), &[status])?;
                 pass.memory_barrier(
@@ -227,7 +226,7 @@ impl PathTracer {
             self.pending = None;
             let before = status.rounds;
             status = self.buffers.readback.read::<Status>(0, 1)?[0];
-            if status.stalled != 0 {
+            if status.stalled != STALLED_NOT {
                 self.counters.stalls += 1;
                 stalls_in_a_row = if status.rounds == before {
                     stalls_in_a_row + 1

@@ -6,6 +6,7 @@
 use super::settings::SLOTS_MAX;
 use crate::Result;
 use crate::film::GpuFilm;
+use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP};
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::shaders::transport::path_camera;
 use crate::gpu::shaders::types::{Hit, PathAov, PathState, Ray, ShadowRay};
@@ -14,10 +15,6 @@ use crate::gpu::{Buffer, BufferDesc, Category, Gpu};
 /// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
 /// iterations in all.
 const SAMPLES_A_WAVE: u32 = 1024;
-/// Places that one invocation of the compaction kernels handles (`COMPACT_CHUNK`).
-const COMPACT_CHUNK: u32 = 32;
-/// Invocations of a workgroup of every stage (`PATH_GROUP`).
-pub(super) const PATH_GROUP: u32 = 64;
 
 /// One wave: consecutive pixels of a band × consecutive samples.
 #[derive(Debug, Clone, Copy)]
