@@ -68,8 +68,8 @@ const RADIOMETRY: &[&str] = &[
 ];
 const SAMPLING: &[&str] = &[
     "engine/src/transport/warp.rs::directions_follow_their_density",
-    "engine/src/transport/bsdf_tests.rs::samples_follow_their_density",
-    "engine/src/transport/bsdf_tests.rs::weight_is_value_over_density_and_density_integrates",
+    "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
+    "engine/src/transport/bsdf/tests.rs::weight_is_value_over_density_and_density_integrates",
     "engine/src/transport/lights.rs::heuristics_sum_to_one",
 ];
 const PATH_TRACER: &[&str] = &[
@@ -136,8 +136,8 @@ const ROWS: &[Row] = &[
             "engine/src/transport/phong.rs::white_furnace",
             "engine/src/transport/phong.rs::reciprocal",
             "engine/src/transport/phong.rs::samples_follow_their_density",
-            "engine/src/transport/bsdf_tests.rs::specular_zero_is_exactly_lambert",
-            "engine/src/transport/bsdf_tests.rs::clear_solid_is_the_smooth_dielectric",
+            "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
+            "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
         ],
     )),
     unbiased(part(
@@ -178,21 +178,21 @@ const ROWS: &[Row] = &[
         "MET-B2",
         "microfacet product of distribution, masking and Fresnel factor",
         "Walter et al. 2007; Heitz 2014",
-        "src/transport/bsdf.rs",
+        "src/transport/bsdf/mod.rs",
         &[
-            "engine/src/transport/bsdf_tests.rs::white_furnace",
-            "engine/src/transport/bsdf_tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
-            "engine/src/transport/bsdf_tests.rs::samples_follow_their_density",
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+            "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
         ],
     )),
     unbiased(part(
         "MET-B7",
         "coupled matte and specular reflection",
         "Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997",
-        "src/transport/bsdf.rs",
+        "src/transport/bsdf/mod.rs",
         &[
-            "engine/src/transport/bsdf_tests.rs::white_furnace",
-            "engine/src/transport/bsdf_tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
         ],
     )),
     unbiased(part(
@@ -240,8 +240,8 @@ const ROWS: &[Row] = &[
         "Kulla and Conty 2017",
         "src/transport/albedo.rs",
         &[
-            "engine/src/transport/bsdf_tests.rs::white_furnace",
-            "engine/src/transport/bsdf_tests.rs::albedo_table_interpolates_within_its_bound",
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
         ],
     ),
     part(
@@ -303,7 +303,7 @@ const ROWS: &[Row] = &[
         "src/transport/path_set.rs",
         &[
             "engine/src/transport/path_set.rs::text_round_trips",
-            "engine/src/transport/bsdf_tests.rs::masks_divide_the_whole",
+            "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
         ],
     ),
     part(
