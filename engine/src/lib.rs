@@ -29,6 +29,9 @@ pub mod settings;
 pub mod techniques;
 pub mod transport;
 
+#[cfg(test)]
+pub mod test_random;
+
 pub use error::{Error, Result};
 
 /// The examples of the README, compiled as doc tests.

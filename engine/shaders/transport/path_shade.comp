@@ -73,9 +73,9 @@ void main() {
     bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
     // A camera inside a solid does not know it until it looks out.
     uint interior = path.interior == OUTSIDE && solid && !front ? s.material : path.interior;
-    if (HAS_ATTENUATION) {
+    if (HAS_ABSORPTION) {
         if (interior != OUTSIDE) {
-            path.throughput *= exp(-scene_materials[interior].attenuation * hit.t);
+            path.throughput *= exp(-scene_materials[interior].absorption * hit.t);
         }
     }
 
@@ -132,9 +132,9 @@ void main() {
                 }
                 ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
                 uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : OUTSIDE) : interior;
-                if (HAS_ATTENUATION && passed != OUTSIDE && !light.infinite) {
+                if (HAS_ABSORPTION && passed != OUTSIDE && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
-                    ray_to_light.contribution *= exp(-scene_materials[passed].attenuation * way);
+                    ray_to_light.contribution *= exp(-scene_materials[passed].absorption * way);
                 }
                 shadow[place] = ray_to_light;
                 flags[place] = FLAG_SHADOW;
@@ -167,9 +167,9 @@ void main() {
         path.throughput /= survival;
     }
     vec3 start = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
-    if (HAS_ATTENUATION && solid && dot(wi, s.geometric_normal) < 0.0) {
+    if (HAS_ABSORPTION && solid && dot(wi, s.geometric_normal) < 0.0) {
         // The way through the body that the offset of the start leaves out.
-        path.throughput *= exp(m.attenuation * (distance(start, s.point.position) / dot(wi, s.geometric_normal)));
+        path.throughput *= exp(m.absorption * (distance(start, s.point.position) / dot(wi, s.geometric_normal)));
     }
     rays[slot] = Ray(start, 0.0, normalize(wi), FAR_AWAY);
     paths[slot].throughput = path.throughput;

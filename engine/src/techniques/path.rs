@@ -54,7 +54,7 @@ const FEATURES: [(&str, &str, &str); 16] = [
     ("has_shading_normals", "shading normals", "no mesh interpolates normals"),
     ("has_normal_maps", "normal maps", "no material has one"),
     ("has_vertex_colors", "vertex colours", "no mesh has them"),
-    ("has_attenuation", "absorption in solids", "no solid absorbs"),
+    ("has_absorption", "absorption in solids", "no solid absorbs"),
     ("has_environment", "environment light", "the scene has none"),
     ("has_area_lights", "area lights", "no material emits"),
     ("has_unlit", "unlit surfaces", "no material is unlit"),

@@ -27,11 +27,11 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         AlphaMode::Mask { cutoff } => (cutoff, MATERIAL_MASK),
         AlphaMode::Blend => (0.0, MATERIAL_BLEND),
     };
-    let attenuation = m
+    let absorption = m
         .attenuation_color
         .as_dvec3()
         .map(|c| -c.clamp(f64::from(f32::MIN_POSITIVE), 1.0).ln());
-    let attenuation = attenuation / f64::from(m.attenuation_distance);
+    let absorption = absorption / f64::from(m.attenuation_distance);
     SceneMaterial {
         base_color: m.base_color.truncate().to_array(),
         base_alpha: m.base_color.w,
@@ -49,7 +49,7 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
                 .to_array()
         }),
         specular: m.specular,
-        attenuation: attenuation.as_vec3().to_array(),
+        absorption: absorption.as_vec3().to_array(),
         thickness: m.thickness,
         alpha_cutoff: cutoff,
         normal_scale: m.normal_scale,

@@ -69,7 +69,7 @@ impl Pipelines {
             has_shading_normals: profile.has_shading_normals,
             has_normal_maps: profile.has_normal_maps,
             has_vertex_colors: profile.has_vertex_colors,
-            has_attenuation: profile.has_attenuation,
+            has_absorption: profile.has_absorption,
             has_unlit: profile.has_unlit,
             has_environment: profile.has_environment(),
             has_area_lights: scene.has_area_lights(),
