@@ -26,7 +26,9 @@ pub fn from_json<T: DeserializeOwned + Default>(json: &Value) -> Result<T> {
         // Each setting alone, to tell which one it was.
         let culprit = object.iter().find_map(|(name, value)| {
             let alone = Value::Object(std::iter::once((name.clone(), value.clone())).collect());
-            let error = serde_json::from_value::<T>(alone).err()?;
+            let error = serde_json::from_value::<T>(alone).err()?.to_string();
+            // Serde repeats a value in full.
+            let error = error.replace(&value.to_string(), &shown(value));
             Some(Error::setting(name, shown(value), format!("does not fit: {error}")))
         });
         culprit.unwrap_or_else(|| Error::setting("settings", "object", format!("does not fit: {error}")))

@@ -38,13 +38,13 @@ pub(super) enum TracePipelines {
 pub(super) fn camera_pipeline(
     gpu: &Gpu,
     settings: &PathTracerSettings,
-    view: &CameraFrame,
+    frame: &CameraFrame,
     camera: &Camera,
 ) -> Result<ComputePipeline<path_camera::Kernel>> {
     gpu.compute_pipeline(&path_camera::Spec {
         sampler_kind: settings.sampler as u32,
-        has_lens: camera.lens_radius > 0.0 && !view.orthographic,
-        orthographic: view.orthographic,
+        has_lens: camera.lens_radius > 0.0 && !frame.orthographic,
+        orthographic: frame.orthographic,
         write_aovs: settings.aovs,
     })
 }
@@ -54,7 +54,7 @@ impl Pipelines {
         gpu: &Gpu,
         scene: &GpuScene,
         settings: &PathTracerSettings,
-        view: &CameraFrame,
+        frame: &CameraFrame,
         camera: &Camera,
     ) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
@@ -79,7 +79,7 @@ impl Pipelines {
             has_alpha: profile.has_alpha(),
         };
         Ok(Self {
-            camera: camera_pipeline(gpu, settings, view, camera)?,
+            camera: camera_pipeline(gpu, settings, frame, camera)?,
             trace: TracePipelines::new(gpu, scene, settings.ray_quota)?,
             shade: gpu.compute_pipeline(&shade)?,
             count: gpu.compute_pipeline(&())?,
