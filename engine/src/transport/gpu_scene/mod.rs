@@ -66,7 +66,8 @@ impl GpuScene {
     /// Checks the scene, builds its index on the host's threads and uploads everything.
     ///
     /// # Errors
-    /// [`Error::Scene`] for a scene that does not pass [`Scene::check`], [`Error::LimitExceeded`] for one that does not fit the device.
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that does not pass [`Scene::check`],
+    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for one that does not fit the device.
     pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.check()?;
         let profile = SceneProfile::of(scene);

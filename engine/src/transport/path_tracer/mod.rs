@@ -3,7 +3,7 @@
 //! Sources: BG-2 and BG-3; Kajiya, "The Rendering Equation" (SIGGRAPH 1986); Veach, "Robust Monte Carlo Methods for Light Transport
 //! Simulation" (1997), chapters 9 and 10; wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013).
 //!
-//! Unbiased: paths end by Russian roulette or by the [`PathSet`] alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
+//! Unbiased: paths end by Russian roulette or by the [`PathSet`](super::PathSet) alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
 //! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
 
