@@ -12,7 +12,7 @@
 //! strength = 2.0
 //!
 //! [metals]                      # by material name
-//! ring = "gold"                 # gold, silver, copper, aluminium
+//! ring = "gold"                 # gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt
 //! bowl = { eta = [1.4, 0.9, 0.7], k = [7.6, 6.4, 5.6] }
 //!
 //! [[cameras]]                   # changes the camera of that name, or adds one
