@@ -118,6 +118,29 @@ fn sidecar_faults_have_their_line_or_key() {
             "[medium]\nsigma_a = [0.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\ng = 1.0\n",
             "medium.g",
         ),
+        (
+            "[medium]\nmaterial = \"fog\"\nsigma_a = [0.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\n",
+            "medium.material",
+        ),
+        ("[medium]\nsigma_a = [0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\n", "line 2"),
+        (
+            "[medium]\nsigma_a = [-1.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\n",
+            "at least 0",
+        ),
+        ("exposure = nan\n", "exposure"),
+        ("aspect = 0.0\n", "aspect"),
+        (
+            "[[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 180.0\n",
+            "cameras.main.fov",
+        ),
+        (
+            "[[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\naperture = -1.0\n",
+            "aperture",
+        ),
+        (
+            "[[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfocus = 0.0\n",
+            "focus",
+        ),
         ("exposure = \n", "line 1"),
     ] {
         let error = refusal(sidecar);
@@ -128,12 +151,10 @@ fn sidecar_faults_have_their_line_or_key() {
 #[test]
 fn exr_and_hdr_environments_are_read_and_cleaned() {
     let folder = folder("[environment]\nfile = \"sky.exr\"\n");
-    let texel = |x: usize, y: usize| {
-        if (x, y) == (1, 0) {
-            (f32::NAN, -1.0, 0.0)
-        } else {
-            (x as f32, y as f32, 7.5)
-        }
+    let texel = |x: usize, y: usize| match (x, y) {
+        (1, 0) => (f32::NAN, -1.0, 2.0),
+        (2, 0) => (3.0, 0.5, -0.25),
+        _ => (x as f32, y as f32, 7.5),
     };
     exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, texel).expect("EXR");
     let scene = load(folder.path(), "m.obj").expect("scene");
@@ -141,7 +162,8 @@ fn exr_and_hdr_environments_are_read_and_cleaned() {
     assert_eq!((environment.width, environment.height), (4, 2));
     assert_eq!(environment.radiance[7], Vec3::new(3.0, 1.0, 7.5));
     assert_eq!(environment.radiance[1], Vec3::ZERO);
-    assert!(scene.notes.iter().any(|n| n.instead.contains("1 texels")));
+    assert_eq!(environment.radiance[2], Vec3::new(3.0, 0.5, 0.0));
+    assert!(scene.notes.iter().any(|n| n.instead.contains("2 texels")));
     assert_eq!(SceneProfile::of(&scene).environment, EnvironmentUse::Map);
 
     let file = std::fs::File::create(folder.path().join("sky.hdr")).expect("file");

@@ -25,7 +25,8 @@
 //! focus = 4.0                   # distance of the plane in focus, metres
 //! ```
 //!
-//! A `[medium]` table is read and reported as not modelled. Unknown keys are errors with their line.
+//! A `[medium]` table (`sigma_a`, `sigma_s` in 1/m for three channels, `g`, and `material` for a medium inside of one) is checked and
+//! reported as not modelled. Unknown keys are errors with their line.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -188,6 +189,11 @@ impl Sidecar {
                 "sigma_a and sigma_s must be finite and at least 0, in 1/m",
             )?;
             self.require(medium.g.abs() < 1.0, "medium.g", "must lie between -1 and 1")?;
+            if let Some(name) = &medium.material
+                && !scene.materials.iter().any(|material| material.name == *name)
+            {
+                return Err(self.unknown_material(scene, "medium.material"));
+            }
             scene.notes.push(Note {
                 feature: "participating media".into(),
                 at: match &medium.material {
@@ -210,6 +216,14 @@ impl Sidecar {
 
     fn require(&self, condition: bool, key: &str, cause: &str) -> Result<()> {
         if condition { Ok(()) } else { Err(self.fault(key, cause)) }
+    }
+
+    fn unknown_material(&self, scene: &Scene, key: &str) -> Error {
+        let known: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
+        self.fault(
+            key,
+            format!("no material has that name; there are: {}", known.join(", ")),
+        )
     }
 
     fn environment(&self, table: &EnvironmentTable) -> Result<(Environment, Option<Note>)> {
@@ -261,14 +275,11 @@ impl Sidecar {
             material.metallic = 1.0;
             found = true;
         }
-        if !found {
-            let known: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
-            return Err(self.fault(
-                &key,
-                format!("no material has that name; there are: {}", known.join(", ")),
-            ));
+        if found {
+            Ok(())
+        } else {
+            Err(self.unknown_material(scene, &key))
         }
-        Ok(())
     }
 
     fn camera(&self, scene: &mut Scene, table: &CameraTable) -> Result<()> {
@@ -342,7 +353,8 @@ impl Sidecar {
     }
 }
 
-/// Reads a latitude–longitude map; radiance that is negative or not finite becomes 0 and is reported.
+/// Reads a latitude–longitude map. Channels that are negative, as compression leaves them in dark colours, become 0, and texels that are
+/// not finite black; both are counted in a note.
 fn read_environment(path: &Path) -> Result<(Environment, Option<Note>)> {
     let fail = |cause: String| Error::Picture {
         path: path.display().to_string(),
@@ -353,13 +365,13 @@ fn read_environment(path: &Path) -> Result<(Environment, Option<Note>)> {
     let (width, height, mut radiance) = if is_exr { read_exr(path) } else { read_hdr(path) }.map_err(fail)?;
     let mut replaced = 0;
     for r in radiance.iter_mut().filter(|r| !r.is_finite() || r.min_element() < 0.0) {
-        *r = Vec3::ZERO;
+        *r = if r.is_finite() { r.max(Vec3::ZERO) } else { Vec3::ZERO };
         replaced += 1;
     }
     let note = (replaced > 0).then(|| Note {
         feature: "negative or not finite radiance".into(),
         at: name.clone(),
-        instead: format!("{replaced} texels are taken as black"),
+        instead: format!("{replaced} texels: negative channels are taken as 0, what is not finite as black"),
     });
     let environment = Environment {
         name,
