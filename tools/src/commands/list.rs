@@ -125,7 +125,7 @@ fn row_text(row: &Row) -> String {
         &[
             ("system", row.name.into()),
             ("publication", row.publication.into()),
-            ("module", format!("engine/{}", row.module)),
+            ("module", row.module.into()),
             ("path set", row.path_set.map(|set| set.to_string()).unwrap_or_default()),
             ("bias", row.bias.map(bias_line).unwrap_or_default()),
             ("needs", needs_text(row.needs)),
