@@ -17,18 +17,21 @@ use spectra::Spectrum;
 impl Spectrum {
     /// One of the quantities at a wavelength in nanometres: 1 is n, 2 is k. Outside of the samples the nearest one.
     fn at(&self, wavelength: f64, quantity: usize) -> f64 {
-        let above = self.samples.partition_point(|sample| sample[0] < wavelength);
+        let number = |sample: &[u32; 3], quantity: usize| f64::from(sample[quantity]) * spectra::UNITS[quantity];
+        let above = self.samples.partition_point(|sample| number(sample, 0) < wavelength);
         let (Some(low), Some(high)) = (
             self.samples.get(above.saturating_sub(1)),
             self.samples.get(above).or(self.samples.last()),
         ) else {
             return 0.0;
         };
-        if high[0] <= low[0] {
-            return low[quantity];
-        }
-        let t = (wavelength - low[0]) / (high[0] - low[0]);
-        low[quantity] + t * (high[quantity] - low[quantity])
+        let (from, to) = (number(low, 0), number(high, 0));
+        let t = if to > from {
+            (wavelength - from) / (to - from)
+        } else {
+            0.0
+        };
+        number(low, quantity) + t * (number(high, quantity) - number(low, quantity))
     }
 
     fn mean(&self, quantity: usize) -> DVec3 {
@@ -77,20 +80,23 @@ mod tests {
     #[test]
     fn spectra_cover_the_visible_wavelengths_in_order() {
         for spectrum in spectra::ALL {
-            let wavelengths: Vec<f64> = spectrum.samples.iter().map(|sample| sample[0]).collect();
+            let wavelengths: Vec<u32> = spectrum.samples.iter().map(|sample| sample[0]).collect();
             assert!(wavelengths.is_sorted_by(|a, b| a < b), "{}", spectrum.name);
             assert!(
-                wavelengths[0] <= 380.0 && *wavelengths.last().expect("samples") >= 780.0,
+                wavelengths[0] <= 38_000 && *wavelengths.last().expect("samples") >= 78_000,
                 "{}",
                 spectrum.name
             );
-            let [wavelength, n, k] = spectrum.samples[3];
-            assert_eq!(
-                (spectrum.at(wavelength, 1), spectrum.at(wavelength, 2)),
-                (n, k),
+            // At a sample its own values, beyond the ends those of the ends.
+            let [wavelength, n, k] = spectrum.samples[3].map(f64::from);
+            let found = (spectrum.at(wavelength / 100.0, 1), spectrum.at(wavelength / 100.0, 2));
+            assert!(
+                (found.0 - n / 1e4).abs() < 1e-12 && (found.1 - k / 1e4).abs() < 1e-12,
                 "{}",
                 spectrum.name
             );
+            let first = spectrum.samples[0].map(f64::from);
+            assert_eq!(spectrum.at(0.0, 2), first[2] * 1e-4, "{}", spectrum.name);
         }
         assert!(by_name("aluminum").is_some() && by_name("mithril").is_none());
         assert_eq!(names().count(), 9);
