@@ -271,6 +271,11 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     render(&["--settings", "@no-such-file"], 2, &["no-such-file"])?;
     render(&["--settings", "3"], 2, &["JSON object", "hint: "])?;
     render(&["--settings", "{\"roulette_start\": -4}"], 2, &["--settings", "-4"])?;
+    render(
+        &["--settings", "{\"roulette_start\": \"x\"}"],
+        2,
+        &["roulette_start", "type"],
+    )?;
     render(&["--path-set", "bounces=3..1"], 2, &["is empty"])?;
     render(&["--reference", "no-such.exr"], 1, &["no-such.exr"])?;
     refuse(&["render", "--size", "0x4"], 2, &["WIDTHxHEIGHT"])?;

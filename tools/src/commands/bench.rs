@@ -35,11 +35,11 @@ pub struct Arguments {
     /// Pixels: WIDTHxHEIGHT, or the height alone
     #[arg(long, default_value = "128", value_parser = parse_size)]
     size: Size,
-    #[command(flatten)]
-    device: DeviceOptions,
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// Median and range of one quantity.

@@ -67,7 +67,7 @@ pub struct Arguments {
     /// Which light paths: all, emitted, direct, indirect, bounces=1..3, with lobes=diffuse+glossy+… after a comma
     #[arg(long, value_name = "SET", value_parser = parse_path_set)]
     path_set: Option<PathSet>,
-    /// Random numbers
+    /// Sequence of random numbers; by default as the settings say, else sobol
     #[arg(long, value_enum)]
     sampler: Option<Sampler>,
     /// The technique's settings as JSON, or @FILE that holds them
@@ -282,6 +282,13 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
             Failure::usage(format!("--settings: technique {} has no {unknown:?}", info.id))
                 .hint(format!("it has: {}", names.join(", "))),
         );
+    }
+    for (key, value) in &settings {
+        let default = &known[key];
+        if !default.is_null() && std::mem::discriminant(value) != std::mem::discriminant(default) {
+            let message = format!("--settings: {key}: {value} is of another type than the default, {default}");
+            return Err(Failure::usage(message));
+        }
     }
     let path_set = arguments.path_set.map(|set| set.to_string());
     let sampler = arguments.sampler.map(|sampler| match sampler {
