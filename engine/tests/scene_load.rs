@@ -77,6 +77,25 @@ fn a_sidecar_adds_what_the_model_cannot_say() {
 }
 
 #[test]
+fn the_sidecar_of_the_readme_is_understood() {
+    let readme = include_str!("../../README.md");
+    let block = readme
+        .split("```toml\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next());
+    let folder = folder(block.expect("a TOML block"));
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("file");
+    write("m.obj", &format!("{OBJ}usemtl bowl\nf 1 3 2\n"));
+    write("m.mtl", &format!("{MTL}newmtl bowl\nKd 0.5 0.5 0.5\n"));
+    exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, |_, _| (1.0, 1.0, 1.0)).expect("EXR");
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
+    assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
+    assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
+    assert_eq!(scene.notes[0].feature, "participating media");
+}
+
+#[test]
 fn a_sidecar_can_be_the_scene() {
     let folder = folder("");
     std::fs::write(folder.path().join("dusk.toml"), "file = \"m.obj\"\nexposure = -1.0\n").expect("file");
