@@ -101,13 +101,25 @@ fn a_sidecar_can_be_the_scene() {
     std::fs::write(folder.path().join("dusk.toml"), "file = \"m.obj\"\nexposure = -1.0\n").expect("file");
     let scene = load(folder.path(), "dusk.toml").expect("scene");
     assert_eq!((scene.name.as_str(), scene.defaults.exposure), ("dusk", -1.0));
-    std::fs::write(folder.path().join("empty.toml"), "exposure = 1.0\n").expect("file");
-    assert!(
-        load(folder.path(), "empty.toml")
-            .expect_err("no file")
-            .to_string()
-            .contains("file = ")
+    let with = |text: &str| {
+        std::fs::write(folder.path().join("other.toml"), text).expect("file");
+        load(folder.path(), "other.toml")
+    };
+    let ring = with("file = \"builtin:ring?metal=gold\"\nexposure = 1.0\n").expect("generated scene");
+    assert_eq!(
+        (ring.name.as_str(), ring.defaults.exposure, ring.lights.len()),
+        ("other", 1.0, 1)
     );
+    for (text, word) in [
+        ("exposure = 1.0\n", "file = "),
+        ("file = \"none.glb\"\n", "key \"file\""),
+        ("file = \"dusk.toml\"\n", "another sidecar"),
+        ("file = \"builtin:nowhere\"\n", "nowhere"),
+        ("file = \"m\"\n", "ending"),
+    ] {
+        let error = with(text).expect_err("must be refused").to_string();
+        assert!(error.contains(word), "{word}: {error}");
+    }
 }
 
 #[test]
@@ -132,6 +144,8 @@ fn sidecar_faults_have_their_line_or_key() {
         ),
         ("[environment]\nstrength = 1.0\n", "either file or color"),
         ("[environment]\nfile = \"none.exr\"\n", "none.exr"),
+        ("[environment]\nfile = \"m.obj\"\n", "environment.file"),
+        ("exposure = \"bright\"\n", "expected a number"),
         ("[environment]\ncolor = [nan, 0.0, 0.0]\n", "environment.color"),
         (
             "[medium]\nsigma_a = [0.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\ng = 1.0\n",
@@ -211,7 +225,7 @@ fn exr_and_hdr_environments_are_read_and_cleaned() {
     for cut in (0..whole.len()).step_by(7) {
         std::fs::write(folder.path().join("sky.exr"), &whole[..cut]).expect("file");
         assert!(
-            matches!(load(folder.path(), "m.obj"), Err(Error::Picture { .. })),
+            matches!(load(folder.path(), "m.obj"), Err(Error::Scene { at, .. }) if at.contains("environment.file")),
             "{cut}"
         );
     }

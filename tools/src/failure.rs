@@ -56,11 +56,12 @@ impl Failure {
 
     /// An error met while a scene was read: a missing file is then a scene error too.
     pub fn scene(error: Error) -> Self {
+        let unread = matches!(error, Error::Io { .. });
         let mut failure = Self {
             code: Code::Scene,
             ..Self::from(error)
         };
-        if failure.hint.is_none() {
+        if unread {
             failure.hint =
                 Some("`clerestory scenes` lists the generated scenes; files may be gltf, glb, ply, obj, toml".into());
         }

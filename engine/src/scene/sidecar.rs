@@ -1,7 +1,7 @@
 //! The TOML sidecar: what glTF cannot say.
 //!
 //! ```toml
-//! file = "model.gltf"           # only in a sidecar that is given as the scene itself
+//! file = "model.gltf"           # only in a sidecar that is given as the scene itself; "builtin:ring?metal=gold" works too
 //! exposure = 0.5                # stops
 //! technique = "path"
 //! aspect = 1.5                  # width / height
@@ -34,7 +34,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Quat, Vec3};
 use serde::Deserialize;
 
-use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, metals};
+use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, builtin, metals};
 use crate::{Error, Result};
 
 /// Greatest number of texels of an environment map.
@@ -126,7 +126,12 @@ impl Sidecar {
         let content = toml::from_str(text).map_err(|error: toml::de::Error| {
             let start = error.span().map_or(0, |span| span.start);
             let line = 1 + text.bytes().take(start).filter(|&b| b == b'\n').count();
-            Error::scene(path.display().to_string(), format!("line {line}"), error.message())
+            // The names of Rust's types mean nothing to who writes the file.
+            let cause = error
+                .message()
+                .replace("expected f32", "expected a number")
+                .replace("expected f64", "expected a number");
+            Error::scene(path.display().to_string(), format!("line {line}"), cause)
         })?;
         Ok(Self {
             path: path.into(),
@@ -134,25 +139,40 @@ impl Sidecar {
         })
     }
 
-    /// The model that a sidecar given as the scene names.
+    /// The model that a sidecar given as the scene names: a path, or a `builtin:` address as it stands.
     ///
     /// # Errors
-    /// [`Error::Scene`] when it names none.
-    pub fn model_path(&self) -> Result<PathBuf> {
-        match &self.content.file {
-            Some(file) => Ok(self.folder().join(file)),
-            None => Err(self.fault(
+    /// [`Error::Scene`] when it names none, or another sidecar.
+    pub fn model(&self) -> Result<String> {
+        let Some(file) = &self.content.file else {
+            return Err(self.fault(
                 "file",
                 "is missing; a sidecar given as the scene names its model, file = \"model.gltf\"",
-            )),
+            ));
+        };
+        if file.to_lowercase().ends_with(".toml") {
+            return Err(self.fault("file", "names another sidecar; it must name a model"));
+        }
+        Ok(if file.starts_with(builtin::PREFIX) {
+            file.clone()
+        } else {
+            self.folder().join(file).display().to_string()
+        })
+    }
+
+    /// An error about the file that a key names, with the key.
+    pub fn in_file_of(&self, key: &str, error: Error) -> Error {
+        match error {
+            Error::Io { .. } | Error::Picture { .. } => self.fault(key, error.to_string()),
+            other => other,
         }
     }
 
     /// Changes a scene as the sidecar says.
     ///
     /// # Errors
-    /// [`Error::Scene`] naming the key, for unknown metals or materials and for values that cannot be;
-    /// [`Error::Picture`] for an environment map that cannot be read.
+    /// [`Error::Scene`] naming the key, for unknown metals or materials, for values that cannot be, and for an environment map that cannot
+    /// be read.
     pub fn apply(&self, scene: &mut Scene) -> Result<()> {
         let content = &self.content;
         if let Some(exposure) = content.exposure {
@@ -228,7 +248,8 @@ impl Sidecar {
 
     fn environment(&self, table: &EnvironmentTable) -> Result<(Environment, Option<Note>)> {
         let (mut environment, note) = match (&table.file, table.color) {
-            (Some(file), None) => read_environment(&self.folder().join(file))?,
+            (Some(file), None) => read_environment(&self.folder().join(file))
+                .map_err(|error| self.in_file_of("environment.file", error))?,
             (None, Some(color)) => {
                 let sound = color.iter().all(|c| c.is_finite() && *c >= 0.0);
                 self.require(sound, "environment.color", "must be finite and at least 0")?;
