@@ -28,7 +28,7 @@ impl FromStr for DeviceSelection {
 
 impl DeviceSelection {
     /// True when the device is one of those meant.
-    pub(super) fn matches(&self, summary: &DeviceSummary) -> bool {
+    pub fn matches(&self, summary: &DeviceSummary) -> bool {
         match self {
             Self::Fastest => true,
             Self::Index(index) => summary.index == *index,
