@@ -4,6 +4,7 @@
 
 pub mod random;
 pub mod render;
+pub mod shaders;
 pub mod statistics;
 pub mod twin;
 

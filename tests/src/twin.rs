@@ -155,7 +155,7 @@ macro_rules! twin_kernel {
             cases: &[$crate::twin::Case],
             table: &[f32],
         ) -> Vec<$crate::twin::Results> {
-            use clerestory::gpu::shaders::tests::$name as shader;
+            use $crate::shaders::$name as shader;
             let case_count = cases.len() as u32;
             $crate::twin::dispatch::<shader::Kernel>(gpu, cases, table, |pass, pipeline, [inputs, outputs, table]| {
                 let set = shader::Set0 {

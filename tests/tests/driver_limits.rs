@@ -1,6 +1,6 @@
 //! What drivers do in silence. These tests record it, so that the day it changes is noticed.
 
-use clerestory::gpu::shaders::tests::loop_limit;
+use clerestory_tests::shaders::loop_limit;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory_tests::with_gpu;
 

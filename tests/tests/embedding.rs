@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use clerestory::Error;
 use clerestory::gpu::ash::{self, vk};
-use clerestory::gpu::shaders::tests::out_of_bounds;
+use clerestory_tests::shaders::out_of_bounds;
 use clerestory::gpu::{
     BufferDesc, Category, DeviceSelection, EnabledFeatures, Gpu, GpuOptions, HostDevice, OptionalFeatures,
 };

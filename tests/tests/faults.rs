@@ -7,7 +7,7 @@ use std::time::Duration;
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::fault::{FaultCall, FaultPlan};
-use clerestory::gpu::shaders::tests::{layout_probe, out_of_bounds};
+use clerestory_tests::shaders::{layout_probe, out_of_bounds};
 use clerestory::gpu::{BufferDesc, Category, Gpu, GpuOptions, ImageDesc, Submission, Validation};
 use clerestory_tests::{assert_no_messages, gpu_with};
 
@@ -180,7 +180,7 @@ fn out_of_memory_is_an_error_with_its_cause() {
     out_of_memory(
         FaultCall::CreateComputePipelines,
         device,
-        ("device", "tests/out_of_bounds.comp"),
+        ("device", "out_of_bounds.comp"),
         |gpu| gpu.compute_pipeline::<out_of_bounds::Kernel>(&()),
     );
     out_of_memory(

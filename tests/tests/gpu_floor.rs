@@ -2,8 +2,8 @@
 
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::tests::{layout_probe, out_of_bounds};
-use clerestory::gpu::shaders::types::{ProbeInner, ProbeRecord};
+use clerestory_tests::shaders::{layout_probe, out_of_bounds};
+use clerestory_tests::shaders::types::{ProbeInner, ProbeRecord};
 use clerestory::gpu::{
     Access, BufferDesc, Category, DeviceSelection, Gpu, GpuOptions, ImageDesc, Pass, rw_compute_to_compute,
     transfer_to_compute,

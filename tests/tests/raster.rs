@@ -1,7 +1,7 @@
 //! Rendering: exact coverage, depth, kept contents, refused mistakes, and barriers of what vertex and fragment shaders read.
 
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::tests::{quad_frag, quad_vert};
+use clerestory_tests::shaders::{quad_frag, quad_vert};
 use clerestory::gpu::{
     Access, Buffer, BufferDesc, Category, ColorTarget, DepthTarget, Gpu, GraphicsDesc, GraphicsPipeline, Image,
     ImageBarrier, ImageDesc, Targets,

@@ -9,8 +9,8 @@ use clerestory::accel::triangle::{intersect_triangle, ray_shear};
 use clerestory::film::accumulate::{
     TwoFloat, split, two_float_add, two_float_add_square, two_float_add_two_float, two_product, two_sum,
 };
-use clerestory::gpu::shaders::tests::twin_random;
-use clerestory::gpu::shaders::types::{RandomCase, RandomWords};
+use clerestory_tests::shaders::twin_random;
+use clerestory_tests::shaders::types::{RandomCase, RandomWords};
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::transport::albedo::{AlbedoTable, albedo_average, albedo_layer, albedo_lookup};
 use clerestory::transport::bsdf::{
