@@ -106,9 +106,7 @@ fn named_sets(shader: &Shader) -> Result<BTreeMap<u32, String>, String> {
     let mut named = BTreeMap::new();
     for (path, text) in &shader.sources {
         for mark in text.lines().filter_map(|line| line.strip_prefix(SET_MARK)) {
-            let (number, name) = mark
-                .split_once(": ")
-                .ok_or_else(|| format!("{path}: {mark}"))?;
+            let (number, name) = mark.split_once(": ").ok_or_else(|| format!("{path}: {mark}"))?;
             let number = number.parse().map_err(|_| format!("{path}: {mark}"))?;
             let name = name
                 .split_whitespace()

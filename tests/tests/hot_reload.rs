@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use clerestory::Error;
-use clerestory_tests::shaders::out_of_bounds;
 use clerestory::gpu::{Category, ComputePipeline, Gpu, HotReload};
+use clerestory_tests::shaders::out_of_bounds;
 use clerestory_tests::with_gpu;
 
 /// What the kernel writes into word 2 of 4 when it is told to write 5.

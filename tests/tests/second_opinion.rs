@@ -60,7 +60,11 @@ fn check(root: &Path, info: &ShaderInfo) -> Result<usize, String> {
     };
     let theirs = Reflected::new(&module)?;
     if theirs.bindings.len() != ours.bindings.len() {
-        return Err(format!("{} bindings, not {}", theirs.bindings.len(), ours.bindings.len()));
+        return Err(format!(
+            "{} bindings, not {}",
+            theirs.bindings.len(),
+            ours.bindings.len()
+        ));
     }
     let mut compared = ours.bindings.len();
     for (ours, (place, kind, block)) in ours.bindings.iter().zip(&theirs.bindings) {
@@ -79,7 +83,11 @@ fn check(root: &Path, info: &ShaderInfo) -> Result<usize, String> {
         }
         compared += compare(&ours.name, members, block)?;
     }
-    let push = ours.push.as_ref().map(|push| push.members.as_slice()).unwrap_or_default();
+    let push = ours
+        .push
+        .as_ref()
+        .map(|push| push.members.as_slice())
+        .unwrap_or_default();
     compared += compare("push constants", push, &theirs.push)?;
     Ok(compared)
 }
@@ -178,7 +186,10 @@ fn compare(place: &str, ours: &[Member], theirs: &[Theirs]) -> Result<usize, Str
     for (ours, theirs) in ours.iter().zip(theirs) {
         let place = format!("{place}.{}", ours.name);
         if (ours.name.as_str(), ours.offset) != (theirs.name.as_str(), theirs.offset) {
-            return Err(format!("{place} at {} is {} at {}", ours.offset, theirs.name, theirs.offset));
+            return Err(format!(
+                "{place} at {} is {} at {}",
+                ours.offset, theirs.name, theirs.offset
+            ));
         }
         compared += shape(&place, &ours.kind, theirs)?;
     }
@@ -226,8 +237,12 @@ fn shape(place: &str, kind: &Type, theirs: &Theirs) -> Result<usize, String> {
 
 #[test]
 fn spirv_reflect_reads_the_same_interfaces() {
-    let of_engine = clerestory::gpu::shaders::ALL.iter().map(|info| ("engine/shaders", *info));
-    let of_tests = clerestory_tests::shaders::ALL.iter().map(|info| ("tests/shaders", *info));
+    let of_engine = clerestory::gpu::shaders::ALL
+        .iter()
+        .map(|info| ("engine/shaders", *info));
+    let of_tests = clerestory_tests::shaders::ALL
+        .iter()
+        .map(|info| ("tests/shaders", *info));
     let all: Vec<_> = of_engine.chain(of_tests).collect();
     let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
@@ -247,6 +262,9 @@ fn spirv_reflect_reads_the_same_interfaces() {
     let compared: usize = results.iter().flatten().sum();
     assert!(compared > 200, "{compared}");
     for (name, _) in NOT_FOR_VULKAN_1_0 {
-        assert!(all.iter().any(|(_, info)| info.name == *name), "{name}: there is no such shader");
+        assert!(
+            all.iter().any(|(_, info)| info.name == *name),
+            "{name}: there is no such shader"
+        );
     }
 }

@@ -78,20 +78,29 @@ const NOWHERE: &str = "/nowhere/glslc";
 
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.map(|path| (path.clone(), std::fs::read(path).unwrap())).collect()
+    entries
+        .map(|path| (path.clone(), std::fs::read(path).unwrap()))
+        .collect()
 }
 
 #[test]
 fn a_package_needs_no_compiler_until_its_shaders_change() {
     let tree = Tree::new();
     let error = tree.build(NOWHERE).map(|_| ()).unwrap_err();
-    assert!(error.contains(NOWHERE) && error.contains("apt-get install glslc"), "{error}");
+    assert!(
+        error.contains(NOWHERE) && error.contains("apt-get install glslc"),
+        "{error}"
+    );
 
     let made = tree.build("glslc").unwrap();
     let bytes = std::fs::read(&made[0].embedded).unwrap();
     assert_eq!(made[0].head, ["Writes a word."]);
     let used: Vec<_> = made[0].sources.keys().map(String::as_str).collect();
-    assert_eq!(used, ["include/part/value.glsl", "kernels/write.comp"], "the unused include is left out");
+    assert_eq!(
+        used,
+        ["include/part/value.glsl", "kernels/write.comp"],
+        "the unused include is left out"
+    );
     tree.pack();
 
     let packed = tree.build(NOWHERE).unwrap();
@@ -104,7 +113,10 @@ fn a_package_needs_no_compiler_until_its_shaders_change() {
         shaders: "own::shaders",
     };
     let rust = build::generate::generate(&packed, &[interface], &paths).unwrap();
-    assert!(rust.contains("pub mod write {") && rust.contains("use engine::gpu::interface::*;"), "{rust}");
+    assert!(
+        rust.contains("pub mod write {") && rust.contains("use engine::gpu::interface::*;"),
+        "{rust}"
+    );
 
     tree.write("my shaders/include/part/value.glsl", &INCLUDED.replace('7', "8"));
     let error = tree.build(NOWHERE).map(|_| ()).unwrap_err();
@@ -125,7 +137,11 @@ fn only_what_changed_is_compiled_and_what_is_gone_is_removed() {
 
     std::fs::remove_file(tree.path("my shaders/kernels/other.comp")).unwrap();
     assert_eq!(tree.build(NOWHERE).unwrap().len(), 1);
-    assert!(files(&tree.path("out")).keys().all(|path| !path.ends_with("kernels__other.comp.spv")));
+    assert!(
+        files(&tree.path("out"))
+            .keys()
+            .all(|path| !path.ends_with("kernels__other.comp.spv"))
+    );
 
     tree.write("my shaders/kernels/write.comp", &KERNEL.replace("VALUE;", "MISSING;"));
     let error = tree.build("glslc").map(|_| ()).unwrap_err();

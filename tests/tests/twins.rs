@@ -9,8 +9,6 @@ use clerestory::accel::triangle::{intersect_triangle, ray_shear};
 use clerestory::film::accumulate::{
     TwoFloat, split, two_float_add, two_float_add_square, two_float_add_two_float, two_product, two_sum,
 };
-use clerestory_tests::shaders::twin_random;
-use clerestory_tests::shaders::types::{RandomCase, RandomWords};
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::transport::albedo::{AlbedoTable, albedo_average, albedo_layer, albedo_lookup};
 use clerestory::transport::bsdf::{
@@ -40,6 +38,8 @@ use clerestory::transport::warp::{
     square_to_hemisphere, square_to_sphere, square_to_triangle,
 };
 use clerestory_tests::random::Random;
+use clerestory_tests::shaders::twin_random;
+use clerestory_tests::shaders::types::{RandomCase, RandomWords};
 use clerestory_tests::twin::{Case, Results, Tolerance, compare, trigonometric_error};
 use clerestory_tests::{twin_kernel, with_gpu};
 use glam::{DVec2, DVec3, DVec4, UVec2, UVec3, UVec4, Vec3};

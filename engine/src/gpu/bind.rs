@@ -14,10 +14,22 @@ use crate::{Error, Result};
 /// How the stage of a shader reads and writes a binding.
 fn access(stage: Stage, binding: &BindingInfo) -> Access {
     let (read, write, uniform) = match stage {
-        Stage::Compute => (Access::COMPUTE_READ, Access::COMPUTE_WRITE, Access::COMPUTE_UNIFORM_READ),
+        Stage::Compute => (
+            Access::COMPUTE_READ,
+            Access::COMPUTE_WRITE,
+            Access::COMPUTE_UNIFORM_READ,
+        ),
         Stage::Vertex => (Access::VERTEX_READ, Access::VERTEX_WRITE, Access::VERTEX_UNIFORM_READ),
-        Stage::Geometry => (Access::GEOMETRY_READ, Access::GEOMETRY_WRITE, Access::GEOMETRY_UNIFORM_READ),
-        Stage::Fragment => (Access::FRAGMENT_READ, Access::FRAGMENT_WRITE, Access::FRAGMENT_UNIFORM_READ),
+        Stage::Geometry => (
+            Access::GEOMETRY_READ,
+            Access::GEOMETRY_WRITE,
+            Access::GEOMETRY_UNIFORM_READ,
+        ),
+        Stage::Fragment => (
+            Access::FRAGMENT_READ,
+            Access::FRAGMENT_WRITE,
+            Access::FRAGMENT_UNIFORM_READ,
+        ),
     };
     if binding.kind == BindingKind::UniformBuffer {
         return uniform;

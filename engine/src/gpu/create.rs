@@ -141,13 +141,7 @@ impl Gpu {
                 instead: "choose another device".into(),
             })?;
         let caps = Caps::read(&instance, physical_device, queue_family);
-        let device = create_device(
-            &instance,
-            physical_device,
-            queue_family,
-            surface.is_some(),
-            options,
-        )?;
+        let device = create_device(&instance, physical_device, queue_family, surface.is_some(), options)?;
         let presents = surface.is_some();
         // It must go before the instance, which `finish` drops when it fails.
         drop(surface);

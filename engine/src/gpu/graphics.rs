@@ -213,8 +213,7 @@ fn make<V: VertexShader, F: FragmentShader>(
         })
         .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
         .line_width(1.0);
-    let samples =
-        vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
     let depth = vk::PipelineDepthStencilStateCreateInfo::default()
         .depth_test_enable(desc.depth.is_some())
         .depth_write_enable(desc.depth.is_some())
@@ -250,8 +249,8 @@ fn make<V: VertexShader, F: FragmentShader>(
         gpu.device
             .create_graphics_pipelines(gpu.pipeline_cache.raw, &[create], None)
     };
-    let made = made
-        .map_err(|(_, result)| gpu.creation_error("vkCreateGraphicsPipelines", result, shaders[0].name, 0))?;
+    let made =
+        made.map_err(|(_, result)| gpu.creation_error("vkCreateGraphicsPipelines", result, shaders[0].name, 0))?;
     Ok(made[0])
 }
 

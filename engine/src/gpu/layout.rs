@@ -46,9 +46,9 @@ impl PipelineObjects {
 
     fn make(&mut self, shaders: &[&'static ShaderInfo]) -> Result<()> {
         let (gpu, name) = (&self.gpu, shaders[0].name);
-        let stages = shaders
-            .iter()
-            .fold(vk::ShaderStageFlags::empty(), |all, shader| all | stage_flags(shader.stage));
+        let stages = shaders.iter().fold(vk::ShaderStageFlags::empty(), |all, shader| {
+            all | stage_flags(shader.stage)
+        });
         let mut bindings: BTreeMap<(u32, u32), BindingKind> = BTreeMap::new();
         for binding in shaders.iter().flat_map(|shader| shader.bindings) {
             bindings.insert((binding.set, binding.binding), binding.kind);
@@ -168,7 +168,11 @@ impl Wanted {
                 self.sampled_images,
                 offered.per_stage_sampled_images,
             ),
-            ("maxPerStageDescriptorSamplers", self.samplers, offered.per_stage_samplers),
+            (
+                "maxPerStageDescriptorSamplers",
+                self.samplers,
+                offered.per_stage_samplers,
+            ),
             ("maxPerStageResources", self.resources, offered.per_stage_resources),
             (
                 "maxDescriptorSetStorageBuffers",
@@ -340,14 +344,26 @@ mod tests {
         assert_eq!(wanted.excess(&exact, 11), Some(("maxPushConstantsSize", 12, 11)));
         let less: [(&str, fn(&mut DescriptorLimits) -> &mut u32); 12] = [
             ("maxBoundDescriptorSets", |l| &mut l.bound_sets),
-            ("maxPerStageDescriptorStorageBuffers", |l| &mut l.per_stage_storage_buffers),
-            ("maxPerStageDescriptorUniformBuffers", |l| &mut l.per_stage_uniform_buffers),
-            ("maxPerStageDescriptorStorageImages", |l| &mut l.per_stage_storage_images),
-            ("maxPerStageDescriptorSampledImages", |l| &mut l.per_stage_sampled_images),
+            ("maxPerStageDescriptorStorageBuffers", |l| {
+                &mut l.per_stage_storage_buffers
+            }),
+            ("maxPerStageDescriptorUniformBuffers", |l| {
+                &mut l.per_stage_uniform_buffers
+            }),
+            ("maxPerStageDescriptorStorageImages", |l| {
+                &mut l.per_stage_storage_images
+            }),
+            ("maxPerStageDescriptorSampledImages", |l| {
+                &mut l.per_stage_sampled_images
+            }),
             ("maxPerStageDescriptorSamplers", |l| &mut l.per_stage_samplers),
             ("maxPerStageResources", |l| &mut l.per_stage_resources),
-            ("maxDescriptorSetStorageBuffers", |l| &mut l.per_pipeline_storage_buffers),
-            ("maxDescriptorSetUniformBuffers", |l| &mut l.per_pipeline_uniform_buffers),
+            ("maxDescriptorSetStorageBuffers", |l| {
+                &mut l.per_pipeline_storage_buffers
+            }),
+            ("maxDescriptorSetUniformBuffers", |l| {
+                &mut l.per_pipeline_uniform_buffers
+            }),
             ("maxDescriptorSetStorageImages", |l| &mut l.per_pipeline_storage_images),
             ("maxDescriptorSetSampledImages", |l| &mut l.per_pipeline_sampled_images),
             ("maxDescriptorSetSamplers", |l| &mut l.per_pipeline_samplers),

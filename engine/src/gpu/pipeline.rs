@@ -152,8 +152,7 @@ impl PipelineInner {
             gpu.device
                 .create_compute_pipelines(gpu.pipeline_cache.raw, &[create], None)
         };
-        let made =
-            made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, info.name, 0))?;
+        let made = made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, info.name, 0))?;
         objects.set_pipeline(made[0], info.name);
         Ok(Self {
             objects,

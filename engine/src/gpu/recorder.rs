@@ -201,7 +201,7 @@ impl Recorder {
             value,
             resources: self.resources,
             passes: self.passes,
-            kept: self.kept,
+            _kept: self.kept,
             statistics: self.statistics,
             finished: false,
         })
@@ -275,7 +275,9 @@ unsafe fn record_marker(device: &ash::Device, command_buffer: vk::CommandBuffer,
         vk::PipelineStageFlags2::ALL_COMMANDS,
         vk::PipelineStageFlags2::ALL_TRANSFER,
     );
-    let before = [vk::MemoryBarrier2::default().src_stage_mask(all).dst_stage_mask(transfer)];
+    let before = [vk::MemoryBarrier2::default()
+        .src_stage_mask(all)
+        .dst_stage_mask(transfer)];
     let after = [vk::MemoryBarrier2::default()
         .src_stage_mask(transfer)
         .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
@@ -462,7 +464,13 @@ impl Pass<'_> {
                 .device
                 .cmd_bind_pipeline(self.command_buffer, point, pipeline.inner.objects.raw)
         };
-        self.bind_sets(&[info], point, pipeline.inner.objects.layout, &pipeline.inner.objects.sets, sets)?;
+        self.bind_sets(
+            &[info],
+            point,
+            pipeline.inner.objects.layout,
+            &pipeline.inner.objects.sets,
+            sets,
+        )?;
         let bytes = push.bytes();
         if !bytes.is_empty() {
             let stages = vk::ShaderStageFlags::COMPUTE;

@@ -22,7 +22,7 @@ pub struct Submission {
     /// Goes back before what its commands use does.
     pub(super) resources: Lease,
     pub(super) passes: Vec<String>,
-    pub(super) kept: Kept,
+    pub(super) _kept: Kept,
     pub(super) statistics: bool,
     /// The device is known to have finished.
     pub(super) finished: bool,
