@@ -14,6 +14,8 @@ mod copy;
 mod create;
 mod device;
 pub mod fault;
+#[cfg(feature = "hot-reload")]
+mod glsl;
 mod graphics;
 mod host;
 #[cfg(feature = "hot-reload")]
