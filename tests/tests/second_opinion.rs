@@ -133,7 +133,7 @@ impl Reflected {
         let mut bindings: Vec<_> = bindings
             .iter()
             .map(|binding| {
-                let kind = vk::DescriptorType::from_raw(binding.descriptor_type as i32);
+                let kind = vk::DescriptorType::from_raw(binding.descriptor_type);
                 ([binding.set, binding.binding], kind, members(&binding.block))
             })
             .collect();

@@ -323,6 +323,8 @@ mod tests {
         assert_eq!(Wanted::by(&[&FIRST, &SECOND], 2), expected);
     }
 
+    type Field = fn(&mut DescriptorLimits) -> &mut u32;
+
     #[test]
     fn each_limit_is_reached_and_passed() {
         let wanted = Wanted::by(&[&FIRST, &SECOND], 2);
@@ -342,7 +344,7 @@ mod tests {
         };
         assert_eq!(wanted.excess(&exact, 12), None);
         assert_eq!(wanted.excess(&exact, 11), Some(("maxPushConstantsSize", 12, 11)));
-        let less: [(&str, fn(&mut DescriptorLimits) -> &mut u32); 12] = [
+        let less: [(&str, Field); 12] = [
             ("maxBoundDescriptorSets", |l| &mut l.bound_sets),
             ("maxPerStageDescriptorStorageBuffers", |l| {
                 &mut l.per_stage_storage_buffers

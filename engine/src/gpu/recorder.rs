@@ -27,6 +27,8 @@ pub(super) type Kept = BTreeMap<usize, Arc<dyn Any + Send + Sync>>;
 
 /// One command buffer under construction.
 ///
+/// How much work one submission may hold is up to its author: see [`Timings`](super::Timings).
+///
 /// It starts with a barrier over everything, so that a submission may rely on all earlier ones of the same queue. Between its own passes
 /// every barrier is the author's; debug builds check that none is missing.
 pub struct Recorder {
