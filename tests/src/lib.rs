@@ -5,6 +5,7 @@
 #[path = "../../engine/src/test_random.rs"]
 pub mod random;
 pub mod render;
+pub mod shaders;
 pub mod statistics;
 pub mod twin;
 

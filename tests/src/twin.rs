@@ -4,9 +4,9 @@
 //! f64 twin itself moves when its inputs move by some rounding units. The second part is what f32 arithmetic can promise where a
 //! function is ill-conditioned, and needs no bound written down for each.
 
+use crate::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 use clerestory::gpu::interface::{ComputeShader, SpecConstants};
-use clerestory::gpu::shaders::constants;
 use clerestory::gpu::{BufferDesc, Category, ComputePipeline, Gpu};
 
 /// Numbers of a case.
@@ -156,7 +156,7 @@ macro_rules! twin_kernel {
             cases: &[$crate::twin::Case],
             table: &[f32],
         ) -> Vec<$crate::twin::Results> {
-            use clerestory::gpu::shaders::tests::$name as shader;
+            use $crate::shaders::$name as shader;
             let case_count = cases.len() as u32;
             $crate::twin::dispatch::<shader::Kernel>(gpu, cases, table, |pass, pipeline, [inputs, outputs, table]| {
                 let set = shader::Set0 {

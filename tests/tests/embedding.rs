@@ -6,17 +6,17 @@ use std::sync::Mutex;
 
 use clerestory::film::{GpuFilm, Picture, Step};
 use clerestory::gpu::ash::{self, vk};
-use clerestory::gpu::shaders::tests::out_of_bounds;
 use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
 use clerestory::gpu::{
     Access, Buffer, BufferDesc, Category, DeviceSelection, EnabledFeatures, Gpu, GpuOptions, HostDevice,
-    OptionalFeatures, PipelineInfo,
+    OptionalFeatures, PipelineInfo, VALIDATION_LAYER,
 };
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::Camera;
 use clerestory::techniques::{Bias, Skipped, Technique, TechniqueInfo};
 use clerestory::transport::PathSet;
 use clerestory::{Error, Result};
+use clerestory_tests::shaders::out_of_bounds;
 use clerestory_tests::{assert_no_messages, gpu, gpu_with, with_gpu};
 
 /// A host's own Vulkan objects, destroyed by the host.
@@ -54,7 +54,7 @@ impl Host {
             let entry = ash::Entry::load().unwrap();
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
             // The layer is always on: it is the witness that nothing of the host's is misused or destroyed.
-            let layers = [c"VK_LAYER_KHRONOS_validation".as_ptr()];
+            let layers = [VALIDATION_LAYER.as_ptr()];
             let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
             let info = vk::InstanceCreateInfo::default()
                 .application_info(&application)
@@ -74,17 +74,8 @@ impl Host {
                 .unwrap();
             let physical_device = instance.enumerate_physical_devices().unwrap()[0];
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-            let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default()
-                .timeline_semaphore(true)
-                .scalar_block_layout(true)
-                .host_query_reset(true);
-            let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
-                .synchronization2(true)
-                .dynamic_rendering(true);
-            let info = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .push_next(&mut vulkan12)
-                .push_next(&mut vulkan13);
+            let mut features = EnabledFeatures::REQUIRED.to_vulkan();
+            let info = features.chain(vk::DeviceCreateInfo::default().queue_create_infos(&queues));
             let device = instance.create_device(physical_device, &info, None).unwrap();
             let queue = device.get_device_queue(0, 0);
             Self {
@@ -300,6 +291,13 @@ fn a_missing_feature_is_named() {
             }
             other => panic!("expected {name} to be missed, got {other:?}"),
         }
+    }
+    match host.lend(EnabledFeatures::NONE) {
+        Err(Error::MissingFeature { feature, .. }) => assert_eq!(
+            feature,
+            "synchronization2, dynamicRendering, timelineSemaphore, scalarBlockLayout, hostQueryReset"
+        ),
+        other => panic!("expected all features to be missed, got {other:?}"),
     }
     // A refusal leaves the device usable, too.
     host.work();

@@ -1,12 +1,12 @@
 //! Random numbers, bit for bit.
 
-use clerestory::gpu::shaders::tests::twin_random;
-use clerestory::gpu::shaders::types::{RandomCase, RandomWords};
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::transport::random::{
     Sampler, SamplerKind, owen_scramble, pcg3d, pcg4d, sample_1d, sample_2d, sampler_bits, sobol_pascal,
 };
 use clerestory_tests::random::Random;
+use clerestory_tests::shaders::twin_random;
+use clerestory_tests::shaders::types::{RandomCase, RandomWords};
 use clerestory_tests::with_gpu;
 use glam::{UVec3, UVec4};
 
