@@ -270,7 +270,7 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     render(&["--settings", "{\"roulete\": 1}"], 2, &["roulete", "roulette_start"])?;
     render(&["--settings", "@no-such-file"], 2, &["no-such-file"])?;
     render(&["--settings", "3"], 2, &["JSON object", "hint: "])?;
-    render(&["--settings", "{\"roulette_start\": -4}"], 2, &["--settings", "-4"])?;
+    render(&["--settings", "{\"roulette_start\": -4}"], 2, &["roulette_start", "-4"])?;
     render(
         &["--settings", "{\"roulette_start\": \"x\"}"],
         2,
