@@ -1,11 +1,18 @@
-//! Drives `glslc` over every entry file, in parallel, and only over what changed.
+//! Compiles every entry file by `glslc`, in parallel, and only those that changed.
+//!
+//! A module goes with a stamp: a hash of the flags and of all sources, and the names of those that the compiler really used. Where the hash
+//! fits the sources, the module is used as it is. That holds for the modules of an earlier build and for those that a packaged crate
+//! carries in its folder `spirv/`, so that building a package needs no compiler.
 
-use std::collections::hash_map::DefaultHasher;
-use std::hash::{Hash, Hasher};
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::reflect::fnv1a;
 
 /// Vulkan 1.1 is the environment whose SPIR-V is 1.3: the newest version that every tool here reads.
 const COMMON_FLAGS: [&str; 3] = ["-Werror", "--target-env=vulkan1.1", "--target-spv=spv1.3"];
@@ -14,12 +21,28 @@ const COMMON_FLAGS: [&str; 3] = ["-Werror", "--target-env=vulkan1.1", "--target-
 /// multi-byte characters.
 const REFLECTED_FLAGS: [&str; 1] = ["-O0"];
 
-/// File extensions of entry files; everything else under `shaders/` is included by them.
+/// What the embedded modules are compiled with; those of debug builds get line numbers, too.
+const EMBEDDED_FLAGS: [&str; 1] = ["-O"];
+const EMBEDDED_DEBUG_FLAGS: [&str; 2] = ["-O", "-g"];
+
+/// File extensions of entry files; everything else is included by them.
 const STAGES: [&str; 4] = ["comp", "vert", "frag", "geom"];
+
+/// How to compile.
+pub struct Compiler {
+    /// `glslc`, or where it is.
+    pub program: OsString,
+    /// The folder that `#include` searches after the includer's own.
+    pub include: PathBuf,
+    /// Line numbers in the embedded modules.
+    pub debug_info: bool,
+    /// A folder with modules and stamps that were made elsewhere.
+    pub prebuilt: PathBuf,
+}
 
 /// One compiled entry file.
 pub struct Shader {
-    /// Path below `shaders/`, with forward slashes: `accel/trace_closest.comp`.
+    /// Path below the folder of shaders, with forward slashes: `accel/trace_closest.comp`.
     pub name: String,
     /// First comment block of the file, one string a line.
     pub head: Vec<String>,
@@ -27,148 +50,212 @@ pub struct Shader {
     pub embedded: PathBuf,
     /// The same module unoptimized with all names, for reflection.
     pub reflected: PathBuf,
-    /// The entry file and everything it includes.
-    pub sources: Vec<PathBuf>,
+    /// Text of the entry file and of everything that it used, by path: below the folder of shaders, or `include/…`.
+    pub sources: BTreeMap<String, String>,
 }
 
-/// Compiles every entry file below `root` into `out`.
-pub fn compile_all(root: &Path, out: &Path, debug_info: bool) -> Result<Vec<Shader>, String> {
-    let mut files = Vec::new();
-    find(root, &mut files)?;
-    files.sort();
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(Vec::new());
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                while let Some(file) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let result = compile(root, file, out, debug_info);
-                    results.lock().expect("no worker panics").push(result);
-                }
-            });
+impl Compiler {
+    /// Compiles every entry file below `root` into `out`, and takes modules of shaders that are gone out of `out`.
+    pub fn compile_all(&self, root: &Path, out: &Path) -> Result<Vec<Shader>, String> {
+        let mut files = Vec::new();
+        find(root, &mut files)?;
+        files.sort();
+        let next = AtomicUsize::new(0);
+        let results = Mutex::new(Vec::new());
+        let workers = std::thread::available_parallelism().map_or(1, usize::from);
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                scope.spawn(|| {
+                    while let Some(file) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let result = self.compile(root, file, out);
+                        results.lock().expect("no worker panics").push(result);
+                    }
+                });
+            }
+        });
+        let mut shaders = results
+            .into_inner()
+            .expect("no worker panics")
+            .into_iter()
+            .collect::<Result<Vec<_>, _>>()?;
+        shaders.sort_by(|a, b| a.name.cmp(&b.name));
+        remove_others(out, &shaders)?;
+        Ok(shaders)
+    }
+
+    fn compile(&self, root: &Path, file: &Path, out: &Path) -> Result<Shader, String> {
+        let name = below(root, file)?;
+        let places = self.sources(root, file, &name)?;
+        let mut sources = BTreeMap::new();
+        for (name, path) in &places {
+            let text = std::fs::read_to_string(path).map_err(|error| failed(path, &error))?;
+            sources.insert(name.clone(), text);
         }
-    });
-    let mut shaders = results
-        .into_inner()
-        .expect("no worker panics")
-        .into_iter()
-        .collect::<Result<Vec<_>, _>>()?;
-    shaders.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(shaders)
+        let head = sources[&name]
+            .lines()
+            .skip_while(|line| line.starts_with("#version"))
+            .take_while(|line| line.starts_with("//"))
+            .map(|line| line.trim_start_matches('/').trim().to_owned())
+            .collect();
+        let mut flags = EMBEDDED_FLAGS.as_slice();
+        let mut folder = self.prebuilt.as_path();
+        let mut used = used_if_fresh(folder, &name, &fingerprint(&sources, flags));
+        if used.is_none() {
+            folder = out;
+            if self.debug_info {
+                flags = &EMBEDDED_DEBUG_FLAGS;
+            }
+            let print = fingerprint(&sources, flags);
+            used = used_if_fresh(folder, &name, &print);
+            if used.is_none() {
+                let [embedded, reflected, stamp] = products(out, &name);
+                let list = stamp.with_extension("d");
+                self.glslc(file, &reflected, &REFLECTED_FLAGS, Some(&list))?;
+                self.glslc(file, &embedded, flags, None)?;
+                let list = std::fs::read_to_string(&list).map_err(|error| failed(&list, &error))?;
+                let names = named_in(&list, &places);
+                let text = std::iter::once(&print).chain(&names).map(|line| format!("{line}\n"));
+                std::fs::write(&stamp, text.collect::<String>()).map_err(|error| failed(&stamp, &error))?;
+                used = Some(names);
+            }
+        }
+        sources.retain(|name, _| used.as_ref().is_none_or(|used| used.contains(name)));
+        let [embedded, reflected, _] = products(folder, &name);
+        Ok(Shader {
+            name,
+            head,
+            embedded,
+            reflected,
+            sources,
+        })
+    }
+
+    /// Where the entry file and everything it includes are. Includes count whatever `#if` they stand in, so there may be more than are used.
+    fn sources(&self, root: &Path, file: &Path, name: &str) -> Result<BTreeMap<String, PathBuf>, String> {
+        let mut sources = BTreeMap::new();
+        let mut open = vec![(name.to_owned(), file.to_owned())];
+        while let Some((name, path)) = open.pop() {
+            let text = std::fs::read_to_string(&path).map_err(|error| failed(&path, &error))?;
+            for included in text.lines().filter_map(included_file) {
+                let beside = path.parent().unwrap_or(root).join(included);
+                let (name, found) = if beside.exists() {
+                    let name = below(&self.include, &beside).map(|below| format!("include/{below}"));
+                    (name.or_else(|_| below(root, &beside))?, beside)
+                } else {
+                    (format!("include/{included}"), self.include.join(included))
+                };
+                if !sources.contains_key(&name) && open.iter().all(|(other, _)| *other != name) {
+                    open.push((name, found));
+                }
+            }
+            sources.insert(name, path);
+        }
+        Ok(sources)
+    }
+
+    fn glslc(&self, file: &Path, target: &Path, flags: &[&str], list: Option<&Path>) -> Result<(), String> {
+        let mut command = Command::new(&self.program);
+        command.args(COMMON_FLAGS).args(flags);
+        command.arg("-I").arg(&self.include).arg(file).arg("-o").arg(target);
+        if let Some(list) = list {
+            command.arg("-MD").arg("-MF").arg(list);
+        }
+        let output = command
+            .output()
+            .map_err(|error| {
+                format!(
+                    "cannot run {}: {error}\nThe GLSL compiler glslc is needed (Debian and Ubuntu: apt-get install glslc; elsewhere: the \
+                     Vulkan SDK), or set GLSLC to its path. Only a packaged crate with its own shaders unchanged does without.",
+                    self.program.to_string_lossy()
+                )
+            })?;
+        if output.status.success() {
+            Ok(())
+        } else {
+            Err(String::from_utf8_lossy(&output.stderr).into_owned())
+        }
+    }
 }
 
 fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), String> {
-    let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    for entry in entries {
-        let path = entry.map_err(|error| error.to_string())?.path();
+    for entry in std::fs::read_dir(folder).map_err(|error| failed(folder, &error))? {
+        let path = entry.map_err(|error| failed(folder, &error))?.path();
+        let extension = path.extension().and_then(|e| e.to_str());
         if path.is_dir() {
             find(&path, files)?;
-        } else if path
-            .extension()
-            .and_then(|e| e.to_str())
-            .is_some_and(|e| STAGES.contains(&e))
-        {
+        } else if extension.is_some_and(|e| STAGES.contains(&e)) {
             files.push(path);
         }
     }
     Ok(())
 }
 
-fn compile(root: &Path, file: &Path, out: &Path, debug_info: bool) -> Result<Shader, String> {
-    let name = file
-        .strip_prefix(root)
-        .map_err(|e| e.to_string())?
-        .to_string_lossy()
-        .replace('\\', "/");
+/// `x.glsl` of `#include "x.glsl"`.
+fn included_file(line: &str) -> Option<&str> {
+    let quoted = line.trim().strip_prefix("#include")?.trim();
+    Some(quoted.strip_prefix('"')?.split_once('"')?.0)
+}
+
+/// A path below a folder, with forward slashes.
+fn below(folder: &Path, path: &Path) -> Result<String, String> {
+    let rest = path
+        .strip_prefix(folder)
+        .map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(rest.to_string_lossy().replace('\\', "/"))
+}
+
+/// The embedded module, the reflected module and the stamp of a shader.
+fn products(folder: &Path, name: &str) -> [PathBuf; 3] {
     let flat = name.replace('/', "__");
-    let embedded = out.join(format!("{flat}.spv"));
-    let reflected = out.join(format!("{flat}.reflect.spv"));
-    let depfile = out.join(format!("{flat}.d"));
-    let stamp = out.join(format!("{flat}.stamp"));
-    let mut embedded_flags = vec!["-O"];
-    if debug_info {
-        embedded_flags.push("-g");
-    }
-    let fresh = embedded.exists()
-        && reflected.exists()
-        && std::fs::read_to_string(&stamp).is_ok_and(|old| {
-            sources(&depfile)
-                .and_then(|list| fingerprint(file, &list, &embedded_flags))
-                .is_ok_and(|new| old == new)
-        });
-    if !fresh {
-        glslc(root, file, &reflected, &REFLECTED_FLAGS, Some(&depfile))?;
-        glslc(root, file, &embedded, &embedded_flags, None)?;
-        let print = fingerprint(file, &sources(&depfile)?, &embedded_flags)?;
-        std::fs::write(&stamp, print).map_err(|error| format!("{}: {error}", stamp.display()))?;
-    }
-    let text = std::fs::read_to_string(file).map_err(|error| format!("{name}: {error}"))?;
-    let head = text
-        .lines()
-        .skip_while(|line| line.starts_with("#version"))
-        .take_while(|line| line.starts_with("//"))
-        .map(|line| line.trim_start_matches('/').trim().to_owned())
+    ["spv", "reflect.spv", "stamp"].map(|end| folder.join(format!("{flat}.{end}")))
+}
+
+/// The names of the sources used, when the folder holds modules of that fingerprint.
+fn used_if_fresh(folder: &Path, name: &str, fingerprint: &str) -> Option<Vec<String>> {
+    let [embedded, reflected, stamp] = products(folder, name);
+    let text = std::fs::read_to_string(stamp).ok()?;
+    let mut lines = text.lines().map(str::to_owned);
+    (embedded.exists() && reflected.exists() && lines.next()? == fingerprint).then(|| lines.collect())
+}
+
+/// The names whose files stand in a make-style dependency list. Paths are looked for as they are, since the list does not mark spaces.
+fn named_in(list: &str, places: &BTreeMap<String, PathBuf>) -> Vec<String> {
+    let stands_in_list = |path: &Path| {
+        let path = path.to_string_lossy();
+        list.match_indices(&*path).any(|(at, _)| {
+            let after = &list[at + path.len()..];
+            list[..at].ends_with(' ') && (after.is_empty() || after.starts_with(char::is_whitespace))
+        })
+    };
+    let named = places.iter().filter(|(_, path)| stands_in_list(path));
+    named.map(|(name, _)| name.clone()).collect()
+}
+
+/// A hash of flags, paths and texts, the same on every machine.
+fn fingerprint(sources: &BTreeMap<String, String>, flags: &[&str]) -> String {
+    let flags = [&COMMON_FLAGS, REFLECTED_FLAGS.as_slice(), flags];
+    let text: String = sources
+        .iter()
+        .flat_map(|(path, text)| [path.as_str(), "\0", text, "\0"])
         .collect();
-    Ok(Shader {
-        name,
-        head,
-        embedded,
-        reflected,
-        sources: sources(&depfile)?,
-    })
+    format!("{:016x}", fnv1a(format!("{flags:?}{text}").bytes()))
 }
 
-fn glslc(root: &Path, file: &Path, target: &Path, flags: &[&str], depfile: Option<&Path>) -> Result<(), String> {
-    let program = std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
-    let mut command = Command::new(&program);
-    // Vulkan 1.1 is the environment whose SPIR-V is 1.3: the newest version that every tool here reads.
-    command
-        .args(["-Werror", "--target-env=vulkan1.1", "--target-spv=spv1.3"])
-        .args(flags);
-    command
-        .arg("-I")
-        .arg(root.join("include"))
-        .arg(file)
-        .arg("-o")
-        .arg(target);
-    if let Some(depfile) = depfile {
-        command.arg("-MD").arg("-MF").arg(depfile);
+fn remove_others(out: &Path, shaders: &[Shader]) -> Result<(), String> {
+    let kept: Vec<_> = shaders.iter().flat_map(|shader| products(out, &shader.name)).collect();
+    for entry in std::fs::read_dir(out).map_err(|error| failed(out, &error))? {
+        let path = entry.map_err(|error| failed(out, &error))?.path();
+        let product = path.extension().is_some_and(|end| end == "spv" || end == "stamp");
+        if product && !kept.contains(&path) {
+            match std::fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(&path, &error)),
+                _ => {}
+            }
+        }
     }
-    let output = command.output().map_err(|error| {
-        format!(
-            "cannot run {}: {error}\nThe GLSL compiler glslc is needed (Debian and Ubuntu: apt-get install glslc; elsewhere: the Vulkan \
-             SDK), or set GLSLC to its path.",
-            program.to_string_lossy()
-        )
-    })?;
-    if output.status.success() {
-        Ok(())
-    } else {
-        Err(String::from_utf8_lossy(&output.stderr).into_owned())
-    }
+    Ok(())
 }
 
-/// The files named by a make-style dependency file.
-fn sources(depfile: &Path) -> Result<Vec<PathBuf>, String> {
-    let text = std::fs::read_to_string(depfile).map_err(|error| format!("{}: {error}", depfile.display()))?;
-    let list = text.split_once(": ").map_or("", |(_, list)| list);
-    Ok(list
-        .split_whitespace()
-        .filter(|word| *word != "\\")
-        .map(PathBuf::from)
-        .collect())
-}
-
-/// A hash of the sources' contents, the flags and the entry file's place (a build folder may have been copied from another tree, whose
-/// files its dependency lists name): what decides whether a module is still fresh.
-fn fingerprint(file: &Path, sources: &[PathBuf], flags: &[&str]) -> Result<String, String> {
-    let mut hasher = DefaultHasher::new();
-    (file, COMMON_FLAGS, REFLECTED_FLAGS, flags).hash(&mut hasher);
-    for path in sources {
-        std::fs::read(path)
-            .map_err(|error| format!("{}: {error}", path.display()))?
-            .hash(&mut hasher);
-    }
-    Ok(format!("{:016x}", hasher.finish()))
+fn failed(path: &Path, error: &std::io::Error) -> String {
+    format!("{}: {error}", path.display())
 }

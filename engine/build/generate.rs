@@ -6,10 +6,15 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use crate::compile::Shader;
-use crate::reflect::{Binding, Interface, Member, Resource, Struct, Type, snake_case};
+use super::Paths;
+use super::compile::Shader;
+use super::reflect::{Binding, Interface, Member, Resource, Struct, Type, snake_case};
 
 const SET_MARK: &str = "// descriptor set ";
+
+/// What stands for the paths of the crate in the text, until it is complete.
+const GPU: &str = "@gpu@";
+const SHADERS: &str = "@shaders@";
 
 /// A node of the module tree.
 #[derive(Default)]
@@ -19,7 +24,7 @@ struct Folder {
 }
 
 /// The text of `shaders.rs`.
-pub fn generate(shaders: &[Shader], interfaces: &[Interface]) -> Result<String, String> {
+pub fn generate(shaders: &[Shader], interfaces: &[Interface], paths: &Paths) -> Result<String, String> {
     let mut types = BTreeMap::new();
     let mut sets: BTreeMap<String, (String, Vec<Binding>)> = BTreeMap::new();
     let mut root = Folder::default();
@@ -63,7 +68,7 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface]) -> Result<String, 
     }
     text += "}\n/// Descriptor sets that several shaders share.\npub mod sets {\n";
     if !sets.is_empty() {
-        text += "use crate::gpu::interface::*;\n";
+        let _ = writeln!(text, "use {GPU}::interface::*;");
     }
     for (name, (_, bindings)) in &sets {
         text += &rust_set(name, bindings[0].set, bindings);
@@ -72,9 +77,9 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface]) -> Result<String, 
     write_folder(&root, &mut text);
     let _ = write!(
         text,
-        "/// Every shader of the engine.\npub static ALL: &[&crate::gpu::interface::ShaderInfo] = &[\n{all}];\n"
+        "/// Every shader of this crate.\npub static ALL: &[&{GPU}::interface::ShaderInfo] = &[\n{all}];\n"
     );
-    Ok(text)
+    Ok(text.replace(GPU, paths.gpu).replace(SHADERS, paths.shaders))
 }
 
 fn write_folder(folder: &Folder, text: &mut String) {
@@ -99,13 +104,10 @@ fn module_name(file: &str) -> String {
 /// Sets that the shader's sources give a name to.
 fn named_sets(shader: &Shader) -> Result<BTreeMap<u32, String>, String> {
     let mut named = BTreeMap::new();
-    for path in &shader.sources {
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    for (path, text) in &shader.sources {
         for mark in text.lines().filter_map(|line| line.strip_prefix(SET_MARK)) {
-            let (number, name) = mark
-                .split_once(": ")
-                .ok_or_else(|| format!("{}: {mark}", path.display()))?;
-            let number = number.parse().map_err(|_| format!("{}: {mark}", path.display()))?;
+            let (number, name) = mark.split_once(": ").ok_or_else(|| format!("{path}: {mark}"))?;
+            let number = number.parse().map_err(|_| format!("{path}: {mark}"))?;
             let name = name
                 .split_whitespace()
                 .next()
@@ -164,7 +166,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
     for line in &shader.head {
         let _ = writeln!(text, "/// {line}");
     }
-    let _ = writeln!(text, "pub mod {module} {{\nuse crate::gpu::interface::*;");
+    let _ = writeln!(text, "pub mod {module} {{\nuse {GPU}::interface::*;");
     let embedded = shader.embedded.display().to_string();
     let local_size = interface.local_size.map(|size| match size {
         Ok(fixed) => format!("LocalSize::Fixed({fixed})"),
@@ -219,7 +221,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         let bindings: Vec<_> = interface.bindings.iter().filter(|b| b.set == set).cloned().collect();
         match named.get(&set) {
             Some(name) => {
-                let _ = writeln!(text, "pub use crate::gpu::shaders::sets::{name};");
+                let _ = writeln!(text, "pub use {SHADERS}::sets::{name};");
             }
             None => text += &rust_set(&format!("Set{set}"), set, &bindings),
         }
@@ -420,6 +422,6 @@ fn rust_type(kind: &Type) -> String {
         Type::Scalar(name, _) => (*name).to_owned(),
         Type::Array(element, count, _) => format!("[{}; {count}]", rust_type(element)),
         Type::Runtime(element, _) => format!("[{}]", rust_type(element)),
-        Type::Struct(layout) => format!("crate::gpu::shaders::types::{}", layout.name),
+        Type::Struct(layout) => format!("{SHADERS}::types::{}", layout.name),
     }
 }

@@ -123,17 +123,22 @@ struct Reader {
 
 impl Interface {
     /// A hash of all that the generated Rust code depends on: equal for two versions of a shader that can stand in for each other. The
-    /// defaults of specialization constants are left out, since the host always sets them. FNV-1a.
+    /// defaults of specialization constants are left out, since the host always sets them.
     pub fn fingerprint(&self) -> u64 {
         let spec: Vec<_> = self.spec.iter().map(|c| (c.id, &c.name, c.kind)).collect();
         let text = format!(
             "{} {:?} {:?} {spec:?} {:?}",
             self.stage, self.bindings, self.push, self.local_size
         );
-        text.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
-        })
+        fnv1a(text.bytes())
     }
+}
+
+/// The 64-bit hash FNV-1a, which is the same on every machine and with every compiler.
+pub fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3)
+    })
 }
 
 /// Reflects a module that was compiled with all its names.

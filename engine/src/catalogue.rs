@@ -1,6 +1,6 @@
 //! The catalogue: one row for every system that the engine carries, so that a reader finds where a publication lives in the code.
 //!
-//! Ids with the prefixes `BG-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility and media,
+//! Ids with the prefixes `BG-`, `DP-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility and media,
 //! photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
 //! the prefix `CL-` are the engine's own, for published methods outside of those documents. Guarantee: the tests below check that the
 //! module, every test and every experiment named here exist.
@@ -17,7 +17,7 @@ pub struct Row {
     pub name: &'static str,
     /// Where it was published.
     pub publication: &'static str,
-    /// Its main file, below `engine/`.
+    /// Its main file, from the repository's root.
     pub module: &'static str,
     /// The light paths of its picture; `None` for what makes no picture by itself.
     pub path_set: Option<PathSet>,
@@ -64,17 +64,33 @@ const RADIOMETRY: &[&str] = &[
     "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
     "engine/src/transport/lights.rs::spot_flux_and_falloff",
     "engine/src/transport/lights.rs::a_triangle_seen_by_its_density_has_its_solid_angle",
-    "tests/tests/smoke.rs::a_furnace_has_its_radiance",
+    "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+    "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
 ];
 const SAMPLING: &[&str] = &[
     "engine/src/transport/warp.rs::directions_follow_their_density",
-    "engine/src/transport/bsdf_tests.rs::samples_follow_their_density",
-    "engine/src/transport/bsdf_tests.rs::weight_is_value_over_density_and_density_integrates",
-    "engine/src/transport/lights.rs::heuristics_sum_to_one",
+    "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
+    "engine/src/transport/bsdf/tests.rs::weight_is_value_over_density_and_density_integrates",
+    "tests/tests/samplers.rs::warps_keep_areas",
+    "tests/tests/samplers.rs::pairs_fill_the_square_evenly",
 ];
 const PATH_TRACER: &[&str] = &[
-    "tests/tests/smoke.rs::a_furnace_has_its_radiance",
-    "tests/tests/smoke.rs::the_cornell_box_is_finite_and_lit",
+    "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+    "tests/tests/path_tracer.rs::a_light_in_a_lambert_sphere_fills_it_evenly",
+    "tests/tests/path_tracer.rs::white_objects_vanish_in_a_white_furnace",
+    "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+    "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
+    "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
+    "tests/tests/path_tracer.rs::rough_glass_loses_what_the_f64_twin_says",
+    "tests/tests/hard_cases.rs::closed_rooms_do_not_leak_at_any_scale_or_place",
+    "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
+];
+const ESTIMATION: &[&str] = &[
+    "engine/src/transport/lights.rs::heuristics_sum_to_one",
+    "tests/tests/path_tracer.rs::lights_are_chosen_in_the_end_as_often_as_their_weights_say",
+    "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+    "tests/tests/path_tracer.rs::the_variance_layer_is_the_variance_of_the_means",
+    "tests/tests/path_tracer.rs::sobol_draws_have_the_same_expectation_and_less_variance_between_seeds",
 ];
 
 /// All rows, ordered by document and id.
@@ -85,16 +101,16 @@ pub fn all() -> &'static [Row] {
 const ROWS: &[Row] = &[
     part(
         "BG-1",
-        "radiometry and surface transport (without media)",
+        "radiometry and surface transport (the volumetric equation is not carried yet)",
         "Veach 1997, chapter 3",
-        "src/transport/lights.rs",
+        "engine/src/transport/lights.rs",
         RADIOMETRY,
     ),
     unbiased(part(
         "BG-2",
         "Monte Carlo and importance sampling",
         "Veach 1997, chapters 2 and 9",
-        "src/transport/warp.rs",
+        "engine/src/transport/warp.rs",
         SAMPLING,
     )),
     Row {
@@ -102,9 +118,9 @@ const ROWS: &[Row] = &[
         experiment: Some("tools/report"),
         ..unbiased(part(
             "BG-3",
-            "path tracer, surfaces: technique `path`",
+            "path tracer, surfaces (no media yet): technique `path`",
             "Kajiya 1986; Veach 1997, chapters 9 and 10; Laine, Karras and Aila 2013",
-            "src/transport/path_tracer/mod.rs",
+            "engine/src/transport/path_tracer/mod.rs",
             PATH_TRACER,
         ))
     },
@@ -112,39 +128,54 @@ const ROWS: &[Row] = &[
         "BG-14",
         "ray index: binary BVH by binned surface-area heuristic",
         "Wald 2007; Aila and Laine 2009; Laine 2010; Ize 2013",
-        "src/accel/bvh2.rs",
+        "engine/src/accel/bvh2.rs",
         &[
             "engine/src/accel/bvh2/tests.rs::traversal_equals_trying_all_triangles_bit_for_bit",
             "engine/src/accel/bvh2/tests.rs::hits_agree_with_f64_up_to_their_stated_error",
             "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
             "engine/src/accel/bvh2/tests.rs::stopped_traversals_go_on_without_loss_or_repetition",
+            "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
+            "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
         ],
     ),
     part(
+        "DP-1",
+        "latitude–longitude map (y up, as glTF)",
+        "Blinn and Newell 1976",
+        "engine/src/transport/environment.rs",
+        &["engine/src/transport/environment.rs::directions_and_coordinates_agree"],
+    ),
+    part(
         "PM-F-1",
-        "radiometry of point and spot lights",
+        "radiometry of point and spot lights, split into direct and indirect light",
         "Veach 1997, chapter 3; Khronos, KHR_lights_punctual",
-        "src/transport/lights.rs",
-        RADIOMETRY,
+        "engine/src/transport/lights.rs",
+        &[
+            "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
+            "engine/src/transport/lights.rs::spot_flux_and_falloff",
+            "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+            "tests/tests/path_tracer.rs::path_sets_are_a_partition",
+        ],
     ),
     unbiased(part(
         "PM-F-2",
         "surface models: Lambert, mirror, refraction (path tracer); modified Phong (function)",
         "Lafortune and Willems 1994; Walter et al. 2007",
-        "src/transport/phong.rs",
+        "engine/src/transport/phong.rs",
         &[
             "engine/src/transport/phong.rs::white_furnace",
             "engine/src/transport/phong.rs::reciprocal",
             "engine/src/transport/phong.rs::samples_follow_their_density",
-            "engine/src/transport/bsdf_tests.rs::specular_zero_is_exactly_lambert",
-            "engine/src/transport/bsdf_tests.rs::clear_solid_is_the_smooth_dielectric",
+            "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
+            "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
+            "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
         ],
     )),
     unbiased(part(
         "PM-F-3",
         "phase functions of Henyey and Greenstein and of Schlick (functions; no medium yet)",
         "Henyey and Greenstein 1941; Blasi, Le Saëc and Schlick 1993",
-        "src/transport/phase.rs",
+        "engine/src/transport/phase.rs",
         &[
             "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
             "engine/src/transport/phase.rs::samples_follow_their_density",
@@ -154,7 +185,7 @@ const ROWS: &[Row] = &[
         "PM-I-1",
         "ray/sphere hit and closest approach",
         "Haines et al. 2019",
-        "src/accel/sphere.rs",
+        "engine/src/accel/sphere.rs",
         &[
             "engine/src/accel/sphere.rs::approach_matches_the_definition",
             "engine/src/accel/sphere.rs::sphere_hits_inside_outside_tangent_and_behind",
@@ -164,70 +195,74 @@ const ROWS: &[Row] = &[
         "PM-I-2",
         "Möller–Trumbore triangle test (oracle in f64)",
         "Möller and Trumbore 1997",
-        "src/accel/triangle.rs",
+        "engine/src/accel/triangle.rs",
         &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
     ),
     part(
         "MET-B1",
         "radiometry and rendering equation",
         "Kajiya 1986",
-        "src/transport/lights.rs",
+        "engine/src/transport/lights.rs",
         RADIOMETRY,
     ),
     unbiased(part(
         "MET-B2",
         "microfacet product of distribution, masking and Fresnel factor",
         "Walter et al. 2007; Heitz 2014",
-        "src/transport/bsdf.rs",
+        "engine/src/transport/bsdf/mod.rs",
         &[
-            "engine/src/transport/bsdf_tests.rs::white_furnace",
-            "engine/src/transport/bsdf_tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
-            "engine/src/transport/bsdf_tests.rs::samples_follow_their_density",
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+            "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
         ],
     )),
     unbiased(part(
         "MET-B7",
         "coupled matte and specular reflection",
         "Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997",
-        "src/transport/bsdf.rs",
+        "engine/src/transport/bsdf/mod.rs",
         &[
-            "engine/src/transport/bsdf_tests.rs::white_furnace",
-            "engine/src/transport/bsdf_tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
         ],
     )),
     unbiased(part(
         "MET-B8",
         "path estimation: light sampling, BRDF sampling, Russian roulette",
         "Kajiya 1986; Veach 1997, chapters 9 and 10",
-        "src/transport/path_tracer/mod.rs",
-        PATH_TRACER,
+        "engine/src/transport/path_tracer/mod.rs",
+        ESTIMATION,
     )),
     part(
         "MET-F1",
         "exact unpolarised conductor Fresnel",
         "Born and Wolf, Principles of Optics, 14.2",
-        "src/transport/fresnel.rs",
+        "engine/src/transport/fresnel.rs",
         &["engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric"],
     ),
     part(
         "CL-FRESNEL",
         "exact dielectric Fresnel",
         "Born and Wolf, Principles of Optics, 1.5",
-        "src/transport/fresnel.rs",
+        "engine/src/transport/fresnel.rs",
         &["engine/src/transport/fresnel.rs::dielectric_equals_the_textbook_form_and_its_edges"],
     ),
     part(
         "CL-METALS",
-        "measured metals: gold, silver, copper, aluminium",
-        "Johnson and Christy 1972; Rakić 1995",
-        "src/scene/metals.rs",
-        &["engine/src/scene/metals.rs::normal_reflectances_have_the_colours_of_the_metals"],
+        "measured metals: gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt",
+        "Johnson and Christy 1972, 1974; Rakić 1995",
+        "engine/src/scene/metals/mod.rs",
+        &[
+            "engine/src/scene/metals/mod.rs::spectra_reflect_what_others_computed_of_them",
+            "engine/src/scene/metals/mod.rs::channels_reflect_as_their_spectra_do",
+            "engine/src/scene/metals/mod.rs::channels_reflect_like_other_samples_of_the_metals",
+        ],
     ),
     unbiased(part(
         "CL-GGX",
         "GGX distribution, height-correlated masking, visible normals by spherical caps",
         "Walter et al. 2007; Heitz 2014; Dupuy and Benyoub 2023",
-        "src/transport/ggx.rs",
+        "engine/src/transport/ggx.rs",
         &[
             "engine/src/transport/ggx.rs::densities_are_normalised",
             "engine/src/transport/ggx.rs::visible_normals_follow_their_density",
@@ -238,17 +273,17 @@ const ROWS: &[Row] = &[
         "CL-MULTISCATTER",
         "compensation of rough metals for scattering among microfacets",
         "Kulla and Conty 2017",
-        "src/transport/albedo.rs",
+        "engine/src/transport/albedo.rs",
         &[
-            "engine/src/transport/bsdf_tests.rs::white_furnace",
-            "engine/src/transport/bsdf_tests.rs::albedo_table_interpolates_within_its_bound",
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
         ],
     ),
     part(
         "CL-NORMALS",
         "shading normals and normal maps that never gain energy",
         "Veach 1997, 5.3 (the problem; the bend towards the viewer is the engine's own)",
-        "src/transport/shading_normal.rs",
+        "engine/src/transport/shading_normal.rs",
         &[
             "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_lose_energy_only",
             "engine/src/transport/shading_normal.rs::flat_maps_keep_the_normal",
@@ -258,18 +293,19 @@ const ROWS: &[Row] = &[
         "CL-SOBOL",
         "Owen-scrambled Sobol' points by hashing",
         "Burley 2020; Laine and Karras 2011",
-        "src/transport/random.rs",
+        "engine/src/transport/random.rs",
         &[
             "engine/src/transport/random.rs::pascal_steps_equal_the_direction_numbers",
             "engine/src/transport/random.rs::sobol_pairs_are_stratified_plain_and_scrambled",
             "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
+            "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
         ],
     )),
     unbiased(part(
         "CL-PCG",
         "counter-based random numbers by PCG hashes",
         "Jarzynski and Olano 2020",
-        "src/transport/random.rs",
+        "engine/src/transport/random.rs",
         &[
             "engine/src/transport/random.rs::pcg_avalanche_and_means",
             "engine/src/transport/random.rs::floats_stay_below_one",
@@ -279,38 +315,42 @@ const ROWS: &[Row] = &[
         "CL-ENVIRONMENT",
         "environment light with importance sampling",
         "Pharr, Jakob and Humphreys 2016, 14.2.4",
-        "src/transport/environment.rs",
+        "engine/src/transport/environment.rs",
         &[
             "engine/src/transport/environment.rs::directions_and_coordinates_agree",
             "engine/src/transport/environment.rs::samples_follow_the_density",
             "engine/src/transport/environment.rs::light_is_never_missed_and_bad_maps_are_errors",
+            "tests/tests/samplers.rs::environments_are_sampled_by_their_texels_and_evenly_within",
+            "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
         ],
     )),
     unbiased(part(
         "CL-LIGHTS",
         "choice of lights by power",
         "Shirley, Wang and Zimmerman 1996 (inversion of the cumulative distribution)",
-        "src/transport/distribution.rs",
+        "engine/src/transport/distribution.rs",
         &[
             "engine/src/transport/distribution.rs::probabilities_follow_weights_and_none_is_lost",
             "engine/src/transport/distribution.rs::cells_follow_their_probability",
+            "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
         ],
     )),
     part(
         "CL-PATHSET",
         "restriction of a picture to a set of light paths",
         "Heckbert 1990, path notation",
-        "src/transport/path_set.rs",
+        "engine/src/transport/path_set.rs",
         &[
             "engine/src/transport/path_set.rs::text_round_trips",
-            "engine/src/transport/bsdf_tests.rs::masks_divide_the_whole",
+            "tests/tests/path_tracer.rs::path_sets_are_a_partition",
+            "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
         ],
     ),
     part(
         "CL-TRIANGLE",
         "watertight triangle test",
         "Woop, Benthin and Wald 2013",
-        "src/accel/triangle.rs",
+        "engine/src/accel/triangle.rs",
         &[
             "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
             "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
@@ -320,7 +360,7 @@ const ROWS: &[Row] = &[
         "CL-OFFSET",
         "ray origins off their surface by error bounds",
         "Pharr, Jakob and Humphreys 2016, 3.9",
-        "src/accel/offset.rs",
+        "engine/src/accel/offset.rs",
         &[
             "engine/src/accel/offset/tests.rs::position_lies_within_its_rounding_bound",
             "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
@@ -330,7 +370,7 @@ const ROWS: &[Row] = &[
         "CL-SUM",
         "sums of samples in pairs of floats",
         "Dekker 1971; Joldes, Muller and Popescu 2017",
-        "src/film/accumulate.rs",
+        "engine/src/film/accumulate.rs",
         &[
             "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
             "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
@@ -340,7 +380,7 @@ const ROWS: &[Row] = &[
         "CL-ERROR",
         "error metrics: MSE, relative MSE, bias, quantile, FLIP",
         "Rousselle, Knaus and Zwicker 2011; Andersson et al. 2020",
-        "src/film/metrics.rs",
+        "engine/src/film/metrics.rs",
         &[
             "engine/src/film/metrics.rs::formulas_on_numbers_done_by_hand",
             "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
@@ -350,17 +390,120 @@ const ROWS: &[Row] = &[
         "CL-ZTEST",
         "agreement of two pictures by z-test with Šidák's correction",
         "Subr and Arvo 2007; Šidák 1967",
-        "src/film/z_test.rs",
+        "engine/src/film/z_test.rs",
         &[
             "engine/src/film/z_test.rs::false_alarms_come_at_the_stated_rate",
             "engine/src/film/z_test.rs::a_bias_of_one_per_cent_is_found",
+        ],
+    ),
+    unbiased(part(
+        "CL-ALPHA",
+        "alpha: masks, and blending by chance",
+        "Enderton, Sintorn, Shirley and Luebke 2010",
+        "engine/src/transport/path_tracer/mod.rs",
+        &[
+            "tests/tests/alpha.rs::masks_are_all_or_nothing",
+            "tests/tests/alpha.rs::blended_walls_thin_out_the_light_behind_them",
+            "tests/tests/alpha.rs::blended_surfaces_scatter_in_proportion_to_alpha",
+            "tests/tests/alpha.rs::textures_and_vertex_colours_carry_alpha",
+        ],
+    )),
+    part(
+        "CL-ABSORPTION",
+        "absorption inside of solids",
+        "Khronos, KHR_materials_volume (law of Beer and Lambert)",
+        "engine/src/transport/path_tracer/mod.rs",
+        &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
+    ),
+    part(
+        "CL-TEXTURE",
+        "texture look-ups: nearest, bilinear, three ways to wrap, sRGB",
+        "Khronos, glTF 2.0 specification, 3.8; IEC 61966-2-1",
+        "engine/src/scene/texture.rs",
+        &[
+            "engine/src/scene/texture.rs::half_texels_and_wrap_modes_meet_at_borders",
+            "tests/tests/twin_texture.rs::look_ups_agree_with_their_twins",
+        ],
+    ),
+    part(
+        "CL-TANGENT",
+        "tangent frames of normal maps",
+        "Mikkelsen 2008 (MikkTSpace)",
+        "engine/src/scene/tangents.rs",
+        &[
+            "engine/src/scene/tangents.rs::tangents_follow_u_and_the_sign_follows_mirroring",
+            "engine/src/scene/tangents.rs::disagreeing_corners_split_vertices",
+        ],
+    ),
+    part(
+        "CL-CORNELL",
+        "Cornell box and thirteen more generated scenes",
+        "Goral, Torrance, Greenberg and Battaile 1984; Cornell University, Cornell Box Data; Haines 1987",
+        "engine/src/scene/builtin/mod.rs",
+        &[
+            "engine/src/scene/builtin/cornell.rs::the_areas_are_those_of_the_published_data",
+            "engine/src/scene/builtin/mod.rs::every_entry_builds_with_its_defaults_and_has_what_it_promises",
+        ],
+    ),
+    part(
+        "CL-PROFILE",
+        "only what a scene needs: profile and specialization",
+        "Khronos, SPIR-V specification, 2.12 (specialization constants)",
+        "engine/src/scene/profile.rs",
+        &[
+            "tests/tests/profile.rs::what_is_absent_costs_no_pass",
+            "tests/tests/profile.rs::what_is_absent_costs_no_byte",
+            "tests/tests/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
+        ],
+    ),
+    part(
+        "CL-BARRIERS",
+        "hand-recorded passes whose missing barriers are errors",
+        "Khronos, Vulkan 1.3 specification, chapter 7",
+        "engine/src/gpu/recorder.rs",
+        &[
+            "tests/tests/gpu_floor.rs::missing_barrier_is_an_error_that_names_both_passes",
+            "tests/tests/gpu_floor.rs::write_after_read_and_wrong_scope_are_hazards",
+            "tests/tests/layers.rs::the_recorder_catches_a_missing_barrier_between_dispatches",
+        ],
+    ),
+    part(
+        "CL-EXR",
+        "pictures as OpenEXR with layers and facts, Radiance HDR and PNG",
+        "Academy Software Foundation, Technical Introduction to OpenEXR; Ward 1991",
+        "engine/src/film/exr.rs",
+        &[
+            "engine/src/film/exr.rs::every_bit_and_every_attribute_comes_back",
+            "engine/src/film/hdr.rs::round_trip_errs_by_at_most_a_step_of_the_largest_channel",
+            "engine/src/film/png.rs::a_written_file_reads_back_to_the_byte",
+        ],
+    ),
+    part(
+        "CL-SIDECAR",
+        "sidecar of a model: environment, metals, cameras, exposure, technique (media are read and reported only)",
+        "the engine's own",
+        "engine/src/scene/sidecar.rs",
+        &[
+            "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
+            "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
+        ],
+    ),
+    part(
+        "CL-MESH",
+        "readers of PLY and OBJ",
+        "Turk 1994; Wavefront, OBJ and MTL",
+        "engine/src/scene/ply.rs",
+        &[
+            "engine/src/scene/ply.rs::all_encodings_are_read",
+            "engine/src/scene/ply.rs::every_cut_is_an_error_and_no_panic",
+            "engine/src/scene/obj.rs::faces_materials_and_coordinates_are_read",
         ],
     ),
     part(
         "CL-GLTF",
         "reader of glTF 2.0",
         "Khronos, glTF 2.0 specification",
-        "src/scene/gltf/mod.rs",
+        "engine/src/scene/gltf/mod.rs",
         &[
             "engine/src/scene/gltf/tests/features.rs::text_and_binary_containers_give_the_same_scene",
             "engine/src/scene/gltf/tests/features.rs::material_extensions_are_carried_over",
@@ -398,7 +541,7 @@ mod tests {
         for row in all() {
             assert!(seen.insert(row.id), "{} twice", row.id);
             assert!(
-                ["BG-", "PM-", "MET-", "CL-"]
+                ["BG-", "DP-", "PM-", "MET-", "CL-"]
                     .iter()
                     .any(|prefix| row.id.starts_with(prefix)),
                 "{}",
@@ -408,22 +551,97 @@ mod tests {
         }
     }
 
+    /// All Rust files of the workspace's crates.
+    fn sources() -> Vec<PathBuf> {
+        let mut folders: Vec<PathBuf> = ["engine/src", "engine/tests", "tests/tests", "tools", "samples"]
+            .map(|folder| repository().join(folder))
+            .into();
+        let mut files = Vec::new();
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|e| e == "rs") {
+                    files.push(path);
+                }
+            }
+        }
+        files.sort();
+        files
+    }
+
+    /// What is wrong with where a test is said to be, with the files that have a test of that name.
+    fn fault_of_test(test: &str) -> Option<String> {
+        let Some((file, name)) = test.split_once("::") else {
+            return Some(format!("{test:?} is not file::function"));
+        };
+        let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
+        if has_test(&read(&repository().join(file)), name) {
+            return None;
+        }
+        let elsewhere = sources().into_iter().filter(|path| has_test(&read(path), name));
+        let elsewhere: Vec<String> = elsewhere.map(|path| path.display().to_string()).collect();
+        Some(format!("no test {name} in {file}; it is in {elsewhere:?}"))
+    }
+
     #[test]
     fn modules_tests_and_experiments_exist() {
+        let mut faults = Vec::new();
         for row in all() {
-            let module = repository().join("engine").join(row.module);
-            assert!(module.is_file(), "{}: no module {}", row.id, row.module);
-            assert!(!row.tests.is_empty(), "{}: no test", row.id);
-            for test in row.tests {
-                let (file, name) = test.split_once("::").expect("tests are file::function");
-                let source = std::fs::read_to_string(repository().join(file))
-                    .unwrap_or_else(|error| panic!("{}: {file}: {error}", row.id));
-                assert!(has_test(&source, name), "{}: no test {test}", row.id);
+            if !(row.module.starts_with("engine/src/") && repository().join(row.module).is_file()) {
+                let folder = row.module.replace(".rs", "/mod.rs");
+                let moved = if repository().join(&folder).is_file() {
+                    format!("; there is {folder}")
+                } else {
+                    String::new()
+                };
+                faults.push(format!("{}: no module {}{moved}", row.id, row.module));
             }
+            if row.tests.is_empty() {
+                faults.push(format!("{}: no test", row.id));
+            }
+            faults.extend(
+                row.tests
+                    .iter()
+                    .filter_map(|test| fault_of_test(test))
+                    .map(|f| format!("{}: {f}", row.id)),
+            );
             if let Some(command) = row.experiment {
                 let program = command.split_whitespace().next().unwrap_or_default();
-                assert!(repository().join(program).is_file(), "{}: no {program}", row.id);
+                if !repository().join(program).is_file() {
+                    faults.push(format!("{}: no program {program}", row.id));
+                }
             }
+        }
+        assert!(
+            faults.is_empty(),
+            "the catalogue names what is not there:\n{}",
+            faults.join("\n")
+        );
+    }
+
+    #[test]
+    fn tests_that_are_not_there_are_found_out() {
+        let fault = fault_of_test("engine/src/lib.rs::tests_that_are_not_there_are_found_out").expect("fault");
+        assert!(fault.contains("catalogue.rs"), "{fault}");
+        assert!(fault_of_test("engine/src/catalogue.rs").is_some());
+        assert!(fault_of_test("engine/src/catalogue.rs::tests_that_are_not_there_are_found_out").is_none());
+    }
+
+    #[test]
+    fn every_technique_has_a_row_with_its_path_set() {
+        for technique in crate::techniques::all() {
+            let row = all()
+                .iter()
+                .find(|row| row.name.contains(&format!("`{}`", technique.id)));
+            let row = row.unwrap_or_else(|| panic!("no row names technique `{}`", technique.id));
+            assert_eq!(
+                (row.path_set, row.bias),
+                (Some(technique.path_set), Some(technique.bias)),
+                "{}",
+                row.id
+            );
         }
     }
 

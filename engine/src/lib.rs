@@ -8,7 +8,7 @@
 //! let gpu = Gpu::headless(&GpuOptions::default())?;
 //! let scene = scene::load("builtin:cornell-box")?;
 //! let rendered = render::render(&gpu, &scene, &render::RenderOptions::default())?;
-//! film::exr::write("cornell-box.exr".as_ref(), &rendered.picture)?;
+//! film::exr::write("cornell-box.exr", &rendered.picture)?;
 //! println!("{:.2} s of GPU time", rendered.report.gpu_seconds);
 //! # Ok(())
 //! # }
@@ -25,8 +25,12 @@ pub mod film;
 pub mod gpu;
 pub mod render;
 pub mod scene;
+pub mod settings;
 pub mod techniques;
 pub mod transport;
+
+#[cfg(test)]
+pub mod test_random;
 
 pub use error::{Error, Result};
 

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use crate::accel::IndexStatistics;
 use crate::film::picture::{Metadata, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
-use crate::scene::{Note, Scene, SceneProfile};
-use crate::techniques::{self, Skipped, Technique, View};
+use crate::scene::{Camera, Note, Scene, SceneProfile};
+use crate::techniques::{self, Skipped, Technique, TechniqueInfo, View};
 use crate::transport::GpuScene;
 use crate::{Error, Result};
 
@@ -193,35 +193,29 @@ impl Renderer {
         &self.gpu_scene
     }
 
-    /// Prepares a picture.
+    /// Prepares a picture by one of the engine's techniques.
     ///
     /// # Errors
     /// [`Error::Setting`] for an option out of range or a camera that does not exist, [`Error::Unsupported`] when the technique cannot
     /// model the scene, [`Error::MissingFeature`], [`Error::OutOfMemory`].
     pub fn start(&self, options: &RenderOptions) -> Result<Rendering> {
-        let fail = |name: &str, value: String, cause: String| Error::Setting {
-            name: name.into(),
-            value,
-            cause,
-        };
-        if options.spp == 0 {
-            return Err(fail("spp", "0".into(), "must be at least 1".into()));
-        }
-        let camera = self.scene.camera(options.camera.as_deref()).ok_or_else(|| {
-            let names: Vec<_> = self.scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-            let wanted = options.camera.clone().unwrap_or_default();
-            fail(
-                "camera",
-                wanted,
-                format!("is not in the scene; there is: {}", names.join(", ")),
-            )
-        })?;
         let id = options
             .technique
             .as_deref()
             .or(self.scene.defaults.technique.as_deref())
             .unwrap_or("path");
-        let info = techniques::by_id(id)?;
+        self.start_technique(techniques::by_id(id)?, options)
+    }
+
+    /// Prepares a picture by a technique of the host's own (see [`techniques`]), whatever the options name.
+    ///
+    /// # Errors
+    /// As [`Renderer::start`].
+    pub fn start_technique(&self, info: &TechniqueInfo, options: &RenderOptions) -> Result<Rendering> {
+        if options.spp == 0 {
+            return Err(Error::setting("spp", 0, "is not at least 1"));
+        }
+        let camera = self.scene.require_camera(options.camera.as_deref())?;
         let view = View {
             camera,
             size: options.size,
@@ -304,7 +298,7 @@ impl Rendering {
     ///
     /// # Errors
     /// [`Error::Setting`], [`Error::DeviceLost`].
-    pub fn set_camera(&mut self, camera: &crate::scene::Camera) -> Result<()> {
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         self.camera.clone_from(&camera.name);
         (self.start, self.first_step, self.finished) = (Instant::now(), None, false);
         self.passes.clear();
@@ -314,7 +308,7 @@ impl Rendering {
     /// Writes the picture as it is now to a buffer on the device; see [`Technique::display`].
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`], [`Error::DeviceLost`].
+    /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
     pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
         self.technique.display(target, exposure, bgra)
     }

@@ -77,18 +77,49 @@ fn a_sidecar_adds_what_the_model_cannot_say() {
 }
 
 #[test]
+fn the_sidecar_of_the_readme_is_understood() {
+    let readme = include_str!("../../README.md");
+    let block = readme
+        .split("```toml\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next());
+    let folder = folder(block.expect("a TOML block"));
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("file");
+    write("m.obj", &format!("{OBJ}usemtl bowl\nf 1 3 2\n"));
+    write("m.mtl", &format!("{MTL}newmtl bowl\nKd 0.5 0.5 0.5\n"));
+    exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, |_, _| (1.0, 1.0, 1.0)).expect("EXR");
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
+    assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
+    assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
+    assert_eq!(scene.notes[0].feature, "participating media");
+}
+
+#[test]
 fn a_sidecar_can_be_the_scene() {
     let folder = folder("");
     std::fs::write(folder.path().join("dusk.toml"), "file = \"m.obj\"\nexposure = -1.0\n").expect("file");
     let scene = load(folder.path(), "dusk.toml").expect("scene");
     assert_eq!((scene.name.as_str(), scene.defaults.exposure), ("dusk", -1.0));
-    std::fs::write(folder.path().join("empty.toml"), "exposure = 1.0\n").expect("file");
-    assert!(
-        load(folder.path(), "empty.toml")
-            .expect_err("no file")
-            .to_string()
-            .contains("file = ")
+    let with = |text: &str| {
+        std::fs::write(folder.path().join("other.toml"), text).expect("file");
+        load(folder.path(), "other.toml")
+    };
+    let ring = with("file = \"builtin:ring?metal=gold\"\nexposure = 1.0\n").expect("generated scene");
+    assert_eq!(
+        (ring.name.as_str(), ring.defaults.exposure, ring.lights.len()),
+        ("other", 1.0, 1)
     );
+    for (text, word) in [
+        ("exposure = 1.0\n", "file = "),
+        ("file = \"none.glb\"\n", "key \"file\""),
+        ("file = \"dusk.toml\"\n", "another sidecar"),
+        ("file = \"builtin:nowhere\"\n", "nowhere"),
+        ("file = \"m\"\n", "ending"),
+    ] {
+        let error = with(text).expect_err("must be refused").to_string();
+        assert!(error.contains(word), "{word}: {error}");
+    }
 }
 
 #[test]
@@ -113,10 +144,35 @@ fn sidecar_faults_have_their_line_or_key() {
         ),
         ("[environment]\nstrength = 1.0\n", "either file or color"),
         ("[environment]\nfile = \"none.exr\"\n", "none.exr"),
+        ("[environment]\nfile = \"m.obj\"\n", "environment.file"),
+        ("exposure = \"bright\"\n", "expected a number"),
         ("[environment]\ncolor = [nan, 0.0, 0.0]\n", "environment.color"),
         (
             "[medium]\nsigma_a = [0.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\ng = 1.0\n",
             "medium.g",
+        ),
+        (
+            "[medium]\nmaterial = \"fog\"\nsigma_a = [0.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\n",
+            "medium.material",
+        ),
+        ("[medium]\nsigma_a = [0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\n", "line 2"),
+        (
+            "[medium]\nsigma_a = [-1.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\n",
+            "at least 0",
+        ),
+        ("exposure = nan\n", "exposure"),
+        ("aspect = 0.0\n", "aspect"),
+        (
+            "[[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 180.0\n",
+            "cameras.main.fov",
+        ),
+        (
+            "[[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\naperture = -1.0\n",
+            "aperture",
+        ),
+        (
+            "[[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfocus = 0.0\n",
+            "focus",
         ),
         ("exposure = \n", "line 1"),
     ] {
@@ -128,12 +184,10 @@ fn sidecar_faults_have_their_line_or_key() {
 #[test]
 fn exr_and_hdr_environments_are_read_and_cleaned() {
     let folder = folder("[environment]\nfile = \"sky.exr\"\n");
-    let texel = |x: usize, y: usize| {
-        if (x, y) == (1, 0) {
-            (f32::NAN, -1.0, 0.0)
-        } else {
-            (x as f32, y as f32, 7.5)
-        }
+    let texel = |x: usize, y: usize| match (x, y) {
+        (1, 0) => (f32::NAN, -1.0, 2.0),
+        (2, 0) => (3.0, 0.5, -0.25),
+        _ => (x as f32, y as f32, 7.5),
     };
     exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, texel).expect("EXR");
     let scene = load(folder.path(), "m.obj").expect("scene");
@@ -141,7 +195,8 @@ fn exr_and_hdr_environments_are_read_and_cleaned() {
     assert_eq!((environment.width, environment.height), (4, 2));
     assert_eq!(environment.radiance[7], Vec3::new(3.0, 1.0, 7.5));
     assert_eq!(environment.radiance[1], Vec3::ZERO);
-    assert!(scene.notes.iter().any(|n| n.instead.contains("1 texels")));
+    assert_eq!(environment.radiance[2], Vec3::new(3.0, 0.5, 0.0));
+    assert!(scene.notes.iter().any(|n| n.instead.contains("2 texels")));
     assert_eq!(SceneProfile::of(&scene).environment, EnvironmentUse::Map);
 
     let file = std::fs::File::create(folder.path().join("sky.hdr")).expect("file");
@@ -170,7 +225,7 @@ fn exr_and_hdr_environments_are_read_and_cleaned() {
     for cut in (0..whole.len()).step_by(7) {
         std::fs::write(folder.path().join("sky.exr"), &whole[..cut]).expect("file");
         assert!(
-            matches!(load(folder.path(), "m.obj"), Err(Error::Picture { .. })),
+            matches!(load(folder.path(), "m.obj"), Err(Error::Scene { at, .. }) if at.contains("environment.file")),
             "{cut}"
         );
     }

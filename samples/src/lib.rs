@@ -3,6 +3,7 @@
 pub mod arguments;
 pub mod orbit;
 pub mod progressive;
+pub mod shaders;
 pub mod small_gltf;
 
 use std::path::{Path, PathBuf};

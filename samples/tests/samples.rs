@@ -141,7 +141,7 @@ fn render_gltf_shows_its_own_file_with_the_texture() {
             .count()
     };
     assert!(row(true) > 20 && row(false) > 20, "{} {}", row(true), row(false));
-    let exr = clerestory::film::exr::read(&path.with_extension("exr")).unwrap();
+    let exr = clerestory::film::exr::read(path.with_extension("exr")).unwrap();
     assert_eq!((exr.width(), exr.height()), (80, 60));
     assert!(exr.layer("radiance").is_some() && exr.metadata.spp == Some(8));
 }

@@ -2,8 +2,10 @@
 //!
 //! Tests never skip for want of a device: without one they fail. Which validation layers run is decided by `CLERESTORY_VALIDATION`.
 
+#[path = "../../engine/src/test_random.rs"]
 pub mod random;
 pub mod render;
+pub mod shaders;
 pub mod statistics;
 pub mod twin;
 

@@ -4,14 +4,15 @@
 //! f64 twin itself moves when its inputs move by some rounding units. The second part is what f32 arithmetic can promise where a
 //! function is ill-conditioned, and needs no bound written down for each.
 
+use crate::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 use clerestory::gpu::interface::{ComputeShader, SpecConstants};
 use clerestory::gpu::{BufferDesc, Category, ComputePipeline, Gpu};
 
-/// Numbers of a case (`TWIN_INPUTS`).
-pub const INPUTS: usize = 32;
-/// Numbers of its results (`TWIN_OUTPUTS`).
-pub const OUTPUTS: usize = 16;
+/// Numbers of a case.
+pub const INPUTS: usize = constants::TWIN_INPUTS as usize;
+/// Numbers of its results.
+pub const OUTPUTS: usize = constants::TWIN_OUTPUTS as usize;
 
 /// Unit roundoff of f32, 2⁻²⁴.
 pub const U: f64 = 1.0 / 16_777_216.0;
@@ -155,7 +156,7 @@ macro_rules! twin_kernel {
             cases: &[$crate::twin::Case],
             table: &[f32],
         ) -> Vec<$crate::twin::Results> {
-            use clerestory::gpu::shaders::tests::$name as shader;
+            use $crate::shaders::$name as shader;
             let case_count = cases.len() as u32;
             $crate::twin::dispatch::<shader::Kernel>(gpu, cases, table, |pass, pipeline, [inputs, outputs, table]| {
                 let set = shader::Set0 {

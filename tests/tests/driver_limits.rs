@@ -1,7 +1,7 @@
 //! What drivers do in silence. These tests record it, so that the day it changes is noticed.
 
-use clerestory::gpu::shaders::tests::loop_limit;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
+use clerestory_tests::shaders::loop_limit;
 use clerestory_tests::with_gpu;
 
 /// Iterations that lavapipe runs in all loops of an invocation together. The test that ends a loop counts too: a loop of n within

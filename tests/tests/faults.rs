@@ -7,8 +7,8 @@ use std::time::Duration;
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::fault::{FaultCall, FaultPlan};
-use clerestory::gpu::shaders::tests::{layout_probe, out_of_bounds};
-use clerestory::gpu::{BufferDesc, Category, Gpu, GpuOptions, ImageDesc, Submission, Validation};
+use clerestory::gpu::{Access, BufferDesc, Category, Gpu, GpuOptions, ImageDesc, Submission, Validation};
+use clerestory_tests::shaders::{layout_probe, out_of_bounds};
 use clerestory_tests::{assert_no_messages, gpu_with};
 
 /// The fault count is process-wide.
@@ -35,7 +35,7 @@ fn submit_fills(gpu: &Gpu, names: [&str; 2]) -> clerestory::Result<Submission> {
     let mut recorder = gpu.recorder("fills")?;
     recorder.pass(names[0], |pass| pass.fill(buffer.slice(0, 512), 1))?;
     recorder.pass(names[1], |pass| {
-        pass.memory_barrier(clerestory::gpu::Access::TRANSFER, clerestory::gpu::Access::TRANSFER);
+        pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
         pass.fill(buffer.slice(512, 512), 2)
     })?;
     recorder.submit()
@@ -180,7 +180,7 @@ fn out_of_memory_is_an_error_with_its_cause() {
     out_of_memory(
         FaultCall::CreateComputePipelines,
         device,
-        ("device", "tests/out_of_bounds.comp"),
+        ("device", "out_of_bounds.comp"),
         |gpu| gpu.compute_pipeline::<out_of_bounds::Kernel>(&()),
     );
     out_of_memory(
@@ -216,5 +216,59 @@ fn exhausted_descriptors_fail_the_pass_and_not_the_program() {
     };
     assert!(matches!(run(), Err(Error::OutOfMemory { .. })));
     run().unwrap();
+    assert_no_messages(&gpu);
+}
+
+#[test]
+#[expect(
+    unsafe_code,
+    reason = "an event that the host sets, to hold the device inside of a pass"
+)]
+fn the_marker_of_a_pass_is_written_when_all_before_has_ended_and_none_after() {
+    let (_guard, gpu) = faulty(FaultCall::WaitSemaphores, 1, vk::Result::ERROR_DEVICE_LOST);
+    let device = gpu.raw_device();
+    // SAFETY: plain creation; destroyed below.
+    let event = unsafe { device.create_event(&vk::EventCreateInfo::default(), None) }.unwrap();
+    let work = gpu
+        .buffer(&BufferDesc::storage("work", 16 << 20, Category::Work))
+        .unwrap();
+    let seen = gpu.buffer(&BufferDesc::readback("seen", 16)).unwrap();
+    seen.write(0, &[0u32; 4]).unwrap();
+    let mut recorder = gpu.recorder("held").unwrap();
+    recorder.pass("before", |pass| pass.fill(work.view(), 1)).unwrap();
+    recorder
+        .pass("held", |pass| {
+            pass.fill(seen.view(), 7)?;
+            pass.memory_barrier(Access::TRANSFER_WRITE, Access::HOST_READ);
+            let (host, all) = (vk::PipelineStageFlags::HOST, vk::PipelineStageFlags::ALL_COMMANDS);
+            // SAFETY: the event outlives the submission.
+            unsafe { device.cmd_wait_events(pass.raw(), &[event], host, all, &[], &[], &[]) };
+            Ok(())
+        })
+        .unwrap();
+    recorder
+        .pass("after", |pass| {
+            pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
+            pass.fill(work.view(), 2)
+        })
+        .unwrap();
+    let submission = recorder.submit().unwrap();
+    let start = std::time::Instant::now();
+    while seen.read::<u32>(0, 1).unwrap() != [7] {
+        assert!(
+            start.elapsed() < Duration::from_secs(60),
+            "the device does not reach the pass"
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    // Some time for a marker that does not wait for the pass before it.
+    std::thread::sleep(Duration::from_millis(20));
+    let lost = last_pass(submission.is_done());
+    // SAFETY: the event is alive; setting it lets the device go on.
+    unsafe { device.set_event(event) }.unwrap();
+    assert_eq!(lost, "held");
+    drop(submission);
+    // SAFETY: the submission is gone, and with it the last use.
+    unsafe { device.destroy_event(event, None) };
     assert_no_messages(&gpu);
 }

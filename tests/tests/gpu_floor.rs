@@ -2,12 +2,12 @@
 
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::tests::{layout_probe, out_of_bounds};
-use clerestory::gpu::shaders::types::{ProbeInner, ProbeRecord};
 use clerestory::gpu::{
-    Access, BufferDesc, Category, DeviceSelection, Gpu, GpuOptions, ImageDesc, Pass, rw_compute_to_compute,
-    transfer_to_compute,
+    Access, BufferBarrier, BufferDesc, Category, DescriptorLimits, DeviceSelection, Gpu, GpuOptions, ImageDesc, Lesser,
+    Pass, Residency, rw_compute_to_compute, transfer_to_compute,
 };
+use clerestory_tests::shaders::types::{ProbeInner, ProbeRecord};
+use clerestory_tests::shaders::{layout_probe, out_of_bounds, uniform_probe};
 use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
 
 /// Runs the probe over `count` records and returns the output block's header and its records.
@@ -385,20 +385,7 @@ fn submissions_may_be_empty_dropped_or_given_up() {
 #[test]
 fn waiting_with_a_limit_gives_the_submission_back() {
     with_gpu(|gpu| {
-        let words = gpu
-            .buffer(&BufferDesc::storage("words", 64 << 20, Category::Work))
-            .unwrap();
-        let mut recorder = gpu.recorder("long").unwrap();
-        recorder
-            .pass("fill often", |pass| {
-                for turn in 0..20 {
-                    pass.fill(words.view(), turn)?;
-                    pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
-                }
-                Ok(())
-            })
-            .unwrap();
-        let submission = recorder.submit().unwrap();
+        let submission = long_work(gpu);
         // More than a gigabyte of writes cannot be over before the first question is asked.
         match submission.wait_for(std::time::Duration::ZERO) {
             Err((Error::TimedOut { what, .. }, Some(submission))) => {
@@ -408,7 +395,6 @@ fn waiting_with_a_limit_gives_the_submission_back() {
             Err((error, _)) => panic!("{error}"),
             Ok(timings) => panic!("done at once: {timings:?}"),
         }
-        assert_eq!(gpu.read::<u32>(words.view(), 1).unwrap(), [19]);
     });
 }
 
@@ -474,5 +460,247 @@ fn images_that_the_device_cannot_make_are_refused() {
         assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
         let error = image([16, 16], vk::Format::D32_SFLOAT).unwrap_err();
         assert!(matches!(error, Error::MissingFeature { .. }), "{error}");
+    });
+}
+
+#[test]
+fn a_pipeline_beyond_the_limits_names_limit_wanted_and_offered() {
+    let descriptors = gpu_with(&GpuOptions::default()).caps().descriptors;
+    // The kernel has two storage buffers in one set.
+    let lesser = [
+        (
+            "maxPerStageDescriptorStorageBuffers >= 2",
+            DescriptorLimits {
+                per_stage_storage_buffers: 1,
+                ..descriptors
+            },
+        ),
+        (
+            "maxDescriptorSetStorageBuffers >= 2",
+            DescriptorLimits {
+                per_pipeline_storage_buffers: 1,
+                ..descriptors
+            },
+        ),
+        (
+            "maxPerStageResources >= 2",
+            DescriptorLimits {
+                per_stage_resources: 1,
+                ..descriptors
+            },
+        ),
+    ];
+    for (wanted, limits) in lesser {
+        let gpu = gpu_with(&GpuOptions {
+            lesser: Lesser {
+                descriptors: Some(limits),
+                ..Lesser::default()
+            },
+            ..GpuOptions::default()
+        });
+        match gpu.compute_pipeline::<layout_probe::Kernel>(&Default::default()) {
+            Err(Error::MissingFeature {
+                feature,
+                needed_by,
+                instead,
+                ..
+            }) => {
+                assert_eq!(feature, wanted);
+                assert!(needed_by.contains("layout_probe.comp"), "{needed_by}");
+                assert!(instead.contains("offers 1;"), "{instead}");
+            }
+            other => panic!("expected {wanted}, got {other:?}"),
+        }
+        // One storage buffer still fits.
+        gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).unwrap();
+        assert_no_messages(&gpu);
+    }
+}
+
+/// Three passes of different length.
+fn timed(gpu: &Gpu) -> clerestory::gpu::Timings {
+    let words = gpu
+        .buffer(&BufferDesc::storage("words", 16 << 20, Category::Work))
+        .unwrap();
+    let mut recorder = gpu.recorder("timed").unwrap();
+    for (name, bytes) in [("short", 1 << 10), ("long", 16 << 20), ("short again", 1 << 10)] {
+        recorder
+            .pass(name, |pass| {
+                pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
+                pass.fill(words.slice(0, bytes), 1)
+            })
+            .unwrap();
+    }
+    recorder.submit().unwrap().wait().unwrap()
+}
+
+#[test]
+fn devices_with_few_timestamp_bits_or_none_are_timed_as_far_as_they_can_be() {
+    let with_bits = |bits| {
+        let gpu = gpu_with(&GpuOptions {
+            lesser: Lesser {
+                timestamp_valid_bits: Some(bits),
+                ..Lesser::default()
+            },
+            ..GpuOptions::default()
+        });
+        let timings = timed(&gpu);
+        assert_no_messages(&gpu);
+        (timings, gpu.caps().clone())
+    };
+    let (untimed, caps) = with_bits(0);
+    assert_eq!((caps.timestamp_valid_bits, caps.timestamp_period), (0, 0.0));
+    assert_eq!(untimed.passes.len(), 3);
+    assert!(untimed.passes.iter().all(|pass| pass.nanoseconds.is_none()));
+    assert_eq!(untimed.untimed, Some("the device's queue has no timestamps"));
+    assert_eq!(untimed.longest(), None);
+    let (timings, caps) = with_bits(36);
+    if caps.timestamp_period > 0.0 {
+        assert!(caps.timestamp_valid_bits <= 36);
+        assert_eq!(timings.untimed, None);
+        assert_eq!(timings.longest().unwrap().name, "long");
+        // 36 bits of nanoseconds are over a minute.
+        assert!(timings.seconds() < 60.0, "{timings:?}");
+    }
+}
+
+#[test]
+fn uniform_buffers_want_barriers_of_their_own() {
+    with_gpu(|gpu| {
+        let pipeline = gpu.compute_pipeline::<uniform_probe::Kernel>(&()).unwrap();
+        let words = gpu.buffer_with("words", Category::Work, &[1u32; 8]).unwrap();
+        let addend = gpu
+            .buffer(&BufferDesc {
+                name: "addend",
+                bytes: 16,
+                residency: Residency::Device,
+                category: Category::Work,
+                usage: vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::TRANSFER_DST,
+            })
+            .unwrap();
+        let run = |to| {
+            let mut recorder = gpu.recorder("uniforms")?;
+            recorder.pass("write", |pass| {
+                pass.update(addend.view(), &[41u32])?;
+                pass.barrier(&[BufferBarrier {
+                    buffer: &addend,
+                    from: Access::TRANSFER_WRITE,
+                    to,
+                }]);
+                Ok(())
+            })?;
+            recorder.pass("add", |pass| {
+                let set = uniform_probe::Set0 {
+                    addend: addend.view(),
+                    words: words.view(),
+                };
+                pass.dispatch(&pipeline, &[&set], &(), [1, 1, 1])
+            })?;
+            recorder.submit()?.wait()
+        };
+        // The union holds on every device: stages that it lacks are left out.
+        run(Access::UNIFORM_READ).unwrap();
+        assert_eq!(gpu.read::<u32>(words.view(), 8).unwrap(), [42; 8]);
+        run(Access::COMPUTE_UNIFORM_READ).unwrap();
+        assert_eq!(gpu.read::<u32>(words.view(), 8).unwrap(), [83; 8]);
+        if cfg!(debug_assertions) {
+            let result = run(Access::COMPUTE);
+            assert!(
+                matches!(&result, Err(Error::MissingBarrier { buffer, .. }) if buffer == "addend"),
+                "{result:?}"
+            );
+        }
+    });
+}
+
+#[test]
+fn a_uniform_buffer_beyond_the_limit_is_refused() {
+    with_gpu(|gpu| {
+        let pipeline = gpu.compute_pipeline::<uniform_probe::Kernel>(&()).unwrap();
+        let bytes = gpu.caps().max_uniform_buffer_range + 16;
+        let addend = gpu
+            .buffer(&BufferDesc {
+                name: "too much",
+                bytes,
+                residency: Residency::Device,
+                category: Category::Work,
+                usage: vk::BufferUsageFlags::UNIFORM_BUFFER,
+            })
+            .unwrap();
+        let words = gpu.buffer(&BufferDesc::storage("words", 32, Category::Work)).unwrap();
+        let mut recorder = gpu.recorder("too much").unwrap();
+        let result = recorder.pass("add", |pass| {
+            let set = uniform_probe::Set0 {
+                addend: addend.view(),
+                words: words.view(),
+            };
+            pass.dispatch(&pipeline, &[&set], &(), [1, 1, 1])
+        });
+        assert!(
+            matches!(
+                &result,
+                Err(Error::LimitExceeded {
+                    limit_name: "maxUniformBufferRange",
+                    ..
+                })
+            ),
+            "{result:?}"
+        );
+    });
+}
+
+/// Twenty fills of 64 MiB: more than a gigabyte of writes, which no device has done when the call returns.
+fn long_work(gpu: &Gpu) -> clerestory::gpu::Submission {
+    let words = gpu
+        .buffer(&BufferDesc::storage("words", 64 << 20, Category::Work))
+        .unwrap();
+    let mut recorder = gpu.recorder("long").unwrap();
+    recorder
+        .pass("fill often", |pass| {
+            for turn in 0..20 {
+                pass.fill(words.view(), turn)?;
+                pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
+            }
+            Ok(())
+        })
+        .unwrap();
+    recorder.submit().unwrap()
+}
+
+#[test]
+fn what_the_device_still_uses_outlives_its_owners() {
+    // The submission dropped first, in the middle of the device's work, and its buffer with it.
+    with_gpu(|gpu| {
+        let before = gpu.memory_report();
+        let submission = long_work(gpu);
+        assert!(
+            !submission.is_done().unwrap(),
+            "the test wants work that is still running"
+        );
+        drop(submission);
+        assert_eq!(gpu.memory_report(), before);
+        // Its pools are used again.
+        assert_eq!(many_dispatches(gpu, 3), [1, 2, 3]);
+    });
+    // The submission as the last owner of everything.
+    let gpu = gpu_with(&GpuOptions::default());
+    let log = gpu.validation_log();
+    let submission = long_work(&gpu);
+    drop(gpu);
+    assert!(!submission.is_done().unwrap());
+    drop(submission);
+    let messages = log.take();
+    assert!(messages.is_empty(), "{messages:#?}");
+    // A thread that unwinds while its submission runs.
+    with_gpu(|gpu| {
+        let outcome = std::thread::scope(|scope| {
+            let unwinding = scope.spawn(|| {
+                let _running = long_work(gpu);
+                std::panic::resume_unwind(Box::new("planted"));
+            });
+            unwinding.join()
+        });
+        assert!(outcome.is_err());
+        assert_eq!(many_dispatches(gpu, 3), [1, 2, 3]);
     });
 }

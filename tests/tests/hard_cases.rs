@@ -338,7 +338,7 @@ fn extreme_materials_stay_finite() {
             scene.materials[0] = material;
             let picture = render(gpu, &scene, SMALL, 64, &calm());
             for (mean, variance) in picture.mean() {
-                // The albedo table's interpolation may gain 5·10⁻³ (transport/bsdf_tests.rs).
+                // The albedo table's interpolation may gain 5·10⁻³ (transport/bsdf/tests.rs).
                 assert!(mean <= 1.005 + 4.9 * variance.sqrt(), "{what}: {mean}");
             }
         }

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 
 use clerestory::Error;
-use clerestory::gpu::shaders::tests::out_of_bounds;
 use clerestory::gpu::{Category, ComputePipeline, Gpu, HotReload};
+use clerestory_tests::shaders::out_of_bounds;
 use clerestory_tests::with_gpu;
 
 /// What the kernel writes into word 2 of 4 when it is told to write 5.
@@ -34,10 +34,9 @@ fn save(path: &Path, text: &str, turn: u64) {
 
 #[test]
 fn a_changed_source_takes_effect_and_a_faulty_one_does_not() {
-    let original = include_str!("../../engine/shaders/tests/out_of_bounds.comp");
+    let original = include_str!("../shaders/out_of_bounds.comp");
     let folder = tempfile::tempdir().unwrap();
-    std::fs::create_dir_all(folder.path().join("tests")).unwrap();
-    let source = folder.path().join("tests/out_of_bounds.comp");
+    let source = folder.path().join("out_of_bounds.comp");
     save(&source, original, 0);
     with_gpu(|gpu| {
         let mut kernel = HotReload::<out_of_bounds::Kernel>::new(gpu, folder.path(), ()).unwrap();
@@ -52,7 +51,7 @@ fn a_changed_source_takes_effect_and_a_faulty_one_does_not() {
         save(&source, &original.replace("= value", "= valeu"), 2);
         match kernel.poll() {
             Err(Error::Shader { name, message }) => {
-                assert_eq!(name, "tests/out_of_bounds.comp");
+                assert_eq!(name, "out_of_bounds.comp");
                 assert!(message.contains("valeu"), "{message}");
             }
             other => panic!("expected the compiler's words, got {other:?}"),

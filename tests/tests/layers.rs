@@ -2,8 +2,8 @@
 
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::tests::out_of_bounds;
 use clerestory::gpu::{Access, BufferDesc, Category, Gpu, GpuOptions, Validation, ValidationMessage};
+use clerestory_tests::shaders::out_of_bounds;
 use clerestory_tests::{assert_no_messages, gpu_with};
 
 fn validated(validation: Validation) -> Gpu {

@@ -1,7 +1,8 @@
 //! Every dependency's licence is one of those that `deny.toml` allows.
 //!
 //! Offline: `cargo metadata` on the lock file, and the SPDX expressions evaluated here (AND, OR, WITH, parentheses; `/` as the old
-//! form of OR). An unknown word, a missing licence or a syntax error fails.
+//! form of OR). An unknown word, a missing licence or a syntax error fails. The crates used directly have their line in
+//! `third_party_notes/crates.md`, and every page of notes is in the index.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -113,6 +114,44 @@ fn host() -> String {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let name = text.lines().find_map(|line| line.strip_prefix("host: "));
     name.expect("rustc names its host").to_owned()
+}
+
+#[test]
+fn crates_used_directly_and_pages_of_notes_are_listed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |path: &str| std::fs::read_to_string(root.join(path)).expect("file");
+    let manifest = read("Cargo.toml");
+    let list = manifest.split_once("[workspace.dependencies]").expect("dependencies").1;
+    let list = list.split_once("\n[").map_or(list, |(list, _)| list);
+    let crates: Vec<&str> = list
+        .lines()
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(name, _)| name)
+        .collect();
+    assert!(crates.len() > 20, "{crates:?}");
+    let notes = read("third_party_notes/crates.md");
+    // The first cell may name several, and say when they are used.
+    let listed: Vec<&str> = notes
+        .lines()
+        .filter_map(|line| line.strip_prefix("| ")?.split(" |").next())
+        .flat_map(|cell| cell.split([' ', ',', '(']))
+        .collect();
+    let missing: Vec<_> = crates
+        .iter()
+        .filter(|name| **name != "clerestory" && !listed.contains(name))
+        .collect();
+    assert!(
+        missing.is_empty(),
+        "third_party_notes/crates.md has no line for {missing:?}"
+    );
+    let index = read("third_party_notes/README.md");
+    for page in std::fs::read_dir(root.join("third_party_notes")).expect("folder") {
+        let name = page.expect("entry").file_name().to_string_lossy().into_owned();
+        assert!(
+            name == "README.md" || index.contains(&format!("]({name})")),
+            "{name} is not in the index"
+        );
+    }
 }
 
 #[test]

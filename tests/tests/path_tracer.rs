@@ -115,7 +115,7 @@ fn covered(scene: &Scene) -> f64 {
 #[test]
 fn white_objects_vanish_in_a_white_furnace() {
     with_gpu(|gpu| {
-        // Interpolation of the albedo table (transport/bsdf_tests.rs): relative 2·10⁻³. Delta lobes have no table.
+        // Interpolation of the albedo table (transport/bsdf/tests.rs): relative 2·10⁻³. Delta lobes have no table.
         const TABLE: f64 = 2e-3;
         for (what, query, bias) in [
             ("rough metal", "metallic=1&roughness=0.6", TABLE),

@@ -282,7 +282,7 @@ fn features_that_are_compiled_in_without_need_change_no_bit() {
                 "has_shading_normals",
                 "has_normal_maps",
                 "has_vertex_colors",
-                "has_attenuation",
+                "has_absorption",
                 "has_unlit",
             ] {
                 assert!(compiled.contains(&feature), "{feature}: {compiled:?}");

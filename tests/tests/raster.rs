@@ -1,12 +1,12 @@
 //! Rendering: exact coverage, depth, kept contents, refused mistakes, and barriers of what vertex and fragment shaders read.
 
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::tests::{quad_frag, quad_vert};
 use clerestory::gpu::{
     Access, Buffer, BufferDesc, Category, ColorTarget, DepthTarget, Gpu, GraphicsDesc, GraphicsPipeline, Image,
     ImageBarrier, ImageDesc, Targets,
 };
 use clerestory::{Error, Result};
+use clerestory_tests::shaders::{quad_frag, quad_vert};
 use clerestory_tests::with_gpu;
 
 const SIZE: [u32; 2] = [16, 8];

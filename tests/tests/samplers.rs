@@ -6,12 +6,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use clerestory::gpu::shaders::tests::twin_random;
-use clerestory::gpu::shaders::types::{RandomCase, RandomWords};
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::transport::distribution::{build_distribution, build_distribution_2d, distribution_probability};
 use clerestory::transport::ggx::ggx_visible_pdf;
 use clerestory::transport::random::SamplerKind;
+use clerestory_tests::shaders::twin_random;
+use clerestory_tests::shaders::types::{RandomCase, RandomWords};
 use clerestory_tests::statistics::{FALSE_ALARM, chi_square_test, expect_counts};
 use clerestory_tests::twin::Case;
 use clerestory_tests::{twin_kernel, with_gpu};

@@ -5,14 +5,15 @@ use std::process::{Command, Stdio};
 
 use clerestory::gpu::interface::{ShaderInfo, Stage};
 use clerestory::gpu::shaders;
+use clerestory_tests::shaders as test_shaders;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 /// The modules that naga cannot read or does not accept, each with words of its reason. One that it starts to accept must leave the list.
 const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Matrix columns of three rows without padding: naga knows the standard layouts only, not the scalar one.
-    ("tests/layout_probe.comp", "UnsupportedMatrixStride"),
+    ("layout_probe.comp", "UnsupportedMatrixStride"),
     // Arrays of structs of 32-bit words whose stride is no multiple of 16: the scalar layout again.
-    ("tests/twin_texture.comp", "ArrayStride"),
+    ("twin_texture.comp", "ArrayStride"),
     ("transport/path_resolve.comp", "ArrayStride"),
     // Texel buffers.
     ("accel/trace_any.comp", "SampledBuffer"),
@@ -22,7 +23,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("transport/path_shadow.comp", "SampledBuffer"),
     ("transport/path_shadow_alpha.comp", "SampledBuffer"),
     // Comparisons of specialization constants.
-    ("tests/twin_random.comp", "SpecConstantOp"),
+    ("twin_random.comp", "SpecConstantOp"),
     ("transport/path_camera.comp", "SpecConstantOp"),
     ("transport/path_shade.comp", "SpecConstantOp"),
     // Addition with carry.
@@ -47,6 +48,11 @@ fn without_lines(spirv: &[u8]) -> Vec<u8> {
     kept
 }
 
+/// The shaders of the engine, and those of the tests.
+fn all() -> impl Iterator<Item = &'static ShaderInfo> {
+    shaders::ALL.iter().chain(test_shaders::ALL).copied()
+}
+
 fn naga_says(shader: &ShaderInfo) -> Result<(), String> {
     let options = naga::front::spv::Options::default();
     let module = naga::front::spv::parse_u8_slice(&without_lines(shader.spirv), &options)
@@ -60,7 +66,7 @@ fn naga_says(shader: &ShaderInfo) -> Result<(), String> {
 #[test]
 fn naga_accepts_every_compute_module_that_it_can_read() {
     let mut wrong = Vec::new();
-    for shader in shaders::ALL.iter().filter(|shader| shader.stage == Stage::Compute) {
+    for shader in all().filter(|shader| shader.stage == Stage::Compute) {
         let known = REFUSED_BY_NAGA.iter().find(|(name, _)| *name == shader.name);
         match (naga_says(shader), known) {
             (Ok(()), None) => {}
@@ -70,7 +76,7 @@ fn naga_accepts_every_compute_module_that_it_can_read() {
         }
     }
     for (name, _) in REFUSED_BY_NAGA {
-        if !shaders::ALL.iter().any(|shader| shader.name == *name) {
+        if !all().any(|shader| shader.name == *name) {
             wrong.push(format!("{name}: there is no such shader"));
         }
     }
@@ -79,7 +85,7 @@ fn naga_accepts_every_compute_module_that_it_can_read() {
 
 #[test]
 fn spirv_val_accepts_every_module() {
-    for shader in shaders::ALL {
+    for shader in all() {
         // Scalar layout is enabled on every device; the version is the one that the build compiles for.
         let mut child = Command::new("spirv-val")
             .args(["--target-env", "vulkan1.1", "--scalar-block-layout", "-"])

@@ -8,11 +8,11 @@
 use std::collections::BTreeSet;
 
 use clerestory::gpu::Gpu;
-use clerestory::gpu::shaders::tests::twin_texture as shader;
 use clerestory::scene::texture::{fetch_texel, linear_from_srgb, sample_texture, texel_coordinates, wrap_texel};
 use clerestory::scene::{Filter, Image, Material, Scene, Texture, Wrap};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{camera_down, floor, upload};
+use clerestory_tests::shaders::twin_texture as shader;
 use clerestory_tests::twin::{Case, Results, U, dispatch};
 use clerestory_tests::with_gpu;
 use glam::{DVec2, DVec3, DVec4};

@@ -17,11 +17,12 @@ use std::time::Instant;
 
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE};
 use clerestory::film::{CompareOptions, Picture, ToneMap, compare, exr, png, z_test};
-use clerestory::gpu::{Gpu, GpuOptions};
+use clerestory::gpu::Gpu;
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
 
+use crate::machine::median;
 use crate::mitsuba::export;
 use crate::mitsuba::scenes::{ComparedScene, scenes};
 use peer::{Peer, Variant};
@@ -88,19 +89,18 @@ const BLOCK: u32 = 8;
 /// Radiance difference shown as full white in the difference pictures, in units of its standard deviation.
 const FULL_SCALE_Z: f32 = 5.0;
 
-/// Compares all wanted scenes, calling `progress` with a line before each and after each, and writes the report.
+/// Compares all wanted scenes on a device, calling `progress` with a line before each and after each, and writes the report.
 ///
 /// # Errors
 /// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the exporter and
 /// the files. A picture that disagrees is no error: see [`AgreementReport::passes`].
-pub fn run_with(options: &AgreementOptions, mut progress: impl FnMut(&str)) -> Result<AgreementReport> {
+pub fn run_with(gpu: &Gpu, options: &AgreementOptions, mut progress: impl FnMut(&str)) -> Result<AgreementReport> {
     let wanted = selected(options)?;
-    let gpu = Gpu::headless(&GpuOptions::default())?;
     let mut done = Vec::new();
     let mut mitsuba = String::new();
     for one in &wanted {
         progress(&format!("{}: {}", one.name, one.shows));
-        let (scene, version) = compare_scene(&gpu, one, options)?;
+        let (scene, version) = compare_scene(gpu, one, options)?;
         progress(&scene.to_string());
         mitsuba = version;
         done.push(scene);
@@ -121,12 +121,14 @@ pub fn run_with(options: &AgreementOptions, mut progress: impl FnMut(&str)) -> R
     })
 }
 
-/// [`run_with`], in silence.
-///
-/// # Errors
-/// As [`run_with`].
-pub fn run(options: &AgreementOptions) -> Result<AgreementReport> {
-    run_with(options, |_| {})
+impl AgreementOptions {
+    /// Checks all that can be checked before work begins.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for options out of range and for an unknown scene.
+    pub fn check(&self) -> Result<()> {
+        selected(self).map(|_| ())
+    }
 }
 
 fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
@@ -247,11 +249,11 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
 
 /// Both pictures as EXR and PNG, and their difference in units of its standard deviation.
 fn write_pictures(folder: &Path, ours: &Picture, reference: &Picture) -> Result<()> {
-    exr::write(&folder.join("clerestory.exr"), ours)?;
+    exr::write(folder.join("clerestory.exr"), ours)?;
     let tone = ToneMap::default();
     let show = |picture: &Picture, name: &str| {
         let shown = png::tone_mapped(picture.main_layer()?, picture.width(), &tone);
-        png::write(&folder.join(name), &shown)
+        png::write(folder.join(name), &shown)
     };
     show(ours, "clerestory.png")?;
     show(reference, "mitsuba.png")?;
@@ -266,7 +268,7 @@ fn write_pictures(folder: &Path, ours: &Picture, reference: &Picture) -> Result<
         .map(|pixel| pixel.iter().fold(0.0f64, |worst, z| worst.max(z.abs())) as f32)
         .collect();
     png::write(
-        &folder.join("z.png"),
+        folder.join("z.png"),
         &png::false_color(&worst, ours.width(), FULL_SCALE_Z)?,
     )
 }
@@ -340,8 +342,8 @@ fn measure(
             cpu[i].push(timed.paths_per_cpu_second);
         }
     }
-    let [ours, scalar, llvm] = wall.map(median);
-    let [ours_cpu, scalar_cpu, llvm_cpu] = cpu.map(median);
+    let [ours, scalar, llvm] = wall.map(middle);
+    let [ours_cpu, scalar_cpu, llvm_cpu] = cpu.map(middle);
     Ok(Speed {
         ours,
         scalar,
@@ -352,10 +354,8 @@ fn measure(
     })
 }
 
-/// Middle value; of an even number, the lower of the two in the middle. `None` of nothing.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len().saturating_sub(1) / 2).copied()
+fn middle(values: Vec<f64>) -> Option<f64> {
+    Some(median(values)).filter(|middle| !middle.is_nan())
 }
 
 /// Processor seconds of this process so far, all threads; `None` where the system does not say.
@@ -391,9 +391,7 @@ mod tests {
 
     #[test]
     fn medians_and_squared_z() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![4.0, 1.0, 3.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![]), None);
+        assert_eq!((middle(vec![4.0, 1.0]), middle(vec![])), (Some(2.5), None));
         // z = 2 and 0 where there is noise; the value without noise does not count.
         let (a, b) = ([3.0, 1.0, 5.0], [1.0, 1.0, 5.0]);
         assert_eq!(mean_squared_z(&a, &[0.5, 0.5, 0.0], &b, &[0.5, 0.5, 0.0]), 2.0);

@@ -56,11 +56,12 @@ impl Failure {
 
     /// An error met while a scene was read: a missing file is then a scene error too.
     pub fn scene(error: Error) -> Self {
+        let unread = matches!(error, Error::Io { .. });
         let mut failure = Self {
             code: Code::Scene,
             ..Self::from(error)
         };
-        if failure.hint.is_none() {
+        if unread {
             failure.hint =
                 Some("`clerestory scenes` lists the generated scenes; files may be gltf, glb, ply, obj, toml".into());
         }
@@ -104,6 +105,8 @@ impl From<Error> for Failure {
                 let wanted = wanted.split_once('(').map_or(wanted, |(_, what)| what);
                 format!("no Vulkan device is called or numbered {wanted}; there is {found}")
             }
+            // The settings as a whole are long; the cause names the one that is wrong.
+            Error::Setting { name, cause, .. } if name == "settings" => format!("--settings: {cause}"),
             _ => error.to_string(),
         };
         // Most errors of the engine say the way round after the first semicolon.
@@ -114,7 +117,10 @@ impl From<Error> for Failure {
             ),
             Error::OutOfMemory { .. } | Error::LimitExceeded { .. } => (
                 text,
-                Some("a smaller --size needs less memory; `clerestory info` lists the limits of each device".into()),
+                Some(
+                    "a smaller picture (--size) or scene takes less; `clerestory info` lists the limits of each device"
+                        .into(),
+                ),
             ),
             Error::Vulkan { .. } | Error::Io { .. } | Error::Picture { .. } | Error::Shader { .. } => (text, None),
             _ => match text.split_once("; ") {

@@ -1,4 +1,5 @@
 //! What the command line program and its tests share.
 
 pub mod agreement;
+pub mod machine;
 pub mod mitsuba;

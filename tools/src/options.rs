@@ -20,45 +20,54 @@ pub enum ValidationMode {
 
 /// Options of every command.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Global options")]
 pub struct Global {
     /// Says more to the error output; twice for all of it
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Vulkan validation layers; by default as CLERESTORY_VALIDATION says, else off
-    #[arg(long, global = true, value_name = "MODE")]
+}
+
+/// Which device, and whether the validation layers watch it: options of every command that opens one.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Device")]
+pub struct DeviceOptions {
+    /// Device by its index or a part of its name (`lavapipe` is Mesa's software device); the fastest kind by default. `clerestory
+    /// info` lists them
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Vulkan validation layers, whose errors fail the run; by default as CLERESTORY_VALIDATION says, else off
+    #[arg(long, value_name = "MODE")]
     pub validation: Option<ValidationMode>,
 }
 
-/// Which device.
-#[derive(Debug, Clone, Args)]
-pub struct DeviceOption {
-    /// Device by its index or a part of its name (`lavapipe` is Mesa's software device); the fastest kind by default
-    #[arg(long, value_name = "NAME|INDEX")]
-    pub device: Option<String>,
-}
+impl DeviceOptions {
+    /// The device that is meant.
+    pub fn selection(&self) -> DeviceSelection {
+        self.device.as_deref().map_or(DeviceSelection::Fastest, |text| {
+            text.parse().unwrap_or_else(|never| match never {})
+        })
+    }
 
-impl DeviceOption {
-    /// Opens the device.
-    pub fn open(&self, global: &Global) -> Outcome<Gpu> {
+    /// How to make the device.
+    pub fn options(&self) -> GpuOptions {
         let mut options = GpuOptions {
-            device: selection(self.device.as_deref()),
+            device: self.selection(),
             ..GpuOptions::default()
         };
-        if let Some(mode) = global.validation {
+        if let Some(mode) = self.validation {
             options.validation = match mode {
                 ValidationMode::Off => Validation::Off,
                 ValidationMode::Core => Validation::Core,
                 ValidationMode::Gpu => Validation::GpuAssisted,
             };
         }
-        Ok(Gpu::headless(&options)?)
+        options
     }
-}
 
-fn selection(text: Option<&str>) -> DeviceSelection {
-    text.map_or(DeviceSelection::Fastest, |text| {
-        text.parse().unwrap_or_else(|never| match never {})
-    })
+    /// Opens the device.
+    pub fn open(&self) -> Outcome<Gpu> {
+        Ok(Gpu::headless(&self.options())?)
+    }
 }
 
 /// A picture's size on the command line: `WIDTHxHEIGHT`, or the height alone, which takes its width from the scene's aspect.

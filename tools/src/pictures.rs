@@ -24,7 +24,10 @@ pub fn read(path: &Path) -> Result<Picture> {
         "png" => read_png(path),
         other => Err(Error::Picture {
             path: path.display().to_string(),
-            cause: format!("{other:?} is no kind of picture that can be read: exr, hdr and png are"),
+            cause: match other {
+                "" => "has no ending; pictures are read by it: .exr, .hdr or .png".into(),
+                _ => format!(".{other} pictures cannot be read; .exr, .hdr and .png can"),
+            },
         }),
     }
 }

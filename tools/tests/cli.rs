@@ -269,13 +269,35 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     render(&["--path-set", "dirct"], 2, &["dirct", "indirect"])?;
     render(&["--settings", "{\"roulete\": 1}"], 2, &["roulete", "roulette_start"])?;
     render(&["--settings", "@no-such-file"], 2, &["no-such-file"])?;
-    render(&["--settings", "3"], 2, &["JSON object"])?;
+    render(&["--settings", "3"], 2, &["JSON object", "hint: "])?;
+    render(
+        &["--settings", "{\"roulette_start\": -4}"],
+        2,
+        &["roulette_start", "-4"],
+    )?;
+    render(
+        &["--settings", "{\"roulette_start\": \"x\"}"],
+        2,
+        &["roulette_start", "type"],
+    )?;
+    render(&["--path-set", "bounces=3..1"], 2, &["is empty"])?;
     render(&["--reference", "no-such.exr"], 1, &["no-such.exr"])?;
     refuse(&["render", "--size", "0x4"], 2, &["WIDTHxHEIGHT"])?;
     refuse(&["render", "--spp", "0"], 2, &["--spp"])?;
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;
     refuse(&["scenes", "nothing"], 2, &["ring"])?;
     refuse(&["info", "builtin:nothing"], 3, &["cornell-box"])?;
+    refuse(&["info", "--device", "abacus"], 5, &["abacus", "there is"])?;
+    refuse(&["info", "builtin:ring", "--device", "0"], 2, &["--device"])?;
+    refuse(
+        &["compare", "a.exr", "b.exr", "--validation", "core"],
+        2,
+        &["--validation"],
+    )?;
+    refuse(&["agreement", "--device", "abacus", "--python", "true"], 5, &["abacus"])?;
+    refuse(&["report", "--device", "abacus"], 5, &["abacus"])?;
+    refuse(&["report", "--repeat", "0"], 2, &["--repeat"])?;
+    refuse(&["render", "--size", "65535x65535"], 2, &["memory", "--size"])?;
     refuse(&["list", "nothing"], 2, &["nothing"])?;
     refuse(
         &["agreement", "--scene", "nothing", "--python", "true"],
@@ -311,6 +333,7 @@ fn comparisons() -> Tested {
     refuse(&["compare", a, small], 1, &["16×16", "8×8"])?;
     refuse(&["compare", a, broken], 1, &["broken.exr"])?;
     refuse(&["compare", a, "picture.gif"], 1, &["gif"])?;
+    refuse(&["compare", a, "picture"], 1, &["has no ending", ".exr"])?;
     refuse(&["compare", a, b, "--threshold", "ssim=1"], 2, &["flip"])?;
 
     // sRGB code 188 is linear 0.5029; the nearest code to 0.5 errs by less than half a code's width, 0.5 · 0.0061.
@@ -339,8 +362,8 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
             .is_some_and(|rows| rows.iter().any(|row| row["id"] == "BG-3"))
     );
     let row = String::from_utf8(succeed(&["list", "bg-3"])?.stdout)?;
-    assert!(row.contains("engine/src/transport/path_tracer.rs"), "{row}");
-    let devices = json(&succeed(&["info", "--json"])?.stdout)?;
+    assert!(row.contains("engine/src/transport/path_tracer/mod.rs"), "{row}");
+    let devices = json(&succeed(&["info", "--json", "--validation", "off", "--device", "0"])?.stdout)?;
     assert!(devices["devices"][0]["caps"]["subgroup_size"].is_u64());
     let scene = json(&succeed(&["info", "builtin:ring", "--json"])?.stdout)?;
     assert_eq!(scene["cameras"][0]["name"], "main");
@@ -397,5 +420,37 @@ fn a_benchmark_counts_its_runs() -> Tested {
         of("least") > 0.0 && of("least") <= of("median") && of("median") <= of("greatest"),
         "{rates}"
     );
+    Ok(())
+}
+
+#[test]
+fn a_report_has_a_table_for_its_scene() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let (page, references) = (folder.path().join("page.md"), folder.path().join("references"));
+    let arguments = [
+        "report",
+        "--smoke",
+        "--scene",
+        "builtin:cornell-box",
+        "--repeat",
+        "1",
+        "-o",
+        text(&page),
+    ];
+    succeed(&[&arguments[..], &["--references", text(&references)]].concat())?;
+    let written = std::fs::read_to_string(&page)?;
+    assert!(
+        written.contains("### `builtin:cornell-box` (38 triangles)"),
+        "{written}"
+    );
+    assert_eq!(
+        written
+            .lines()
+            .filter(|line| line.starts_with("| 2 |") || line.starts_with("| 32 |"))
+            .count(),
+        2,
+        "{written}"
+    );
+    assert_eq!(std::fs::read_dir(&references)?.count(), 1);
     Ok(())
 }

@@ -11,18 +11,18 @@ void main() {
     if (gl_GlobalInvocationID.x >= trace_constants.ray_count) {
         return;
     }
-    uint resume = resume_words[index];
+    uint resume = trace_resume[index];
     if (resume == BVH2_FINISHED) {
         return;
     }
-    Ray ray = rays[index];
+    Ray ray = trace_rays[index];
     Hit hit = no_hit(ray.t_max);
     if (resume != BVH2_START) {
-        hit = hits[index];
+        hit = trace_hits[index];
     }
     resume = any_hit(ray, resume, hit);
-    hits[index] = hit;
-    resume_words[index] = resume;
+    trace_hits[index] = hit;
+    trace_resume[index] = resume;
     if (resume != BVH2_FINISHED) {
         atomicAdd(trace_status.unfinished, 1u);
     }

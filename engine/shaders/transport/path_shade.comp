@@ -66,9 +66,9 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     // A camera inside a solid does not know it until it looks out.
     uint interior = HAS_TRANSMISSION ? path_gathered[slot].interior : OUTSIDE;
     interior = interior == OUTSIDE && solid && !front ? s.material : interior;
-    if (HAS_ATTENUATION) {
+    if (HAS_ABSORPTION) {
         if (interior != OUTSIDE) {
-            path.throughput *= exp(-load_material(interior).attenuation * hit.t);
+            path.throughput *= exp(-load_material(interior).absorption * hit.t);
         }
     }
 
@@ -128,9 +128,9 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
                 ray_to_light.origin = start;
                 ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
                 uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : OUTSIDE) : interior;
-                if (HAS_ATTENUATION && passed != OUTSIDE && !light.infinite) {
+                if (HAS_ABSORPTION && passed != OUTSIDE && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
-                    ray_to_light.contribution *= exp(-load_material(passed).attenuation * way);
+                    ray_to_light.contribution *= exp(-load_material(passed).absorption * way);
                 }
                 path_shadow_rays_out[place] = ray_to_light;
                 flags |= FLAG_SHADOW;
@@ -161,9 +161,9 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         path.throughput /= survival;
     }
     path.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
-    if (HAS_ATTENUATION && solid && dot(wi, s.geometric_normal) < 0.0) {
+    if (HAS_ABSORPTION && solid && dot(wi, s.geometric_normal) < 0.0) {
         // The way through the body that the offset of the start leaves out.
-        path.throughput *= exp(m.attenuation * (distance(path.origin, s.point.position) / dot(wi, s.geometric_normal)));
+        path.throughput *= exp(m.absorption * (distance(path.origin, s.point.position) / dot(wi, s.geometric_normal)));
     }
     path.direction = normalize(wi);
     path.pdf = scattered.pdf;

@@ -17,18 +17,19 @@ pub use traverse::{FINISHED, Traversal};
 
 use super::{CandidateFilter, Hit, IndexBuffer, IndexStatistics, Ray, RayIndex, TraversalCounters};
 use crate::Result;
+use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Most inner nodes on a way from the root, which is the size of the kernels' stack.
-pub const MAX_DEPTH: u32 = 32;
+pub const MAX_DEPTH: u32 = constants::BVH2_MAX_DEPTH;
 
 /// Largest number of triangles in a leaf that settings may ask for.
 pub const MAX_LEAF_SIZE: u32 = 8;
 
 /// Bits of a child word that hold the number of triangles; zero there marks an inner node, whose index is in the bits above. In a leaf
 /// the bits above hold its first triangle.
-pub const COUNT_BITS: u32 = 4;
+pub const COUNT_BITS: u32 = constants::BVH2_COUNT_BITS;
 
 /// Most triangles that child words can address.
 pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);

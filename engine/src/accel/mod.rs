@@ -13,10 +13,11 @@ pub mod triangle;
 #[cfg(test)]
 mod test_support;
 
+use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 
 /// [`Hit::triangle`] of a ray that met nothing.
-pub const NO_HIT: u32 = u32::MAX;
+pub const NO_HIT: u32 = constants::NO_HIT;
 
 /// Smallest largest-component of a ray direction that is traced; shorter directions, zero among them, meet nothing.
 pub const MIN_DIRECTION: f32 = 1.0 / MAX_DIRECTION;

@@ -1,41 +1,12 @@
-//! Seeded random numbers, rays and triangle sets that the tests of this floor share.
+//! Rays and triangle sets that the tests of this floor share.
+
+pub use crate::test_random::Random;
 
 use super::{Hit, NO_HIT, Ray, triangle};
 use glam::{DVec3, Vec3};
 
 /// Unit roundoff of f32.
 pub const U: f64 = 1.0 / 16_777_216.0;
-
-/// SplitMix64 (Steele, Lea and Flood 2014).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-
-    /// Uniform in [-1, 1).
-    pub fn signed(&mut self) -> f32 {
-        ((self.bits() >> 40) as f32) / 8_388_608.0 - 1.0
-    }
-
-    pub fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.signed(), self.signed(), self.signed())
-    }
-
-    /// Power of two with a random factor in [1, 2).
-    pub fn magnitude(&mut self, low: i32, high: i32) -> f32 {
-        2f32.powi(low + self.below((high - low) as usize) as i32) * (1.5 + 0.5 * self.signed())
-    }
-}
 
 pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
     Ray {

@@ -26,7 +26,8 @@ const LIBRARY_ATTRIBUTES: [&str; 1] = ["software"];
 ///
 /// # Errors
 /// [`crate::Error::Picture`] when the picture has no layer or cannot be encoded; [`crate::Error::Io`] when the file cannot be written.
-pub fn write(path: &Path, picture: &Picture) -> EngineResult<()> {
+pub fn write(path: impl AsRef<Path>, picture: &Picture) -> EngineResult<()> {
+    let path = path.as_ref();
     let bytes = to_bytes(picture, &path.display().to_string())?;
     super::atomic::write(path, &bytes)
 }
@@ -138,7 +139,8 @@ fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
 /// # Errors
 /// [`crate::Error::Io`] when the file cannot be opened; [`crate::Error::Picture`] when it is not a flat EXR file, holds more than 2²⁹ values, has
 /// subsampled channels or parts of different sizes.
-pub fn read(path: &Path) -> EngineResult<Picture> {
+pub fn read(path: impl AsRef<Path>) -> EngineResult<Picture> {
+    let path = path.as_ref();
     let file = std::fs::File::open(path).map_err(|cause| EngineError::io(path, cause))?;
     read_from(std::io::BufReader::new(file), &path.display().to_string())
 }

@@ -18,7 +18,8 @@ const MAX_PIXELS: u64 = 1 << 27;
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Picture`] with the cause.
-pub fn read(path: &Path) -> Result<Picture> {
+pub fn read(path: impl AsRef<Path>) -> Result<Picture> {
+    let path = path.as_ref();
     let file = std::fs::File::open(path).map_err(|cause| Error::io(path, cause))?;
     read_from(std::io::BufReader::new(file), &path.display().to_string())
 }
@@ -45,7 +46,8 @@ pub fn read_from(source: impl BufRead + Seek, name: &str) -> Result<Picture> {
 ///
 /// # Errors
 /// [`Error::Picture`] when a value is negative or not finite, [`Error::Io`] when the file cannot be written.
-pub fn write(path: &Path, picture: &Picture) -> Result<()> {
+pub fn write(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
+    let path = path.as_ref();
     let wrong = |cause: String| Error::Picture {
         path: path.display().to_string(),
         cause,

@@ -103,7 +103,8 @@ fn from_pixels(width: u32, pixels: impl ExactSizeIterator<Item = [u8; 3]>) -> Rg
 ///
 /// # Errors
 /// [`Error::Picture`] when it cannot be encoded, [`Error::Io`] when it cannot be written.
-pub fn write(path: &Path, picture: &Rgb8) -> Result<()> {
+pub fn write(path: impl AsRef<Path>, picture: &Rgb8) -> Result<()> {
+    let path = path.as_ref();
     let expected = picture.width as usize * picture.height as usize * 3;
     let mut bytes = Vec::new();
     let encoded = if picture.bytes.len() == expected {

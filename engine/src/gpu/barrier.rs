@@ -1,53 +1,115 @@
 //! Barriers in the vocabulary of synchronization2, with short names for the common ones.
 
 use ash::vk;
+use ash::vk::{AccessFlags2 as Kinds, PipelineStageFlags2 as Stages};
 
 use super::buffer::Buffer;
+use super::caps::Caps;
 use super::image::Image;
 
 /// A set of uses of a resource: pipeline stages together with access kinds.
+///
+/// Storage, sampled and texel-buffer reads of a stage are one use (`COMPUTE_READ` …); uniform buffers are another
+/// (`COMPUTE_UNIFORM_READ` …), since Vulkan reads them by another path. Uses whose stage the device or its queue lacks are left out of
+/// barriers, so the unions over all stages can be used everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Access(u16);
+pub struct Access(u32);
+
+macro_rules! uses {
+    ($($(#[$doc:meta])+ $name:ident = $bit:literal, $stage:expr, $kind:expr;)*) => {
+        impl Access {
+            $($(#[$doc])+ pub const $name: Self = Self(1 << $bit);)*
+        }
+
+        /// Stage and access kinds of every single use.
+        const TABLE: &[(u32, vk::PipelineStageFlags2, vk::AccessFlags2)] = &[$((1 << $bit, $stage, $kind),)*];
+    };
+}
+
+uses! {
+    /// Storage, sampled and texel-buffer reads in compute shaders.
+    COMPUTE_READ = 0, Stages::COMPUTE_SHADER, Kinds::SHADER_READ;
+    /// Storage writes in compute shaders.
+    COMPUTE_WRITE = 1, Stages::COMPUTE_SHADER, Kinds::SHADER_WRITE;
+    /// Uniform buffers in compute shaders.
+    COMPUTE_UNIFORM_READ = 2, Stages::COMPUTE_SHADER, Kinds::UNIFORM_READ;
+    /// Reads by copies.
+    TRANSFER_READ = 3, Stages::ALL_TRANSFER, Kinds::TRANSFER_READ;
+    /// Writes by copies, fills and updates.
+    TRANSFER_WRITE = 4, Stages::ALL_TRANSFER, Kinds::TRANSFER_WRITE;
+    /// Arguments of indirect dispatches and draws.
+    INDIRECT_READ = 5, Stages::DRAW_INDIRECT, Kinds::INDIRECT_COMMAND_READ;
+    /// Reads by the host, after the submission was waited for.
+    HOST_READ = 6, Stages::HOST, Kinds::HOST_READ;
+    /// Writes by the host. Only those that come while the device waits for the host want a barrier: a submission sees all earlier ones.
+    HOST_WRITE = 7, Stages::HOST, Kinds::HOST_WRITE;
+    /// Storage, sampled and texel-buffer reads in vertex shaders.
+    VERTEX_READ = 8, Stages::VERTEX_SHADER, Kinds::SHADER_READ;
+    /// Storage writes in vertex shaders.
+    VERTEX_WRITE = 9, Stages::VERTEX_SHADER, Kinds::SHADER_WRITE;
+    /// Uniform buffers in vertex shaders.
+    VERTEX_UNIFORM_READ = 10, Stages::VERTEX_SHADER, Kinds::UNIFORM_READ;
+    /// Storage, sampled and texel-buffer reads in geometry shaders.
+    GEOMETRY_READ = 11, Stages::GEOMETRY_SHADER, Kinds::SHADER_READ;
+    /// Storage writes in geometry shaders.
+    GEOMETRY_WRITE = 12, Stages::GEOMETRY_SHADER, Kinds::SHADER_WRITE;
+    /// Uniform buffers in geometry shaders.
+    GEOMETRY_UNIFORM_READ = 13, Stages::GEOMETRY_SHADER, Kinds::UNIFORM_READ;
+    /// Storage, sampled and texel-buffer reads in fragment shaders.
+    FRAGMENT_READ = 14, Stages::FRAGMENT_SHADER, Kinds::SHADER_READ;
+    /// Storage writes in fragment shaders.
+    FRAGMENT_WRITE = 15, Stages::FRAGMENT_SHADER, Kinds::SHADER_WRITE;
+    /// Uniform buffers in fragment shaders.
+    FRAGMENT_UNIFORM_READ = 16, Stages::FRAGMENT_SHADER, Kinds::UNIFORM_READ;
+    /// Vertex attributes fetched by fixed function.
+    VERTEX_ATTRIBUTE_READ = 17, Stages::VERTEX_ATTRIBUTE_INPUT, Kinds::VERTEX_ATTRIBUTE_READ;
+    /// Vertex indices of indexed draws.
+    VERTEX_INDEX_READ = 18, Stages::INDEX_INPUT, Kinds::INDEX_READ;
+    /// Reads of colour attachments: by loading or blending.
+    COLOR_READ = 19, Stages::COLOR_ATTACHMENT_OUTPUT, Kinds::COLOR_ATTACHMENT_READ;
+    /// Writes of colour attachments, with the reads that go with them.
+    COLOR_WRITE = 20, Stages::COLOR_ATTACHMENT_OUTPUT, COLOR_KINDS;
+    /// Reads of depth attachments: by loading or testing.
+    DEPTH_READ = 21, DEPTH_STAGES, Kinds::DEPTH_STENCIL_ATTACHMENT_READ;
+    /// Writes of depth attachments, with the reads that go with them.
+    DEPTH_WRITE = 22, DEPTH_STAGES, DEPTH_KINDS;
+}
+
+const COLOR_KINDS: Kinds =
+    Kinds::from_raw(Kinds::COLOR_ATTACHMENT_READ.as_raw() | Kinds::COLOR_ATTACHMENT_WRITE.as_raw());
+const DEPTH_STAGES: Stages =
+    Stages::from_raw(Stages::EARLY_FRAGMENT_TESTS.as_raw() | Stages::LATE_FRAGMENT_TESTS.as_raw());
+const DEPTH_KINDS: Kinds =
+    Kinds::from_raw(Kinds::DEPTH_STENCIL_ATTACHMENT_READ.as_raw() | Kinds::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw());
+
+/// Stages that only a queue with graphics has.
+const GRAPHICS_STAGES: Stages = Stages::from_raw(
+    Stages::VERTEX_SHADER.as_raw()
+        | Stages::GEOMETRY_SHADER.as_raw()
+        | Stages::FRAGMENT_SHADER.as_raw()
+        | Stages::VERTEX_ATTRIBUTE_INPUT.as_raw()
+        | Stages::INDEX_INPUT.as_raw()
+        | Stages::COLOR_ATTACHMENT_OUTPUT.as_raw()
+        | DEPTH_STAGES.as_raw(),
+);
 
 impl Access {
     /// Nothing.
     pub const NONE: Self = Self(0);
-    /// Reads in compute shaders.
-    pub const COMPUTE_READ: Self = Self(1);
-    /// Writes in compute shaders.
-    pub const COMPUTE_WRITE: Self = Self(1 << 1);
-    /// Reads by copies.
-    pub const TRANSFER_READ: Self = Self(1 << 2);
-    /// Writes by copies, fills and updates.
-    pub const TRANSFER_WRITE: Self = Self(1 << 3);
-    /// Arguments of indirect dispatches and draws.
-    pub const INDIRECT_READ: Self = Self(1 << 4);
-    /// Reads by the host.
-    pub const HOST_READ: Self = Self(1 << 5);
-    /// Reads in fragment shaders.
-    pub const FRAGMENT_READ: Self = Self(1 << 6);
-    /// Reads and writes of colour attachments.
-    pub const COLOR_WRITE: Self = Self(1 << 7);
-    /// Reads in vertex shaders.
-    pub const VERTEX_READ: Self = Self(1 << 8);
-    /// Reads and writes of depth attachments.
-    pub const DEPTH_WRITE: Self = Self(1 << 9);
-    /// Writes in fragment shaders.
-    pub const FRAGMENT_WRITE: Self = Self(1 << 10);
-    /// Writes in vertex shaders.
-    pub const VERTEX_WRITE: Self = Self(1 << 11);
-    /// Reads and writes in compute shaders.
+    /// Storage, sampled and texel-buffer reads, and storage writes, in compute shaders.
     pub const COMPUTE: Self = Self(Self::COMPUTE_READ.0 | Self::COMPUTE_WRITE.0);
-
     /// Reads and writes by copies.
     pub const TRANSFER: Self = Self(Self::TRANSFER_READ.0 | Self::TRANSFER_WRITE.0);
-
-    const WRITES: u16 = Self::COMPUTE_WRITE.0
-        | Self::TRANSFER_WRITE.0
-        | Self::COLOR_WRITE.0
-        | Self::DEPTH_WRITE.0
-        | Self::FRAGMENT_WRITE.0
-        | Self::VERTEX_WRITE.0;
+    /// Uniform buffers in shaders of any stage.
+    pub const UNIFORM_READ: Self = Self(
+        Self::COMPUTE_UNIFORM_READ.0
+            | Self::VERTEX_UNIFORM_READ.0
+            | Self::GEOMETRY_UNIFORM_READ.0
+            | Self::FRAGMENT_UNIFORM_READ.0,
+    );
+    /// Storage, sampled and texel-buffer reads in shaders of any stage.
+    pub const SHADER_READ: Self =
+        Self(Self::COMPUTE_READ.0 | Self::VERTEX_READ.0 | Self::GEOMETRY_READ.0 | Self::FRAGMENT_READ.0);
 
     /// All uses of either.
     pub const fn union(self, other: Self) -> Self {
@@ -64,33 +126,47 @@ impl Access {
     }
 
     /// The uses that write.
-    pub(super) const fn writes(self) -> Self {
-        Self(self.0 & Self::WRITES)
+    pub(super) fn writes(self) -> Self {
+        let writing = Kinds::SHADER_WRITE
+            | Kinds::TRANSFER_WRITE
+            | Kinds::HOST_WRITE
+            | Kinds::COLOR_ATTACHMENT_WRITE
+            | Kinds::DEPTH_STENCIL_ATTACHMENT_WRITE;
+        self.only(|_, kinds| kinds.intersects(writing))
+    }
+
+    /// The uses that a device has stages for.
+    pub(super) fn on(self, caps: &Caps) -> Self {
+        self.only(|stages, _| {
+            (caps.graphics || !GRAPHICS_STAGES.contains(stages))
+                && (caps.geometry_shader || !stages.contains(Stages::GEOMETRY_SHADER))
+        })
     }
 
     /// `self` without the uses whose stage `other` covers.
     pub(super) fn without_stages_of(self, other: Self) -> Self {
-        let covered = TABLE
-            .iter()
-            .filter(|(_, stage, _)| other.stages().contains(*stage))
-            .fold(0, |bits, (bit, ..)| bits | bit);
-        Self(self.0 & !covered)
+        let covered = other.stages();
+        self.only(|stages, _| !covered.contains(stages))
+    }
+
+    fn only(self, keep: impl Fn(Stages, Kinds) -> bool) -> Self {
+        self.rows()
+            .filter(|(_, stages, kinds)| keep(*stages, *kinds))
+            .fold(Self::NONE, |all, (bit, ..)| Self(all.0 | bit))
+    }
+
+    fn rows(self) -> impl Iterator<Item = &'static (u32, Stages, Kinds)> {
+        TABLE.iter().filter(move |(bit, ..)| self.0 & bit != 0)
     }
 
     /// Pipeline stages.
     pub fn stages(self) -> vk::PipelineStageFlags2 {
-        TABLE
-            .iter()
-            .filter(|(bit, ..)| self.0 & bit != 0)
-            .fold(vk::PipelineStageFlags2::NONE, |all, (_, stage, _)| all | *stage)
+        self.rows().fold(Stages::NONE, |all, (_, stages, _)| all | *stages)
     }
 
     /// Access kinds.
     pub fn kinds(self) -> vk::AccessFlags2 {
-        TABLE
-            .iter()
-            .filter(|(bit, ..)| self.0 & bit != 0)
-            .fold(vk::AccessFlags2::NONE, |all, (.., kind)| all | *kind)
+        self.rows().fold(Kinds::NONE, |all, (.., kinds)| all | *kinds)
     }
 }
 
@@ -101,77 +177,6 @@ impl std::ops::BitOr for Access {
         self.union(other)
     }
 }
-
-const COLOR_KINDS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
-    vk::AccessFlags2::COLOR_ATTACHMENT_READ.as_raw() | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw(),
-);
-const DEPTH_STAGES: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
-    vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS.as_raw() | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS.as_raw(),
-);
-const DEPTH_KINDS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
-    vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ.as_raw()
-        | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw(),
-);
-
-/// Stage and access of every bit of [`Access`].
-const TABLE: [(u16, vk::PipelineStageFlags2, vk::AccessFlags2); 12] = [
-    (
-        Access::COMPUTE_READ.0,
-        vk::PipelineStageFlags2::COMPUTE_SHADER,
-        vk::AccessFlags2::SHADER_READ,
-    ),
-    (
-        Access::COMPUTE_WRITE.0,
-        vk::PipelineStageFlags2::COMPUTE_SHADER,
-        vk::AccessFlags2::SHADER_WRITE,
-    ),
-    (
-        Access::TRANSFER_READ.0,
-        vk::PipelineStageFlags2::ALL_TRANSFER,
-        vk::AccessFlags2::TRANSFER_READ,
-    ),
-    (
-        Access::TRANSFER_WRITE.0,
-        vk::PipelineStageFlags2::ALL_TRANSFER,
-        vk::AccessFlags2::TRANSFER_WRITE,
-    ),
-    (
-        Access::INDIRECT_READ.0,
-        vk::PipelineStageFlags2::DRAW_INDIRECT,
-        vk::AccessFlags2::INDIRECT_COMMAND_READ,
-    ),
-    (
-        Access::HOST_READ.0,
-        vk::PipelineStageFlags2::HOST,
-        vk::AccessFlags2::HOST_READ,
-    ),
-    (
-        Access::FRAGMENT_READ.0,
-        vk::PipelineStageFlags2::FRAGMENT_SHADER,
-        vk::AccessFlags2::SHADER_READ,
-    ),
-    (
-        Access::COLOR_WRITE.0,
-        vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-        COLOR_KINDS,
-    ),
-    (
-        Access::VERTEX_READ.0,
-        vk::PipelineStageFlags2::VERTEX_SHADER,
-        vk::AccessFlags2::SHADER_READ,
-    ),
-    (Access::DEPTH_WRITE.0, DEPTH_STAGES, DEPTH_KINDS),
-    (
-        Access::FRAGMENT_WRITE.0,
-        vk::PipelineStageFlags2::FRAGMENT_SHADER,
-        vk::AccessFlags2::SHADER_WRITE,
-    ),
-    (
-        Access::VERTEX_WRITE.0,
-        vk::PipelineStageFlags2::VERTEX_SHADER,
-        vk::AccessFlags2::SHADER_WRITE,
-    ),
-];
 
 /// Makes the writes among `from` visible to `to`, and keeps `to` from starting before `from` has ended, for one buffer.
 #[derive(Debug, Clone, Copy)]
@@ -232,5 +237,42 @@ pub fn compute_to_indirect(buffer: &Buffer) -> BufferBarrier<'_> {
         buffer,
         from: Access::COMPUTE,
         to: Access::INDIRECT_READ | Access::COMPUTE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_use_has_a_bit_a_stage_and_a_kind_of_its_own() {
+        for (index, row) in TABLE.iter().enumerate() {
+            assert_eq!(row.0, 1 << index, "bits are in order and none is used twice");
+            assert!(!row.1.is_empty() && !row.2.is_empty());
+            assert!(TABLE[..index].iter().all(|other| (other.1, other.2) != (row.1, row.2)));
+        }
+    }
+
+    #[test]
+    fn writes_are_told_from_reads() {
+        let all = Access((1 << TABLE.len()) - 1);
+        let writes = Access::COMPUTE_WRITE
+            | Access::TRANSFER_WRITE
+            | Access::HOST_WRITE
+            | Access::VERTEX_WRITE
+            | Access::GEOMETRY_WRITE
+            | Access::FRAGMENT_WRITE
+            | Access::COLOR_WRITE
+            | Access::DEPTH_WRITE;
+        assert_eq!(all.writes(), writes);
+        assert_eq!(Access::UNIFORM_READ.kinds(), Kinds::UNIFORM_READ);
+        assert_eq!(Access::SHADER_READ.kinds(), Kinds::SHADER_READ);
+        // A barrier for storage reads does not hold for uniform reads.
+        assert!(!Access::COMPUTE.contains(Access::COMPUTE_UNIFORM_READ));
+        // What waits for a stage waits for all its uses.
+        assert_eq!(
+            (Access::COMPUTE_UNIFORM_READ | Access::TRANSFER_READ).without_stages_of(Access::COMPUTE_WRITE),
+            Access::TRANSFER_READ
+        );
     }
 }

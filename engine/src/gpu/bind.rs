@@ -7,17 +7,33 @@ use ash::vk;
 
 use super::barrier::Access;
 use super::interface::{BindingInfo, BindingKind, BindingSet, BoundResource, ShaderInfo, Stage};
-use super::pipeline::descriptor_type;
+use super::layout::descriptor_type;
 use super::recorder::Pass;
 use crate::{Error, Result};
 
 /// How the stage of a shader reads and writes a binding.
 fn access(stage: Stage, binding: &BindingInfo) -> Access {
-    let (read, write) = match stage {
-        Stage::Compute => (Access::COMPUTE_READ, Access::COMPUTE_WRITE),
-        Stage::Fragment => (Access::FRAGMENT_READ, Access::FRAGMENT_WRITE),
-        Stage::Vertex | Stage::Geometry => (Access::VERTEX_READ, Access::VERTEX_WRITE),
+    let (read, write, uniform) = match stage {
+        Stage::Compute => (
+            Access::COMPUTE_READ,
+            Access::COMPUTE_WRITE,
+            Access::COMPUTE_UNIFORM_READ,
+        ),
+        Stage::Vertex => (Access::VERTEX_READ, Access::VERTEX_WRITE, Access::VERTEX_UNIFORM_READ),
+        Stage::Geometry => (
+            Access::GEOMETRY_READ,
+            Access::GEOMETRY_WRITE,
+            Access::GEOMETRY_UNIFORM_READ,
+        ),
+        Stage::Fragment => (
+            Access::FRAGMENT_READ,
+            Access::FRAGMENT_WRITE,
+            Access::FRAGMENT_UNIFORM_READ,
+        ),
     };
+    if binding.kind == BindingKind::UniformBuffer {
+        return uniform;
+    }
     let read = if binding.reads { read } else { Access::NONE };
     let write = if binding.writes { write } else { Access::NONE };
     read | write
@@ -87,7 +103,20 @@ impl Pass<'_> {
         let inner = Arc::clone(&self.recorder.gpu.inner);
         match (binding.kind, resource) {
             (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
-                view.check(inner.caps.storage_buffer_alignment)?;
+                let uniform = binding.kind == BindingKind::UniformBuffer;
+                view.check(if uniform {
+                    inner.caps.uniform_buffer_alignment
+                } else {
+                    inner.caps.storage_buffer_alignment
+                })?;
+                if uniform && view.bytes > inner.caps.max_uniform_buffer_range {
+                    return Err(Error::LimitExceeded {
+                        name: view.buffer.name().into(),
+                        bytes: view.bytes,
+                        limit_name: "maxUniformBufferRange",
+                        limit: inner.caps.max_uniform_buffer_range,
+                    });
+                }
                 self.recorder
                     .touch(self.name, view.buffer, access(shader.stage, binding))?;
                 let raw = [vk::DescriptorBufferInfo {

@@ -2,6 +2,8 @@
 
 use ash::vk;
 
+use super::options::Lesser;
+
 /// Capabilities and limits of a device, as far as techniques and kernels ask.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Caps {
@@ -41,12 +43,20 @@ pub struct Caps {
     pub descriptor_indexing: bool,
     /// Nanoseconds a timestamp tick; 0 when the queue has no timestamps.
     pub timestamp_period: f32,
+    /// Bits of a timestamp that count, `timestampValidBits` of the queue's family; times beyond them wrap. 0 for no timestamps.
+    pub timestamp_valid_bits: u32,
+    /// How many descriptors a pipeline may have.
+    pub descriptors: DescriptorLimits,
     /// `maxStorageBufferRange`, bytes.
     pub max_storage_buffer_range: u64,
     /// `maxTexelBufferElements`.
     pub max_texel_buffer_elements: u64,
     /// `minStorageBufferOffsetAlignment`, bytes.
     pub storage_buffer_alignment: u64,
+    /// `maxUniformBufferRange`, bytes.
+    pub max_uniform_buffer_range: u64,
+    /// `minUniformBufferOffsetAlignment`, bytes.
+    pub uniform_buffer_alignment: u64,
     /// `maxMemoryAllocationSize`, bytes.
     pub max_allocation_size: u64,
     /// Size of the largest device-local heap, bytes.
@@ -79,7 +89,68 @@ pub struct SubgroupOperations {
     pub shuffle: bool,
 }
 
+/// Limits on the descriptors of a pipeline: of each stage, and of its whole layout. Texel buffers count as sampled images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct DescriptorLimits {
+    /// `maxBoundDescriptorSets`.
+    pub bound_sets: u32,
+    /// `maxPerStageDescriptorStorageBuffers`.
+    pub per_stage_storage_buffers: u32,
+    /// `maxPerStageDescriptorUniformBuffers`.
+    pub per_stage_uniform_buffers: u32,
+    /// `maxPerStageDescriptorStorageImages`.
+    pub per_stage_storage_images: u32,
+    /// `maxPerStageDescriptorSampledImages`.
+    pub per_stage_sampled_images: u32,
+    /// `maxPerStageDescriptorSamplers`.
+    pub per_stage_samplers: u32,
+    /// `maxPerStageResources`: all of the above, and colour attachments.
+    pub per_stage_resources: u32,
+    /// `maxDescriptorSetStorageBuffers`.
+    pub per_pipeline_storage_buffers: u32,
+    /// `maxDescriptorSetUniformBuffers`.
+    pub per_pipeline_uniform_buffers: u32,
+    /// `maxDescriptorSetStorageImages`.
+    pub per_pipeline_storage_images: u32,
+    /// `maxDescriptorSetSampledImages`.
+    pub per_pipeline_sampled_images: u32,
+    /// `maxDescriptorSetSamplers`.
+    pub per_pipeline_samplers: u32,
+}
+
+impl DescriptorLimits {
+    fn of(limits: &vk::PhysicalDeviceLimits) -> Self {
+        Self {
+            bound_sets: limits.max_bound_descriptor_sets,
+            per_stage_storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
+            per_stage_uniform_buffers: limits.max_per_stage_descriptor_uniform_buffers,
+            per_stage_storage_images: limits.max_per_stage_descriptor_storage_images,
+            per_stage_sampled_images: limits.max_per_stage_descriptor_sampled_images,
+            per_stage_samplers: limits.max_per_stage_descriptor_samplers,
+            per_stage_resources: limits.max_per_stage_resources,
+            per_pipeline_storage_buffers: limits.max_descriptor_set_storage_buffers,
+            per_pipeline_uniform_buffers: limits.max_descriptor_set_uniform_buffers,
+            per_pipeline_storage_images: limits.max_descriptor_set_storage_images,
+            per_pipeline_sampled_images: limits.max_descriptor_set_sampled_images,
+            per_pipeline_samplers: limits.max_descriptor_set_samplers,
+        }
+    }
+}
+
 impl Caps {
+    /// Lowers what was read to what a test pretends.
+    pub(super) fn pretend(&mut self, lesser: &Lesser) {
+        if let Some(descriptors) = lesser.descriptors {
+            self.descriptors = descriptors;
+        }
+        if let Some(bits) = lesser.timestamp_valid_bits {
+            self.timestamp_valid_bits = self.timestamp_valid_bits.min(bits);
+            if bits == 0 {
+                self.timestamp_period = 0.0;
+            }
+        }
+    }
+
     /// Reads the capabilities of a physical device.
     pub(super) fn read(instance: &super::instance::Instance, device: vk::PhysicalDevice, queue_family: u32) -> Self {
         let summary = instance.summary(0, device);
@@ -110,9 +181,9 @@ impl Caps {
         } else {
             vk::SubgroupFeatureFlags::empty()
         };
-        let timestamps = families
+        let timestamp_valid_bits = families
             .get(queue_family as usize)
-            .is_some_and(|family| family.timestamp_valid_bits > 0);
+            .map_or(0, |family| family.timestamp_valid_bits);
         let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
         let uuid: String = properties
             .pipeline_cache_uuid
@@ -148,10 +219,18 @@ impl Caps {
                 .any(|e| e.extension_name_as_c_str() == Ok(ash::khr::ray_query::NAME)),
             descriptor_indexing: vulkan12.runtime_descriptor_array != 0
                 && vulkan12.shader_sampled_image_array_non_uniform_indexing != 0,
-            timestamp_period: if timestamps { limits.timestamp_period } else { 0.0 },
+            timestamp_period: if timestamp_valid_bits > 0 {
+                limits.timestamp_period
+            } else {
+                0.0
+            },
+            timestamp_valid_bits,
+            descriptors: DescriptorLimits::of(&limits),
             max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
             max_texel_buffer_elements: u64::from(limits.max_texel_buffer_elements),
             storage_buffer_alignment: limits.min_storage_buffer_offset_alignment,
+            max_uniform_buffer_range: u64::from(limits.max_uniform_buffer_range),
+            uniform_buffer_alignment: limits.min_uniform_buffer_offset_alignment,
             max_allocation_size: maintenance.max_memory_allocation_size,
             device_heap: heaps
                 .iter()

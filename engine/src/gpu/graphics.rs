@@ -12,7 +12,7 @@ use ash::vk;
 use super::device::{Gpu, Inner};
 use super::image::Image;
 use super::interface::{BindingSet, FragmentShader, PushConstants, ShaderInfo, SpecConstants, VertexShader};
-use super::pipeline::{layouts, shader_module, specialization_data};
+use super::layout::{PipelineObjects, ShaderModule, specialization_data};
 use super::recorder::Pass;
 use crate::{Error, Result};
 
@@ -88,10 +88,7 @@ impl<V, F> std::fmt::Debug for GraphicsPipeline<V, F> {
 }
 
 struct GraphicsInner {
-    gpu: Arc<Inner>,
-    raw: vk::Pipeline,
-    layout: vk::PipelineLayout,
-    set_layouts: Vec<vk::DescriptorSetLayout>,
+    objects: PipelineObjects,
     shaders: [&'static ShaderInfo; 2],
     colors: Vec<vk::Format>,
     depth: Option<vk::Format>,
@@ -106,7 +103,8 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Shader`] when the shaders do not agree on a binding or on the push constants, [`Error::MissingFeature`] on a queue without
-    /// graphics or when a shader writes buffers or images from a stage that cannot, [`Error::OutOfMemory`], [`Error::Vulkan`].
+    /// graphics, when a shader writes buffers or images from a stage that cannot or when the descriptors are more than the device allows,
+    /// [`Error::OutOfMemory`], [`Error::Vulkan`].
     pub fn graphics_pipeline<V: VertexShader, F: FragmentShader>(
         &self,
         desc: &GraphicsDesc<'_, V, F>,
@@ -114,17 +112,16 @@ impl Gpu {
         let shaders = [V::info(), F::info()];
         self.inner.check_alive()?;
         check_shaders(&self.inner, shaders)?;
-        let (set_layouts, layout) = layouts(&self.inner, &shaders, STAGES)?;
-        let mut inner = GraphicsInner {
-            gpu: Arc::clone(&self.inner),
-            raw: vk::Pipeline::null(),
-            layout,
-            set_layouts,
+        let attachments = desc.colors.len() as u32;
+        let mut objects = PipelineObjects::new(&self.inner, &shaders, attachments)?;
+        let name = shaders[0].name;
+        objects.set_pipeline(make(&self.inner, shaders, objects.layout, desc)?, name);
+        let inner = GraphicsInner {
+            objects,
             shaders,
             colors: desc.colors.to_vec(),
             depth: desc.depth,
         };
-        inner.make(desc)?;
         Ok(GraphicsPipeline {
             inner: Arc::new(inner),
             shaders: PhantomData,
@@ -176,109 +173,85 @@ fn check_shaders(gpu: &Inner, shaders: [&'static ShaderInfo; 2]) -> Result<()> {
     Ok(())
 }
 
-impl GraphicsInner {
-    fn make<V: VertexShader, F: FragmentShader>(&mut self, desc: &GraphicsDesc<'_, V, F>) -> Result<()> {
-        let device = &self.gpu.device;
-        let vertex = shader_module(&self.gpu, self.shaders[0], self.shaders[0].spirv)?;
-        let fragment = match shader_module(&self.gpu, self.shaders[1], self.shaders[1].spirv) {
-            Ok(module) => module,
-            Err(error) => {
-                // SAFETY: nothing uses the module yet.
-                unsafe { device.destroy_shader_module(vertex, None) };
-                return Err(error);
-            }
-        };
-        let (vertex_entries, vertex_data) = specialization_data(&desc.vertex.values());
-        let (fragment_entries, fragment_data) = specialization_data(&desc.fragment.values());
-        let vertex_spec = vk::SpecializationInfo::default()
-            .map_entries(&vertex_entries)
-            .data(&vertex_data);
-        let fragment_spec = vk::SpecializationInfo::default()
-            .map_entries(&fragment_entries)
-            .data(&fragment_data);
-        let stage = |stage, module| {
-            vk::PipelineShaderStageCreateInfo::default()
-                .stage(stage)
-                .module(module)
-                .name(c"main")
-        };
-        let stages = [
-            stage(vk::ShaderStageFlags::VERTEX, vertex).specialization_info(&vertex_spec),
-            stage(vk::ShaderStageFlags::FRAGMENT, fragment).specialization_info(&fragment_spec),
-        ];
-        let input = vk::PipelineVertexInputStateCreateInfo::default();
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(desc.topology);
-        let viewport = vk::PipelineViewportStateCreateInfo::default()
-            .viewport_count(1)
-            .scissor_count(1);
-        let raster = vk::PipelineRasterizationStateCreateInfo::default()
-            .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(match desc.cull {
-                Cull::None => vk::CullModeFlags::NONE,
-                Cull::Back => vk::CullModeFlags::BACK,
-                Cull::Front => vk::CullModeFlags::FRONT,
-            })
-            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
-            .line_width(1.0);
-        let samples =
-            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(desc.depth.is_some())
-            .depth_write_enable(desc.depth.is_some())
-            .depth_compare_op(vk::CompareOp::LESS_OR_EQUAL);
-        let blend = vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA)
-            .blend_enable(desc.additive)
-            .src_color_blend_factor(vk::BlendFactor::ONE)
-            .dst_color_blend_factor(vk::BlendFactor::ONE)
-            .src_alpha_blend_factor(vk::BlendFactor::ONE)
-            .dst_alpha_blend_factor(vk::BlendFactor::ONE);
-        let blends = vec![blend; desc.colors.len()];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
-        let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-        let mut rendering = vk::PipelineRenderingCreateInfo::default()
-            .color_attachment_formats(desc.colors)
-            .depth_attachment_format(desc.depth.unwrap_or_default());
-        let create = vk::GraphicsPipelineCreateInfo::default()
-            .stages(&stages)
-            .vertex_input_state(&input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&raster)
-            .multisample_state(&samples)
-            .depth_stencil_state(&depth)
-            .color_blend_state(&blend)
-            .dynamic_state(&dynamic)
-            .layout(self.layout)
-            .push_next(&mut rendering);
-        // SAFETY: every pointer in `create` lives on this stack; modules and layout come from the same reflection.
-        let made = unsafe { device.create_graphics_pipelines(self.gpu.pipeline_cache.raw, &[create], None) };
-        // SAFETY: modules may go once their pipelines are made.
-        unsafe {
-            device.destroy_shader_module(vertex, None);
-            device.destroy_shader_module(fragment, None);
-        }
-        let name = self.shaders[0].name;
-        let made = made.map_err(|(_, result)| self.gpu.creation_error("vkCreateGraphicsPipelines", result, name, 0))?;
-        self.raw = made[0];
-        self.gpu.name(self.raw, name);
-        self.gpu.name(self.layout, name);
-        Ok(())
-    }
-}
-
-impl Drop for GraphicsInner {
-    fn drop(&mut self) {
-        // SAFETY: the last owner is gone, and submissions own what they use.
-        unsafe {
-            self.gpu.device.destroy_pipeline(self.raw, None);
-            self.gpu.device.destroy_pipeline_layout(self.layout, None);
-            for layout in &self.set_layouts {
-                self.gpu.device.destroy_descriptor_set_layout(*layout, None);
-            }
-        }
-    }
+fn make<V: VertexShader, F: FragmentShader>(
+    gpu: &Inner,
+    shaders: [&'static ShaderInfo; 2],
+    layout: vk::PipelineLayout,
+    desc: &GraphicsDesc<'_, V, F>,
+) -> Result<vk::Pipeline> {
+    let vertex = ShaderModule::new(gpu, shaders[0].name, shaders[0].spirv)?;
+    let fragment = ShaderModule::new(gpu, shaders[1].name, shaders[1].spirv)?;
+    let (vertex_entries, vertex_data) = specialization_data(&desc.vertex.values());
+    let (fragment_entries, fragment_data) = specialization_data(&desc.fragment.values());
+    let vertex_spec = vk::SpecializationInfo::default()
+        .map_entries(&vertex_entries)
+        .data(&vertex_data);
+    let fragment_spec = vk::SpecializationInfo::default()
+        .map_entries(&fragment_entries)
+        .data(&fragment_data);
+    let stage = |stage, module: &ShaderModule<'_>| {
+        vk::PipelineShaderStageCreateInfo::default()
+            .stage(stage)
+            .module(module.raw)
+            .name(c"main")
+    };
+    let stages = [
+        stage(vk::ShaderStageFlags::VERTEX, &vertex).specialization_info(&vertex_spec),
+        stage(vk::ShaderStageFlags::FRAGMENT, &fragment).specialization_info(&fragment_spec),
+    ];
+    let input = vk::PipelineVertexInputStateCreateInfo::default();
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(desc.topology);
+    let viewport = vk::PipelineViewportStateCreateInfo::default()
+        .viewport_count(1)
+        .scissor_count(1);
+    let raster = vk::PipelineRasterizationStateCreateInfo::default()
+        .polygon_mode(vk::PolygonMode::FILL)
+        .cull_mode(match desc.cull {
+            Cull::None => vk::CullModeFlags::NONE,
+            Cull::Back => vk::CullModeFlags::BACK,
+            Cull::Front => vk::CullModeFlags::FRONT,
+        })
+        .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+        .line_width(1.0);
+    let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+        .depth_test_enable(desc.depth.is_some())
+        .depth_write_enable(desc.depth.is_some())
+        .depth_compare_op(vk::CompareOp::LESS_OR_EQUAL);
+    let blend = vk::PipelineColorBlendAttachmentState::default()
+        .color_write_mask(vk::ColorComponentFlags::RGBA)
+        .blend_enable(desc.additive)
+        .src_color_blend_factor(vk::BlendFactor::ONE)
+        .dst_color_blend_factor(vk::BlendFactor::ONE)
+        .src_alpha_blend_factor(vk::BlendFactor::ONE)
+        .dst_alpha_blend_factor(vk::BlendFactor::ONE);
+    let blends = vec![blend; desc.colors.len()];
+    let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
+    let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+    let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+    let mut rendering = vk::PipelineRenderingCreateInfo::default()
+        .color_attachment_formats(desc.colors)
+        .depth_attachment_format(desc.depth.unwrap_or_default());
+    let create = vk::GraphicsPipelineCreateInfo::default()
+        .stages(&stages)
+        .vertex_input_state(&input)
+        .input_assembly_state(&assembly)
+        .viewport_state(&viewport)
+        .rasterization_state(&raster)
+        .multisample_state(&samples)
+        .depth_stencil_state(&depth)
+        .color_blend_state(&blend)
+        .dynamic_state(&dynamic)
+        .layout(layout)
+        .push_next(&mut rendering);
+    // SAFETY: every pointer in `create` lives on this stack; modules and layout come from the same reflection.
+    let made = unsafe {
+        gpu.device
+            .create_graphics_pipelines(gpu.pipeline_cache.raw, &[create], None)
+    };
+    let made =
+        made.map_err(|(_, result)| gpu.creation_error("vkCreateGraphicsPipelines", result, shaders[0].name, 0))?;
+    Ok(made[0])
 }
 
 /// A colour attachment, in layout `COLOR_ATTACHMENT_OPTIMAL`.
@@ -419,15 +392,15 @@ impl Render<'_, '_> {
         pass.recorder.next_command();
         pass.recorder.keep(inner);
         let point = vk::PipelineBindPoint::GRAPHICS;
-        let device = inner.gpu.device.clone();
+        let device = pass.recorder.gpu.inner.device.clone();
         // SAFETY: pipeline, layout and sets are alive and come from one reflection.
-        unsafe { device.cmd_bind_pipeline(pass.command_buffer, point, inner.raw) };
-        pass.bind_sets(&inner.shaders, point, inner.layout, &inner.set_layouts, sets)?;
+        unsafe { device.cmd_bind_pipeline(pass.command_buffer, point, inner.objects.raw) };
+        pass.bind_sets(&inner.shaders, point, inner.objects.layout, &inner.objects.sets, sets)?;
         let bytes = push.bytes();
         // SAFETY: the generated struct has the size of the block.
         unsafe {
             if !bytes.is_empty() {
-                device.cmd_push_constants(pass.command_buffer, inner.layout, STAGES, 0, bytes);
+                device.cmd_push_constants(pass.command_buffer, inner.objects.layout, STAGES, 0, bytes);
             }
             device.cmd_draw(pass.command_buffer, vertices, instances, 0, 0);
         }

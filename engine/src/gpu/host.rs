@@ -20,7 +20,9 @@ pub struct HostDevice {
     pub queue: vk::Queue,
     /// The queue's family.
     pub queue_family: u32,
-    /// What the host enabled; what the engine needs is [`EnabledFeatures::REQUIRED`].
+    /// What the host enabled; what the engine needs is [`EnabledFeatures::REQUIRED`]. A host that creates its device with
+    /// [`EnabledFeatures::to_vulkan`] cannot get the two apart, one that fills the Vulkan structs itself has
+    /// [`EnabledFeatures::from_vulkan`].
     pub enabled: EnabledFeatures,
     /// `VK_EXT_debug_utils` is enabled on the instance.
     pub debug_utils: bool,
@@ -120,27 +122,64 @@ impl EnabledFeatures {
         caps.descriptor_indexing &= optional.descriptor_indexing;
     }
 
-    /// The required features that a physical device offers.
-    pub(super) fn offered(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
-        let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
-        let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-        let mut features = vk::PhysicalDeviceFeatures2::default()
-            .push_next(&mut vulkan12)
-            .push_next(&mut vulkan13);
-        // SAFETY: the device belongs to the instance; the chain lives on this stack.
-        unsafe { instance.get_physical_device_features2(device, &mut features) };
-        Self {
-            synchronization2: vulkan13.synchronization2 != 0,
-            dynamic_rendering: vulkan13.dynamic_rendering != 0,
-            timeline_semaphore: vulkan12.timeline_semaphore != 0,
-            scalar_block_layout: vulkan12.scalar_block_layout != 0,
-            host_query_reset: vulkan12.host_query_reset != 0,
-            optional: OptionalFeatures::NONE,
+    /// The Vulkan structs that switch these features on, for a host that creates a device. `ray_query` is an extension and has to be asked
+    /// for beside them.
+    pub fn to_vulkan(&self) -> DeviceFeatures {
+        let optional = &self.optional;
+        DeviceFeatures {
+            vulkan10: vk::PhysicalDeviceFeatures::default()
+                .robust_buffer_access(optional.robust_buffer_access)
+                .geometry_shader(optional.geometry_shader)
+                .pipeline_statistics_query(optional.pipeline_statistics_query)
+                .shader_int64(optional.shader_int64)
+                .shader_float64(optional.shader_float64)
+                .fragment_stores_and_atomics(optional.fragment_stores_and_atomics)
+                .vertex_pipeline_stores_and_atomics(optional.vertex_pipeline_stores_and_atomics),
+            vulkan12: vk::PhysicalDeviceVulkan12Features::default()
+                .timeline_semaphore(self.timeline_semaphore)
+                .scalar_block_layout(self.scalar_block_layout)
+                .host_query_reset(self.host_query_reset)
+                .shader_buffer_int64_atomics(optional.shader_buffer_int64_atomics)
+                .runtime_descriptor_array(optional.descriptor_indexing)
+                .shader_sampled_image_array_non_uniform_indexing(optional.descriptor_indexing),
+            vulkan13: vk::PhysicalDeviceVulkan13Features::default()
+                .synchronization2(self.synchronization2)
+                .dynamic_rendering(self.dynamic_rendering),
         }
     }
 
-    /// Fails with the first required feature that is off.
-    pub(super) fn check(&self, device: &str, instead: &str) -> Result<()> {
+    /// What the Vulkan structs switch on (or offer): the inverse of [`EnabledFeatures::to_vulkan`], for a host that filled them itself.
+    pub fn from_vulkan(features: &DeviceFeatures) -> Self {
+        let DeviceFeatures {
+            vulkan10,
+            vulkan12,
+            vulkan13,
+        } = features;
+        let on = |flag: vk::Bool32| flag != vk::FALSE;
+        Self {
+            synchronization2: on(vulkan13.synchronization2),
+            dynamic_rendering: on(vulkan13.dynamic_rendering),
+            timeline_semaphore: on(vulkan12.timeline_semaphore),
+            scalar_block_layout: on(vulkan12.scalar_block_layout),
+            host_query_reset: on(vulkan12.host_query_reset),
+            optional: OptionalFeatures {
+                robust_buffer_access: on(vulkan10.robust_buffer_access),
+                geometry_shader: on(vulkan10.geometry_shader),
+                pipeline_statistics_query: on(vulkan10.pipeline_statistics_query),
+                shader_int64: on(vulkan10.shader_int64),
+                shader_float64: on(vulkan10.shader_float64),
+                fragment_stores_and_atomics: on(vulkan10.fragment_stores_and_atomics),
+                vertex_pipeline_stores_and_atomics: on(vulkan10.vertex_pipeline_stores_and_atomics),
+                shader_buffer_int64_atomics: on(vulkan12.shader_buffer_int64_atomics),
+                ray_query: false,
+                descriptor_indexing: on(vulkan12.runtime_descriptor_array)
+                    && on(vulkan12.shader_sampled_image_array_non_uniform_indexing),
+            },
+        }
+    }
+
+    /// The names of the required features that are off: empty when a `Gpu` can be made.
+    pub fn missing(&self) -> Vec<&'static str> {
         let required = [
             (self.synchronization2, "synchronization2"),
             (self.dynamic_rendering, "dynamicRendering"),
@@ -148,14 +187,85 @@ impl EnabledFeatures {
             (self.scalar_block_layout, "scalarBlockLayout"),
             (self.host_query_reset, "hostQueryReset"),
         ];
-        match required.iter().find(|(on, _)| !on) {
-            None => Ok(()),
-            Some((_, name)) => Err(Error::MissingFeature {
-                feature: (*name).into(),
-                needed_by: "the engine".into(),
-                device: device.into(),
-                instead: instead.into(),
-            }),
+        required.iter().filter(|(on, _)| !on).map(|(_, name)| *name).collect()
+    }
+
+    /// Fails with the names of all required features that are off.
+    pub(super) fn check(&self, device: &str, instead: &str) -> Result<()> {
+        let missing = self.missing();
+        if missing.is_empty() {
+            return Ok(());
         }
+        Err(Error::MissingFeature {
+            feature: missing.join(", "),
+            needed_by: "the engine".into(),
+            device: device.into(),
+            instead: instead.into(),
+        })
+    }
+}
+
+/// The Vulkan structs that hold the features which the engine knows.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DeviceFeatures {
+    /// Features of Vulkan 1.0.
+    pub vulkan10: vk::PhysicalDeviceFeatures,
+    /// Features of Vulkan 1.2.
+    pub vulkan12: vk::PhysicalDeviceVulkan12Features<'static>,
+    /// Features of Vulkan 1.3.
+    pub vulkan13: vk::PhysicalDeviceVulkan13Features<'static>,
+}
+
+impl DeviceFeatures {
+    /// Hangs the structs into a device's creation. The host may set more of their members before.
+    pub fn chain<'a>(&'a mut self, info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
+        info.enabled_features(&self.vulkan10)
+            .push_next(&mut self.vulkan12)
+            .push_next(&mut self.vulkan13)
+    }
+
+    /// What a physical device of this instance offers.
+    pub(super) fn offered(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
+        let mut offered = Self::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut offered.vulkan12)
+            .push_next(&mut offered.vulkan13);
+        // SAFETY: the device belongs to the instance; the chain lives on this stack.
+        unsafe { instance.get_physical_device_features2(device, &mut features) };
+        offered.vulkan10 = features.features;
+        // The chain ends here: these structs outlive each other's addresses.
+        offered.vulkan12.p_next = std::ptr::null_mut();
+        offered.vulkan13.p_next = std::ptr::null_mut();
+        offered
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_travel_to_vulkan_and_back() {
+        let bit = |set: bool| EnabledFeatures {
+            optional: OptionalFeatures {
+                shader_int64: set,
+                descriptor_indexing: set,
+                ..OptionalFeatures::NONE
+            },
+            ..EnabledFeatures::REQUIRED
+        };
+        for features in [
+            EnabledFeatures::NONE,
+            EnabledFeatures::REQUIRED,
+            bit(true),
+            EnabledFeatures {
+                host_query_reset: false,
+                ..bit(false)
+            },
+        ] {
+            assert_eq!(EnabledFeatures::from_vulkan(&features.to_vulkan()), features);
+        }
+        assert!(EnabledFeatures::REQUIRED.missing().is_empty());
+        assert_eq!(EnabledFeatures::NONE.missing().len(), 5);
     }
 }

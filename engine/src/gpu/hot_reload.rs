@@ -1,13 +1,14 @@
 //! Kernels compiled anew while the program runs, when their source changes.
 //!
-//! The source is looked at by its time of change; a new one is compiled by `glslc` and reflected by the same code as in the build. It takes
+//! The source is looked at by its time of change; a new one is compiled by `glslc` (or in this process, with
+//! the feature `shaderc`) and reflected by the same code as in the build. It takes
 //! the place of the pipeline only when it compiles and its interface is the one that the program was built with; else the old one stays.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::time::SystemTime;
 
 use super::device::Gpu;
+use super::glsl::{self, Purpose, shader_error};
 use super::interface::ComputeShader;
 use super::pipeline::ComputePipeline;
 use super::reflect;
@@ -60,36 +61,18 @@ impl<K: ComputeShader> HotReload<K> {
         }
         self.seen = Some(now);
         let info = K::info();
-        let reflected = self.compile(&["-g", "-O0"])?;
-        let interface = reflect::reflect(&reflected).map_err(shader_error(info.name))?;
+        let compile = |purpose| glsl::compile(info, &self.source, &self.includes, purpose);
+        let reflected = compile(Purpose::Reflection)?;
+        let interface = reflect::reflect(&reflected).map_err(|message| shader_error(info, message))?;
         if interface.fingerprint() != info.fingerprint {
-            return Err(shader_error(info.name)(
+            return Err(shader_error(
+                info,
                 "the new source has another interface (bindings, blocks, constants or workgroup size); build the program anew".into(),
             ));
         }
-        let spirv = self.compile(&["-O"])?;
+        let spirv = compile(Purpose::Execution)?;
         self.pipeline = ComputePipeline::from_spirv(&self.gpu, &spirv, &self.spec)?;
         Ok(true)
-    }
-
-    fn compile(&self, flags: &[&str]) -> Result<Vec<u8>> {
-        let program = std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
-        let output = Command::new(&program)
-            .args(["-Werror", "--target-env=vulkan1.1", "--target-spv=spv1.3"])
-            .args(flags)
-            .arg("-I")
-            .arg(&self.includes)
-            .arg(&self.source)
-            .args(["-o", "-"])
-            .output()
-            .map_err(|error| Error::io(&program, error))?;
-        if output.status.success() {
-            Ok(output.stdout)
-        } else {
-            Err(shader_error(K::info().name)(
-                String::from_utf8_lossy(&output.stderr).trim().to_owned(),
-            ))
-        }
     }
 }
 
@@ -97,11 +80,4 @@ fn changed(source: &Path) -> Result<SystemTime> {
     std::fs::metadata(source)
         .and_then(|data| data.modified())
         .map_err(|error| Error::io(source, error))
-}
-
-fn shader_error(name: &str) -> impl Fn(String) -> Error {
-    move |message| Error::Shader {
-        name: name.into(),
-        message,
-    }
 }

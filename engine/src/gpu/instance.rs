@@ -212,7 +212,8 @@ impl Drop for Instance {
     }
 }
 
-const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+/// The layer that [`Validation`] switches on.
+pub const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 fn require_validation_layer(entry: &ash::Entry) -> Result<()> {
     // SAFETY: plain query.
@@ -225,7 +226,7 @@ fn require_validation_layer(entry: &ash::Entry) -> Result<()> {
         return Ok(());
     }
     Err(Error::MissingFeature {
-        feature: "VK_LAYER_KHRONOS_validation".into(),
+        feature: VALIDATION_LAYER.to_string_lossy().into_owned(),
         needed_by: "validation".into(),
         device: "the Vulkan loader".into(),
         instead: "install it (Debian: vulkan-validationlayers) or switch validation off".into(),

@@ -11,8 +11,11 @@ mod bind;
 mod buffer;
 mod caps;
 mod copy;
+mod create;
 mod device;
 pub mod fault;
+#[cfg(feature = "hot-reload")]
+mod glsl;
 mod graphics;
 mod host;
 #[cfg(feature = "hot-reload")]
@@ -20,6 +23,7 @@ mod hot_reload;
 mod image;
 mod instance;
 pub mod interface;
+mod layout;
 mod marker;
 mod memory;
 mod options;
@@ -44,16 +48,16 @@ pub use barrier::{
     transfer_to_compute,
 };
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
-pub use caps::{Caps, SubgroupOperations};
+pub use caps::{Caps, DescriptorLimits, SubgroupOperations};
 pub use device::{Gpu, QueueGuard};
 pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
-pub use host::{EnabledFeatures, HostDevice, OptionalFeatures};
+pub use host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures};
 #[cfg(feature = "hot-reload")]
 pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
-pub use instance::{DeviceSummary, ValidationLog, ValidationMessage};
+pub use instance::{DeviceSummary, VALIDATION_LAYER, ValidationLog, ValidationMessage};
 pub use memory::{AllocationInfo, Category, MemoryReport};
-pub use options::{DeviceSelection, GpuOptions, Validation};
+pub use options::{DeviceSelection, GpuOptions, Lesser, Validation};
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorder::{Pass, Recorder};
 pub use submission::Submission;

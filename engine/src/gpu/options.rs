@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use super::caps::DescriptorLimits;
 use super::fault::FaultPlan;
 use super::instance::DeviceSummary;
 
@@ -28,7 +29,7 @@ impl FromStr for DeviceSelection {
 
 impl DeviceSelection {
     /// True when the device is one of those meant.
-    pub(super) fn matches(&self, summary: &DeviceSummary) -> bool {
+    pub fn matches(&self, summary: &DeviceSummary) -> bool {
         match self {
             Self::Fastest => true,
             Self::Index(index) => summary.index == *index,
@@ -64,10 +65,22 @@ pub struct GpuOptions {
     pub validation: Validation,
     /// Folder of the pipeline cache; `None` keeps none. The default is `$XDG_CACHE_HOME/clerestory`, else `~/.cache/clerestory`.
     pub cache_folder: Option<PathBuf>,
-    /// Writes a marker before every pass, so that a lost device names the last one. Costs a 4-byte fill a pass.
+    /// Writes a marker before every pass, so that a lost device names the last one that was reached. Costs a pass a 4-byte fill between two
+    /// barriers, so that passes do not overlap; off, they overlap as far as their own barriers allow.
     pub crash_markers: bool,
     /// Makes the n-th call of a Vulkan command fail, for tests.
     pub fault: Option<FaultPlan>,
+    /// Makes the device look smaller than it is, for tests.
+    pub lesser: Lesser,
+}
+
+/// A device made to look smaller than it is, so that what happens on lesser hardware can be tested on any.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Lesser {
+    /// Descriptor limits in place of the device's, none of them higher.
+    pub descriptors: Option<DescriptorLimits>,
+    /// At most as many bits of a timestamp count.
+    pub timestamp_valid_bits: Option<u32>,
 }
 
 impl Default for GpuOptions {
@@ -90,6 +103,7 @@ impl Default for GpuOptions {
             cache_folder: cache.map(|folder| folder.join("clerestory")),
             crash_markers: true,
             fault: None,
+            lesser: Lesser::default(),
         }
     }
 }

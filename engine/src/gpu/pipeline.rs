@@ -7,7 +7,8 @@ use std::sync::{Arc, PoisonError, Weak};
 use ash::vk;
 
 use super::device::{Gpu, Inner};
-use super::interface::{BindingKind, ComputeShader, LocalSize, ShaderInfo, SpecConstants};
+use super::interface::{ComputeShader, LocalSize, ShaderInfo, SpecConstants};
+use super::layout::{PipelineObjects, ShaderModule, specialization_data};
 use crate::{Error, Result};
 
 /// Live pipelines by shader and specialization, so that equal ones are made once.
@@ -47,10 +48,7 @@ pub struct PipelineInfo {
 }
 
 pub(super) struct PipelineInner {
-    gpu: Arc<Inner>,
-    pub raw: vk::Pipeline,
-    pub layout: vk::PipelineLayout,
-    pub set_layouts: Vec<vk::DescriptorSetLayout>,
+    pub objects: PipelineObjects,
     pub info: &'static ShaderInfo,
     pub local_size: [u32; 3],
     spec: Vec<(u32, u32)>,
@@ -60,7 +58,8 @@ impl Gpu {
     /// Makes the pipeline of a shader, or shares one that is alive with the same specialization.
     ///
     /// # Errors
-    /// [`Error::MissingFeature`] when the workgroup is larger than the device allows, [`Error::OutOfMemory`], [`Error::Vulkan`].
+    /// [`Error::MissingFeature`] when the workgroup is larger or the descriptors are more than the device allows,
+    /// [`Error::OutOfMemory`], [`Error::Vulkan`].
     pub fn compute_pipeline<K: ComputeShader>(&self, spec: &K::Spec) -> Result<ComputePipeline<K>> {
         let (info, values) = (K::info(), spec.values());
         let key = (info.name, values.clone());
@@ -136,150 +135,30 @@ impl PipelineInner {
                 instead: format!("choose a workgroup of at most {}", gpu.caps.max_workgroup_invocations),
             });
         }
-        let (set_layouts, layout) = layouts(gpu, &[info], vk::ShaderStageFlags::COMPUTE)?;
-        let mut inner = Self {
-            gpu: Arc::clone(gpu),
-            raw: vk::Pipeline::null(),
-            layout,
-            set_layouts,
-            info,
-            local_size,
-            spec,
-        };
-        let module = shader_module(gpu, info, spirv)?;
-        let (entries, data) = specialization_data(&inner.spec);
+        let mut objects = PipelineObjects::new(gpu, &[info], 0)?;
+        let module = ShaderModule::new(gpu, info.name, spirv)?;
+        let (entries, data) = specialization_data(&spec);
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(module)
+            .module(module.raw)
             .name(c"main")
             .specialization_info(&specialization);
-        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+        let create = vk::ComputePipelineCreateInfo::default()
+            .stage(stage)
+            .layout(objects.layout);
         // SAFETY: module and layout are alive and match, since both come from the same reflection.
         let made = unsafe {
             gpu.device
                 .create_compute_pipelines(gpu.pipeline_cache.raw, &[create], None)
         };
-        // SAFETY: a module may go once its pipelines are made.
-        unsafe { gpu.device.destroy_shader_module(module, None) };
-        inner.raw =
-            made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, info.name, 0))?[0];
-        gpu.name(inner.raw, info.name);
-        gpu.name(inner.layout, info.name);
-        Ok(inner)
-    }
-}
-
-impl Drop for PipelineInner {
-    fn drop(&mut self) {
-        // SAFETY: the last owner is gone, and submissions own what they use.
-        unsafe {
-            self.gpu.device.destroy_pipeline(self.raw, None);
-            self.gpu.device.destroy_pipeline_layout(self.layout, None);
-            for layout in &self.set_layouts {
-                self.gpu.device.destroy_descriptor_set_layout(*layout, None);
-            }
-        }
-    }
-}
-
-/// Map entries and packed values of specialization constants.
-pub(super) fn specialization_data(values: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
-    let entry = |(index, (id, _)): (u32, &(u32, u32))| {
-        vk::SpecializationMapEntry::default()
-            .constant_id(*id)
-            .offset(index * 4)
-            .size(4)
-    };
-    let entries = (0u32..).zip(values).map(entry).collect();
-    let data = values.iter().flat_map(|(_, bits)| bits.to_ne_bytes()).collect();
-    (entries, data)
-}
-
-/// The shader module of a reflected shader.
-pub(super) fn shader_module(gpu: &Inner, info: &ShaderInfo, spirv: &[u8]) -> Result<vk::ShaderModule> {
-    let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).map_err(|error| Error::Shader {
-        name: info.name.into(),
-        message: error.to_string(),
-    })?;
-    let create = vk::ShaderModuleCreateInfo::default().code(&words);
-    // SAFETY: the words are a module that was validated when it was built.
-    let module = unsafe { gpu.device.create_shader_module(&create, None) }
-        .map_err(|result| gpu.error("vkCreateShaderModule", result))?;
-    gpu.name(module, info.name);
-    Ok(module)
-}
-
-/// Descriptor set layouts (with empty ones in gaps) and the pipeline layout of the shaders of one pipeline.
-pub(super) fn layouts(
-    gpu: &Inner,
-    shaders: &[&'static ShaderInfo],
-    stages: vk::ShaderStageFlags,
-) -> Result<(Vec<vk::DescriptorSetLayout>, vk::PipelineLayout)> {
-    let mut bindings: BTreeMap<(u32, u32), BindingKind> = BTreeMap::new();
-    for binding in shaders.iter().flat_map(|shader| shader.bindings) {
-        bindings.insert((binding.set, binding.binding), binding.kind);
-    }
-    let sets = bindings.keys().map(|(set, _)| set + 1).max().unwrap_or(0);
-    let mut set_layouts = Vec::new();
-    let destroy = |set_layouts: &[vk::DescriptorSetLayout]| {
-        for layout in set_layouts {
-            // SAFETY: nothing uses the layout yet.
-            unsafe { gpu.device.destroy_descriptor_set_layout(*layout, None) };
-        }
-    };
-    for set in 0..sets {
-        let list: Vec<_> = bindings
-            .iter()
-            .filter(|((s, _), _)| *s == set)
-            .map(|((_, binding), kind)| {
-                vk::DescriptorSetLayoutBinding::default()
-                    .binding(*binding)
-                    .descriptor_type(descriptor_type(*kind))
-                    .descriptor_count(1)
-                    .stage_flags(stages)
-            })
-            .collect();
-        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&list);
-        // SAFETY: plain creation.
-        match unsafe { gpu.device.create_descriptor_set_layout(&info, None) } {
-            Ok(layout) => {
-                gpu.name(layout, &format!("{} set {set}", shaders[0].name));
-                set_layouts.push(layout);
-            }
-            Err(result) => {
-                destroy(&set_layouts);
-                return Err(gpu.error("vkCreateDescriptorSetLayout", result));
-            }
-        }
-    }
-    let push_bytes = shaders
-        .iter()
-        .map(|shader| shader.push_constant_bytes)
-        .max()
-        .unwrap_or(0);
-    let ranges = [vk::PushConstantRange::default().stage_flags(stages).size(push_bytes)];
-    let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts);
-    if push_bytes > 0 {
-        info = info.push_constant_ranges(&ranges);
-    }
-    // SAFETY: plain creation from live layouts.
-    match unsafe { gpu.device.create_pipeline_layout(&info, None) } {
-        Ok(layout) => Ok((set_layouts, layout)),
-        Err(result) => {
-            destroy(&set_layouts);
-            Err(gpu.error("vkCreatePipelineLayout", result))
-        }
-    }
-}
-
-/// The Vulkan type of a binding.
-pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
-    match kind {
-        BindingKind::StorageBuffer => vk::DescriptorType::STORAGE_BUFFER,
-        BindingKind::UniformBuffer => vk::DescriptorType::UNIFORM_BUFFER,
-        BindingKind::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
-        BindingKind::SampledImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-        BindingKind::TexelBuffer => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        let made = made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, info.name, 0))?;
+        objects.set_pipeline(made[0], info.name);
+        Ok(Self {
+            objects,
+            info,
+            local_size,
+            spec,
+        })
     }
 }

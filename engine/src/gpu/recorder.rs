@@ -14,7 +14,7 @@ use super::interface::{BindingSet, ComputeShader, PushConstants};
 use super::marker::BEGUN;
 use super::memory::Category;
 use super::pipeline::ComputePipeline;
-use super::resources::FrameResources;
+use super::resources::{FrameResources, Lease};
 use super::submission::{self, Submission};
 use super::tracker::Tracker;
 use crate::{Error, Result};
@@ -27,12 +27,15 @@ pub(super) type Kept = BTreeMap<usize, Arc<dyn Any + Send + Sync>>;
 
 /// One command buffer under construction.
 ///
+/// How much work one submission may hold is up to its author: see [`Timings`](super::Timings).
+///
 /// It starts with a barrier over everything, so that a submission may rely on all earlier ones of the same queue. Between its own passes
 /// every barrier is the author's; debug builds check that none is missing.
 pub struct Recorder {
     pub(super) gpu: Gpu,
     name: String,
-    resources: Option<FrameResources>,
+    /// Goes back before what its commands use does.
+    resources: Lease,
     markers: Option<Buffer>,
     passes: Vec<String>,
     kept: Kept,
@@ -71,7 +74,7 @@ impl Gpu {
         let recorder = Recorder {
             gpu: self.clone(),
             name: name.into(),
-            resources: Some(FrameResources::take(self)?),
+            resources: Lease::take(self)?,
             markers,
             passes: Vec::new(),
             kept: Kept::new(),
@@ -105,10 +108,12 @@ impl Recorder {
         }
         self.passes.push(name.into());
         let inner = Arc::clone(&self.gpu.inner);
-        let (command_buffer, timestamps, statistics) = {
-            let resources = self.resources();
-            (resources.command_buffer, resources.timestamps, resources.statistics)
-        };
+        let FrameResources {
+            command_buffer,
+            timestamps,
+            statistics,
+            ..
+        } = *self.resources;
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         let (device, counted) = (&inner.device, self.statistics);
         // SAFETY: the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
@@ -119,7 +124,7 @@ impl Recorder {
                     .cmd_begin_debug_utils_label(command_buffer, &vk::DebugUtilsLabelEXT::default().label_name(&label));
             }
             if let Some(markers) = &self.markers {
-                device.cmd_fill_buffer(command_buffer, markers.raw(), index as u64 * 4, 4, BEGUN);
+                record_marker(device, command_buffer, markers, index);
             }
             if timestamps != vk::QueryPool::null() {
                 device.cmd_write_timestamp2(command_buffer, stage, timestamps, 2 * index as u32);
@@ -160,10 +165,10 @@ impl Recorder {
     ///
     /// # Errors
     /// As [`Recorder::submit`].
-    pub fn submit_with(mut self, wait: &[vk::Semaphore], signal: &[vk::Semaphore]) -> Result<Submission> {
+    pub fn submit_with(self, wait: &[vk::Semaphore], signal: &[vk::Semaphore]) -> Result<Submission> {
         let inner = Arc::clone(&self.gpu.inner);
         inner.check_alive()?;
-        let command_buffer = self.resources().command_buffer;
+        let command_buffer = self.resources.command_buffer;
         let host = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
@@ -192,22 +197,21 @@ impl Recorder {
         }
         queue.last_value = value;
         drop(queue);
-        Ok(Submission::new(
-            self.gpu.clone(),
-            std::mem::take(&mut self.name),
+        Ok(Submission {
+            gpu: self.gpu,
+            name: self.name,
             value,
-            self.resources.take(),
-            std::mem::take(&mut self.passes),
-            std::mem::take(&mut self.kept),
-            self.statistics,
-        ))
+            resources: self.resources,
+            passes: self.passes,
+            _kept: self.kept,
+            statistics: self.statistics,
+            finished: false,
+        })
     }
 
     fn begin(&self) -> Result<()> {
         let inner = &self.gpu.inner;
-        let Some(resources) = &self.resources else {
-            return Ok(());
-        };
+        let resources = &self.resources;
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         let all = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
@@ -239,9 +243,7 @@ impl Recorder {
     }
 
     pub(super) fn resources(&mut self) -> &mut FrameResources {
-        self.resources
-            .as_mut()
-            .expect("a recorder holds its resources until it is submitted")
+        &mut self.resources
     }
 
     pub(super) fn keep<T: Any + Send + Sync>(&mut self, item: &Arc<T>) {
@@ -265,22 +267,29 @@ impl Recorder {
     }
 }
 
-impl Drop for Recorder {
-    fn drop(&mut self) {
-        if let Some(mut resources) = self.resources.take() {
-            // Recording was given up: the command buffer was never submitted, so all of it can be used again.
-            match resources.reset(&self.gpu.inner) {
-                Ok(()) => self
-                    .gpu
-                    .inner
-                    .recycled
-                    .lock()
-                    .unwrap_or_else(std::sync::PoisonError::into_inner)
-                    .push(resources),
-                // SAFETY: the device never saw the command buffer.
-                Err(_) => unsafe { resources.destroy(&self.gpu.inner.device) },
-            }
-        }
+/// Writes the marker of a pass: once all before has ended, and before anything of the pass begins. So the last marker is the pass that the
+/// device really was in. Written where the host can see it at once, since a lost device flushes nothing more.
+///
+/// # Safety
+/// The command buffer must be recording outside of rendering, and the buffer must live until it has been executed.
+unsafe fn record_marker(device: &ash::Device, command_buffer: vk::CommandBuffer, markers: &Buffer, index: usize) {
+    let (all, transfer) = (
+        vk::PipelineStageFlags2::ALL_COMMANDS,
+        vk::PipelineStageFlags2::ALL_TRANSFER,
+    );
+    let before = [vk::MemoryBarrier2::default()
+        .src_stage_mask(all)
+        .dst_stage_mask(transfer)];
+    let after = [vk::MemoryBarrier2::default()
+        .src_stage_mask(transfer)
+        .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+        .dst_stage_mask(all | vk::PipelineStageFlags2::HOST)
+        .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+    // SAFETY: see above; the index lies inside the buffer.
+    unsafe {
+        device.cmd_pipeline_barrier2(command_buffer, &vk::DependencyInfo::default().memory_barriers(&before));
+        device.cmd_fill_buffer(command_buffer, markers.raw(), index as u64 * 4, 4, BEGUN);
+        device.cmd_pipeline_barrier2(command_buffer, &vk::DependencyInfo::default().memory_barriers(&after));
     }
 }
 
@@ -353,16 +362,17 @@ impl Pass<'_> {
         let raw: Vec<_> = barriers
             .iter()
             .map(|barrier| {
+                let (from, to) = self.usable(barrier.from, barrier.to);
                 if let Some(tracker) = &mut self.recorder.tracker {
                     tracker.barrier(barrier.buffer, barrier.from, barrier.to);
                 }
                 vk::BufferMemoryBarrier2::default()
                     .buffer(barrier.buffer.raw())
                     .size(vk::WHOLE_SIZE)
-                    .src_stage_mask(barrier.from.stages())
-                    .src_access_mask(barrier.from.writes().kinds())
-                    .dst_stage_mask(barrier.to.stages())
-                    .dst_access_mask(barrier.to.kinds())
+                    .src_stage_mask(from.stages())
+                    .src_access_mask(from.writes().kinds())
+                    .dst_stage_mask(to.stages())
+                    .dst_access_mask(to.kinds())
                     .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
                     .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             })
@@ -378,6 +388,7 @@ impl Pass<'_> {
         if let Some(tracker) = &mut self.recorder.tracker {
             tracker.barrier_all(from, to);
         }
+        let (from, to) = self.usable(from, to);
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(from.stages())
             .src_access_mask(from.writes().kinds())
@@ -391,6 +402,7 @@ impl Pass<'_> {
         let raw: Vec<_> = barriers
             .iter()
             .map(|barrier| {
+                let (from, to) = self.usable(barrier.from, barrier.to);
                 vk::ImageMemoryBarrier2::default()
                     .image(barrier.image.raw())
                     .subresource_range(vk::ImageSubresourceRange {
@@ -399,10 +411,10 @@ impl Pass<'_> {
                         layer_count: vk::REMAINING_ARRAY_LAYERS,
                         ..Default::default()
                     })
-                    .src_stage_mask(barrier.from.stages())
-                    .src_access_mask(barrier.from.writes().kinds())
-                    .dst_stage_mask(barrier.to.stages())
-                    .dst_access_mask(barrier.to.kinds())
+                    .src_stage_mask(from.stages())
+                    .src_access_mask(from.writes().kinds())
+                    .dst_stage_mask(to.stages())
+                    .dst_access_mask(to.kinds())
                     .old_layout(barrier.old_layout)
                     .new_layout(barrier.new_layout)
                     .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
@@ -419,6 +431,12 @@ impl Pass<'_> {
     /// synchronize.
     pub fn raw(&self) -> vk::CommandBuffer {
         self.command_buffer
+    }
+
+    /// The uses that the device has stages for.
+    fn usable(&self, from: Access, to: Access) -> (Access, Access) {
+        let caps = self.recorder.gpu.caps();
+        (from.on(caps), to.on(caps))
     }
 
     fn pipeline_barrier(&self, info: &vk::DependencyInfo<'_>) {
@@ -446,9 +464,15 @@ impl Pass<'_> {
         unsafe {
             inner
                 .device
-                .cmd_bind_pipeline(self.command_buffer, point, pipeline.inner.raw)
+                .cmd_bind_pipeline(self.command_buffer, point, pipeline.inner.objects.raw)
         };
-        self.bind_sets(&[info], point, pipeline.inner.layout, &pipeline.inner.set_layouts, sets)?;
+        self.bind_sets(
+            &[info],
+            point,
+            pipeline.inner.objects.layout,
+            &pipeline.inner.objects.sets,
+            sets,
+        )?;
         let bytes = push.bytes();
         if !bytes.is_empty() {
             let stages = vk::ShaderStageFlags::COMPUTE;
@@ -456,7 +480,7 @@ impl Pass<'_> {
             unsafe {
                 inner
                     .device
-                    .cmd_push_constants(self.command_buffer, pipeline.inner.layout, stages, 0, bytes)
+                    .cmd_push_constants(self.command_buffer, pipeline.inner.objects.layout, stages, 0, bytes)
             };
         }
         Ok(())

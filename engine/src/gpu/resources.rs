@@ -11,7 +11,48 @@ const SETS_PER_POOL: u32 = 256;
 /// Descriptors of each type of one pool.
 const DESCRIPTORS_PER_POOL: u32 = 2048;
 
+/// Frame resources on loan. They go back to the device's store when this is dropped, so the device must be done with them by then.
+pub(super) struct Lease {
+    gpu: Gpu,
+    held: FrameResources,
+}
+
+impl Lease {
+    /// Takes recycled resources or makes new ones.
+    pub fn take(gpu: &Gpu) -> Result<Self> {
+        let recycled = gpu.inner.recycled().pop();
+        let held = recycled.map_or_else(|| FrameResources::new(&gpu.inner), Ok)?;
+        Ok(Self { gpu: gpu.clone(), held })
+    }
+}
+
+impl std::ops::Deref for Lease {
+    type Target = FrameResources;
+
+    fn deref(&self) -> &FrameResources {
+        &self.held
+    }
+}
+
+impl std::ops::DerefMut for Lease {
+    fn deref_mut(&mut self) -> &mut FrameResources {
+        &mut self.held
+    }
+}
+
+impl Drop for Lease {
+    fn drop(&mut self) {
+        let mut held = std::mem::take(&mut self.held);
+        match held.reset(&self.gpu.inner) {
+            Ok(()) => self.gpu.inner.recycled().push(held),
+            // SAFETY: the device is done with all of it.
+            Err(_) => unsafe { held.destroy(&self.gpu.inner.device) },
+        }
+    }
+}
+
 /// A command pool with its buffer, query pools and descriptor pools.
+#[derive(Default)]
 pub(super) struct FrameResources {
     pub command_pool: vk::CommandPool,
     pub command_buffer: vk::CommandBuffer,
@@ -24,27 +65,9 @@ pub(super) struct FrameResources {
 }
 
 impl FrameResources {
-    /// Takes a recycled set or makes a new one.
-    pub fn take(gpu: &Gpu) -> Result<Self> {
-        let inner = &gpu.inner;
-        let recycled = inner
-            .recycled
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .pop();
-        recycled.map_or_else(|| Self::new(inner), Ok)
-    }
-
     fn new(inner: &Inner) -> Result<Self> {
         let device = &inner.device;
-        let mut resources = Self {
-            command_pool: vk::CommandPool::null(),
-            command_buffer: vk::CommandBuffer::null(),
-            timestamps: vk::QueryPool::null(),
-            statistics: vk::QueryPool::null(),
-            descriptor_pools: Vec::new(),
-            pool_in_use: 0,
-        };
+        let mut resources = Self::default();
         if let Err(error) = resources.fill(inner) {
             // SAFETY: nothing of it is in use yet.
             unsafe { resources.destroy(device) };
@@ -67,7 +90,7 @@ impl FrameResources {
         // SAFETY: the pool was just made.
         self.command_buffer = unsafe { device.allocate_command_buffers(&info) }
             .map_err(|r| inner.error("vkAllocateCommandBuffers", r))?[0];
-        if inner.caps.timestamp_period > 0.0 {
+        if inner.caps.timestamp_valid_bits > 0 {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2 * MAX_PASSES as u32);
@@ -111,7 +134,7 @@ impl FrameResources {
     }
 
     /// Makes everything ready to be recorded again. The device must be done with it.
-    pub fn reset(&mut self, inner: &Inner) -> Result<()> {
+    fn reset(&mut self, inner: &Inner) -> Result<()> {
         // SAFETY: the caller waited for the submission that used these.
         unsafe {
             inner

@@ -1,6 +1,5 @@
 //! Work that the queue has taken, and waiting for it.
 
-use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 use ash::vk;
@@ -8,45 +7,28 @@ use ash::vk;
 use super::device::{Gpu, Inner};
 use super::options::Validation;
 use super::recorder::Kept;
-use super::resources::FrameResources;
-use super::timing::{PassTiming, Timings};
+use super::resources::Lease;
+use super::timing::{PassTiming, Timings, elapsed};
 use crate::{Error, Result};
 
 /// How long one call to the driver waits, so that a host thread never blocks for good.
 const WAIT_SLICE: Duration = Duration::from_millis(200);
 
-/// A submitted command buffer. It keeps alive what the device uses; dropping it waits.
+/// A submitted command buffer. It keeps alive what the device uses, whatever else is dropped; dropping it waits for the device.
 pub struct Submission {
-    gpu: Gpu,
-    name: String,
-    value: u64,
-    resources: Option<FrameResources>,
-    passes: Vec<String>,
-    kept: Kept,
-    statistics: bool,
+    pub(super) gpu: Gpu,
+    pub(super) name: String,
+    pub(super) value: u64,
+    /// Goes back before what its commands use does.
+    pub(super) resources: Lease,
+    pub(super) passes: Vec<String>,
+    pub(super) _kept: Kept,
+    pub(super) statistics: bool,
+    /// The device is known to have finished.
+    pub(super) finished: bool,
 }
 
 impl Submission {
-    pub(super) fn new(
-        gpu: Gpu,
-        name: String,
-        value: u64,
-        resources: Option<FrameResources>,
-        passes: Vec<String>,
-        kept: Kept,
-        statistics: bool,
-    ) -> Self {
-        Self {
-            gpu,
-            name,
-            value,
-            resources,
-            passes,
-            kept,
-            statistics,
-        }
-    }
-
     /// True when the device has finished.
     ///
     /// # Errors
@@ -61,7 +43,7 @@ impl Submission {
     /// [`Error::DeviceLost`], naming the last pass that began.
     pub fn wait(self) -> Result<Timings> {
         while !self.wait_slice(WAIT_SLICE)? {}
-        self.finish()
+        Ok(self.finish())
     }
 
     /// As [`Submission::wait`], for at most `limit`; on [`Error::TimedOut`] the submission comes back to be waited for again.
@@ -73,7 +55,7 @@ impl Submission {
         loop {
             let left = limit.saturating_sub(start.elapsed());
             match self.wait_slice(left.min(WAIT_SLICE)) {
-                Ok(true) => return self.finish().map_err(|error| (error, None)),
+                Ok(true) => return Ok(self.finish()),
                 Ok(false) if left.is_zero() => {
                     return Err((
                         Error::TimedOut {
@@ -102,12 +84,10 @@ impl Submission {
         }
     }
 
-    fn finish(mut self) -> Result<Timings> {
-        self.gpu.inner.in_flight().end(self.value, true);
-        let Some(mut resources) = self.resources.take() else {
-            return Ok(Timings::default());
-        };
+    fn finish(mut self) -> Timings {
+        self.finished = true;
         let inner = &self.gpu.inner;
+        inner.in_flight().end(self.value, true);
         let count = self.passes.len();
         let read = |pool: vk::QueryPool, queries: usize| -> Option<Vec<u64>> {
             let mut values = vec![0u64; queries];
@@ -123,35 +103,31 @@ impl Submission {
             .ok()?;
             Some(values)
         };
-        let timestamps = read(resources.timestamps, 2 * count);
+        let timestamps = read(self.resources.timestamps, 2 * count);
         let invocations = if self.statistics {
-            read(resources.statistics, count)
+            read(self.resources.statistics, count)
         } else {
             None
         };
-        let period = f64::from(inner.caps.timestamp_period);
-        let passes = std::mem::take(&mut self.passes);
-        let passes = passes.into_iter().enumerate().map(|(index, name)| PassTiming {
-            name,
-            nanoseconds: timestamps
-                .as_ref()
-                .map(|ticks| (ticks[2 * index + 1].saturating_sub(ticks[2 * index]) as f64 * period) as u64),
+        let (period, valid_bits) = (f64::from(inner.caps.timestamp_period), inner.caps.timestamp_valid_bits);
+        let nanoseconds = |index: usize| {
+            let ticks = timestamps.as_ref()?;
+            Some((elapsed(ticks[2 * index], ticks[2 * index + 1], valid_bits) as f64 * period) as u64)
+        };
+        let passes = self.passes.iter().enumerate().map(|(index, name)| PassTiming {
+            name: name.clone(),
+            nanoseconds: nanoseconds(index),
             invocations: invocations.as_ref().map(|counts| counts[index]),
         });
-        let timings = Timings {
+        Timings {
             passes: passes.collect(),
-        };
-        self.kept.clear();
-        match resources.reset(inner) {
-            Ok(()) => inner
-                .recycled
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push(resources),
-            // SAFETY: the device has finished with all of it.
-            Err(_) => unsafe { resources.destroy(&inner.device) },
+            untimed: match &timestamps {
+                Some(_) => None,
+                None if valid_bits == 0 => Some("the device's queue has no timestamps"),
+                None if count == 0 => Some("there is no pass"),
+                None => Some("the driver did not give the timestamps"),
+            },
         }
-        Ok(timings)
     }
 }
 
@@ -221,7 +197,9 @@ unsafe fn submit_by_version_1(
 
 impl Drop for Submission {
     fn drop(&mut self) {
-        let Some(resources) = self.resources.take() else { return };
+        if self.finished {
+            return;
+        }
         let outcome = loop {
             match self.wait_slice(WAIT_SLICE) {
                 Ok(false) => {}
@@ -229,11 +207,9 @@ impl Drop for Submission {
             }
         };
         if outcome.is_err() {
-            // A device that was lost while it worked may still be stopping.
+            // A device that was lost while it worked may still be stopping. Afterwards it will never touch anything again.
             self.gpu.inner.wait_for_queue();
         }
         self.gpu.inner.in_flight().end(self.value, outcome.is_ok());
-        // SAFETY: the device has finished, or is lost and will never touch anything again.
-        unsafe { resources.destroy(&self.gpu.inner.device) };
     }
 }

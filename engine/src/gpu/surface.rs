@@ -10,7 +10,8 @@ use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
 use super::barrier::{Access, ImageBarrier};
-use super::device::{Gpu, Inner, no_window};
+use super::create::no_window;
+use super::device::{Gpu, Inner};
 use super::image::{Image, ImageInner};
 use super::instance::vulkan;
 use super::recorder::{Pass, Recorder};

@@ -46,7 +46,13 @@ impl Gpu {
     ) -> Result<TexelView> {
         let texel = texel_bytes(format).unwrap_or(1);
         let texels = (size_of_val(data) as u64).div_ceil(texel);
-        let view = self.texel_view(name, category, format, texels, vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER)?;
+        let view = self.texel_view(
+            name,
+            category,
+            format,
+            texels,
+            vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
+        )?;
         if !data.is_empty() {
             self.upload(view.buffer(), 0, data)?;
         }

@@ -1,4 +1,9 @@
 //! GPU time and counters of passes.
+//!
+//! Drivers end a submission that takes too long (seconds) and lose the device with it. Whoever submits work of unknown size should begin
+//! with little, and size each submission by the [`Timings`] of the last: [`Timings::seconds`] says how long it took, and
+//! [`Timings::longest`] which pass to make smaller. Where a device has no timestamps ([`Timings::untimed`]), the host's clock around
+//! [`Submission::wait`](super::Submission::wait) is an upper bound.
 
 /// One pass of a submission.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -16,6 +21,8 @@ pub struct PassTiming {
 pub struct Timings {
     /// The passes.
     pub passes: Vec<PassTiming>,
+    /// Why the passes have no times; `None` when they have.
+    pub untimed: Option<&'static str>,
 }
 
 impl Timings {
@@ -31,5 +38,54 @@ impl Timings {
     /// Number of passes with this name.
     pub fn count(&self, name: &str) -> usize {
         self.passes.iter().filter(|pass| pass.name == name).count()
+    }
+
+    /// The pass that took longest, the first of equal ones; `None` without times.
+    pub fn longest(&self) -> Option<&PassTiming> {
+        let timed = self.passes.iter().rev().filter(|pass| pass.nanoseconds.is_some());
+        timed.max_by_key(|pass| pass.nanoseconds)
+    }
+}
+
+/// Ticks from one timestamp to a later one, of which only the low `valid_bits` count: the counter may have wrapped once in between. An end
+/// that lies just before the beginning, as a device with several clocks may report it, counts as no time.
+pub(super) fn elapsed(begin: u64, end: u64, valid_bits: u32) -> u64 {
+    let mask = 1u64.checked_shl(valid_bits).map_or(u64::MAX, |beyond| beyond - 1);
+    let ticks = end.wrapping_sub(begin) & mask;
+    if ticks > mask / 2 { 0 } else { ticks }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn timestamps_wrap_at_their_valid_bits() {
+        assert_eq!(elapsed(5, 12, 64), 7);
+        assert_eq!(elapsed(u64::MAX - 1, 3, 64), 5);
+        assert_eq!(elapsed(0xF_FFFF_FFFE, 3, 36), 5);
+        // Bits beyond the valid ones are undefined.
+        assert_eq!(elapsed(0xAB_0000_0000_0010, 0xCD_0000_0000_0018, 36), 8);
+        assert_eq!(elapsed(12, 5, 64), 0);
+        assert_eq!(elapsed(12, 5, 36), 0);
+        assert_eq!(elapsed(7, 9, 0), 0);
+    }
+
+    #[test]
+    fn the_longest_pass_is_found() {
+        let pass = |name: &str, nanoseconds| PassTiming {
+            name: name.into(),
+            nanoseconds,
+            invocations: None,
+        };
+        let passes = vec![
+            pass("a", Some(3)),
+            pass("b", Some(9)),
+            pass("c", None),
+            pass("d", Some(9)),
+        ];
+        let timings = Timings { passes, untimed: None };
+        assert_eq!(timings.longest().map(|pass| pass.name.as_str()), Some("b"));
+        assert_eq!(Timings::default().longest(), None);
     }
 }

@@ -23,7 +23,12 @@ pub fn load(address_or_path: &str) -> Result<Scene> {
     let path = Path::new(address_or_path);
     let mut scene = if extension(path) == "toml" {
         let sidecar = sidecar::Sidecar::read(path)?;
-        let mut scene = model(&sidecar.model_path()?)?;
+        let address = sidecar.model()?;
+        let mut scene = if address.starts_with(builtin::PREFIX) {
+            builtin::generate(&address)?
+        } else {
+            model(Path::new(&address)).map_err(|error| sidecar.in_file_of("file", error))?
+        };
         scene.name = stem(path);
         sidecar.apply(&mut scene)?;
         scene
@@ -61,13 +66,18 @@ fn model(path: &Path) -> Result<Scene> {
         "gltf" | "glb" => gltf::load(path),
         "ply" => ply::load(path),
         "obj" => obj::load(path),
-        other => Err(Error::scene(
-            path.display().to_string(),
-            "file name",
-            format!(
-                "{other:?} is no known kind of scene file; known: gltf, glb, ply, obj, toml, and builtin: addresses"
-            ),
-        )),
+        other => {
+            let cause = match other {
+                "" => "has no ending that tells its kind".into(),
+                _ => format!("{other:?} is no known kind of scene file"),
+            };
+            let known = "known: gltf, glb, ply, obj, toml, and builtin: addresses";
+            Err(Error::scene(
+                path.display().to_string(),
+                "file name",
+                format!("{cause}; {known}"),
+            ))
+        }
     }
 }
 

@@ -20,6 +20,8 @@ pub use profile::{AlphaUse, EnvironmentUse, LightCounts, SceneProfile, Transmiss
 
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 
+use crate::{Error, Result};
+
 /// A scene as described, before anything is uploaded.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
@@ -91,6 +93,22 @@ impl Scene {
             Some(name) => self.cameras.iter().find(|camera| camera.name == name),
             None => self.cameras.first(),
         }
+    }
+
+    /// As [`Scene::camera`], for a camera that must be there.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] that lists the cameras there are.
+    pub fn require_camera(&self, name: Option<&str>) -> Result<&Camera> {
+        self.camera(name).ok_or_else(|| {
+            let names: Vec<_> = self.cameras.iter().map(|camera| camera.name.as_str()).collect();
+            let cause = if names.is_empty() {
+                "is not in the scene, which has none".to_owned()
+            } else {
+                format!("is not in the scene; there is: {}", names.join(", "))
+            };
+            Error::setting("camera", name.unwrap_or("(the first)"), cause)
+        })
     }
 }
 

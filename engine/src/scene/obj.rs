@@ -1,7 +1,7 @@
 //! Wavefront OBJ: positions, normals, texture coordinates and faces, with the Kd and Ke of `.mtl` files.
 //!
 //! Read by the crate `tobj`; polygons are cut into fans. Materials are Lambert with their Kd, and emit their Ke; everything else an
-//! `.mtl` says is reported.
+//! `.mtl` says is reported. Texts that are not UTF-8 (names in older encodings) are read as far as they are.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -36,19 +36,23 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
         source: source.into(),
         ..Scene::default()
     };
-    let missing = RefCell::new(Vec::new());
-    let loaded = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, |name| match library(name) {
-        Some(text) => tobj::load_mtl_buf(&mut Cursor::new(text)),
-        None => {
-            missing.borrow_mut().push(name.display().to_string());
-            Ok(Default::default())
-        }
+    let unread = RefCell::new(Vec::new());
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(utf8(bytes)), &options, |name| {
+        let cause = match library(name) {
+            Some(text) => match tobj::load_mtl_buf(&mut Cursor::new(utf8(&text))) {
+                Ok(materials) => return Ok(materials),
+                Err(error) => error.to_string(),
+            },
+            None => "there is no such file".into(),
+        };
+        unread.borrow_mut().push((name.display().to_string(), cause));
+        Ok(Default::default())
     });
-    let (models, materials) = loaded.map_err(|error| Error::scene(source, "OBJ", error.to_string()))?;
-    for name in missing.into_inner() {
+    let (models, materials) = loaded.map_err(|error| Error::scene(source, "content", error.to_string()))?;
+    for (name, cause) in unread.into_inner() {
         scene.notes.push(Note {
-            feature: "material library that cannot be read".into(),
-            at: name,
+            feature: format!("material library that cannot be read: {cause}"),
+            at: format!("mtllib {name}"),
             instead: "its materials are grey".into(),
         });
     }
@@ -114,6 +118,11 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
     Ok(scene)
 }
 
+/// The text with what is not UTF-8 replaced, in the library as in the model, so that names still meet.
+fn utf8(bytes: &[u8]) -> Vec<u8> {
+    String::from_utf8_lossy(bytes).into_owned().into_bytes()
+}
+
 fn add_material(scene: &mut Scene, source: &tobj::Material) {
     let unit = |value: f32| if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 };
     let diffuse = source.diffuse.unwrap_or([0.6; 3]).map(unit);
@@ -161,6 +170,9 @@ fn add_material(scene: &mut Scene, source: &tobj::Material) {
 fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
     // Counts of v, vt, vn so far: faces may refer backwards only, by the format's rules; forwards is refused.
     let mut counts = [0i64; 3];
+    if bytes.starts_with(b"\xFE\xFF") || bytes.starts_with(b"\xFF\xFE") {
+        return Err((1, "is UTF-16; save the file as UTF-8".into()));
+    }
     for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
         let line = String::from_utf8_lossy(line);
         let mut words = line.split_ascii_whitespace();
@@ -173,7 +185,11 @@ fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
                 return Err((i + 1, "a position is no finite number".into()));
             }
         } else if key == "f" {
-            for corner in words {
+            let mut corners = words.peekable();
+            if corners.peek().is_none() {
+                return Err((i + 1, "a face without corners".into()));
+            }
+            for corner in corners {
                 for (part, count) in corner.split('/').zip(counts) {
                     if part.is_empty() {
                         continue;
@@ -231,6 +247,29 @@ mod tests {
         assert!(at(TEXT.replace("1//1 2//1 3//1", "1//1 2//1 0//1")).contains("line 13"));
         assert!(at(TEXT.replace("v 1 1 0", "v 1 nan 0")).contains("line 4"));
         assert!(at("v 0 0 0\n".into()).contains("faces"));
+        assert!(at(TEXT.replace("f 1//1 2//1 3//1", "f")).contains("line 13"));
+        let utf16: Vec<u8> = std::iter::once(0xFEFF)
+            .chain(TEXT.encode_utf16())
+            .flat_map(u16::to_be_bytes)
+            .collect();
+        let error = parse(&utf16, "a.obj", |_| None).expect_err("fault").to_string();
+        assert!(error.contains("UTF-16"), "{error}");
+    }
+
+    #[test]
+    fn names_in_older_encodings_meet_their_materials() {
+        let latin = |text: &str| {
+            text.replace("red", "r\u{e9}d")
+                .chars()
+                .map(|c| c as u8)
+                .collect::<Vec<u8>>()
+        };
+        let scene = parse(&latin(TEXT), "a.obj", |_| Some(latin(MTL))).expect("scene");
+        let material = scene.meshes[0].material.expect("material") as usize;
+        assert_eq!(
+            scene.materials[material].base_color.truncate(),
+            Vec3::new(0.8, 0.1, 0.1)
+        );
     }
 
     #[test]
@@ -241,8 +280,11 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_library_is_a_note() {
+    fn a_library_that_cannot_be_read_is_a_note() {
         let scene = parse(TEXT.as_bytes(), "a.obj", |_| None).expect("scene");
-        assert!(scene.notes.iter().any(|n| n.at == "a.mtl"));
+        assert!(scene.notes.iter().any(|n| n.at == "mtllib a.mtl"));
+        let scene = parse(TEXT.as_bytes(), "a.obj", |_| Some(b"newmtl\nKd x\n".to_vec())).expect("scene");
+        let note = scene.notes.iter().find(|n| n.at == "mtllib a.mtl").expect("note");
+        assert!(note.feature.contains("invalid object name"), "{}", note.feature);
     }
 }

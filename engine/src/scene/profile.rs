@@ -76,7 +76,7 @@ pub struct SceneProfile {
     /// Specular transmission.
     pub transmission: TransmissionUse,
     /// Some solid body absorbs.
-    pub has_attenuation: bool,
+    pub has_absorption: bool,
     /// Alpha.
     pub alpha: AlphaUse,
     /// Triangles over all instances whose material emits.
@@ -134,7 +134,7 @@ impl SceneProfile {
                 solid: false,
                 thin: false,
             },
-            has_attenuation: false,
+            has_absorption: false,
             alpha: AlphaUse {
                 mask: false,
                 blend: false,
@@ -211,7 +211,7 @@ impl SceneProfile {
             let solid = material.thickness > 0.0;
             self.transmission.solid |= solid;
             self.transmission.thin |= !solid;
-            self.has_attenuation |=
+            self.has_absorption |=
                 solid && material.attenuation_distance.is_finite() && material.attenuation_color != Vec3::ONE;
         }
         if reflects || transmits || metallic[1] > 0.0 {
@@ -313,7 +313,7 @@ impl fmt::Display for SceneProfile {
             ("dielectric reflection", self.has_rough_dielectric_spec),
             ("solid transmission", self.transmission.solid),
             ("thin transmission", self.transmission.thin),
-            ("attenuation", self.has_attenuation),
+            ("absorption", self.has_absorption),
             ("alpha mask", self.alpha.mask),
             ("alpha blend", self.alpha.blend),
             ("unlit", self.has_unlit),

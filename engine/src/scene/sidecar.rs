@@ -1,7 +1,7 @@
 //! The TOML sidecar: what glTF cannot say.
 //!
 //! ```toml
-//! file = "model.gltf"           # only in a sidecar that is given as the scene itself
+//! file = "model.gltf"           # only in a sidecar that is given as the scene itself; "builtin:ring?metal=gold" works too
 //! exposure = 0.5                # stops
 //! technique = "path"
 //! aspect = 1.5                  # width / height
@@ -12,7 +12,7 @@
 //! strength = 2.0
 //!
 //! [metals]                      # by material name
-//! ring = "gold"                 # gold, silver, copper, aluminium
+//! ring = "gold"                 # gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt
 //! bowl = { eta = [1.4, 0.9, 0.7], k = [7.6, 6.4, 5.6] }
 //!
 //! [[cameras]]                   # changes the camera of that name, or adds one
@@ -25,7 +25,8 @@
 //! focus = 4.0                   # distance of the plane in focus, metres
 //! ```
 //!
-//! A `[medium]` table is read and reported as not modelled. Unknown keys are errors with their line.
+//! A `[medium]` table (`sigma_a`, `sigma_s` in 1/m for three channels, `g`, and `material` for a medium inside of one) is checked and
+//! reported as not modelled. Unknown keys are errors with their line.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Quat, Vec3};
 use serde::Deserialize;
 
-use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, metals};
+use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, builtin, metals};
 use crate::{Error, Result};
 
 /// Greatest number of texels of an environment map.
@@ -125,7 +126,12 @@ impl Sidecar {
         let content = toml::from_str(text).map_err(|error: toml::de::Error| {
             let start = error.span().map_or(0, |span| span.start);
             let line = 1 + text.bytes().take(start).filter(|&b| b == b'\n').count();
-            Error::scene(path.display().to_string(), format!("line {line}"), error.message())
+            // The names of Rust's types mean nothing to who writes the file.
+            let cause = error
+                .message()
+                .replace("expected f32", "expected a number")
+                .replace("expected f64", "expected a number");
+            Error::scene(path.display().to_string(), format!("line {line}"), cause)
         })?;
         Ok(Self {
             path: path.into(),
@@ -133,25 +139,40 @@ impl Sidecar {
         })
     }
 
-    /// The model that a sidecar given as the scene names.
+    /// The model that a sidecar given as the scene names: a path, or a `builtin:` address as it stands.
     ///
     /// # Errors
-    /// [`Error::Scene`] when it names none.
-    pub fn model_path(&self) -> Result<PathBuf> {
-        match &self.content.file {
-            Some(file) => Ok(self.folder().join(file)),
-            None => Err(self.fault(
+    /// [`Error::Scene`] when it names none, or another sidecar.
+    pub fn model(&self) -> Result<String> {
+        let Some(file) = &self.content.file else {
+            return Err(self.fault(
                 "file",
                 "is missing; a sidecar given as the scene names its model, file = \"model.gltf\"",
-            )),
+            ));
+        };
+        if file.to_lowercase().ends_with(".toml") {
+            return Err(self.fault("file", "names another sidecar; it must name a model"));
+        }
+        Ok(if file.starts_with(builtin::PREFIX) {
+            file.clone()
+        } else {
+            self.folder().join(file).display().to_string()
+        })
+    }
+
+    /// An error about the file that a key names, with the key.
+    pub fn in_file_of(&self, key: &str, error: Error) -> Error {
+        match error {
+            Error::Io { .. } | Error::Picture { .. } => self.fault(key, error.to_string()),
+            other => other,
         }
     }
 
     /// Changes a scene as the sidecar says.
     ///
     /// # Errors
-    /// [`Error::Scene`] naming the key, for unknown metals or materials and for values that cannot be;
-    /// [`Error::Picture`] for an environment map that cannot be read.
+    /// [`Error::Scene`] naming the key, for unknown metals or materials, for values that cannot be, and for an environment map that cannot
+    /// be read.
     pub fn apply(&self, scene: &mut Scene) -> Result<()> {
         let content = &self.content;
         if let Some(exposure) = content.exposure {
@@ -188,6 +209,11 @@ impl Sidecar {
                 "sigma_a and sigma_s must be finite and at least 0, in 1/m",
             )?;
             self.require(medium.g.abs() < 1.0, "medium.g", "must lie between -1 and 1")?;
+            if let Some(name) = &medium.material
+                && !scene.materials.iter().any(|material| material.name == *name)
+            {
+                return Err(self.unknown_material(scene, "medium.material"));
+            }
             scene.notes.push(Note {
                 feature: "participating media".into(),
                 at: match &medium.material {
@@ -212,9 +238,18 @@ impl Sidecar {
         if condition { Ok(()) } else { Err(self.fault(key, cause)) }
     }
 
+    fn unknown_material(&self, scene: &Scene, key: &str) -> Error {
+        let known: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
+        self.fault(
+            key,
+            format!("no material has that name; there are: {}", known.join(", ")),
+        )
+    }
+
     fn environment(&self, table: &EnvironmentTable) -> Result<(Environment, Option<Note>)> {
         let (mut environment, note) = match (&table.file, table.color) {
-            (Some(file), None) => read_environment(&self.folder().join(file))?,
+            (Some(file), None) => read_environment(&self.folder().join(file))
+                .map_err(|error| self.in_file_of("environment.file", error))?,
             (None, Some(color)) => {
                 let sound = color.iter().all(|c| c.is_finite() && *c >= 0.0);
                 self.require(sound, "environment.color", "must be finite and at least 0")?;
@@ -261,14 +296,11 @@ impl Sidecar {
             material.metallic = 1.0;
             found = true;
         }
-        if !found {
-            let known: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
-            return Err(self.fault(
-                &key,
-                format!("no material has that name; there are: {}", known.join(", ")),
-            ));
+        if found {
+            Ok(())
+        } else {
+            Err(self.unknown_material(scene, &key))
         }
-        Ok(())
     }
 
     fn camera(&self, scene: &mut Scene, table: &CameraTable) -> Result<()> {
@@ -342,7 +374,8 @@ impl Sidecar {
     }
 }
 
-/// Reads a latitude–longitude map; radiance that is negative or not finite becomes 0 and is reported.
+/// Reads a latitude–longitude map. Channels that are negative, as compression leaves them in dark colours, become 0, and texels that are
+/// not finite black; both are counted in a note.
 fn read_environment(path: &Path) -> Result<(Environment, Option<Note>)> {
     let fail = |cause: String| Error::Picture {
         path: path.display().to_string(),
@@ -353,13 +386,13 @@ fn read_environment(path: &Path) -> Result<(Environment, Option<Note>)> {
     let (width, height, mut radiance) = if is_exr { read_exr(path) } else { read_hdr(path) }.map_err(fail)?;
     let mut replaced = 0;
     for r in radiance.iter_mut().filter(|r| !r.is_finite() || r.min_element() < 0.0) {
-        *r = Vec3::ZERO;
+        *r = if r.is_finite() { r.max(Vec3::ZERO) } else { Vec3::ZERO };
         replaced += 1;
     }
     let note = (replaced > 0).then(|| Note {
         feature: "negative or not finite radiance".into(),
         at: name.clone(),
-        instead: format!("{replaced} texels are taken as black"),
+        instead: format!("{replaced} texels: negative channels are taken as 0, what is not finite as black"),
     });
     let environment = Environment {
         name,

@@ -1,8 +1,20 @@
 //! Techniques: what turns a scene on the device into a picture.
 //!
-//! [`all`] lists them. Each says what it needs of a device, which scenes it can model (and refuses the others with the reason), which
-//! light paths its picture contains, and whether and how it is biased.
+//! [`all`] lists the engine's own. Each says what it needs of a device, which scenes it can model (and refuses the others with the
+//! reason), which light paths its picture contains, and whether and how it is biased.
+//!
+//! # How to add one
+//!
+//! 1. A type with settings, pipelines, working memory and a [`GpuFilm`](crate::film::GpuFilm), made from a [`Gpu`], a [`GpuScene`] and a
+//!    [`View`]. [`PathTracer`](crate::transport::PathTracer) shows the pattern: a file each for the settings (serde with defaults, and a
+//!    check of their ranges), the pipelines (specialized to [`GpuScene::profile`]), the working memory and the recording of passes.
+//! 2. [`Technique`] for it: each [`step`](Technique::step) is a bounded piece of work that adds whole samples to the film, in an order
+//!    that depends on settings and seed alone. What the scene does not need is left out, and said by [`skipped`](Technique::skipped).
+//! 3. A constant [`TechniqueInfo`]. Its [`create`](TechniqueInfo::create) is called once device and scene have been found fit.
+//! 4. In the engine: a file in this folder with the constant in [`all`], and a row in the [`catalogue`](crate::catalogue). In a host:
+//!    nothing more; [`Renderer::start_technique`](crate::render::Renderer::start_technique) takes the constant as it is.
 
+mod features;
 mod path;
 
 use std::collections::BTreeMap;
@@ -14,6 +26,8 @@ use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
+
+pub use features::offers;
 
 /// How a technique's expected picture relates to the truth on its own path set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -37,7 +51,7 @@ pub struct TechniqueInfo {
     pub publication: &'static str,
     /// Bias.
     pub bias: Bias,
-    /// Device features beyond the baseline, by their Vulkan names.
+    /// Device features beyond the baseline, by the Vulkan names that [`offers`] knows.
     pub needs: &'static [&'static str],
     /// The light paths of its picture with default settings.
     pub path_set: PathSet,
@@ -45,10 +59,12 @@ pub struct TechniqueInfo {
     pub refusals: fn(&SceneProfile) -> Vec<String>,
     /// Default settings as JSON.
     pub default_settings: fn() -> serde_json::Value,
-    prepare: Prepare,
+    /// Makes the technique. Whoever wants one calls [`TechniqueInfo::prepare`], which looks at device and scene first.
+    pub create: Create,
 }
 
-type Prepare = fn(&Gpu, Arc<GpuScene>, &View<'_>, &serde_json::Value) -> Result<Box<dyn Technique>>;
+/// Makes a technique for a view, with its settings as JSON; [`from_json`](crate::settings::from_json) reads them.
+pub type Create = fn(&Gpu, Arc<GpuScene>, &View<'_>, &serde_json::Value) -> Result<Box<dyn Technique>>;
 
 impl std::fmt::Debug for TechniqueInfo {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -89,7 +105,7 @@ pub trait Technique: Send {
     /// where `bgra` says so.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::DeviceLost`].
+    /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
     fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()>;
 
     /// Begins anew through another camera.
@@ -133,25 +149,18 @@ pub fn all() -> &'static [TechniqueInfo] {
 /// # Errors
 /// [`Error::Setting`] that lists the ids there are.
 pub fn by_id(id: &str) -> Result<&'static TechniqueInfo> {
-    all()
-        .iter()
-        .find(|technique| technique.id == id)
-        .ok_or_else(|| Error::Setting {
-            name: "technique".into(),
-            value: id.into(),
-            cause: format!(
-                "is unknown; there is: {}",
-                all().iter().map(|t| t.id).collect::<Vec<_>>().join(", ")
-            ),
-        })
+    all().iter().find(|technique| technique.id == id).ok_or_else(|| {
+        let ids: Vec<_> = all().iter().map(|technique| technique.id).collect();
+        Error::setting("technique", id, format!("is unknown; there is: {}", ids.join(", ")))
+    })
 }
 
 impl TechniqueInfo {
     /// Prepares the technique for a view, with its settings as JSON (missing ones take their defaults).
     ///
     /// # Errors
-    /// [`Error::Unsupported`] with every reason why the scene cannot be modelled, [`Error::Setting`], [`Error::MissingFeature`],
-    /// [`Error::OutOfMemory`].
+    /// [`Error::MissingFeature`] for a device that lacks one of its needs, [`Error::Unsupported`] with every reason why the scene cannot
+    /// be modelled, [`Error::Setting`], [`Error::OutOfMemory`].
     pub fn prepare(
         &self,
         gpu: &Gpu,
@@ -159,6 +168,7 @@ impl TechniqueInfo {
         view: &View<'_>,
         settings: &serde_json::Value,
     ) -> Result<Box<dyn Technique>> {
+        features::check(gpu.caps(), self)?;
         let reasons = (self.refusals)(scene.profile());
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
@@ -166,18 +176,6 @@ impl TechniqueInfo {
                 reasons,
             });
         }
-        (self.prepare)(gpu, scene, view, settings)
+        (self.create)(gpu, scene, view, settings)
     }
-}
-
-/// Settings of type `T` from JSON; `null` gives the defaults.
-fn settings_from_json<T: serde::de::DeserializeOwned + Default>(json: &serde_json::Value) -> Result<T> {
-    if json.is_null() {
-        return Ok(T::default());
-    }
-    serde_json::from_value(json.clone()).map_err(|error| Error::Setting {
-        name: "settings".into(),
-        value: json.to_string(),
-        cause: error.to_string(),
-    })
 }

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::{Bias, Skipped, Technique, TechniqueInfo, settings_from_json};
+use super::{Bias, Skipped, Technique, TechniqueInfo};
 use crate::Result;
 use crate::film::Step;
 use crate::film::picture::Picture;
 use crate::gpu::shaders::transport::path_shade;
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
+use crate::settings::from_json;
 use crate::transport::PathSet;
 use crate::transport::path_tracer::{PathTracer, PathTracerSettings};
 
@@ -22,8 +23,8 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     path_set: PathSet::ALL,
     refusals: |_| Vec::new(),
     default_settings: || serde_json::to_value(PathTracerSettings::default()).unwrap_or_default(),
-    prepare: |gpu, scene, view, settings| {
-        let mut settings: PathTracerSettings = settings_from_json(settings)?;
+    create: |gpu, scene, view, settings| {
+        let mut settings: PathTracerSettings = from_json(settings)?;
         settings.seed = view.seed;
         settings.aovs = view.aovs;
         Ok(Box::new(PathTracer::new(gpu, scene, view.camera, view.size, settings)?))
@@ -53,7 +54,7 @@ const FEATURES: [(&str, &str, &str); 16] = [
     ("has_shading_normals", "shading normals", "no mesh interpolates normals"),
     ("has_normal_maps", "normal maps", "no material has one"),
     ("has_vertex_colors", "vertex colours", "no mesh has them"),
-    ("has_attenuation", "absorption in solids", "no solid absorbs"),
+    ("has_absorption", "absorption in solids", "no solid absorbs"),
     ("has_environment", "environment light", "the scene has none"),
     ("has_area_lights", "area lights", "no material emits"),
     ("has_unlit", "unlit surfaces", "no material is unlit"),

@@ -13,23 +13,24 @@
 
 use super::fresnel::{fresnel_dielectric, fresnel_f0, schlick_weight};
 use super::ggx::{ALPHA_MIN, ggx_g1, ggx_g2, ggx_sample_visible};
+use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Columns of a layer.
-pub const COS_NODES: usize = 48;
+pub const COS_NODES: usize = constants::COS_NODES as usize;
 /// Rows of a layer.
-pub const ALPHA_NODES: usize = 32;
+pub const ALPHA_NODES: usize = constants::ALPHA_NODES as usize;
 /// Layers for exact dielectrics.
-pub const ETA_NODES: usize = 8;
+pub const ETA_NODES: usize = constants::ETA_NODES as usize;
 /// (η − 1)/(η + 1) of the last of them (η = 3); larger indices use that layer, which only loses energy.
 pub const ETA_PARAMETER_MAX: f64 = 0.5;
 /// Number of the layer with Schlick's weight.
-pub const SCHLICK_LAYER: usize = ETA_NODES + 1;
+pub const SCHLICK_LAYER: usize = constants::SCHLICK_LAYER as usize;
 const LAYERS: usize = ETA_NODES + 2;
 /// Index of the first cosine-weighted average; each layer has `ALPHA_NODES` of them.
-pub const AVERAGE_BASE: usize = LAYERS * ALPHA_NODES * COS_NODES;
+pub const AVERAGE_BASE: usize = constants::AVERAGE_BASE as usize;
 /// Floats in the whole table.
 pub const TABLE_LENGTH: usize = AVERAGE_BASE + LAYERS * ALPHA_NODES;
 

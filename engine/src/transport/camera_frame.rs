@@ -40,11 +40,8 @@ impl CameraFrame {
             && camera.focus_distance.is_finite()
             && camera.transform.translation.as_vec3().is_finite();
         if !usable {
-            return Err(Error::Setting {
-                name: "camera".into(),
-                value: camera.name.clone(),
-                cause: "has a field of view, lens or place that cannot be used".into(),
-            });
+            let cause = "has a field of view, lens or place that cannot be used";
+            return Err(Error::setting("camera", &camera.name, cause));
         }
         let matrix = camera.transform.matrix3;
         Ok(Self {

@@ -18,19 +18,16 @@ pub const ENTRIES_MAX: usize = 1 << 22;
 /// `name` stands in errors. Weights must be finite and not negative; if all are zero the entries are equally likely.
 pub fn build_distribution(name: &str, weights: &[f64]) -> Result<Vec<f32>> {
     if weights.is_empty() || weights.len() > ENTRIES_MAX {
-        return Err(Error::LimitExceeded {
-            name: format!("{name}: entries to choose from"),
-            bytes: weights.len() as u64,
-            limit_name: "a table's range from 1",
-            limit: ENTRIES_MAX as u64,
-        });
+        let cause = format!("is not in 1..={ENTRIES_MAX}");
+        return Err(Error::setting(
+            format!("{name}: entries to choose from"),
+            weights.len(),
+            cause,
+        ));
     }
     if let Some((i, w)) = weights.iter().enumerate().find(|(_, w)| !(w.is_finite() && **w >= 0.0)) {
-        return Err(Error::Setting {
-            name: format!("{name}[{i}]"),
-            value: w.to_string(),
-            cause: "is no weight: weights are finite and not negative".into(),
-        });
+        let cause = "is no weight: weights are finite and not negative";
+        return Err(Error::setting(format!("{name}[{i}]"), w, cause));
     }
     let largest = weights.iter().copied().fold(0.0, f64::max);
     // Scaled by the largest, so that the sum of huge weights stays finite.
@@ -73,11 +70,8 @@ pub fn build_distribution(name: &str, weights: &[f64]) -> Result<Vec<f32>> {
 pub fn build_distribution_2d(name: &str, size: UVec2, weights: &[f64]) -> Result<Vec<f32>> {
     let width = size.x.max(1) as usize;
     if weights.len() != size.x as usize * size.y as usize {
-        return Err(Error::Setting {
-            name: name.into(),
-            value: format!("{} weights", weights.len()),
-            cause: format!("are not {} × {}", size.x, size.y),
-        });
+        let value = format!("{} weights", weights.len());
+        return Err(Error::setting(name, value, format!("are not {} × {}", size.x, size.y)));
     }
     // One scale for all rows, so that their sums neither overflow nor lose their proportion.
     let largest = weights.iter().copied().fold(0.0, f64::max);
@@ -201,7 +195,7 @@ mod tests {
 
     #[test]
     fn bad_weights_are_errors() {
-        assert!(matches!(build_distribution("w", &[]), Err(Error::LimitExceeded { .. })));
+        assert!(matches!(build_distribution("w", &[]), Err(Error::Setting { .. })));
         for bad in [f64::NAN, -1.0, f64::INFINITY] {
             let error = build_distribution("lights", &[1.0, bad]).unwrap_err().to_string();
             assert!(error.contains("lights[1]"), "{error}");

@@ -77,11 +77,9 @@ pub fn environment_distribution(environment: &Environment) -> Result<Vec<f32>> {
     let size = UVec2::new(environment.width, environment.height);
     let (width, height) = (size.x as usize, size.y as usize);
     if environment.radiance.is_empty() || environment.radiance.len() != width * height {
-        return Err(Error::Setting {
-            name: format!("environment {}", environment.name),
-            value: format!("{} texels", environment.radiance.len()),
-            cause: format!("are not {width} × {height}"),
-        });
+        let name = format!("environment {}", environment.name);
+        let value = format!("{} texels", environment.radiance.len());
+        return Err(Error::setting(name, value, format!("are not {width} × {height}")));
     }
     let texels: Vec<f64> = environment.radiance.iter().map(|c| luminance(c.as_dvec3())).collect();
     // Share of a linear interpolant between texel centres that comes from the texel itself and from each neighbour.

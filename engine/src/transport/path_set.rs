@@ -4,17 +4,20 @@
 //! packed form is that of `transport/path_set.glsl`.
 
 use super::bsdf::{LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION};
+use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use std::fmt;
 use std::str::FromStr;
 
 /// The class of scattering in media, beside the `LOBE_…` bits of surfaces.
-pub const LOBE_VOLUME: u32 = 32;
+pub const LOBE_VOLUME: u32 = constants::LOBE_VOLUME;
 /// Every lobe and the media.
-pub const PATH_SET_LOBES: u32 = 63;
+pub const PATH_SET_LOBES: u32 = constants::PATH_SET_LOBES;
 /// Packed greatest number of bounces that stands for no bound.
-pub const PATH_SET_UNBOUNDED: u32 = 0xfff;
+pub const PATH_SET_UNBOUNDED: u32 = constants::PATH_SET_UNBOUNDED;
 
+/// The setting's name in errors.
+const NAME: &str = "path set";
 const CLASSES: u32 = LOBE_DIFFUSE | LOBE_GLOSSY | LOBE_SPECULAR;
 const SIDES: u32 = LOBE_REFLECTION | LOBE_TRANSMISSION;
 const LOBE_NAMES: [(&str, u32); 6] = [
@@ -71,30 +74,19 @@ impl PathSet {
 
     /// All paths with `min`..=`max` bounces (`None`: no upper bound) by the allowed lobes, `LOBE_…` bits.
     pub fn new(min: u32, max: Option<u32>, lobes: u32) -> Result<Self> {
-        let wrong = |value: String, cause: String| Error::Setting {
-            name: "path set".into(),
-            value,
-            cause,
-        };
         let range = || format!("bounces={min}..{}", max.map_or(String::new(), |m| m.to_string()));
         if max.is_some_and(|m| m < min) {
-            return Err(wrong(
-                range(),
-                "is empty: the first number must not be greater than the second".into(),
-            ));
+            let cause = "is empty: the first number must not be greater than the second";
+            return Err(Error::setting(NAME, range(), cause));
         }
         let most = PATH_SET_UNBOUNDED - 1;
         if min > most || max.is_some_and(|m| m > most) {
-            return Err(wrong(
-                range(),
-                format!("is too long: {most} bounces can be counted; leave the end open (\"..\")"),
-            ));
+            let cause = format!("is too long: {most} bounces can be counted; leave the end open (\"..\")");
+            return Err(Error::setting(NAME, range(), cause));
         }
         if lobes & !PATH_SET_LOBES != 0 {
-            return Err(wrong(
-                format!("lobes={lobes:#x}"),
-                format!("has bits beyond {PATH_SET_LOBES:#x}"),
-            ));
+            let cause = format!("has bits beyond {PATH_SET_LOBES:#x}");
+            return Err(Error::setting(NAME, format!("lobes={lobes:#x}"), cause));
         }
         Ok(Self {
             min_bounces: min,
@@ -169,11 +161,7 @@ impl FromStr for PathSet {
     /// class (`diffuse`, `glossy`, `specular`) all classes are meant, without a side (`reflection`, `transmission`) both sides; media
     /// count when `volume` is named or no `lobes` part is given.
     fn from_str(text: &str) -> Result<Self> {
-        let wrong = |value: &str, cause: &str| Error::Setting {
-            name: "path set".into(),
-            value: format!("{value:?}"),
-            cause: cause.into(),
-        };
+        let wrong = |value: &str, cause: &str| Error::setting(NAME, format!("{value:?}"), cause);
         let mut ranges: Vec<(u32, Option<u32>)> = Vec::new();
         let mut lobes = None;
         for part in text.split(',').map(str::trim) {
@@ -236,11 +224,7 @@ fn parse_lobes(text: &str) -> Result<u32> {
         let (_, bit) = LOBE_NAMES
             .iter()
             .find(|(n, _)| *n == name)
-            .ok_or_else(|| Error::Setting {
-                name: "path set".into(),
-                value: format!("{name:?}"),
-                cause: format!("is no lobe: a path set {GRAMMAR}"),
-            })?;
+            .ok_or_else(|| Error::setting(NAME, format!("{name:?}"), format!("is no lobe: a path set {GRAMMAR}")))?;
         lobes |= bit;
     }
     if lobes & CLASSES != 0 && lobes & SIDES == 0 {

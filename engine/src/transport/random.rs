@@ -5,10 +5,9 @@
 //! with the hash constants of Vegdahl (2021). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
 //! values lie on the 2⁻²⁴ grid of [0, 1). Twin of `transport/random.glsl`, bit for bit.
 
+use crate::gpu::shaders::constants::{SAMPLER_PCG, SAMPLER_SOBOL, SEQUENCE_KEY};
 use glam::{DVec2, UVec3, UVec4};
 
-/// Stands for the sample index in the key of a scrambled sequence, which is the same for all samples of a pixel.
-const SEQUENCE_KEY: u32 = 0x9e37_79b9;
 const PCG_MULTIPLIER: u32 = 1_664_525;
 const PCG_INCREMENT: u32 = 1_013_904_223;
 
@@ -19,9 +18,9 @@ const PCG_INCREMENT: u32 = 1_013_904_223;
 pub enum SamplerKind {
     /// Owen-scrambled Sobol' pairs: stratified over the samples of a pixel.
     #[default]
-    Sobol = 0,
+    Sobol = SAMPLER_SOBOL,
     /// Independent hashes.
-    Pcg = 1,
+    Pcg = SAMPLER_PCG,
 }
 
 /// One stream of random numbers.

@@ -74,17 +74,8 @@ impl Host {
             let queues = [vk::DeviceQueueCreateInfo::default()
                 .queue_family_index(queue_family)
                 .queue_priorities(&[1.0])];
-            let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default()
-                .timeline_semaphore(true)
-                .scalar_block_layout(true)
-                .host_query_reset(true);
-            let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
-                .synchronization2(true)
-                .dynamic_rendering(true);
-            let info = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .push_next(&mut vulkan12)
-                .push_next(&mut vulkan13);
+            let mut features = EnabledFeatures::REQUIRED.to_vulkan();
+            let info = features.chain(vk::DeviceCreateInfo::default().queue_create_infos(&queues));
             let device = instance
                 .create_device(physical_device, &info, None)
                 .map_err(failed("vkCreateDevice"))?;

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use clerestory::Result;
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::samples::{triangle_frag, triangle_vert};
-use clerestory::gpu::shaders::types::TriangleVertex;
 use clerestory::gpu::{
     Access, BufferDesc, Category, ColorTarget, Gpu, GpuOptions, GraphicsDesc, ImageBarrier, ImageDesc, Targets,
 };
+use clerestory_samples::shaders::types::TriangleVertex;
+use clerestory_samples::shaders::{triangle_frag, triangle_vert};
 
 const SIZE: [u32; 2] = [512, 512];
 const BACKGROUND: [f32; 4] = [0.05, 0.05, 0.08, 1.0];

@@ -154,14 +154,7 @@ impl Open {
             camera: options.camera.clone(),
             ..RenderOptions::default()
         };
-        let camera = scene.camera(options.camera.as_deref()).ok_or_else(|| {
-            let names: Vec<_> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-            Error::Setting {
-                name: "--camera".into(),
-                value: options.camera.clone().unwrap_or_default(),
-                cause: format!("is not in the scene; there is: {}", names.join(", ")),
-            }
-        })?;
+        let camera = scene.require_camera(options.camera.as_deref())?;
         let orbit = Orbit::new(camera, renderer.gpu_scene().profile().bounds);
         let exposure = options.exposure.unwrap_or(scene.defaults.exposure);
         let bgra = surface.format() == vk::Format::B8G8R8A8_UNORM;

@@ -8,6 +8,7 @@ use clerestory::gpu::Caps;
 use clerestory::{Error, Result};
 
 use super::AgreementOptions;
+use crate::machine;
 
 /// What everything ran on.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -26,12 +27,9 @@ pub struct Machine {
 
 impl Machine {
     pub(super) fn read(caps: &Caps, mitsuba: &str) -> Self {
-        let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-        let line = text.lines().find(|line| line.starts_with("model name"));
-        let name = line.and_then(|line| line.split_once(':'));
         Self {
-            processor: name.map_or(std::env::consts::ARCH, |(_, name)| name.trim()).into(),
-            threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            processor: machine::processor(),
+            threads: machine::threads(),
             device: caps.device.clone(),
             driver: caps.driver.clone(),
             mitsuba: mitsuba.into(),

@@ -7,13 +7,15 @@ use clap::Args;
 use clerestory_tools::agreement::{AgreementOptions, run_with};
 use clerestory_tools::mitsuba::scenes::scenes;
 
+use super::check_validation;
 use crate::failure::{Code, Failure, Outcome};
+use crate::options::DeviceOptions;
 use crate::output;
 
 /// Compares converged pictures with those of Mitsuba 3, within their noise, and measures both renderers' speed
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Run it from the repository's root. It needs a Python that has the package `mitsuba`.
+Run it from the repository's root. It needs a Python that has the package `mitsuba`: tools/mitsuba/README.md says how to get it.
 
 Examples:
   clerestory agreement --list
@@ -30,13 +32,13 @@ pub struct Arguments {
     #[arg(long, value_name = "PIXELS", default_value_t = AgreementOptions::default().size)]
     size: u32,
     /// Independent passes of Mitsuba
-    #[arg(long, default_value_t = AgreementOptions::default().passes)]
+    #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().passes)]
     passes: u32,
     /// Samples a pixel in each pass
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().samples_per_pass)]
     spp: u32,
     /// Seed of both renderers
-    #[arg(long, default_value_t = AgreementOptions::default().seed)]
+    #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().seed)]
     seed: u32,
     /// Rounds of the speed measurement; 0 measures nothing
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_rounds)]
@@ -53,6 +55,8 @@ pub struct Arguments {
     /// Prints the report as JSON, else as Markdown
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// Runs the command.
@@ -78,7 +82,12 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         results: arguments.results.clone(),
         ..defaults
     };
-    let report = run_with(&options, |line| line.lines().for_each(output::note))?;
+    options.check()?;
+    let gpu = arguments.device.open()?;
+    let report = run_with(&gpu, &options, |line| line.lines().for_each(output::note))?;
+    let log = gpu.validation_log();
+    drop(gpu);
+    check_validation(&log)?;
     if arguments.json {
         output::print_json(&report)?;
     } else {

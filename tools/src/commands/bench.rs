@@ -6,10 +6,11 @@ use std::time::Instant;
 use clap::Args;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Result, scene};
+use clerestory_tools::machine::median;
 
 use super::check_validation;
 use crate::failure::{Failure, Outcome};
-use crate::options::{DeviceOption, Global, Size, parse_size};
+use crate::options::{DeviceOptions, Size, parse_size};
 use crate::output::{self, Table};
 
 /// Measures paths and rays per second of the path tracer: medians of repeated runs
@@ -19,26 +20,26 @@ Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
 
-One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to
-the last; figures move with the load of the machine, so compare ratios of runs made together.")]
+One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to the last; figures move with \
+the load of the machine, so compare ratios of runs made together. `clerestory report` measures errors too.")]
 pub struct Arguments {
-    /// Scenes
+    /// A scene; may be given several times
     #[arg(long = "scene", value_name = "SCENE", default_values = ["builtin:cornell-box", "builtin:materials"])]
     scenes: Vec<String>,
     /// Measured runs of each scene
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=999))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=999))]
     repeat: u32,
     /// Samples a pixel
-    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
     /// Pixels: WIDTHxHEIGHT, or the height alone
     #[arg(long, default_value = "128", value_parser = parse_size)]
     size: Size,
-    #[command(flatten)]
-    device: DeviceOption,
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// Median and range of one quantity.
@@ -52,16 +53,10 @@ struct Spread {
 impl Spread {
     fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
-        let middle = values.len() / 2;
-        let median = match values.as_slice() {
-            [] => f64::NAN,
-            all if all.len() % 2 == 1 => all[middle],
-            all => 0.5 * (all[middle - 1] + all[middle]),
-        };
         Self {
-            median,
             least: values.first().copied().unwrap_or(f64::NAN),
             greatest: values.last().copied().unwrap_or(f64::NAN),
+            median: median(values),
         }
     }
 
@@ -84,8 +79,8 @@ struct Measured {
 }
 
 /// Runs the command.
-pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
-    let gpu = arguments.device.open(global)?;
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let gpu = arguments.device.open()?;
     let mut all = Vec::new();
     for address in &arguments.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
@@ -173,10 +168,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn medians() {
+    fn spreads() {
         let of = |values: &[f64]| Spread::of(values.to_vec());
-        assert_eq!(of(&[3.0, 1.0, 2.0]).median, 2.0);
-        assert_eq!(of(&[4.0, 1.0, 2.0, 3.0]).median, 2.5);
+        let spread = of(&[4.0, 1.0, 2.0, 3.0]);
+        assert_eq!((spread.least, spread.median, spread.greatest), (1.0, 2.5, 4.0));
         let one = of(&[5.0]);
         assert_eq!((one.least, one.greatest, one.relative()), (5.0, 5.0, 0.0));
     }

@@ -20,10 +20,9 @@ Examples:
   clerestory compare picture.exr reference.exr --diff difference.png
   clerestory compare a.exr b.exr --threshold rmse=1e-3,flip=0.05     exit code 4 beyond either
 
-Metrics are of linear radiance, FLIP of tone-mapped pictures. A metric that is not a number is beyond
-every threshold; so are pixels that are not finite, unless non_finite=COUNT allows them. Where both
-pictures have variance and more than one sample a pixel, a z-test says whether they differ by more
-than noise.")]
+Metrics are of linear radiance, FLIP of tone-mapped pictures. A metric that is not a number is beyond every threshold; so are pixels \
+that are not finite, unless non_finite=COUNT allows them. Where both pictures have variance (render with --aov variance,samples) and \
+more than one sample a pixel, a z-test says whether they differ by more than noise.")]
 pub struct Arguments {
     /// The picture: EXR, Radiance HDR or PNG (taken as sRGB)
     picture: PathBuf,

@@ -9,6 +9,7 @@ use clerestory::scene::{self, Camera, Projection, Scene, SceneProfile};
 use clerestory::techniques;
 
 use crate::failure::{Code, Failure, Outcome};
+use crate::options::DeviceOptions;
 use crate::output::{self, Stream};
 
 /// Shows the devices of this machine; with a scene, what it holds and which techniques can render it
@@ -17,13 +18,17 @@ use crate::output::{self, Stream};
 Examples:
   clerestory info                          devices, limits, and what each technique needs of them
   clerestory info builtin:cornell-box      profile, cameras, notes of the reader, techniques
+  clerestory info --device lavapipe        one device
   clerestory info --json | jq '.devices[].name'")]
 pub struct Arguments {
     /// A scene file or `builtin:` address
+    #[arg(conflicts_with_all = ["device", "validation"])]
     scene: Option<String>,
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// Runs the command.
@@ -38,7 +43,19 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             }
         }
         None => {
-            let devices: Vec<DeviceInfo> = Gpu::list()?.into_iter().map(DeviceInfo::of).collect();
+            let wanted = arguments.device.options();
+            let all = Gpu::list()?;
+            let names: Vec<String> = all.iter().map(|(s, _)| format!("{}: {}", s.index, s.name)).collect();
+            let devices = all.into_iter().filter(|(summary, _)| wanted.device.matches(summary));
+            let devices: Vec<DeviceInfo> = devices.map(|device| DeviceInfo::of(device, &wanted)).collect();
+            if devices.is_empty() && !names.is_empty() {
+                let wanted = arguments.device.device.as_deref().unwrap_or_default();
+                return Err(Failure {
+                    code: Code::NoDevice,
+                    message: format!("no Vulkan device is called or numbered {wanted:?}"),
+                    hint: Some(format!("there is {}", names.join(", "))),
+                });
+            }
             if arguments.json {
                 output::print_json(&serde_json::json!({ "devices": devices }))?;
             } else {
@@ -82,11 +99,11 @@ struct Need {
 }
 
 impl DeviceInfo {
-    fn of((summary, caps): (DeviceSummary, Caps)) -> Self {
+    fn of((summary, caps): (DeviceSummary, Caps), wanted: &GpuOptions) -> Self {
         let options = GpuOptions {
             device: DeviceSelection::Index(summary.index),
             cache_folder: None,
-            ..GpuOptions::default()
+            ..wanted.clone()
         };
         let need = |feature: &&'static str| Need {
             feature,

@@ -15,6 +15,7 @@ use crate::output::{self, Table};
 Examples:
   clerestory list
   clerestory list BG-3                 one system, with its module and tests
+  clerestory list path                 one technique, with its settings
   clerestory list --json | jq '.techniques[].default_settings'
   clerestory render --technique path --settings '{\"roulette_start\": 8}'")]
 pub struct Arguments {
@@ -75,10 +76,11 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if arguments.id.is_some() {
         texts.extend(rows.into_iter().map(row_text));
     } else {
-        let mut table = Table::new(&["id", "system", "module", "bias", "tests"], &[1, 2, 3]);
+        // What is longest comes last: lines that a narrow terminal breaks stay readable.
+        let mut table = Table::new(&["id", "module", "bias", "tests", "system"], &[1, 2, 4]);
         for row in rows {
             let bias = row.bias.map_or("-", |bias| bias_text(bias).0);
-            table.row([row.id, row.name, row.module, bias, &row.tests.len().to_string()].map(str::to_owned));
+            table.row([row.id, row.module, bias, &row.tests.len().to_string(), row.name].map(str::to_owned));
         }
         texts.push(table.text());
     }
@@ -125,7 +127,7 @@ fn row_text(row: &Row) -> String {
         &[
             ("system", row.name.into()),
             ("publication", row.publication.into()),
-            ("module", format!("engine/{}", row.module)),
+            ("module", row.module.into()),
             ("path set", row.path_set.map(|set| set.to_string()).unwrap_or_default()),
             ("bias", row.bias.map(bias_line).unwrap_or_default()),
             ("needs", needs_text(row.needs)),

@@ -6,6 +6,7 @@ mod compare;
 mod info;
 mod list;
 mod render;
+mod report;
 mod scenes;
 
 use std::io::IsTerminal;
@@ -35,6 +36,9 @@ Examples:
   clerestory info                       devices, and what each technique needs of them
   clerestory scenes                     generated scenes and their parameters
   clerestory compare picture.exr reference.exr --threshold rmse=1e-3
+  clerestory report --smoke             error against time, into RESULTS.md
+
+Each command explains itself: clerestory render --help
 
 Exit codes:
   0    done
@@ -53,6 +57,7 @@ enum Command {
     Scenes(scenes::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
+    Report(report::Arguments),
     Agreement(agreement::Arguments),
 }
 
@@ -94,14 +99,14 @@ fn start() -> ExitCode {
 }
 
 fn run(program: &Program) -> Outcome<ExitCode> {
-    let global = &program.global;
     match &program.command {
-        Command::Render(arguments) => render::run(arguments, global),
+        Command::Render(arguments) => render::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Scenes(arguments) => scenes::run(arguments),
         Command::List(arguments) => list::run(arguments),
-        Command::Bench(arguments) => bench::run(arguments, global),
+        Command::Bench(arguments) => bench::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
         Command::Agreement(arguments) => agreement::run(arguments),
     }
 }

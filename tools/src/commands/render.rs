@@ -8,18 +8,20 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use clerestory::Error;
 use clerestory::film::picture::{ALBEDO, DEPTH, NORMAL, SAMPLES, VARIANCE};
 use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{self, Scene};
 use clerestory::techniques;
 use clerestory::transport::PathSet;
+use clerestory_tools::machine::available_memory;
 use serde_json::{Map, Value};
 
 use super::check_validation;
 use super::compare::finite;
 use crate::failure::{Code, Failure, Outcome};
-use crate::options::{DeviceOption, Global, Size, parse_duration, parse_size};
+use crate::options::{DeviceOptions, Size, parse_duration, parse_size};
 use crate::{output, pictures, statistics};
 use files::{Document, ErrorAgainst, Files};
 use progress::Watch;
@@ -36,8 +38,10 @@ Examples:
   clerestory render --spp 16 --seed 1 --reference reference.exr
   clerestory render --settings '{\"roulette_start\": 8}' --stats json | jq .steady_rates
 
-Ctrl-C stops after the step at hand and writes what is there, with exit code 130; a second one stops
-at once and writes nothing. `clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
+Beside a model NAME.gltf, NAME.scene.toml may say what glTF cannot: environment map, measured metals, aperture, exposure, technique.
+
+Ctrl-C stops after the step at hand and writes what is there, with exit code 130; a second one stops at once and writes nothing. \
+`clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
 pub struct Arguments {
     /// A scene file (gltf, glb, ply, obj, toml) or `builtin:` address
     #[arg(default_value = "builtin:cornell-box")]
@@ -55,15 +59,15 @@ pub struct Arguments {
     #[arg(long, value_parser = parse_size)]
     size: Option<Size>,
     /// Seed of the random numbers; the same seed gives the same picture
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
     /// Camera by name; by default the scene's first
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
     /// Which light paths: all, emitted, direct, indirect, bounces=1..3, with lobes=diffuse+glossy+… after a comma
-    #[arg(long, value_name = "SET")]
+    #[arg(long, value_name = "SET", value_parser = parse_path_set)]
     path_set: Option<PathSet>,
-    /// Random numbers
+    /// Sequence of random numbers; by default as the settings say, else sobol
     #[arg(long, value_enum)]
     sampler: Option<Sampler>,
     /// The technique's settings as JSON, or @FILE that holds them
@@ -75,8 +79,6 @@ pub struct Arguments {
     /// Stops after about this time with the samples there are: 10s, 500ms, 2min
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time_budget: Option<Duration>,
-    #[command(flatten)]
-    device: DeviceOption,
     /// What to print about the run to standard output
     #[arg(long, value_enum, default_value_t = Statistics::Table)]
     stats: Statistics,
@@ -89,6 +91,8 @@ pub struct Arguments {
     /// Tone curve of the PNG
     #[arg(long, value_enum, default_value_t = Tone::Srgb)]
     tone: Tone,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// Tone curves.
@@ -161,8 +165,15 @@ enum Statistics {
     None,
 }
 
+fn parse_path_set(text: &str) -> Result<PathSet, String> {
+    text.parse().map_err(|error: Error| match error {
+        Error::Setting { value, cause, .. } => format!("{value} {cause}"),
+        other => other.to_string(),
+    })
+}
+
 /// Runs the command.
-pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let scene = scene::load(&arguments.scene).map_err(Failure::scene)?;
     for note in &scene.notes {
         output::warn(&format!("{} ({}): {}", note.feature, note.at, note.instead));
@@ -171,7 +182,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Outcome<ExitCode> {
     let options = options(arguments, &scene, reference.as_ref())?;
     let files = Files::choose(arguments.output.as_deref(), &scene.name)?;
     files.prepare()?;
-    let gpu = arguments.device.open(global)?;
+    let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
     let watch = Watch::start()?;
     let (rendered, interrupted) = watch.render(&Renderer::new(&gpu, &scene)?, &options)?;
@@ -220,6 +231,7 @@ fn options(arguments: &Arguments, scene: &Scene, reference: Option<&Picture>) ->
             return Err(Failure::usage(message).hint("without --size the picture takes the reference's size"));
         }
     }
+    check_memory(size, available_memory())?;
     Ok(RenderOptions {
         technique: arguments.technique.clone(),
         camera: arguments.camera.clone(),
@@ -232,6 +244,24 @@ fn options(arguments: &Arguments, scene: &Scene, reference: Option<&Picture>) ->
     })
 }
 
+/// Refuses pictures that cannot fit, before the system ends the program for them. `available` is `None` where the system does not tell.
+fn check_memory(size: [u32; 2], available: Option<u64>) -> Outcome {
+    // Film on the device (which may be the host's own memory), and all layers of the finished picture.
+    const BYTES_PER_PIXEL: u64 = 56 + 14 * 4;
+    let needed = u64::from(size[0]) * u64::from(size[1]) * BYTES_PER_PIXEL;
+    match available {
+        Some(available) if needed > available => Err(Failure::usage(format!(
+            "a picture of {} × {} pixels takes about {} of memory; {} are free",
+            size[0],
+            size[1],
+            output::bytes(needed),
+            output::bytes(available)
+        ))
+        .hint("render a smaller --size")),
+        _ => Ok(()),
+    }
+}
+
 /// The technique's settings: those given as JSON, changed by the options of their own.
 fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
     let mut settings = match arguments.settings.as_deref() {
@@ -241,6 +271,25 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
     let technique = arguments.technique.as_deref().or(scene.defaults.technique.as_deref());
     let info = techniques::by_id(technique.unwrap_or("path"))?;
     let known = (info.default_settings)();
+    let names: Vec<&str> = known
+        .as_object()
+        .into_iter()
+        .flat_map(Map::keys)
+        .map(String::as_str)
+        .collect();
+    if let Some(unknown) = settings.keys().find(|key| !names.contains(&key.as_str())) {
+        return Err(
+            Failure::usage(format!("--settings: technique {} has no {unknown:?}", info.id))
+                .hint(format!("it has: {}", names.join(", "))),
+        );
+    }
+    for (key, value) in &settings {
+        let default = &known[key];
+        if !default.is_null() && std::mem::discriminant(value) != std::mem::discriminant(default) {
+            let message = format!("--settings: {key}: {value} is of another type than the default, {default}");
+            return Err(Failure::usage(message));
+        }
+    }
     let path_set = arguments.path_set.map(|set| set.to_string());
     let sampler = arguments.sampler.map(|sampler| match sampler {
         Sampler::Sobol => "sobol".to_owned(),
@@ -271,7 +320,7 @@ fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
     };
     serde_json::from_str(&text).map_err(|cause| {
         Failure::usage(format!("--settings: {from} is no JSON object: {cause}"))
-            .hint("`clerestory list` shows the settings")
+            .hint("write for example --settings '{\"roulette_start\": 8}'; `clerestory list` shows all settings")
     })
 }
 
@@ -337,4 +386,18 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
     }
     output::note(&format!("wrote {}", files.names()));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_that_cannot_fit_are_refused() {
+        assert!(check_memory([512, 512], Some(1 << 30)).is_ok() && check_memory([65_535; 2], None).is_ok());
+        let refusal = check_memory([65_535; 2], Some(1 << 30))
+            .err()
+            .map(|failure| failure.message);
+        assert!(refusal.is_some_and(|message| message.contains("65535 × 65535") && message.contains("1.00 GiB")));
+    }
 }

@@ -1,7 +1,7 @@
 // What the trace kernels share: rays in, hits out, and where stopped rays go on (set 0).
 //
-// The host zeroes `resume` and `status`, dispatches groups of 64 until `unfinished` stays zero, zeroing `status` in between; finished
-// rays return at once. Larger ray counts than one dispatch takes go in parts by `first_ray`.
+// The host zeroes `trace_resume` and `trace_status` and dispatches groups of 64 until `trace_status.unfinished` stays zero, zeroing
+// `trace_status` in between; finished rays return at once. Larger ray counts than one dispatch takes go in parts by `first_ray`.
 #ifndef CLERESTORY_ACCEL_TRACE_INTERFACE_GLSL
 #define CLERESTORY_ACCEL_TRACE_INTERFACE_GLSL
 
@@ -10,15 +10,15 @@
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer TraceRays {
-    Ray rays[];
+    Ray trace_rays[];
 };
 
 layout(set = 0, binding = 1, scalar) restrict buffer TraceHits {
-    Hit hits[];
+    Hit trace_hits[];
 };
 
 layout(set = 0, binding = 2, scalar) restrict buffer TraceResume {
-    uint resume_words[];
+    uint trace_resume[];
 };
 
 // Rays stopped by the quota, and traversal counters modulo 2³² when counting is specialised in.

@@ -46,7 +46,7 @@ struct SceneMaterial {
     float ior;
     vec3 conductor_average;
     float specular;
-    vec3 attenuation;  // absorption coefficient inside, 1/m
+    vec3 absorption;  // absorption coefficient inside, 1/m
     float thickness;
     float alpha_cutoff;
     float normal_scale;

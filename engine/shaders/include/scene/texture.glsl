@@ -12,6 +12,7 @@ const uint TEXTURE_WRAP_U_SHIFT = 3u;
 const uint TEXTURE_WRAP_V_SHIFT = 5u;
 const uint WRAP_REPEAT = 0u;
 const uint WRAP_MIRRORED = 1u;
+const uint WRAP_CLAMP = 2u;
 const uint WRAP_MASK = 3u;
 
 // IEC 61966-2-1.

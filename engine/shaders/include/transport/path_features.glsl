@@ -12,7 +12,7 @@ layout(constant_id = 6) const bool HAS_TEXTURES = true;
 layout(constant_id = 7) const bool HAS_SHADING_NORMALS = true;
 layout(constant_id = 8) const bool HAS_NORMAL_MAPS = true;
 layout(constant_id = 9) const bool HAS_VERTEX_COLORS = true;
-layout(constant_id = 10) const bool HAS_ATTENUATION = true;            // absorbing solids
+layout(constant_id = 10) const bool HAS_ABSORPTION = true;            // absorbing solids
 layout(constant_id = 11) const bool HAS_UNLIT = true;
 layout(constant_id = 12) const bool HAS_ENVIRONMENT = true;
 layout(constant_id = 13) const bool HAS_AREA_LIGHTS = true;

@@ -9,12 +9,13 @@
 use super::{BOX_SLACK, Bvh2, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
 use crate::accel::{CandidateFilter, Hit, Ray, TraversalCounters};
+use crate::gpu::shaders::constants;
 use glam::Vec3;
 
 /// [`Traversal::resume`] of a traversal that is done.
-pub const FINISHED: u32 = u32::MAX;
+pub const FINISHED: u32 = constants::BVH2_FINISHED;
 
-const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
+const COUNT_MASK: u32 = constants::BVH2_COUNT_MASK;
 
 /// A traversal between two runs.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -151,7 +151,7 @@ mod tests {
         let scene = generate("builtin:materials?aperture=0.05").expect("scene");
         let profile = SceneProfile::of(&scene);
         assert!(profile.has_textures && profile.has_normal_maps && profile.has_metal && profile.has_conductor);
-        assert!(profile.transmission.solid && profile.transmission.thin && profile.has_attenuation);
+        assert!(profile.transmission.solid && profile.transmission.thin && profile.has_absorption);
         assert!(profile.alpha.mask && !profile.alpha.blend && profile.has_lens && profile.has_area_lights());
         assert_eq!(profile.environment, EnvironmentUse::Map);
         assert_eq!(profile.roughness, Some([0.0, 1.0]));

@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(furnace.bounds, Some([[-1.0; 3], [1.0; 3]]));
         let white = of("builtin:white-furnace?ior=1");
         assert!(!white.has_rough_dielectric_spec && white.has_environment());
-        assert!(of("builtin:slab?attenuation_color=0.5").has_attenuation && !of("builtin:slab").has_attenuation);
+        assert!(of("builtin:slab?attenuation_color=0.5").has_absorption && !of("builtin:slab").has_absorption);
         assert!(of("builtin:divider-room").has_textures);
         assert_eq!(of("builtin:ring").lights.point, 1);
         let text = cornell.to_string();

@@ -65,6 +65,15 @@ pub struct Parameter {
 }
 
 impl Parameter {
+    const fn new(name: &'static str, default: &'static str, range: ParameterKind, meaning: &'static str) -> Self {
+        Self {
+            name,
+            default,
+            range,
+            meaning,
+        }
+    }
+
     pub(super) const fn real(
         name: &'static str,
         default: &'static str,
@@ -72,12 +81,7 @@ impl Parameter {
         max: f64,
         meaning: &'static str,
     ) -> Self {
-        Self {
-            name,
-            default,
-            range: ParameterKind::Real { min, max },
-            meaning,
-        }
+        Self::new(name, default, ParameterKind::Real { min, max }, meaning)
     }
 
     pub(super) const fn integer(
@@ -87,12 +91,7 @@ impl Parameter {
         max: u32,
         meaning: &'static str,
     ) -> Self {
-        Self {
-            name,
-            default,
-            range: ParameterKind::Integer { min, max },
-            meaning,
-        }
+        Self::new(name, default, ParameterKind::Integer { min, max }, meaning)
     }
 
     pub(super) const fn color(
@@ -102,12 +101,7 @@ impl Parameter {
         max: f64,
         meaning: &'static str,
     ) -> Self {
-        Self {
-            name,
-            default,
-            range: ParameterKind::Color { min, max },
-            meaning,
-        }
+        Self::new(name, default, ParameterKind::Color { min, max }, meaning)
     }
 
     pub(super) const fn choice(
@@ -116,12 +110,7 @@ impl Parameter {
         words: &'static [&'static str],
         meaning: &'static str,
     ) -> Self {
-        Self {
-            name,
-            default,
-            range: ParameterKind::Choice { words },
-            meaning,
-        }
+        Self::new(name, default, ParameterKind::Choice { words }, meaning)
     }
 }
 

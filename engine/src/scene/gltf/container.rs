@@ -25,11 +25,10 @@ pub fn open(bytes: &[u8], source: &str) -> Result<Container> {
         (bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), None)
     };
     let bad_json = |error: serde_json::Error| {
-        Error::scene(
-            source,
-            format!("JSON line {} column {}", error.line(), error.column()),
-            error.to_string(),
-        )
+        let place = format!("line {} column {}", error.line(), error.column());
+        let text = error.to_string();
+        let cause = text.strip_suffix(&place).and_then(|text| text.strip_suffix(" at "));
+        Error::scene(source, format!("JSON {place}"), cause.unwrap_or(&text))
     };
     let mut value: Value = serde_json::from_slice(json).map_err(bad_json)?;
     check_version(&value, source)?;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, Vec3};
 
-use super::NONE;
+use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::scene::{Scene, SceneProfile};
 use crate::{Error, Result};
@@ -28,10 +28,8 @@ impl Geometry {
     pub(super) fn flatten(scene: &Scene, profile: &SceneProfile) -> Result<Self> {
         let mut all = Self::default();
         let default_material = scene.materials.len() as u32;
-        let has_attributes = profile.has_shading_normals
-            || profile.has_textures
-            || profile.has_normal_maps
-            || profile.has_vertex_colors;
+        let has_attributes =
+            profile.has_shading_normals || profile.has_textures || profile.has_normal_maps || profile.has_vertex_colors;
         let mut placed = 0u32;
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];
@@ -57,7 +55,8 @@ impl Geometry {
                 .collect();
             if profile.has_shading_normals {
                 let normal = |n: &Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3();
-                all.normals.extend(mesh.normals.iter().map(|n| normal(n).extend(0.0).to_array()));
+                all.normals
+                    .extend(mesh.normals.iter().map(|n| normal(n).extend(0.0).to_array()));
                 // Zero stands for "flat" in the shader.
                 all.normals.resize(end, [0.0; 4]);
             }
@@ -87,7 +86,7 @@ impl Geometry {
                     a: positions[a as usize].to_array(),
                     material,
                     b: positions[b as usize].to_array(),
-                    light: NONE,
+                    light: NO_LIGHT,
                     c: positions[c as usize].to_array(),
                     spare: 0,
                 });

@@ -5,21 +5,16 @@ use glam::{DVec3, UVec2, Vec3};
 
 use super::LightKinds;
 use super::geometry::{Geometry, corners_of};
-use super::materials::{MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT};
 use crate::Result;
+use crate::gpu::shaders::constants::{
+    LIGHT_DARK, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE, MATERIAL_BLEND,
+    MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
+};
 use crate::gpu::shaders::types::{SceneEnvironment, SceneLight, SceneMaterial, SceneTriangle};
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
 use crate::transport::distribution::build_distribution;
 use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
 use crate::transport::lights::{light_power, triangle_power};
-
-// Kinds of `scene/bindings.glsl`.
-const LIGHT_TRIANGLE: u32 = 0;
-const LIGHT_POINT: u32 = 1;
-const LIGHT_SPOT: u32 = 2;
-const LIGHT_DIRECTIONAL: u32 = 3;
-const LIGHT_ENVIRONMENT: u32 = 4;
-const LIGHT_DARK: u32 = 5;
 
 /// Everything that light sampling chooses among: emissive triangles, lights without area, the environment last.
 pub(super) struct Lights {
@@ -187,7 +182,7 @@ fn environment_block(map: &Environment, cdf_base: u32) -> Vec<u8> {
         up: axes[1],
         height: map.height,
         back: axes[2],
-        cdf_base: cdf_base,
+        cdf_base,
     };
     let mut block = bytemuck::bytes_of(&header).to_vec();
     for texel in &map.radiance {

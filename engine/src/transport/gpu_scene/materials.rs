@@ -1,16 +1,12 @@
 //! Material records: factors, absorption, and where the textures are.
 
 use super::textures::Textures;
+use crate::gpu::shaders::constants::{
+    MATERIAL_BLEND, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
+};
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::scene::{AlphaMode, Material, Scene};
 use crate::transport::fresnel::fresnel_conductor_average;
-
-// Flags of `scene/bindings.glsl`.
-pub(super) const MATERIAL_DOUBLE_SIDED: u32 = 1;
-pub(super) const MATERIAL_UNLIT: u32 = 2;
-const MATERIAL_CONDUCTOR: u32 = 4;
-pub(super) const MATERIAL_MASK: u32 = 8;
-pub(super) const MATERIAL_BLEND: u32 = 16;
 
 /// All materials with whether some instance places them; last the default one, for meshes that have none.
 pub(super) fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> Vec<(&'a Material, bool)> {
@@ -31,11 +27,11 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         AlphaMode::Mask { cutoff } => (cutoff, MATERIAL_MASK),
         AlphaMode::Blend => (0.0, MATERIAL_BLEND),
     };
-    let attenuation = m
+    let absorption = m
         .attenuation_color
         .as_dvec3()
         .map(|c| -c.clamp(f64::from(f32::MIN_POSITIVE), 1.0).ln());
-    let attenuation = attenuation / f64::from(m.attenuation_distance);
+    let absorption = absorption / f64::from(m.attenuation_distance);
     SceneMaterial {
         base_color: m.base_color.truncate().to_array(),
         base_alpha: m.base_color.w,
@@ -53,7 +49,7 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
                 .to_array()
         }),
         specular: m.specular,
-        attenuation: attenuation.as_vec3().to_array(),
+        absorption: absorption.as_vec3().to_array(),
         thickness: m.thickness,
         alpha_cutoff: cutoff,
         normal_scale: m.normal_scale,

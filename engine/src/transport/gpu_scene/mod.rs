@@ -25,9 +25,6 @@ use crate::gpu::shaders::types::SceneMaterial;
 use crate::gpu::{Category, Gpu, TexelView};
 use crate::scene::{Material, Scene, SceneProfile};
 
-/// No light, no texture (`NO_LIGHT`, `NO_TEXTURE` of `scene/bindings.glsl`).
-const NONE: u32 = u32::MAX;
-
 /// A scene in device memory. Make it once and render it with any technique.
 #[derive(Debug)]
 pub struct GpuScene {
@@ -69,7 +66,8 @@ impl GpuScene {
     /// Checks the scene, builds its index on the host's threads and uploads everything.
     ///
     /// # Errors
-    /// [`Error::Scene`] for a scene that does not pass [`Scene::check`], [`Error::LimitExceeded`] for one that does not fit the device.
+    /// [`Error::Scene`](crate::Error::Scene) for a scene that does not pass [`Scene::check`],
+    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for one that does not fit the device.
     pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.check()?;
         let profile = SceneProfile::of(scene);
@@ -193,7 +191,13 @@ impl SceneBuffers {
             optional(name, category, vk::Format::R32G32B32A32_UINT, data, &no_words)
         };
         let floats = |name: &str, category, data: &[f32]| {
-            optional(name, category, vk::Format::R32_SFLOAT, bytemuck::cast_slice(data), &no_floats)
+            optional(
+                name,
+                category,
+                vk::Format::R32_SFLOAT,
+                bytemuck::cast_slice(data),
+                &no_floats,
+            )
         };
         let vectors = |name: &str, data: &[[f32; 4]]| {
             let format = vk::Format::R32G32B32A32_SFLOAT;

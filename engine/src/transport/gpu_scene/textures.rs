@@ -1,15 +1,11 @@
 //! Texture records and the texels of the images that they use.
 
-use super::NONE;
+use crate::gpu::shaders::constants::{
+    NO_TEXTURE, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV1, TEXTURE_WRAP_U_SHIFT, TEXTURE_WRAP_V_SHIFT, WRAP_CLAMP,
+    WRAP_MIRRORED, WRAP_REPEAT,
+};
 use crate::gpu::shaders::types::SceneTexture;
 use crate::scene::{Filter, Scene, Texture, Wrap};
-
-// Flags of `scene/texture.glsl`.
-const TEXTURE_SRGB: u32 = 1;
-const TEXTURE_NEAREST: u32 = 2;
-const TEXTURE_UV1: u32 = 4;
-const TEXTURE_WRAP_U_SHIFT: u32 = 3;
-const TEXTURE_WRAP_V_SHIFT: u32 = 5;
 
 /// Texture records and the texels of the images that they use, each image once.
 #[derive(Default)]
@@ -22,7 +18,7 @@ pub(super) struct Textures {
 impl Textures {
     /// The index of a texture's record; `srgb` says that its colours are encoded.
     pub(super) fn record(&mut self, scene: &Scene, texture: Option<Texture>, srgb: bool) -> u32 {
-        let Some(texture) = texture else { return NONE };
+        let Some(texture) = texture else { return NO_TEXTURE };
         let image = &scene.images[texture.image as usize];
         self.first_texel.resize(scene.images.len(), None);
         let first_texel = *self.first_texel[texture.image as usize].get_or_insert_with(|| {
@@ -31,9 +27,9 @@ impl Textures {
             first
         });
         let wrap = |mode| match mode {
-            Wrap::Repeat => 0,
-            Wrap::MirroredRepeat => 1,
-            Wrap::ClampToEdge => 2,
+            Wrap::Repeat => WRAP_REPEAT,
+            Wrap::MirroredRepeat => WRAP_MIRRORED,
+            Wrap::ClampToEdge => WRAP_CLAMP,
         };
         let flags = if srgb { TEXTURE_SRGB } else { 0 }
             | if texture.filter == Filter::Nearest {

@@ -3,7 +3,7 @@
 //! Sources: BG-2 and BG-3; Kajiya, "The Rendering Equation" (SIGGRAPH 1986); Veach, "Robust Monte Carlo Methods for Light Transport
 //! Simulation" (1997), chapters 9 and 10; wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013).
 //!
-//! Unbiased: paths end by Russian roulette or by the [`PathSet`] alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
+//! Unbiased: paths end by Russian roulette or by the [`PathSet`](super::PathSet) alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
 //! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
 
@@ -16,21 +16,18 @@ use std::sync::Arc;
 
 use self::pipelines::{Pipelines, TracePipelines, camera_pipeline};
 pub use self::settings::PathTracerSettings;
-use self::wave::{Cursor, PATH_GROUP, Status, Wave, WaveBuffers, group_counts, slots_of_device};
+use self::wave::{Cursor, Status, Wave, WaveBuffers, group_counts, slots_of_device};
 use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
 use crate::film::picture::Picture;
 use crate::film::{GpuFilm, Step};
+use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
 use crate::gpu::{Access, Buffer, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
 
 /// Bounces recorded into one command buffer; a wave that needs more is submitted again.
 const BOUNCES_PER_SUBMISSION: usize = 12;
-/// `STALLED_NOT` and `STALLED_SHADOW` of `path_buffers.glsl`.
-const STALLED_NOT: u32 = 0;
-const STALLED_EXTEND: u32 = 1;
-const STALLED_SHADOW: u32 = 2;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
 /// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
 const STALLS_MAX: u32 = 1 << 16;

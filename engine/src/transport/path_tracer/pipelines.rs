@@ -40,13 +40,13 @@ pub(super) enum TracePipelines {
 pub(super) fn camera_pipeline(
     gpu: &Gpu,
     settings: &PathTracerSettings,
-    view: &CameraFrame,
+    frame: &CameraFrame,
     camera: &Camera,
 ) -> Result<ComputePipeline<path_camera::Kernel>> {
     gpu.compute_pipeline(&path_camera::Spec {
         sampler_kind: settings.sampler as u32,
-        has_lens: camera.lens_radius > 0.0 && !view.orthographic,
-        orthographic: view.orthographic,
+        has_lens: camera.lens_radius > 0.0 && !frame.orthographic,
+        orthographic: frame.orthographic,
         write_aovs: settings.aovs,
     })
 }
@@ -56,7 +56,7 @@ impl Pipelines {
         gpu: &Gpu,
         scene: &GpuScene,
         settings: &PathTracerSettings,
-        view: &CameraFrame,
+        frame: &CameraFrame,
         camera: &Camera,
     ) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
@@ -71,7 +71,7 @@ impl Pipelines {
             has_shading_normals: profile.has_shading_normals,
             has_normal_maps: profile.has_normal_maps,
             has_vertex_colors: profile.has_vertex_colors,
-            has_attenuation: profile.has_attenuation,
+            has_absorption: profile.has_absorption,
             has_unlit: profile.has_unlit,
             has_environment: profile.has_environment(),
             has_area_lights: scene.has_area_lights(),
@@ -81,7 +81,7 @@ impl Pipelines {
             has_alpha: profile.has_alpha(),
         };
         Ok(Self {
-            camera: camera_pipeline(gpu, settings, view, camera)?,
+            camera: camera_pipeline(gpu, settings, frame, camera)?,
             trace: TracePipelines::new(gpu, scene, settings.ray_quota, false)?,
             resume: None,
             shade: gpu.compute_pipeline(&shade)?,

@@ -1,5 +1,7 @@
 //! The path tracer's settings and their ranges.
 
+use std::ops::RangeInclusive;
+
 use crate::transport::path_set::PathSet;
 use crate::transport::random::SamplerKind;
 use crate::{Error, Result};
@@ -7,6 +9,11 @@ use crate::{Error, Result};
 /// Bounds of the roulette's settings, so that every path ends.
 const ROULETTE_CAP_MAX: f32 = 0.999;
 const ROULETTE_START_MAX: u32 = 4096;
+/// A traversal makes progress only with a quota above twice the depth of the deepest tree, and software drivers end loops in silence
+/// after 65,535 iterations.
+const RAY_QUOTAS: RangeInclusive<u32> = 128..=60_000;
+/// Most paths in flight.
+pub(super) const SLOTS_MAX: u32 = 1 << 22;
 
 /// Settings of the path tracer.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -22,6 +29,7 @@ pub struct PathTracerSettings {
     /// First bounce at which Russian roulette may end a path, at most 4096.
     pub roulette_start: u32,
     /// Largest probability to survive a round of roulette, in (0, 0.999]: with 1, paths in lossless scenes would never end.
+    #[serde(serialize_with = "crate::settings::serialize_f32")]
     pub roulette_cap: f32,
     /// Compensation of rough metals for scattering among microfacets; off for comparison with single-scattering renderers.
     pub multiple_scattering: bool,
@@ -54,31 +62,24 @@ impl Default for PathTracerSettings {
 }
 
 impl PathTracerSettings {
+    /// Refuses what is out of range.
     pub(super) fn check(&self) -> Result<()> {
-        let fail = |name: &str, value: String, cause: &str| {
-            Err(Error::Setting {
-                name: name.into(),
-                value,
-                cause: cause.into(),
-            })
-        };
         // Paths in scenes that lose nothing end by roulette alone.
         if !(self.roulette_cap > 0.0 && self.roulette_cap <= ROULETTE_CAP_MAX) {
-            return fail("roulette_cap", self.roulette_cap.to_string(), "is not in (0, 0.999]");
+            let cause = format!("is not in (0, {ROULETTE_CAP_MAX}]");
+            return Err(Error::setting("roulette_cap", self.roulette_cap, cause));
         }
         if self.roulette_start > ROULETTE_START_MAX {
-            return fail("roulette_start", self.roulette_start.to_string(), "is more than 4096");
+            let cause = format!("is more than {ROULETTE_START_MAX}");
+            return Err(Error::setting("roulette_start", self.roulette_start, cause));
         }
-        // A traversal makes progress only with a quota above twice the depth of the deepest tree.
-        if self.ray_quota < 128 || self.ray_quota > 60_000 {
-            return fail("ray_quota", self.ray_quota.to_string(), "is not in 128..=60000");
+        if !RAY_QUOTAS.contains(&self.ray_quota) {
+            let cause = format!("is not in {RAY_QUOTAS:?}");
+            return Err(Error::setting("ray_quota", self.ray_quota, cause));
         }
-        if self.paths_in_flight > 1 << 22 {
-            return fail(
-                "paths_in_flight",
-                self.paths_in_flight.to_string(),
-                "is more than 4194304",
-            );
+        if self.paths_in_flight > SLOTS_MAX {
+            let cause = format!("is more than {SLOTS_MAX}");
+            return Err(Error::setting("paths_in_flight", self.paths_in_flight, cause));
         }
         Ok(())
     }

@@ -3,12 +3,14 @@
 //! The split into waves never reaches the picture: each path depends on (seed, pixel, sample) alone, and samples are added to their pixel
 //! in order.
 
+use super::settings::SLOTS_MAX;
 use crate::Result;
 use crate::film::GpuFilm;
+use crate::gpu::ash::vk;
+use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP};
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::shaders::transport::path_camera;
-use crate::gpu::ash::vk;
-use crate::gpu::shaders::types::{Hit, PathAov, GatheredLight, PathState, ShadowRay};
+use crate::gpu::shaders::types::{GatheredLight, Hit, PathAov, PathState, ShadowRay};
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 
 /// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
@@ -16,10 +18,6 @@ use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 const SAMPLES_A_WAVE: u32 = 1024;
 /// Samples of a pixel that are best under way together, in neighbouring lanes.
 const SAMPLES_TOGETHER: u32 = 8;
-/// Places that one invocation of the compaction kernels handles (`COMPACT_CHUNK`).
-const COMPACT_CHUNK: u32 = 32;
-/// Invocations of a workgroup of every stage (`PATH_GROUP`).
-pub(super) const PATH_GROUP: u32 = 64;
 /// Bytes of a texel of four words.
 const TEXEL_BYTES: u64 = 16;
 
@@ -75,7 +73,10 @@ impl Cursor {
         if c.band == 0 && c.pixel_in_band == 0 {
             // As many as fit with the whole picture, else as many as there are already, so that a picture is complete early.
             let whole = if bands.len() == 1 { slots / band.pixels() } else { 0 };
-            c.samples = whole.max(c.sample.clamp(1, SAMPLES_TOGETHER)).min(SAMPLES_A_WAVE).min(samples - c.sample);
+            c.samples = whole
+                .max(c.sample.clamp(1, SAMPLES_TOGETHER))
+                .min(SAMPLES_A_WAVE)
+                .min(samples - c.sample);
         }
         let pixels = (band.pixels() - c.pixel_in_band).min(slots / c.samples);
         let wave = Wave {
@@ -105,7 +106,7 @@ pub(super) fn slots_of_device(gpu: &Gpu) -> u32 {
     let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
     let by_texels = gpu.caps().max_texel_buffer_elements * TEXEL_BYTES / slot_bytes;
     let by_groups = u64::from(gpu.caps().max_workgroups) * u64::from(PATH_GROUP);
-    let slots = by_range.min(by_texels).min(by_groups).min(1 << 22) as u32;
+    let slots = by_range.min(by_texels).min(by_groups).min(u64::from(SLOTS_MAX)) as u32;
     slots - slots % PATH_GROUP
 }
 
@@ -123,7 +124,8 @@ impl WaveBuffers {
                 Category::Work,
             ))
         };
-        let words = |name: &str, count| gpu.storage_texels(name, Category::Work, vk::Format::R32_UINT, u64::from(count));
+        let words =
+            |name: &str, count| gpu.storage_texels(name, Category::Work, vk::Format::R32_UINT, u64::from(count));
         let quarters = |name: &str, bytes: usize, count: u32| {
             let texels = (bytes as u64 * u64::from(count)).div_ceil(TEXEL_BYTES);
             gpu.storage_texels(name, Category::Work, vk::Format::R32G32B32A32_UINT, texels)

@@ -102,6 +102,10 @@ fn normalized_and_quantized_attributes_are_scaled() {
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::NEG_Y]);
     assert_eq!(mesh.uv0, [Vec2::ZERO, Vec2::X, Vec2::Y]);
     assert_eq!(mesh.colors[0], Vec4::new(1.0, 0.0, 0.0, 0.2));
+    // Colours of three components are opaque.
+    let color = document.floats(&[0.5, 0.25, 0.125, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0], "VEC3");
+    document.primitive()["attributes"]["COLOR_0"] = color.into();
+    assert_eq!(document.load().meshes[0].colors[0], Vec4::new(0.5, 0.25, 0.125, 1.0));
 }
 
 #[test]
@@ -270,6 +274,7 @@ fn material_extensions_are_carried_over() {
     assert_eq!((m.emission, m.ior, m.specular), (Vec3::new(4.0, 2.0, 8.0), 1.25, 0.5));
     assert_eq!(m.specular_color, Vec3::new(1.0, 0.5, 0.25));
     assert_eq!((m.transmission, m.thickness, m.attenuation_distance), (0.75, 2.0, 4.0));
+    assert_eq!(m.attenuation_color, Vec3::new(0.5, 0.5, 1.0));
     assert!(m.unlit && m.double_sided && SceneProfile::of(&scene).has_unlit);
     assert_eq!(notes(&scene), "KHR_materials_clearcoat@materials[0].extensions; ");
     // The default volume is clear, and the default material is the specification's.
@@ -282,6 +287,14 @@ fn material_extensions_are_carried_over() {
     );
     plain.json["materials"][0] = json!({"pbrMetallicRoughness": {"roughnessFactor": 1.5}});
     assert!(plain.refusal().contains("materials[0]") && plain.refusal().contains("roughness"));
+    for (mode, read) in [
+        (json!({"alphaMode": "BLEND"}), AlphaMode::Blend),
+        (json!({"alphaMode": "MASK"}), AlphaMode::Mask { cutoff: 0.5 }),
+        (json!({}), AlphaMode::Opaque),
+    ] {
+        plain.json["materials"][0] = mode;
+        assert_eq!(plain.load().materials[0].alpha_mode, read);
+    }
     plain.json["materials"][0] = json!({"alphaMode": "FANCY"});
     assert!(plain.refusal().contains("materials[0].alphaMode"));
 }

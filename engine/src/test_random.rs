@@ -1,4 +1,6 @@
 //! Seeded random numbers for test data: SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
+//!
+//! The integration tests include this file as a module of theirs.
 
 use glam::Vec3;
 
@@ -37,7 +39,7 @@ impl Random {
 
     /// Uniform in [-1, 1)³.
     pub fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.range(-1.0, 1.0), self.range(-1.0, 1.0), self.range(-1.0, 1.0))
+        Vec3::new(self.signed(), self.signed(), self.signed())
     }
 
     /// A uniform direction, of unit length to f32 rounding.
@@ -54,5 +56,15 @@ impl Random {
     /// One of the values.
     pub fn choose<T: Copy>(&mut self, values: &[T]) -> T {
         values[self.below(values.len())]
+    }
+
+    /// Uniform in [-1, 1).
+    pub fn signed(&mut self) -> f32 {
+        self.range(-1.0, 1.0)
+    }
+
+    /// A power of two from 2^low to below 2^high, with a random factor in [1, 2).
+    pub fn magnitude(&mut self, low: i32, high: i32) -> f32 {
+        2f32.powi(low + self.below((high - low) as usize) as i32) * (1.5 + 0.5 * self.signed())
     }
 }

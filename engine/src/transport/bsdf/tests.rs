@@ -3,12 +3,18 @@
 //! Statistical tests have fixed seeds; a chi-square test fails below p = 1e-5, about forty of them: false alarm below 5e-4 for a
 //! changed seed.
 
-use super::super::albedo::integrate_albedos;
-use super::super::random::{Sampler, SamplerKind, sample_1d, sample_2d};
-use super::super::testing::{random3, sphere_test};
-use super::super::warp::{square_to_cosine_hemisphere, square_to_sphere};
-use super::*;
+use std::f64::consts::FRAC_1_PI;
+
 use glam::Vec3;
+
+use super::*;
+use crate::scene::{ConductorIor, Material};
+use crate::transport::albedo::{AlbedoTable, albedo_lookup, integrate_albedos};
+use crate::transport::fresnel::fresnel_dielectric;
+use crate::transport::ggx::ALPHA_MIN;
+use crate::transport::random::{Sampler, SamplerKind, sample_1d, sample_2d};
+use crate::transport::testing::{random3, sphere_test};
+use crate::transport::warp::square_to_sphere;
 
 const SIGNIFICANCE: f64 = 1e-5;
 /// Bounds on the energy gained and lost through the interpolation of the albedo table, reached by narrow lobes (alpha below 0.01)

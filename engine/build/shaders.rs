@@ -1,0 +1,68 @@
+//! What a build script with shaders does: compile them, reflect them, and write their Rust interfaces to `OUT_DIR/shaders.rs`.
+//!
+//! GLSL is the only place where a layout is written down: bindings, push constants, buffer structs and specialization constants reach
+//! Rust through the file written here, so a renamed field is a compile error on the host side. The engine's build script uses it, and so do
+//! those of crates with kernels of their own (the tests, the samples) through `#[path]`.
+
+mod compile;
+mod constants;
+mod generate;
+mod reflect;
+
+use std::path::{Component, Path, PathBuf};
+
+/// Where the generated code finds what it refers to.
+pub struct Paths {
+    /// The engine's module `gpu`: `clerestory::gpu` outside of the engine.
+    pub gpu: &'static str,
+    /// The module that includes the generated file: `crate::shaders`.
+    pub shaders: &'static str,
+}
+
+/// Compiles the folder `shaders` beside the crate's manifest. `engine` is the engine's folder as seen from there; a failure ends the build.
+pub fn build(engine: &str, paths: &Paths) {
+    let folder = |name| PathBuf::from(std::env::var_os(name).unwrap_or_default());
+    let (root, out) = (folder("CARGO_MANIFEST_DIR"), folder("OUT_DIR"));
+    // Without `..` in it, the path stands in the compiler's lists as it is here.
+    let mut place = root.clone();
+    for part in Path::new(engine).components() {
+        match part {
+            Component::ParentDir => drop(place.pop()),
+            other => place.push(other),
+        }
+    }
+    if let Err(message) = run(&root, &place, &out, paths) {
+        eprintln!("{message}");
+        std::process::exit(1);
+    }
+}
+
+fn run(root: &Path, engine: &Path, out: &Path, paths: &Paths) -> Result<(), String> {
+    let include = engine.join("shaders/include");
+    println!("cargo::rerun-if-changed=shaders");
+    println!("cargo::rerun-if-changed={}", include.display());
+    println!("cargo::rerun-if-changed={}", engine.join("build").display());
+    println!("cargo::rerun-if-env-changed=GLSLC");
+    let prebuilt = root.join("spirv");
+    if prebuilt.exists() {
+        println!("cargo::rerun-if-changed=spirv");
+    }
+    let compiler = compile::Compiler {
+        program: std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into()),
+        include,
+        debug_info: std::env::var("DEBUG").is_ok_and(|level| level != "false" && level != "0"),
+        prebuilt,
+    };
+    let shaders = compiler.compile_all(&root.join("shaders"), out)?;
+    let interfaces = shaders
+        .iter()
+        .map(|shader| {
+            std::fs::read(&shader.reflected)
+                .map_err(|error| error.to_string())
+                .and_then(|module| reflect::reflect(&module))
+                .map_err(|message| format!("{}: {message}", shader.name))
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let rust = generate::generate(&shaders, &interfaces, paths)? + &constants::generate(&root.join("shaders"))?;
+    std::fs::write(out.join("shaders.rs"), rust).map_err(|error| format!("cannot write shaders.rs: {error}"))
+}

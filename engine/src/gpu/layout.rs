@@ -1,0 +1,380 @@
+//! Pipeline layouts made from reflected shaders, checked against the device's limits first, and specialization constants.
+//!
+//! Bindings that a shader declares and does not use count, too: sets are shared between shaders, so their layouts hold all of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::caps::DescriptorLimits;
+use super::device::Inner;
+use super::interface::{BindingKind, ShaderInfo, Stage};
+use crate::{Error, Result};
+
+/// A pipeline layout with its descriptor set layouts, and the pipeline made with it. Destroyed together.
+pub(super) struct PipelineObjects {
+    gpu: Arc<Inner>,
+    /// Null until the pipeline is made.
+    pub raw: vk::Pipeline,
+    pub layout: vk::PipelineLayout,
+    pub sets: Vec<vk::DescriptorSetLayout>,
+}
+
+impl PipelineObjects {
+    /// The layouts (with empty sets in gaps) for the shaders of one pipeline, whose attachments count as resources of the fragment stage.
+    pub fn new(gpu: &Arc<Inner>, shaders: &[&'static ShaderInfo], attachments: u32) -> Result<Self> {
+        let wanted = Wanted::by(shaders, attachments);
+        if let Some((limit, wanted, offered)) = wanted.excess(&gpu.caps.descriptors, gpu.caps.max_push_constants) {
+            let names: Vec<_> = shaders.iter().map(|shader| shader.name).collect();
+            return Err(Error::MissingFeature {
+                feature: format!("{limit} >= {wanted}"),
+                needed_by: format!("the pipeline of {}", names.join(" and ")),
+                device: gpu.caps.device.clone(),
+                instead: format!("it offers {offered}; choose another device"),
+            });
+        }
+        let mut objects = Self {
+            gpu: Arc::clone(gpu),
+            raw: vk::Pipeline::null(),
+            layout: vk::PipelineLayout::null(),
+            sets: Vec::new(),
+        };
+        objects.make(shaders)?;
+        Ok(objects)
+    }
+
+    fn make(&mut self, shaders: &[&'static ShaderInfo]) -> Result<()> {
+        let (gpu, name) = (&self.gpu, shaders[0].name);
+        let stages = shaders.iter().fold(vk::ShaderStageFlags::empty(), |all, shader| {
+            all | stage_flags(shader.stage)
+        });
+        let mut bindings: BTreeMap<(u32, u32), BindingKind> = BTreeMap::new();
+        for binding in shaders.iter().flat_map(|shader| shader.bindings) {
+            bindings.insert((binding.set, binding.binding), binding.kind);
+        }
+        for set in 0..bindings.keys().map(|(set, _)| set + 1).max().unwrap_or(0) {
+            let list: Vec<_> = bindings
+                .range((set, 0)..=(set, u32::MAX))
+                .map(|((_, binding), kind)| {
+                    vk::DescriptorSetLayoutBinding::default()
+                        .binding(*binding)
+                        .descriptor_type(descriptor_type(*kind))
+                        .descriptor_count(1)
+                        .stage_flags(stages)
+                })
+                .collect();
+            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&list);
+            // SAFETY: plain creation.
+            let layout = unsafe { gpu.device.create_descriptor_set_layout(&info, None) }
+                .map_err(|result| gpu.error("vkCreateDescriptorSetLayout", result))?;
+            gpu.name(layout, &format!("{name} set {set}"));
+            self.sets.push(layout);
+        }
+        let push_bytes = shaders
+            .iter()
+            .map(|shader| shader.push_constant_bytes)
+            .max()
+            .unwrap_or(0);
+        let ranges = [vk::PushConstantRange::default().stage_flags(stages).size(push_bytes)];
+        let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&self.sets);
+        if push_bytes > 0 {
+            info = info.push_constant_ranges(&ranges);
+        }
+        // SAFETY: plain creation from live layouts.
+        self.layout = unsafe { gpu.device.create_pipeline_layout(&info, None) }
+            .map_err(|result| gpu.error("vkCreatePipelineLayout", result))?;
+        gpu.name(self.layout, name);
+        Ok(())
+    }
+
+    /// Takes the pipeline that was made with the layout.
+    pub fn set_pipeline(&mut self, raw: vk::Pipeline, name: &str) {
+        self.raw = raw;
+        self.gpu.name(raw, name);
+    }
+}
+
+impl Drop for PipelineObjects {
+    fn drop(&mut self) {
+        // SAFETY: the last owner is gone, and submissions own what they use; null handles are allowed.
+        unsafe {
+            self.gpu.device.destroy_pipeline(self.raw, None);
+            self.gpu.device.destroy_pipeline_layout(self.layout, None);
+            for layout in &self.sets {
+                self.gpu.device.destroy_descriptor_set_layout(*layout, None);
+            }
+        }
+    }
+}
+
+/// What the layout of one pipeline takes. Every binding is visible to all stages of the pipeline, so that one count holds for each stage
+/// and for the whole.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Wanted {
+    sets: u32,
+    storage_buffers: u32,
+    uniform_buffers: u32,
+    storage_images: u32,
+    /// Combined images and samplers, and texel buffers, which count as sampled images.
+    sampled_images: u32,
+    samplers: u32,
+    resources: u32,
+    push_bytes: u32,
+}
+
+impl Wanted {
+    fn by(shaders: &[&ShaderInfo], attachments: u32) -> Self {
+        let kinds: BTreeMap<_, _> = shaders
+            .iter()
+            .flat_map(|shader| shader.bindings)
+            .map(|binding| ((binding.set, binding.binding), binding.kind))
+            .collect();
+        let count = |of: &[BindingKind]| kinds.values().filter(|kind| of.contains(kind)).count() as u32;
+        Self {
+            sets: kinds.keys().map(|(set, _)| set + 1).max().unwrap_or(0),
+            storage_buffers: count(&[BindingKind::StorageBuffer]),
+            uniform_buffers: count(&[BindingKind::UniformBuffer]),
+            storage_images: count(&[BindingKind::StorageImage]),
+            sampled_images: count(&[BindingKind::SampledImage, BindingKind::TexelBuffer]),
+            samplers: count(&[BindingKind::SampledImage]),
+            resources: kinds.len() as u32 + attachments,
+            push_bytes: shaders.iter().map(|s| s.push_constant_bytes).max().unwrap_or(0),
+        }
+    }
+
+    /// The first limit that does not suffice, with what is wanted and what is offered.
+    fn excess(&self, offered: &DescriptorLimits, max_push_constants: u32) -> Option<(&'static str, u32, u32)> {
+        let stage = [
+            ("maxBoundDescriptorSets", self.sets, offered.bound_sets),
+            ("maxPushConstantsSize", self.push_bytes, max_push_constants),
+            (
+                "maxPerStageDescriptorStorageBuffers",
+                self.storage_buffers,
+                offered.per_stage_storage_buffers,
+            ),
+            (
+                "maxPerStageDescriptorUniformBuffers",
+                self.uniform_buffers,
+                offered.per_stage_uniform_buffers,
+            ),
+            (
+                "maxPerStageDescriptorStorageImages",
+                self.storage_images,
+                offered.per_stage_storage_images,
+            ),
+            (
+                "maxPerStageDescriptorSampledImages",
+                self.sampled_images,
+                offered.per_stage_sampled_images,
+            ),
+            (
+                "maxPerStageDescriptorSamplers",
+                self.samplers,
+                offered.per_stage_samplers,
+            ),
+            ("maxPerStageResources", self.resources, offered.per_stage_resources),
+            (
+                "maxDescriptorSetStorageBuffers",
+                self.storage_buffers,
+                offered.per_pipeline_storage_buffers,
+            ),
+            (
+                "maxDescriptorSetUniformBuffers",
+                self.uniform_buffers,
+                offered.per_pipeline_uniform_buffers,
+            ),
+            (
+                "maxDescriptorSetStorageImages",
+                self.storage_images,
+                offered.per_pipeline_storage_images,
+            ),
+            (
+                "maxDescriptorSetSampledImages",
+                self.sampled_images,
+                offered.per_pipeline_sampled_images,
+            ),
+            ("maxDescriptorSetSamplers", self.samplers, offered.per_pipeline_samplers),
+        ];
+        stage.into_iter().find(|(_, wanted, offered)| wanted > offered)
+    }
+}
+
+/// The Vulkan stage.
+pub(super) fn stage_flags(stage: Stage) -> vk::ShaderStageFlags {
+    match stage {
+        Stage::Compute => vk::ShaderStageFlags::COMPUTE,
+        Stage::Vertex => vk::ShaderStageFlags::VERTEX,
+        Stage::Geometry => vk::ShaderStageFlags::GEOMETRY,
+        Stage::Fragment => vk::ShaderStageFlags::FRAGMENT,
+    }
+}
+
+/// The Vulkan type of a binding.
+pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
+    match kind {
+        BindingKind::StorageBuffer => vk::DescriptorType::STORAGE_BUFFER,
+        BindingKind::UniformBuffer => vk::DescriptorType::UNIFORM_BUFFER,
+        BindingKind::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
+        BindingKind::SampledImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+        BindingKind::TexelBuffer => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+    }
+}
+
+/// A shader module, which may go once its pipelines are made.
+pub(super) struct ShaderModule<'a> {
+    gpu: &'a Inner,
+    pub raw: vk::ShaderModule,
+}
+
+impl<'a> ShaderModule<'a> {
+    pub fn new(gpu: &'a Inner, name: &str, spirv: &[u8]) -> Result<Self> {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).map_err(|error| Error::Shader {
+            name: name.into(),
+            message: error.to_string(),
+        })?;
+        let create = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: the words are a module that was validated when it was built.
+        let raw = unsafe { gpu.device.create_shader_module(&create, None) }
+            .map_err(|result| gpu.error("vkCreateShaderModule", result))?;
+        gpu.name(raw, name);
+        Ok(Self { gpu, raw })
+    }
+}
+
+impl Drop for ShaderModule<'_> {
+    fn drop(&mut self) {
+        // SAFETY: its pipelines are made, or failed to be.
+        unsafe { self.gpu.device.destroy_shader_module(self.raw, None) };
+    }
+}
+
+/// Map entries and packed values of specialization constants.
+pub(super) fn specialization_data(values: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
+    let entry = |(index, (id, _)): (u32, &(u32, u32))| {
+        vk::SpecializationMapEntry::default()
+            .constant_id(*id)
+            .offset(index * 4)
+            .size(4)
+    };
+    let entries = (0u32..).zip(values).map(entry).collect();
+    let data = values.iter().flat_map(|(_, bits)| bits.to_ne_bytes()).collect();
+    (entries, data)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::interface::{BindingInfo, LocalSize};
+
+    const fn binding(set: u32, binding: u32, kind: BindingKind) -> BindingInfo {
+        BindingInfo {
+            set,
+            binding,
+            name: "",
+            kind,
+            reads: true,
+            writes: false,
+        }
+    }
+
+    const fn shader(bindings: &'static [BindingInfo], push_constant_bytes: u32) -> ShaderInfo {
+        ShaderInfo {
+            name: "test",
+            stage: Stage::Vertex,
+            spirv: &[],
+            push_constant_bytes,
+            fingerprint: 0,
+            local_size: [LocalSize::Fixed(1); 3],
+            bindings,
+            spec_constants: &[],
+        }
+    }
+
+    static FIRST: ShaderInfo = shader(
+        &[
+            binding(0, 0, BindingKind::StorageBuffer),
+            binding(0, 1, BindingKind::UniformBuffer),
+            binding(2, 0, BindingKind::TexelBuffer),
+        ],
+        12,
+    );
+    static SECOND: ShaderInfo = shader(
+        &[
+            binding(0, 0, BindingKind::StorageBuffer),
+            binding(2, 3, BindingKind::SampledImage),
+            binding(2, 4, BindingKind::StorageImage),
+        ],
+        0,
+    );
+
+    #[test]
+    fn shared_bindings_count_once_and_texel_buffers_as_sampled_images() {
+        let expected = Wanted {
+            sets: 3,
+            storage_buffers: 1,
+            uniform_buffers: 1,
+            storage_images: 1,
+            sampled_images: 2,
+            samplers: 1,
+            resources: 5 + 2,
+            push_bytes: 12,
+        };
+        assert_eq!(Wanted::by(&[&FIRST, &SECOND], 2), expected);
+    }
+
+    type Field = fn(&mut DescriptorLimits) -> &mut u32;
+
+    #[test]
+    fn each_limit_is_reached_and_passed() {
+        let wanted = Wanted::by(&[&FIRST, &SECOND], 2);
+        let exact = DescriptorLimits {
+            bound_sets: 3,
+            per_stage_storage_buffers: 1,
+            per_stage_uniform_buffers: 1,
+            per_stage_storage_images: 1,
+            per_stage_sampled_images: 2,
+            per_stage_samplers: 1,
+            per_stage_resources: 7,
+            per_pipeline_storage_buffers: 1,
+            per_pipeline_uniform_buffers: 1,
+            per_pipeline_storage_images: 1,
+            per_pipeline_sampled_images: 2,
+            per_pipeline_samplers: 1,
+        };
+        assert_eq!(wanted.excess(&exact, 12), None);
+        assert_eq!(wanted.excess(&exact, 11), Some(("maxPushConstantsSize", 12, 11)));
+        let less: [(&str, Field); 12] = [
+            ("maxBoundDescriptorSets", |l| &mut l.bound_sets),
+            ("maxPerStageDescriptorStorageBuffers", |l| {
+                &mut l.per_stage_storage_buffers
+            }),
+            ("maxPerStageDescriptorUniformBuffers", |l| {
+                &mut l.per_stage_uniform_buffers
+            }),
+            ("maxPerStageDescriptorStorageImages", |l| {
+                &mut l.per_stage_storage_images
+            }),
+            ("maxPerStageDescriptorSampledImages", |l| {
+                &mut l.per_stage_sampled_images
+            }),
+            ("maxPerStageDescriptorSamplers", |l| &mut l.per_stage_samplers),
+            ("maxPerStageResources", |l| &mut l.per_stage_resources),
+            ("maxDescriptorSetStorageBuffers", |l| {
+                &mut l.per_pipeline_storage_buffers
+            }),
+            ("maxDescriptorSetUniformBuffers", |l| {
+                &mut l.per_pipeline_uniform_buffers
+            }),
+            ("maxDescriptorSetStorageImages", |l| &mut l.per_pipeline_storage_images),
+            ("maxDescriptorSetSampledImages", |l| &mut l.per_pipeline_sampled_images),
+            ("maxDescriptorSetSamplers", |l| &mut l.per_pipeline_samplers),
+        ];
+        for (name, limit) in less {
+            let mut short = exact;
+            *limit(&mut short) -= 1;
+            let (found, wanted, offered) = wanted.excess(&short, 12).unwrap_or_default();
+            assert_eq!((found, wanted), (name, offered + 1));
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Device features by the names that techniques ask for them.
+
+use crate::gpu::Caps;
+use crate::{Error, Result};
+
+use super::TechniqueInfo;
+
+/// A feature's Vulkan name, and whether a device has it enabled.
+type Feature = (&'static str, fn(&Caps) -> bool);
+
+/// What [`TechniqueInfo::needs`] may name.
+const FEATURES: [Feature; 16] = [
+    ("geometryShader", |caps| caps.geometry_shader),
+    ("shaderInt64", |caps| caps.int64),
+    ("shaderFloat64", |caps| caps.float64),
+    ("shaderBufferInt64Atomics", |caps| caps.int64_atomics),
+    ("robustBufferAccess", |caps| caps.robust_buffer_access),
+    ("pipelineStatisticsQuery", |caps| caps.pipeline_statistics),
+    ("fragmentStoresAndAtomics", |caps| caps.fragment_stores),
+    ("vertexPipelineStoresAndAtomics", |caps| caps.vertex_stores),
+    ("runtimeDescriptorArray", |caps| caps.descriptor_indexing),
+    ("VK_KHR_ray_query", |caps| caps.ray_query),
+    ("VK_QUEUE_GRAPHICS_BIT", |caps| caps.graphics),
+    ("VK_SUBGROUP_FEATURE_BASIC_BIT", |caps| caps.subgroup.basic),
+    ("VK_SUBGROUP_FEATURE_VOTE_BIT", |caps| caps.subgroup.vote),
+    ("VK_SUBGROUP_FEATURE_ARITHMETIC_BIT", |caps| caps.subgroup.arithmetic),
+    ("VK_SUBGROUP_FEATURE_BALLOT_BIT", |caps| caps.subgroup.ballot),
+    ("VK_SUBGROUP_FEATURE_SHUFFLE_BIT", |caps| caps.subgroup.shuffle),
+];
+
+/// Whether a device has a feature, by its Vulkan name; `None` for a name that the engine does not know.
+pub fn offers(caps: &Caps, feature: &str) -> Option<bool> {
+    let (_, has) = FEATURES.iter().find(|(name, _)| *name == feature)?;
+    Some(has(caps))
+}
+
+/// Refuses a device that lacks what the technique needs.
+pub(super) fn check(caps: &Caps, technique: &TechniqueInfo) -> Result<()> {
+    for feature in technique.needs {
+        match offers(caps, feature) {
+            Some(true) => {}
+            Some(false) => {
+                return Err(Error::MissingFeature {
+                    feature: (*feature).into(),
+                    needed_by: format!("technique {}", technique.id),
+                    device: caps.device.clone(),
+                    instead: way_round(caps),
+                });
+            }
+            None => {
+                let known: Vec<_> = FEATURES.iter().map(|(name, _)| *name).collect();
+                let cause = format!(
+                    "is needed by technique {} but is none of {}",
+                    technique.id,
+                    known.join(", ")
+                );
+                return Err(Error::setting("needs", feature, cause));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What to do on a device that does not do: the engine's own techniques that run on it.
+fn way_round(caps: &Caps) -> String {
+    let fits = |technique: &&TechniqueInfo| technique.needs.iter().all(|need| offers(caps, need) == Some(true));
+    let ids: Vec<_> = super::all().iter().filter(fits).map(|technique| technique.id).collect();
+    format!(
+        "choose a device that has it (or enable it, where the host made the device), or one of the techniques that run here: {}",
+        ids.join(", ")
+    )
+}

@@ -1,0 +1,71 @@
+//! Which terms of the scattering function a scene needs.
+
+use crate::scene::Material;
+use crate::transport::albedo::AlbedoTable;
+
+/// Which terms are compiled in: the values of the shader's specialization constants of the same names in capitals (`HAS_METAL` …).
+///
+/// A feature that no material uses can be left out without changing a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "one for each specialization constant")]
+pub struct BsdfFeatures {
+    /// Some `metallic` > 0.
+    pub metal: bool,
+    /// Some metal is an exact conductor.
+    pub conductor: bool,
+    /// Some dielectric has `specular` > 0.
+    pub specular_layer: bool,
+    /// Some `transmission` > 0.
+    pub transmission: bool,
+    /// Metals are compensated for multiple scattering; off for comparison with single-scattering renderers.
+    pub multiple_scattering: bool,
+    /// Masking is G1·G1 (`SEPARABLE_MASKING`), for comparison; meant to be used without `multiple_scattering`.
+    pub separable_masking: bool,
+}
+
+impl BsdfFeatures {
+    /// Everything, height-correlated.
+    pub const ALL: Self = Self {
+        metal: true,
+        conductor: true,
+        specular_layer: true,
+        transmission: true,
+        multiple_scattering: true,
+        separable_masking: false,
+    };
+    /// Lambert only.
+    pub const NONE: Self = Self {
+        metal: false,
+        conductor: false,
+        specular_layer: false,
+        transmission: false,
+        multiple_scattering: false,
+        separable_masking: false,
+    };
+
+    /// What a set of materials needs; textures can only lower a factor, so factors decide.
+    pub fn of_materials<'a>(materials: impl IntoIterator<Item = &'a Material>) -> Self {
+        materials
+            .into_iter()
+            .filter(|m| !m.unlit)
+            .fold(Self::NONE, |f, m| Self {
+                metal: f.metal || m.metallic > 0.0,
+                conductor: f.conductor || (m.metallic > 0.0 && m.conductor.is_some()),
+                specular_layer: f.specular_layer
+                    || (m.specular > 0.0 && m.metallic < 1.0)
+                    || (m.specular > 0.0 && m.metallic_roughness_texture.is_some()),
+                transmission: f.transmission || m.transmission > 0.0,
+                multiple_scattering: f.multiple_scattering || m.metallic > 0.0,
+                separable_masking: false,
+            })
+    }
+}
+
+/// The features and the table that the twin functions read, as the shader reads its constants and its buffer.
+#[derive(Debug, Clone, Copy)]
+pub struct BsdfContext<'a> {
+    /// Terms compiled in.
+    pub features: BsdfFeatures,
+    /// Albedos of the GGX lobe.
+    pub table: &'a AlbedoTable,
+}

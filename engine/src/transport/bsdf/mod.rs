@@ -1,0 +1,251 @@
+//! The surface scattering function: glTF 2.0 metallic-roughness with transmission, and exact conductors.
+//!
+//! f = m f_metal + (1 − m)(f_layer + (1 − t) f_diffuse + t f_transmission), m = metallic, t = transmission:
+//! - f_layer: GGX reflection under the exact dielectric Fresnel factor, tinted as `KHR_materials_specular` asks;
+//! - f_diffuse: base colour · (1 − E(ωo))(1 − E(ωi)) / (π(1 − E_avg)), E the albedo of f_layer: reciprocal, and a white base gives
+//!   back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997);
+//! - f_transmission: Walter et al. (EGSR 2007) through solids, with radiance scaled by 1/η²; a mirrored GGX lobe through thin walls
+//!   (`KHR_materials_transmission`);
+//! - f_metal: GGX with Schlick's or the exact conductor's Fresnel factor, plus the multiple-scattering lobe of Kulla and Conty (2017).
+//!
+//! Guarantees: never gains energy beyond the interpolation error of the albedo table (stated by the tests); reflection is reciprocal,
+//! transmission up to η²; `specular` 0 without transmission and metal is exactly Lambert. Rough transmission is single scattering:
+//! what the microfacets shadow is lost. From inside a solid (`wo.z` < 0) the diffuse base is black: what glTF calls the opaque part
+//! absorbs there. Frame: z is the shading normal; of a solid it points out of the body. Opaque and thin surfaces scatter alike on
+//! both sides. Twin of `transport/bsdf.glsl`.
+
+mod features;
+mod lobes;
+mod parameters;
+
+use glam::{DVec2, DVec3};
+
+pub use self::features::{BsdfContext, BsdfFeatures};
+use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
+pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
+use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
+use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
+use crate::gpu::shaders::constants;
+
+/// The diffuse base.
+pub const LOBE_DIFFUSE: u32 = constants::LOBE_DIFFUSE;
+/// GGX lobes of width [`ALPHA_MIN`](super::ggx::ALPHA_MIN) and more, with what compensates them.
+pub const LOBE_GLOSSY: u32 = constants::LOBE_GLOSSY;
+/// Dirac deltas: mirrors and clear refraction.
+pub const LOBE_SPECULAR: u32 = constants::LOBE_SPECULAR;
+/// Scattering to the side of ωo.
+pub const LOBE_REFLECTION: u32 = constants::LOBE_REFLECTION;
+/// Scattering to the other side.
+pub const LOBE_TRANSMISSION: u32 = constants::LOBE_TRANSMISSION;
+/// Every class on both sides. A mask allows a lobe when it has the bits of both its class and its side.
+pub const LOBE_ALL: u32 = constants::LOBE_ALL;
+
+/// Transmission goes straight through a thin wall.
+pub const BSDF_THIN: u32 = constants::BSDF_THIN;
+/// The metal is `conductor_eta` + i `conductor_k`, not `base_color`.
+pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
+/// ωo is where particles come from: refraction is not scaled by 1/η².
+pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
+
+/// A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
+pub const ETA_MATCHED: f64 = 1.001;
+/// Below this 1 − E_avg there is no multiple scattering to speak of.
+const LOSS_MIN: f64 = 1e-5;
+
+/// One sampled direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BsdfSample {
+    /// Unit direction.
+    pub wi: DVec3,
+    /// Density per solid angle; 0 for a delta lobe.
+    pub pdf: f64,
+    /// f |cos| / pdf with all probabilities included.
+    pub weight: DVec3,
+    /// `LOBE_…` bits of the strategy that was used, 0 when no direction was found. A path is restricted to lobes by the mask, not
+    /// by looking at these: strategies overlap.
+    pub flags: u32,
+}
+
+impl BsdfSample {
+    const NONE: Self = Self {
+        wi: DVec3::ZERO,
+        pdf: 0.0,
+        weight: DVec3::ZERO,
+        flags: 0,
+    };
+}
+
+/// Mean of the three bands.
+pub fn mean3(v: DVec3) -> f64 {
+    v.element_sum() / 3.0
+}
+
+/// Whether a mask allows a lobe (class and side bits).
+pub fn lobe_allowed(mask: u32, lobe: u32) -> bool {
+    mask & lobe == lobe
+}
+
+/// What does not change between the directions of one look: the side-adjusted ωo and what follows from it.
+struct Upper {
+    wo: DVec3,
+    eta: f64,
+    side: f64,
+    lobes: CosineLobes,
+    p_cosine: f64,
+}
+
+impl BsdfContext<'_> {
+    fn upper(&self, b: &Bsdf, mut wo: DVec3, mask: u32) -> Upper {
+        let below = wo.z < 0.0;
+        let inside = below && self.transmission(b) > 0.0 && !b.is_thin();
+        wo.z = wo.z.abs();
+        let eta = if inside { 1.0 / b.eta } else { b.eta };
+        let lobes = self.cosine_lobes(b, wo.z, inside, mask);
+        let (r, t) = self.microfacet_split(b, wo.z, eta, mask);
+        let d = mean3(lobes.seen);
+        let p_cosine = if d > 0.0 { d / (d + mean3(r) + mean3(t)) } else { 0.0 };
+        Upper {
+            wo,
+            eta,
+            side: if below { -1.0 } else { 1.0 },
+            lobes,
+            p_cosine,
+        }
+    }
+
+    fn eval_upper(&self, b: &Bsdf, upper: &Upper, wi: DVec3, mask: u32) -> (DVec3, f64) {
+        let &Upper { wo, eta, p_cosine, .. } = upper;
+        let (reflected, cos_i) = (wi.z > 0.0, wi.z.abs());
+        if cos_i <= 0.0 || wo.z <= 0.0 {
+            return (DVec3::ZERO, 0.0);
+        }
+        let (mut value, mut pdf) = (DVec3::ZERO, 0.0);
+        if reflected {
+            value = self.cosine_lobes_eval(b, &upper.lobes, cos_i) * cos_i;
+            pdf = p_cosine * cosine_hemisphere_pdf(cos_i);
+        }
+        let f = &self.features;
+        let microfacets = f.metal || f.specular_layer || f.transmission;
+        if !microfacets || b.is_delta() || !(reflected || self.transmission(b) > 0.0) {
+            return (value, pdf);
+        }
+        let refracted = !reflected && !b.is_thin();
+        let sum = if refracted {
+            -(wo + eta * wi)
+        } else {
+            wo + DVec3::new(wi.x, wi.y, cos_i)
+        };
+        let h = if sum.z < 0.0 { -sum } else { sum }.normalize();
+        let (cos_h, cos_ih) = (wo.dot(h), wi.dot(h));
+        if cos_h <= 0.0 || (refracted && cos_ih >= 0.0) {
+            return (value, pdf);
+        }
+        let (r, t) = self.microfacet_split(b, cos_h, eta, mask);
+        let p_reflection = reflection_probability(r, t);
+        let p_side = if reflected { p_reflection } else { 1.0 - p_reflection };
+        let density = (1.0 - p_cosine) * ggx_visible_pdf(wo, h, b.alpha) * p_side;
+        let d = ggx_d(h, b.alpha);
+        if refracted {
+            let q = cos_h + eta * cos_ih;
+            let jacobian = -cos_ih * eta * eta / (q * q);
+            let masking = ggx_g1(wo.z, b.alpha) * ggx_g1(cos_i, b.alpha);
+            let shape = d * masking * cos_h / wo.z * jacobian * refraction_scale(b, eta);
+            return (t * shape, density * jacobian);
+        }
+        let shape = d * ggx_g2(wo.z, cos_i, b.alpha, f.separable_masking) / (4.0 * wo.z);
+        value += if reflected { r } else { t } * shape;
+        (value, pdf + density / (4.0 * cos_h))
+    }
+}
+
+/// f |cos θi| and the density of [`bsdf_sample`] of all allowed lobes that are not deltas.
+pub fn bsdf_eval_pdf(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32) -> (DVec3, f64) {
+    let upper = context.upper(b, wo, mask);
+    let wi = DVec3::new(wi.x, wi.y, wi.z * upper.side);
+    context.eval_upper(b, &upper, wi, mask)
+}
+
+/// f |cos θi| of all allowed lobes that are not deltas, sr⁻¹.
+pub fn bsdf_eval(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32) -> DVec3 {
+    bsdf_eval_pdf(context, b, wo, wi, mask).0
+}
+
+/// Density of [`bsdf_sample`] for a direction, sr⁻¹; deltas have none.
+pub fn bsdf_pdf(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32) -> f64 {
+    bsdf_eval_pdf(context, b, wo, wi, mask).1
+}
+
+/// A direction in proportion to the allowed lobes: `u.xy` choose the direction, `u.z` the lobe.
+///
+/// Strategies: the cosine for the diffuse base and the metal's multiple scattering, visible normals for all microfacet lobes, with
+/// reflection and transmission told apart by the Fresnel factor of the sampled facet; all balance-weighted (one-sample MIS).
+pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u32) -> BsdfSample {
+    let upper = context.upper(b, wo, mask);
+    let &Upper {
+        wo,
+        eta,
+        p_cosine,
+        side,
+        ..
+    } = &upper;
+    let uv = DVec2::new(u.x, u.y);
+    let (mut wi, mut flags);
+    if u.z < p_cosine {
+        wi = square_to_cosine_hemisphere(uv);
+        flags = LOBE_DIFFUSE | LOBE_REFLECTION;
+    } else {
+        let delta = b.is_delta();
+        let h = if delta {
+            DVec3::Z
+        } else {
+            ggx_sample_visible(wo, b.alpha, uv)
+        };
+        let cos_h = wo.dot(h);
+        let (r, t) = context.microfacet_split(b, cos_h, eta, mask);
+        let p_reflection = reflection_probability(r, t);
+        let reflected = u.z - p_cosine < p_reflection * (1.0 - p_cosine);
+        wi = 2.0 * cos_h * h - wo;
+        flags = if delta { LOBE_SPECULAR } else { LOBE_GLOSSY } | LOBE_REFLECTION;
+        let mut scale = 1.0 / (p_reflection * (1.0 - p_cosine));
+        if wi.z <= 0.0 && (reflected || b.is_thin()) {
+            return BsdfSample::NONE;
+        }
+        if !reflected {
+            flags ^= LOBE_REFLECTION | LOBE_TRANSMISSION;
+            scale = 1.0 / ((1.0 - p_reflection) * (1.0 - p_cosine));
+            if b.is_thin() {
+                wi.z = -wi.z;
+            } else {
+                let inv = 1.0 / eta;
+                let cos_t = (1.0 - (1.0 - cos_h * cos_h) * inv * inv).max(0.0).sqrt();
+                wi = (cos_h * inv - cos_t) * h - inv * wo;
+                scale *= refraction_scale(b, eta);
+                if wi.z >= 0.0 {
+                    return BsdfSample::NONE;
+                }
+            }
+        }
+        if delta {
+            let weight = if reflected { r } else { t } * scale;
+            return BsdfSample {
+                wi: DVec3::new(wi.x, wi.y, wi.z * side),
+                pdf: 0.0,
+                weight,
+                flags: if weight == DVec3::ZERO { 0 } else { flags },
+            };
+        }
+    }
+    let (value, pdf) = context.eval_upper(b, &upper, wi, mask);
+    if pdf <= 0.0 {
+        return BsdfSample::NONE;
+    }
+    BsdfSample {
+        wi: DVec3::new(wi.x, wi.y, wi.z * side),
+        pdf,
+        weight: value / pdf,
+        flags,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,77 @@
+//! Light without area, measures and weights of light sampling, phase functions.
+
+use clerestory::transport::lights::{
+    area_to_solid_angle, balance_heuristic, power_heuristic, spot_falloff, triangle_point,
+};
+use clerestory::transport::phase::{
+    henyey_greenstein, henyey_greenstein_sample, phase_direction, schlick_phase, schlick_phase_sample,
+};
+use clerestory_tests::twin::{Tolerance, U, trigonometric_error};
+use clerestory_tests::with_gpu;
+
+use crate::{cases, check, direction, join, list, ulps, unit, v2, v3};
+
+#[test]
+fn lights() {
+    with_gpu(|gpu| {
+        let table = cases(6, |r| {
+            let (inner, outer) = (r.range(0.5, 1.0), r.range(-1.0, 0.5));
+            let mut all = vec![
+                r.range(0.1, 9.0),
+                r.range(1e-6, 1e6),
+                r.choose(&[0.0, -1.0, 1e-9, 0.5, 1.0]),
+                r.range(-1.0, 1.0),
+                inner,
+                outer,
+            ];
+            all.extend([r.choose(&[0.0, 1e-6, 1.0, 1e6]), r.choose(&[0.0, 1e-6, 1.0, 1e6])]);
+            all.extend((0..9).map(|_| r.range(-10.0, 10.0)));
+            all.extend([unit(r), unit(r)]);
+            all
+        });
+        check(gpu, "lights", 4, &table, ulps(16.0, 4.0, 0.0), 19, |x| {
+            list![
+                [
+                    area_to_solid_angle(x[0], x[1], x[2]),
+                    spot_falloff(x[3], x[4], x[5]),
+                    balance_heuristic(x[6], x[7]),
+                    power_heuristic(x[6], x[7]),
+                ],
+                triangle_point(v3(x, 8), v3(x, 11), v3(x, 14), v2(x, 17)).to_array(),
+            ]
+        });
+    });
+}
+
+#[test]
+fn phase_functions() {
+    with_gpu(|gpu| {
+        let trig = trigonometric_error(gpu);
+        let table = cases(7, |r| {
+            let head = [
+                r.choose(&[-1.0, 1.0, 0.0, 0.999, 0.3]),
+                r.choose(&[0.0, 0.5, -0.5, 0.99, -0.99, 0.05]),
+                r.choose(&[0.0, 0.7, -0.99]),
+                unit(r),
+                unit(r),
+            ];
+            join(&[&head, &direction(r).to_array()])
+        });
+        // Henyey and Greenstein's inversion divides a difference of terms near 1 by 2g; |g| is 0.05 or more, or 0, here.
+        let tolerance = Tolerance {
+            input_size: 1.0,
+            ..ulps(32.0, 4.0, trig + 4.0 * U / 0.05)
+        };
+        check(gpu, "phase functions", 5, &table, tolerance, 8, |x| {
+            list![
+                [
+                    henyey_greenstein(x[0], x[1]),
+                    henyey_greenstein_sample(x[1], x[3]),
+                    schlick_phase(x[0], x[2]),
+                    schlick_phase_sample(x[2], x[3]),
+                ],
+                phase_direction(v3(x, 5), x[0], x[4]).to_array(),
+            ]
+        });
+    });
+}

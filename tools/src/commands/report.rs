@@ -1,0 +1,275 @@
+//! `clerestory report`: error against time of the path tracer on several scenes, written into a page of results.
+//!
+//! Each row is the median of repeats with different seeds. Errors are taken against a reference of 16 times the greatest number of samples,
+//! with a seed of its own, which is kept in a folder between runs; its own noise adds at most a sixteenth to a row's MSE. Only the part
+//! of the file between two marks is replaced, so that other measurements can stand beside it.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use clerestory::film::exr;
+use clerestory::film::metrics::{CompareOptions, compare};
+use clerestory::film::picture::Picture;
+use clerestory::gpu::Gpu;
+use clerestory::render::{RenderOptions, Rendered, Renderer};
+use clerestory::{Error, Result, scene};
+use clerestory_tools::machine::{self, median};
+
+use super::check_validation;
+use crate::failure::{Failure, Outcome};
+use crate::options::DeviceOptions;
+use crate::output;
+
+/// Measures error against time on several scenes, and writes the tables into RESULTS.md
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  clerestory report --smoke                        the smallest form, under two minutes on two cores
+  clerestory report                                128 × 128 pixels, 4 to 64 samples a pixel
+  clerestory report --scene model.glb --repeat 5 -o model.md
+
+The part of the file between its two marks is replaced, the rest stays. References are rendered once with 16 times the samples, and \
+kept; delete their folder after a change that changes pictures.")]
+pub struct Arguments {
+    /// The smallest form: 48 × 48 pixels, 2 to 32 samples a pixel
+    #[arg(long)]
+    smoke: bool,
+    /// A scene; may be given several times
+    #[arg(long = "scene", value_name = "SCENE", value_delimiter = ',', default_values = SCENES)]
+    scenes: Vec<String>,
+    /// Renderings a row, of which the median counts
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=99))]
+    repeat: u32,
+    /// File whose marked part is replaced; it is made if there is none
+    #[arg(short, long, value_name = "FILE", default_value = "RESULTS.md")]
+    output: PathBuf,
+    /// Folder that keeps the references
+    #[arg(long, value_name = "FOLDER", default_value = "out/references")]
+    references: PathBuf,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+const SCENES: [&str; 4] = [
+    "builtin:cornell-box",
+    "builtin:materials",
+    "builtin:passage",
+    "builtin:ring",
+];
+const BEGIN: &str = "<!-- begin: error against time, written by clerestory report -->";
+const END: &str = "<!-- end: error against time -->";
+/// Samples of the reference over the most samples of a row.
+const REFERENCE_FACTOR: u32 = 16;
+/// Far from the seeds of the rows.
+const REFERENCE_SEED: u32 = 1_000_003;
+
+/// How large the pictures are and how many samples their rows have.
+struct Plan {
+    size: [u32; 2],
+    spp: [u32; 3],
+    repeat: u32,
+}
+
+impl Plan {
+    fn reference_spp(&self) -> u32 {
+        self.spp[2] * REFERENCE_FACTOR
+    }
+}
+
+/// One line of the table.
+struct Row {
+    spp: u32,
+    seconds: f64,
+    gpu_seconds: f64,
+    rays_per_second: f64,
+    relative_mse: f64,
+    bias: f64,
+    flip: f64,
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let (size, spp) = if arguments.smoke {
+        ([48, 48], [2, 8, 32])
+    } else {
+        ([128, 128], [4, 16, 64])
+    };
+    let plan = Plan {
+        size,
+        spp,
+        repeat: arguments.repeat,
+    };
+    let gpu = arguments.device.open()?;
+    let mut text = head(&gpu, &plan);
+    for address in &arguments.scenes {
+        output::note(address);
+        let scene = scene::load(address).map_err(Failure::scene)?;
+        let renderer = Renderer::new(&gpu, &scene)?;
+        let reference = reference(&renderer, address, &plan, &arguments.references)?;
+        let rows = plan.spp.map(|spp| measure(&renderer, &reference, &plan, spp));
+        let rows = rows.into_iter().collect::<Result<Vec<Row>>>()?;
+        table(&mut text, address, &renderer, &rows);
+    }
+    let log = gpu.validation_log();
+    drop(gpu);
+    check_validation(&log)?;
+    write_between_marks(&arguments.output, &text)?;
+    output::note(&format!("wrote {}", arguments.output.display()));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn render(renderer: &Renderer, plan: &Plan, spp: u32, seed: u32) -> Result<Rendered> {
+    let mut rendering = renderer.start(&RenderOptions {
+        technique: Some("path".into()),
+        size: plan.size,
+        spp,
+        seed,
+        ..RenderOptions::default()
+    })?;
+    while rendering.step()?.is_some() {}
+    rendering.finish()
+}
+
+/// The reference from its folder, or rendered and put there.
+fn reference(renderer: &Renderer, address: &str, plan: &Plan, folder: &Path) -> Result<Picture> {
+    let name: String = address
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect();
+    let ([width, height], spp) = (plan.size, plan.reference_spp());
+    let version = env!("CARGO_PKG_VERSION");
+    let path = folder.join(format!("{name}-{width}x{height}-{spp}-{version}.exr"));
+    if path.is_file() {
+        return exr::read(&path);
+    }
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+    let picture = render(renderer, plan, spp, REFERENCE_SEED)?.picture;
+    exr::write(&path, &picture)?;
+    Ok(picture)
+}
+
+fn measure(renderer: &Renderer, reference: &Picture, plan: &Plan, spp: u32) -> Result<Row> {
+    // Once for nothing, so that no row pays for the driver's compilation.
+    render(renderer, plan, 1, 0)?;
+    let mut rows = Vec::new();
+    for seed in 0..plan.repeat {
+        let rendered = render(renderer, plan, spp, seed)?;
+        let error = compare(&rendered.picture, reference, &CompareOptions::default())?;
+        let rays = rendered.report.counters.get("rays").copied().unwrap_or(0) as f64;
+        rows.push(Row {
+            spp,
+            seconds: rendered.report.render_seconds,
+            gpu_seconds: rendered.report.gpu_seconds,
+            rays_per_second: rays / rendered.report.render_seconds,
+            relative_mse: error.relative_mse,
+            bias: error.relative_bias,
+            flip: error.flip,
+        });
+    }
+    let median = |value: fn(&Row) -> f64| median(rows.iter().map(value).collect());
+    Ok(Row {
+        spp,
+        seconds: median(|row| row.seconds),
+        gpu_seconds: median(|row| row.gpu_seconds),
+        rays_per_second: median(|row| row.rays_per_second),
+        relative_mse: median(|row| row.relative_mse),
+        bias: median(|row| row.bias),
+        flip: median(|row| row.flip),
+    })
+}
+
+fn head(gpu: &Gpu, plan: &Plan) -> String {
+    let caps = gpu.caps();
+    let load = machine::load().map_or(String::new(), |load| format!("; load average {load} when it began"));
+    format!(
+        "- Device: {}; driver: {}.\n- Machine: {}, {} threads{load}.\n- Clerestory {}, technique `path` with its default settings, {} × {} \
+         pixels; each row is the median of {} renderings with different seeds.\n- References: {} samples a pixel, a seed of their own.\n\
+         - Seconds: wall clock of the rendering after one picture that warms the driver's cache; GPU: by its timestamps. Rays: closest \
+         hits and shadow rays, over wall clock.\n\n",
+        caps.device,
+        caps.driver,
+        machine::processor(),
+        machine::threads(),
+        env!("CARGO_PKG_VERSION"),
+        plan.size[0],
+        plan.size[1],
+        plan.repeat,
+        plan.reference_spp(),
+    )
+}
+
+fn table(text: &mut String, address: &str, renderer: &Renderer, rows: &[Row]) {
+    let triangles = renderer.gpu_scene().profile().triangles;
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "### `{address}` ({triangles} triangles)\n");
+    text.push_str(
+        "| samples a pixel | seconds | GPU seconds | million rays/s | relative MSE | relative bias | FLIP |\n",
+    );
+    text.push_str("|---:|---:|---:|---:|---:|---:|---:|\n");
+    for row in rows {
+        let _ = writeln!(
+            text,
+            "| {} | {:.3} | {:.3} | {:.2} | {:.3e} | {:+.1e} | {:.4} |",
+            row.spp,
+            row.seconds,
+            row.gpu_seconds,
+            row.rays_per_second * 1e-6,
+            row.relative_mse,
+            row.bias,
+            row.flip
+        );
+    }
+    if let [first, .., last] = rows {
+        let slope = (last.relative_mse / first.relative_mse).ln() / (f64::from(last.spp) / f64::from(first.spp)).ln();
+        let _ = writeln!(
+            text,
+            "\nRelative MSE falls as samples^({slope:.2}) from the first row to the last; independent samples give −1.\n"
+        );
+    }
+}
+
+/// Replaces what stands between the marks, or appends it with its heading.
+fn write_between_marks(path: &Path, text: &str) -> Result<()> {
+    let old = match std::fs::read_to_string(path) {
+        Ok(old) => old,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            "# Results\n\nMeasured, not promised: every table says on what machine and driver, and how to repeat it.\n"
+                .to_owned()
+        }
+        Err(error) => return Err(Error::io(path, error)),
+    };
+    let marked = format!("{BEGIN}\n\n{}\n\n{END}", text.trim_end());
+    let new = match (old.find(BEGIN), old.find(END)) {
+        (Some(begin), Some(end)) if begin < end => format!("{}{marked}{}", &old[..begin], &old[end + END.len()..]),
+        _ => format!(
+            "{}\n\n## Error against time: `clerestory report`\n\n{marked}\n",
+            old.trim_end()
+        ),
+    };
+    std::fs::write(path, new).map_err(|error| Error::io(path, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_marked_part_is_replaced() -> std::result::Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("results.md");
+        write_between_marks(&path, "first\n")?;
+        let made = std::fs::read_to_string(&path)?;
+        assert!(made.starts_with("# Results") && made.contains("first"));
+        std::fs::write(&path, format!("before\n{made}after\n"))?;
+        write_between_marks(&path, "second\n")?;
+        let text = std::fs::read_to_string(&path)?;
+        assert!(
+            text.starts_with("before\n") && text.ends_with("after\n") && text.contains("second"),
+            "{text}"
+        );
+        assert!(!text.contains("first") && text.matches(BEGIN).count() == 1, "{text}");
+        Ok(())
+    }
+}
