@@ -103,6 +103,13 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
                 });
             }
         }
+        if !mesh.vertex_color.is_empty() {
+            scene.notes.push(Note {
+                feature: "vertex colours".into(),
+                at: format!("object {name:?}"),
+                instead: "left out".into(),
+            });
+        }
         if normals.len() != positions.len() {
             normals.clear();
         }
@@ -170,6 +177,8 @@ fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
             if key == "v" && !words.take(3).all(|w| w.parse::<f32>().is_ok_and(f32::is_finite)) {
                 return Err((i + 1, "a position is no finite number".into()));
             }
+        } else if key == "usemtl" && words.next().is_none() {
+            return Err((i + 1, "usemtl without a name".into()));
         } else if key == "f" {
             let mut corners = words.peekable();
             if corners.peek().is_none() {
@@ -234,12 +243,23 @@ mod tests {
         assert!(at(TEXT.replace("v 1 1 0", "v 1 nan 0")).contains("line 4"));
         assert!(at("v 0 0 0\n".into()).contains("faces"));
         assert!(at(TEXT.replace("f 1//1 2//1 3//1", "f")).contains("line 13"));
+        assert!(at(TEXT.replace("usemtl lamp", "usemtl")).contains("line 12"));
         let utf16: Vec<u8> = std::iter::once(0xFEFF)
             .chain(TEXT.encode_utf16())
             .flat_map(u16::to_be_bytes)
             .collect();
         let error = parse(&utf16, "a.obj", |_| None).expect_err("fault").to_string();
         assert!(error.contains("UTF-16"), "{error}");
+    }
+
+    #[test]
+    fn vertex_colours_are_left_out_by_name() {
+        let scene = read("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nf 1 2 3\n").expect("scene");
+        assert!(
+            scene.notes.iter().any(|note| note.feature == "vertex colours"),
+            "{:?}",
+            scene.notes
+        );
     }
 
     #[test]
