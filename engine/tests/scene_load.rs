@@ -182,6 +182,27 @@ fn sidecar_faults_have_their_line_or_key() {
 }
 
 #[test]
+fn cut_and_changed_sidecars_are_read_or_refused() {
+    let text = "exposure = 1.5\n[environment]\ncolor = [1.0, 2.0, 3.0]\n[metals]\nring = { eta = [1.0, 1.0, 1.0], k = [2.0, 2.0, 2.0] }\n\
+                [[cameras]]\nname = \"main\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\n[medium]\nsigma_a = [0.1, 0.1, 0.1]\n\
+                sigma_s = [1.0, 1.0, 1.0]\n";
+    let folder = folder(text);
+    let read = |bytes: &[u8]| {
+        std::fs::write(folder.path().join("m.scene.toml"), bytes).expect("file");
+        load(folder.path(), "m.obj").is_ok()
+    };
+    assert!(read(text.as_bytes()));
+    for place in 0..text.len() {
+        let _ = read(&text.as_bytes()[..place]);
+        for byte in [b'9', b'-', b'"', b'[', b'\n', 0xFF] {
+            let mut changed = text.as_bytes().to_vec();
+            changed[place] = byte;
+            let _ = read(&changed);
+        }
+    }
+}
+
+#[test]
 fn exr_and_hdr_environments_are_read_and_cleaned() {
     let folder = folder("[environment]\nfile = \"sky.exr\"\n");
     let texel = |x: usize, y: usize| match (x, y) {

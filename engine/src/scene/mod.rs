@@ -8,6 +8,7 @@ pub mod check;
 mod files;
 pub mod gltf;
 pub mod metals;
+mod mtl;
 mod obj;
 mod ply;
 mod profile;

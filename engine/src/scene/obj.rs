@@ -1,17 +1,20 @@
 //! Wavefront OBJ: positions, normals, texture coordinates and faces, with the Kd and Ke of `.mtl` files.
 //!
-//! Read by the crate `tobj`; polygons are cut into fans. Materials are Lambert with their Kd, and emit their Ke; everything else an
+//! Read by the crate `tobj`, libraries by `mtl.rs`; polygons are cut into fans. Materials are Lambert with their Kd, and emit their Ke; everything else an
 //! `.mtl` says is reported. Texts that are not UTF-8 (names in older encodings) are read as far as they are.
 
 use std::cell::RefCell;
-use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
 
+use super::mtl::{self, LibraryMaterial};
 use super::{Material, Mesh, Note, Scene, files};
 use crate::{Error, Result};
+
+/// Reflectance of what has no material of its own.
+const GREY: Vec3 = Vec3::splat(0.6);
 
 /// Reads an OBJ file and the material libraries beside it.
 pub(super) fn load(path: &Path) -> Result<Scene> {
@@ -36,19 +39,28 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
         source: source.into(),
         ..Scene::default()
     };
-    let unread = RefCell::new(Vec::new());
+    let (materials, unread) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
     let loaded = tobj::load_obj_buf(&mut Cursor::new(utf8(bytes)), &options, |name| {
-        let cause = match library(name) {
-            Some(text) => match tobj::load_mtl_buf(&mut Cursor::new(utf8(&text))) {
-                Ok(materials) => return Ok(materials),
-                Err(error) => error.to_string(),
-            },
-            None => "there is no such file".into(),
-        };
-        unread.borrow_mut().push((name.display().to_string(), cause));
-        Ok(Default::default())
+        let text = library(name).ok_or_else(|| "there is no such file".to_owned());
+        match text.and_then(|text| mtl::parse(&String::from_utf8_lossy(&text))) {
+            Ok(read) => {
+                let named = |material: &LibraryMaterial| tobj::Material {
+                    name: material.name.clone(),
+                    ..tobj::Material::default()
+                };
+                let all: Vec<tobj::Material> = read.iter().map(named).collect();
+                let indices = all.iter().enumerate().map(|(i, material)| (material.name.clone(), i));
+                let indices = indices.collect();
+                materials.borrow_mut().extend(read);
+                Ok((all, indices))
+            }
+            Err(cause) => {
+                unread.borrow_mut().push((name.display().to_string(), cause));
+                Ok(Default::default())
+            }
+        }
     });
-    let (models, materials) = loaded.map_err(|error| Error::scene(source, "content", error.to_string()))?;
+    let (models, _) = loaded.map_err(|error| Error::scene(source, "content", error.to_string()))?;
     for (name, cause) in unread.into_inner() {
         scene.notes.push(Note {
             feature: format!("material library that cannot be read: {cause}"),
@@ -56,11 +68,11 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
             instead: "its materials are grey".into(),
         });
     }
-    let materials = materials.map_err(|error| Error::scene(source, "mtllib", error.to_string()))?;
+    let materials = materials.into_inner();
     for material in &materials {
         add_material(&mut scene, material);
     }
-    let grey = scene.add_material(Material::lambert("default", Vec3::splat(0.6)));
+    let grey = scene.add_material(Material::lambert("default", GREY));
     for model in models {
         let name = model.name;
         let mesh = model.mesh;
@@ -90,6 +102,13 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
                     instead: "left out".into(),
                 });
             }
+        }
+        if !mesh.vertex_color.is_empty() {
+            scene.notes.push(Note {
+                feature: "vertex colours".into(),
+                at: format!("object {name:?}"),
+                instead: "left out".into(),
+            });
         }
         if normals.len() != positions.len() {
             normals.clear();
@@ -123,40 +142,14 @@ fn utf8(bytes: &[u8]) -> Vec<u8> {
     String::from_utf8_lossy(bytes).into_owned().into_bytes()
 }
 
-fn add_material(scene: &mut Scene, source: &tobj::Material) {
+fn add_material(scene: &mut Scene, source: &LibraryMaterial) {
     let unit = |value: f32| if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 };
-    let diffuse = source.diffuse.unwrap_or([0.6; 3]).map(unit);
+    let diffuse = source.diffuse.unwrap_or(GREY).to_array().map(unit);
     let mut material = Material::lambert(&source.name, Vec3::from_array(diffuse));
     let usable = |emission: &Vec3| emission.is_finite() && emission.min_element() >= 0.0;
-    material.emission = source
-        .emissive
-        .map(Vec3::from_array)
-        .filter(usable)
-        .unwrap_or(Vec3::ZERO);
-    let mut others: BTreeSet<&str> = BTreeSet::new();
-    for key in source.unknown_param.keys() {
-        others.insert(key);
-    }
-    for (key, value) in [
-        ("map_Kd", &source.diffuse_texture),
-        ("map_Ks", &source.specular_texture),
-        ("map_Bump", &source.normal_texture),
-        ("map_d", &source.dissolve_texture),
-    ] {
-        if value.is_some() {
-            others.insert(key);
-        }
-    }
-    for (key, value) in [
-        ("Ks", source.specular.is_some_and(|s| s != [0.0; 3])),
-        ("d", source.dissolve.is_some_and(|d| d < 1.0)),
-    ] {
-        if value {
-            others.insert(key);
-        }
-    }
-    if !others.is_empty() {
-        let keys: Vec<&str> = others.into_iter().collect();
+    material.emission = source.emission.filter(usable).unwrap_or(Vec3::ZERO);
+    if !source.others.is_empty() {
+        let keys: Vec<&str> = source.others.iter().map(String::as_str).collect();
         scene.notes.push(Note {
             feature: format!("material keys {}", keys.join(", ")),
             at: format!("newmtl {}", source.name),
@@ -184,6 +177,8 @@ fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
             if key == "v" && !words.take(3).all(|w| w.parse::<f32>().is_ok_and(f32::is_finite)) {
                 return Err((i + 1, "a position is no finite number".into()));
             }
+        } else if key == "usemtl" && words.next().is_none() {
+            return Err((i + 1, "usemtl without a name".into()));
         } else if key == "f" {
             let mut corners = words.peekable();
             if corners.peek().is_none() {
@@ -248,12 +243,23 @@ mod tests {
         assert!(at(TEXT.replace("v 1 1 0", "v 1 nan 0")).contains("line 4"));
         assert!(at("v 0 0 0\n".into()).contains("faces"));
         assert!(at(TEXT.replace("f 1//1 2//1 3//1", "f")).contains("line 13"));
+        assert!(at(TEXT.replace("usemtl lamp", "usemtl")).contains("line 12"));
         let utf16: Vec<u8> = std::iter::once(0xFEFF)
             .chain(TEXT.encode_utf16())
             .flat_map(u16::to_be_bytes)
             .collect();
         let error = parse(&utf16, "a.obj", |_| None).expect_err("fault").to_string();
         assert!(error.contains("UTF-16"), "{error}");
+    }
+
+    #[test]
+    fn vertex_colours_are_left_out_by_name() {
+        let scene = read("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nf 1 2 3\n").expect("scene");
+        assert!(
+            scene.notes.iter().any(|note| note.feature == "vertex colours"),
+            "{:?}",
+            scene.notes
+        );
     }
 
     #[test]
@@ -273,9 +279,22 @@ mod tests {
     }
 
     #[test]
-    fn cut_files_do_not_panic() {
-        for cut in 0..TEXT.len() {
-            let _ = read(&TEXT[..cut]);
+    fn cut_and_changed_files_do_not_panic() {
+        let bytes = b"90-/\\ \n.e\xFF";
+        for place in 0..TEXT.len() {
+            let _ = read(&TEXT[..place]);
+            for byte in bytes {
+                let mut changed = TEXT.as_bytes().to_vec();
+                changed[place] = *byte;
+                let _ = parse(&changed, "a.obj", |_| Some(MTL.as_bytes().to_vec()));
+            }
+        }
+        for place in 0..MTL.len() {
+            for byte in bytes {
+                let mut changed = MTL.as_bytes().to_vec();
+                changed[place] = *byte;
+                let _ = parse(TEXT.as_bytes(), "a.obj", |_| Some(changed.clone()));
+            }
         }
     }
 
@@ -285,6 +304,10 @@ mod tests {
         assert!(scene.notes.iter().any(|n| n.at == "mtllib a.mtl"));
         let scene = parse(TEXT.as_bytes(), "a.obj", |_| Some(b"newmtl\nKd x\n".to_vec())).expect("scene");
         let note = scene.notes.iter().find(|n| n.at == "mtllib a.mtl").expect("note");
-        assert!(note.feature.contains("invalid object name"), "{}", note.feature);
+        assert!(
+            note.feature.contains("line 1: a material without a name"),
+            "{}",
+            note.feature
+        );
     }
 }

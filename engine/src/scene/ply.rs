@@ -433,6 +433,19 @@ mod tests {
     }
 
     #[test]
+    fn changed_bytes_do_not_panic() {
+        for bytes in [ASCII.as_bytes().to_vec(), binary(false, 3), binary(true, 3)] {
+            for place in 0..bytes.len() {
+                for byte in [0, 1, b'9', b'-', b'\n', b' ', 0x7F, 0xFF] {
+                    let mut changed = bytes.clone();
+                    changed[place] = byte;
+                    let _ = parse(&changed);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn counts_and_indices_are_checked() {
         let (at, cause) = parse(&binary(false, u32::MAX)).expect_err("too many");
         assert!(at.contains("vertex") && cause.contains("do not fit"), "{at} {cause}");

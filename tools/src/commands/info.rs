@@ -8,6 +8,7 @@ use clerestory::gpu::{Caps, DeviceSelection, DeviceSummary, Gpu, GpuOptions};
 use clerestory::scene::{self, Camera, Projection, Scene, SceneProfile};
 use clerestory::techniques;
 
+use super::check_validation;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output::{self, Stream};
@@ -98,6 +99,15 @@ struct Need {
     present: Option<bool>,
 }
 
+/// Why a device cannot be made or used; the validation layers are heard when the options ask for them.
+fn fault_of(options: &GpuOptions) -> Option<String> {
+    let log = match Gpu::headless(options) {
+        Ok(gpu) => gpu.validation_log(),
+        Err(error) => return Some(error.to_string()),
+    };
+    check_validation(&log).err().map(|failure| failure.message)
+}
+
 impl DeviceInfo {
     fn of((summary, caps): (DeviceSummary, Caps), wanted: &GpuOptions) -> Self {
         let options = GpuOptions {
@@ -110,7 +120,7 @@ impl DeviceInfo {
             present: has(&caps, feature),
         };
         Self {
-            unusable: Gpu::headless(&options).err().map(|error| error.to_string()),
+            unusable: fault_of(&options),
             techniques: techniques::all()
                 .iter()
                 .map(|technique| TechniqueNeeds {
