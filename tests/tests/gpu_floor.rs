@@ -569,15 +569,7 @@ fn uniform_buffers_want_barriers_of_their_own() {
     with_gpu(|gpu| {
         let pipeline = gpu.compute_pipeline::<uniform_probe::Kernel>(&()).unwrap();
         let words = gpu.buffer_with("words", Category::Work, &[1u32; 8]).unwrap();
-        let addend = gpu
-            .buffer(&BufferDesc {
-                name: "addend",
-                bytes: 16,
-                residency: Residency::Device,
-                category: Category::Work,
-                usage: vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::TRANSFER_DST,
-            })
-            .unwrap();
+        let addend = gpu.buffer(&BufferDesc::uniform("addend", 16, Category::Work)).unwrap();
         let run = |to| {
             let mut recorder = gpu.recorder("uniforms")?;
             recorder.pass("write", |pass| {
@@ -619,13 +611,7 @@ fn a_uniform_buffer_beyond_the_limit_is_refused() {
         let pipeline = gpu.compute_pipeline::<uniform_probe::Kernel>(&()).unwrap();
         let bytes = gpu.caps().max_uniform_buffer_range + 16;
         let addend = gpu
-            .buffer(&BufferDesc {
-                name: "too much",
-                bytes,
-                residency: Residency::Device,
-                category: Category::Work,
-                usage: vk::BufferUsageFlags::UNIFORM_BUFFER,
-            })
+            .buffer(&BufferDesc::uniform("too much", bytes, Category::Work))
             .unwrap();
         let words = gpu.buffer(&BufferDesc::storage("words", 32, Category::Work)).unwrap();
         let mut recorder = gpu.recorder("too much").unwrap();
