@@ -5,6 +5,7 @@ use clerestory::gpu::ash::vk;
 use clerestory::gpu::{
     Access, BufferDesc, Category, DescriptorLimits, Gpu, GpuOptions, ImageDesc, Lesser, Pass, Timings,
 };
+use clerestory::render::{RenderOptions, render};
 use clerestory_tests::shaders::{layout_probe, out_of_bounds, uniform_probe};
 use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
 
@@ -235,4 +236,38 @@ fn a_uniform_buffer_beyond_the_limit_is_refused() {
             "{result:?}"
         );
     });
+}
+
+#[test]
+fn the_path_tracer_says_what_a_device_of_the_least_limits_lacks() {
+    let descriptors = DescriptorLimits {
+        // What Vulkan promises on every device.
+        per_stage_storage_buffers: 4,
+        ..gpu_with(&GpuOptions::default()).caps().descriptors
+    };
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            descriptors: Some(descriptors),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    let scene = clerestory::scene::load("builtin:cornell-box").unwrap();
+    let options = RenderOptions {
+        size: [8, 8],
+        spp: 1,
+        ..RenderOptions::default()
+    };
+    match render(&gpu, &scene, &options) {
+        Err(Error::MissingFeature { feature, needed_by, .. }) => {
+            assert!(
+                feature.starts_with("maxPerStageDescriptorStorageBuffers >= "),
+                "{feature}"
+            );
+            assert!(needed_by.contains(".comp"), "{needed_by}");
+        }
+        Err(other) => panic!("expected a missing feature, got {other}"),
+        Ok(_) => panic!("the path tracer has more than four storage buffers"),
+    }
+    assert_no_messages(&gpu);
 }
