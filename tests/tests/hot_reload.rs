@@ -37,6 +37,7 @@ fn a_changed_source_takes_effect_and_a_faulty_one_does_not() {
     let original = include_str!("../shaders/out_of_bounds.comp");
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("out_of_bounds.comp");
+    let elsewhere = tempfile::tempdir().unwrap();
     save(&source, original, 0);
     with_gpu(|gpu| {
         let mut kernel = HotReload::<out_of_bounds::Kernel>::new(gpu, folder.path(), ()).unwrap();
@@ -75,7 +76,23 @@ fn a_changed_source_takes_effect_and_a_faulty_one_does_not() {
             assert_eq!(written(gpu, kernel.pipeline()), 6);
         }
 
-        save(&source, original, 9);
+        let including = original.replace(
+            "layout(local_size_x = 1)",
+            "#extension GL_GOOGLE_include_directive : require\n#include \"part/one.glsl\"\nlayout(local_size_x = ONE)",
+        );
+        std::fs::create_dir_all(elsewhere.path().join("part")).unwrap();
+        std::fs::write(elsewhere.path().join("part/one.glsl"), "#define ONE 1\n").unwrap();
+        save(&source, &including.replace("= value", "= value + 2"), 8);
+        match kernel.poll() {
+            Err(Error::Shader { message, .. }) => assert!(message.contains("part/one.glsl"), "{message}"),
+            other => panic!("expected a missing include, got {other:?}"),
+        }
+        kernel = kernel.with_includes(elsewhere.path());
+        save(&source, &including.replace("= value", "= value + 2"), 9);
+        assert!(kernel.poll().unwrap());
+        assert_eq!(written(gpu, kernel.pipeline()), 7);
+
+        save(&source, original, 10);
         assert!(kernel.poll().unwrap());
         assert_eq!(written(gpu, kernel.pipeline()), 5);
         std::fs::remove_file(&source).unwrap();

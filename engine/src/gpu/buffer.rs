@@ -51,6 +51,20 @@ impl<'a> BufferDesc<'a> {
         }
     }
 
+    /// A uniform buffer in device memory that can also be copied and filled. What shaders read of it at once is bounded by
+    /// `maxUniformBufferRange`.
+    pub fn uniform(name: &'a str, bytes: u64, category: Category) -> Self {
+        Self {
+            name,
+            bytes,
+            residency: Residency::Device,
+            category,
+            usage: vk::BufferUsageFlags::UNIFORM_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST,
+        }
+    }
+
     /// A mapped buffer for copies to the device.
     pub fn upload(name: &'a str, bytes: u64) -> Self {
         let usage = vk::BufferUsageFlags::TRANSFER_SRC;

@@ -1,8 +1,8 @@
 //! Kernels compiled anew while the program runs, when their source changes.
 //!
-//! The source is looked at by its time of change; a new one is compiled by `glslc` (or in this process, with
-//! the feature `shaderc`) and reflected by the same code as in the build. It takes
-//! the place of the pipeline only when it compiles and its interface is the one that the program was built with; else the old one stays.
+//! The source is looked at by its time of change; a new one is compiled by `glslc` (or in this process, with the feature `shaderc`) and
+//! reflected by the same code as in the build. It takes the place of the pipeline only when it compiles and its interface is the one that
+//! the program was built with; else the old one stays.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -41,6 +41,13 @@ impl<K: ComputeShader> HotReload<K> {
             includes: shaders.join("include"),
             source,
         })
+    }
+
+    /// Searches includes in another folder than `include` beside the sources: that of the engine, for kernels of another crate.
+    #[must_use]
+    pub fn with_includes(mut self, folder: &Path) -> Self {
+        self.includes = folder.to_owned();
+        self
     }
 
     /// The newest pipeline that works.

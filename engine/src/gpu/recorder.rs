@@ -192,7 +192,10 @@ impl Recorder {
         // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
         let submitted = unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) };
         if let Err(error) = submitted {
+            drop(queue);
             inner.in_flight().end(value, false);
+            // A device that was lost by this call may have begun with it, and still be stopping.
+            inner.wait_for_queue();
             return Err(error);
         }
         queue.last_value = value;

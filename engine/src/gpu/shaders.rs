@@ -48,8 +48,8 @@
 //!    })?;
 //!    ```
 //!
-//! 4. **Mind the limits** of small devices: a pipeline has [`Caps::descriptors`](super::Caps) to live with (16 storage buffers a stage on
-//!    many), and bindings that are declared and not used count; loops end in silence after 65,535 iterations on the software driver; a
+//! 4. **Mind the limits** of small devices: a pipeline has [`Caps::descriptors`](super::Caps) to live with (Vulkan promises
+//!    no more than 4 storage buffers a stage), and bindings that are declared and not used count; loops end in silence after 65,535 iterations on the software driver; a
 //!    submission must be over within seconds, so split work by the [`Timings`](super::Timings) of the last.
 //!
 //! 5. **Test it** against its twin, like `tests/tests/twins/`; every module is also read by `spirv-val`, naga and spirv-reflect.
