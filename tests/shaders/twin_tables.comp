@@ -35,15 +35,11 @@ void main() {
     case 2u: {  // environment maps
         uvec2 size = uvec2(in_bits(0u), in_bits(1u));
         uvec2 texel;
-        float pdf;
-        out3(0u, environment_sample(0u, size, in2(2u), in2(4u), texel, pdf));
-        out1(3u, pdf);
+        out3(0u, environment_sample(0u, size, in2(2u), in2(4u), texel));
         out_bits(4u, texel.x);
         out_bits(5u, texel.y);
         out2(6u, environment_uv(in3(6u)));
-        out1(8u, environment_pdf(0u, size, in3(6u)));
         out3(9u, environment_direction(in2(4u)));
-        out1(12u, environment_texel_solid_angle(size, texel.y));
         break;
     }
     }

@@ -145,8 +145,10 @@ fn what_is_absent_costs_no_pass() {
 fn what_is_absent_costs_no_byte() {
     with_gpu(|gpu| {
         let bare_bytes = bytes(gpu, &bare());
-        // 4 vertices of 12 bytes and 2 triangles of 20; a lone black surface has no light.
-        assert_eq!((bare_bytes[0], bare_bytes[3]), (4 * 12 + 2 * 20, 0), "{bare_bytes:?}");
+        // 2 triangles of 48 bytes; a lone black surface has no light.
+        assert_eq!((bare_bytes[0], bare_bytes[3]), (2 * 48, 0), "{bare_bytes:?}");
+        // Attributes are 16 bytes a vertex, and with any of them each triangle has 16 bytes that say which vertices are its own.
+        let attribute = 4 * 16 + 2 * 16;
         let more = |change: &dyn Fn(&mut Scene)| {
             let mut scene = bare();
             change(&mut scene);
@@ -155,15 +157,15 @@ fn what_is_absent_costs_no_byte() {
         };
         assert_eq!(
             more(&|s| s.meshes[0].colors = vec![Vec4::ONE; 4]),
-            [64, 0, 0, 0],
+            [attribute, 0, 0, 0],
             "vertex colours"
         );
         assert_eq!(
             more(&|s| s.meshes[0].normals = vec![Vec3::Y; 4]),
-            [48, 0, 0, 0],
+            [attribute, 0, 0, 0],
             "normals"
         );
-        // Texture coordinates without a texture are not kept; with one they are 16 bytes a vertex, and an image is uploaded once.
+        // Texture coordinates without a texture are not kept; with one they are, and an image is uploaded once.
         assert_eq!(
             more(&|s| s.meshes[0].uv0 = vec![Vec2::ZERO; 4]),
             [0; 4],
@@ -174,7 +176,11 @@ fn what_is_absent_costs_no_byte() {
             s.materials[0].base_color_texture = Some(texture(0));
             s.materials[0].emission_texture = Some(texture(0));
         });
-        assert_eq!((textured[0], textured[1], textured[3]), (64, 0, 0), "{textured:?}");
+        assert_eq!(
+            (textured[0], textured[1], textured[3]),
+            (attribute, 0, 0),
+            "{textured:?}"
+        );
         assert_eq!(more(&|s| s.images.push(image())), [0; 4], "an image that nothing uses");
         let sun = |s: &mut Scene| {
             s.add_light(

@@ -15,7 +15,7 @@ mod traverse;
 pub use build::Bvh2Settings;
 pub use traverse::{FINISHED, Traversal};
 
-use super::{CandidateFilter, Hit, IndexBuffer, IndexStatistics, Ray, RayIndex, TraversalCounters};
+use super::{CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, RayIndexBuffer, TraversalCounters};
 use crate::Result;
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
@@ -185,8 +185,8 @@ impl RayIndex for Bvh2 {
         self.statistics
     }
 
-    fn buffers(&self) -> Vec<IndexBuffer<'_>> {
-        vec![IndexBuffer {
+    fn buffers(&self) -> Vec<RayIndexBuffer<'_>> {
+        vec![RayIndexBuffer {
             binding: 0,
             name: "bvh2",
             bytes: bytemuck::cast_slice(&self.packed),

@@ -86,7 +86,7 @@ impl Hit {
 
 /// One storage buffer of an index, bound as set 1.
 #[derive(Debug, Clone, Copy)]
-pub struct IndexBuffer<'a> {
+pub struct RayIndexBuffer<'a> {
     /// Binding within set 1.
     pub binding: u32,
     /// Name for the memory report.
@@ -139,7 +139,7 @@ pub trait RayIndex: Send + Sync {
     fn statistics(&self) -> IndexStatistics;
 
     /// The storage buffers of set 1, in binding order.
-    fn buffers(&self) -> Vec<IndexBuffer<'_>>;
+    fn buffers(&self) -> Vec<RayIndexBuffer<'_>>;
 
     /// Twin of the closest-hit kernel: the accepted candidate of least `t`, of equal ones that of least index.
     fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit;

@@ -2,9 +2,7 @@
 
 use clerestory::transport::albedo::{AlbedoTable, albedo_average, albedo_layer, albedo_lookup};
 use clerestory::transport::distribution::{build_distribution, build_distribution_2d, distribution_sample};
-use clerestory::transport::environment::{
-    environment_direction, environment_pdf, environment_sample, environment_texel_solid_angle, environment_uv,
-};
+use clerestory::transport::environment::{environment_direction, environment_sample, environment_uv};
 use clerestory_tests::twin::{U, compare, trigonometric_error};
 use clerestory_tests::{twin_kernel, with_gpu};
 use glam::UVec2;
@@ -85,15 +83,10 @@ fn environments() {
         let results = twin_tables(gpu, 2, &table, &cdf);
         for (case, result) in table.iter().zip(&results) {
             let x = case.0.map(f64::from);
-            let (w, texel, pdf) = environment_sample(&cdf, 0, size, v2(&x, 2), v2(&x, 4));
+            let (w, texel, _) = environment_sample(&cdf, 0, size, v2(&x, 2), v2(&x, 4));
             assert_eq!([result.bits(4), result.bits(5)], texel.to_array(), "{:?}", case.0);
             let trig = 4.0 * trigonometric_error(gpu);
             assert!((result.vector(0) - w).length() < trig, "{} {w}", result.vector(0));
-            assert!(
-                (f64::from(result.0[3]) - pdf).abs() <= pdf * 16.0 * trig,
-                "{} {pdf}",
-                result.0[3]
-            );
             let uv = environment_uv(v3(&x, 6));
             let (du, dv) = (
                 (f64::from(result.0[6]) - uv.x).abs(),
@@ -102,18 +95,7 @@ fn environments() {
             // At the poles the azimuth is not defined, and u is the same at 0 and 1.
             let pole = x[6].hypot(x[8]) < 1e-2;
             assert!((pole || du.min(1.0 - du) < trig) && dv < trig, "{:?}: {uv}", case.0);
-            let p = (uv * size.as_dvec2()).fract();
-            if p.min(1.0 - p).min_element() > 1e-3 && !pole {
-                let pdf = environment_pdf(&cdf, 0, size, v3(&x, 6));
-                assert!(
-                    (f64::from(result.0[8]) - pdf).abs() <= pdf * 16.0 * trig,
-                    "{:?}: {pdf}",
-                    case.0
-                );
-            }
             assert!((result.vector(9) - environment_direction(v2(&x, 4))).length() < trig);
-            let solid_angle = environment_texel_solid_angle(size, texel.y);
-            assert!((f64::from(result.0[12]) / solid_angle - 1.0).abs() < 16.0 * trig);
         }
     });
 }

@@ -24,7 +24,7 @@ layout(set = 2, binding = 8) uniform utextureBuffer scene_texels;    // RGBA8
 layout(set = 2, binding = 9) uniform utextureBuffer scene_lights;
 // Cumulative probabilities: of the lights, then (from the environment's cdf_base on) of the environment's texels.
 layout(set = 2, binding = 10) uniform textureBuffer scene_cdf;
-// ENVIRONMENT_HEADER_QUARTERS, then RGB radiance by texel.
+// ENVIRONMENT_HEADER_QUARTERS, then by texel RGB radiance and the density of its choice per solid angle.
 layout(set = 2, binding = 11) uniform utextureBuffer scene_environment;
 layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
 

@@ -32,17 +32,12 @@ uint distribution_sample(uint base, uint count, float u, out float probability) 
 // Tables of a grid: the rows' (height + 1 values), then one (width + 1 values) for each row.
 uint distribution_row_base(uint base, uvec2 size, uint row) { return base + size.y + 1u + row * (size.x + 1u); }
 
-float distribution_probability_2d(uint base, uvec2 size, uvec2 cell) {
-    return distribution_probability(base, cell.y)
-        * distribution_probability(distribution_row_base(base, size, cell.y), cell.x);
-}
-
-uvec2 distribution_sample_2d(uint base, uvec2 size, vec2 u, out float probability) {
+// The cell that u chooses.
+uvec2 distribution_sample_2d(uint base, uvec2 size, vec2 u) {
     float p_row;
     float p_column;
     uint row = distribution_sample(base, size.y, u.y, p_row);
     uint column = distribution_sample(distribution_row_base(base, size, row), size.x, u.x, p_column);
-    probability = p_row * p_column;
     return uvec2(column, row);
 }
 

@@ -1,4 +1,4 @@
-// Latitude-longitude environment maps: directions, texels and densities, in the environment's own frame.
+// Latitude-longitude environment maps: directions and texels, in the environment's own frame.
 //
 // u = atan(x, -z) / 2 pi + 1/2, v = acos(y) / pi. A texel is chosen by its probability and a direction evenly over its solid angle,
 // so that densities stay finite at the poles. Method and tables: transport/environment.rs.
@@ -22,23 +22,10 @@ vec3 environment_direction(vec2 uv) {
 
 uvec2 environment_texel(vec2 uv, uvec2 size) { return min(uvec2(uv * vec2(size)), size - 1u); }
 
-// Solid angle of a texel: 2 pi / width times the difference of the cosines, written as a product of sines.
-float environment_texel_solid_angle(uvec2 size, uint row) {
-    float step = PI / float(size.y);
-    return 4.0 * PI / float(size.x) * sin((float(row) + 0.5) * step) * sin(0.5 * step);
-}
-
-// Density of environment_sample for a direction.
-float environment_pdf(uint base, uvec2 size, vec3 w) {
-    uvec2 texel = environment_texel(environment_uv(w), size);
-    return distribution_probability_2d(base, size, texel) / environment_texel_solid_angle(size, texel.y);
-}
-
-// A direction and its density: u_texel chooses the texel, which is handed out too, u_within the direction inside it.
-vec3 environment_sample(uint base, uvec2 size, vec2 u_texel, vec2 u_within, out uvec2 texel, out float pdf) {
-    float p;
-    texel = distribution_sample_2d(base, size, u_texel, p);
-    pdf = p / environment_texel_solid_angle(size, texel.y);
+// A direction: u_texel chooses the texel, which is handed out too, u_within the direction inside it. Its density is that of the texel, which
+// the host computes: solid angles of thin texels are beyond the precision that devices promise for sines.
+vec3 environment_sample(uint base, uvec2 size, vec2 u_texel, vec2 u_within, out uvec2 texel) {
+    texel = distribution_sample_2d(base, size, u_texel);
     // Heights are counted from the nearer pole, where 1 - cos keeps its precision: 1 - cos = 2 sin^2 of half the angle.
     bool south = 2u * texel.y >= size.y;
     float row = float(south ? size.y - 1u - texel.y : texel.y);

@@ -26,8 +26,9 @@ vec3 environment_to_world(SceneEnvironment e, vec3 local) { return e.right * loc
 
 uvec2 environment_size(SceneEnvironment e) { return uvec2(e.width, e.height); }
 
-vec3 environment_texel_radiance(SceneEnvironment e, uvec2 texel) {
-    return uintBitsToFloat(texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + texel.y * e.width + texel.x)).rgb);
+// Radiance of a texel, and the density per solid angle of environment_sample in it.
+vec4 load_environment_texel(SceneEnvironment e, uvec2 texel) {
+    return uintBitsToFloat(texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + texel.y * e.width + texel.x)));
 }
 
 // Bilinear, around in u and clamped at the poles; `local` is in the environment's frame.
@@ -38,8 +39,8 @@ vec3 environment_radiance(SceneEnvironment e, vec3 local) {
     int width = int(e.width);
     uvec2 x = uvec2((ivec2(int(base.x)) + ivec2(width, width + 1)) % width);
     uvec2 y = uvec2(clamp(ivec2(int(base.y)) + ivec2(0, 1), ivec2(0), ivec2(int(e.height) - 1)));
-    return mix(mix(environment_texel_radiance(e, uvec2(x.x, y.x)), environment_texel_radiance(e, uvec2(x.y, y.x)), w.x),
-               mix(environment_texel_radiance(e, uvec2(x.x, y.y)), environment_texel_radiance(e, uvec2(x.y, y.y)), w.x), w.y);
+    return mix(mix(load_environment_texel(e, uvec2(x.x, y.x)).rgb, load_environment_texel(e, uvec2(x.y, y.x)).rgb, w.x),
+               mix(load_environment_texel(e, uvec2(x.x, y.y)).rgb, load_environment_texel(e, uvec2(x.y, y.y)).rgb, w.x), w.y);
 }
 
 // The environment is the last light.
@@ -47,7 +48,8 @@ float environment_choice_probability() { return distribution_probability(0u, lig
 
 // Density with which light sampling finds a direction in which the environment is seen.
 float environment_light_pdf(SceneEnvironment e, vec3 local) {
-    return environment_choice_probability() * environment_pdf(e.cdf_base, environment_size(e), local);
+    return environment_choice_probability()
+        * load_environment_texel(e, environment_texel(environment_uv(local), environment_size(e))).a;
 }
 
 // Density with which light sampling finds the point of a triangle light that a ray has hit at distance t.
@@ -63,11 +65,10 @@ LightSample sample_light(vec3 from, float choice, vec2 u, vec2 within, vec3 scen
     SceneLight light = load_light(distribution_sample(0u, light_count(), choice, probability));
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         uvec2 texel;
-        float pdf;
         SceneEnvironment e = load_environment();
-        vec3 local = environment_sample(e.cdf_base, environment_size(e), u, within, texel, pdf);
+        vec3 local = environment_sample(e.cdf_base, environment_size(e), u, within, texel);
         result.direction = environment_to_world(e, local);
-        result.pdf = pdf * probability;
+        result.pdf = load_environment_texel(e, texel).a * probability;
         result.radiance = environment_radiance(e, local) / result.pdf;
         result.infinite = true;
         return result;

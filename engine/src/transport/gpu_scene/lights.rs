@@ -12,7 +12,7 @@ use crate::gpu::shaders::constants::{
 };
 use crate::gpu::shaders::types::{SceneEnvironment, SceneLight, SceneMaterial, SceneTriangle};
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
-use crate::transport::distribution::build_distribution;
+use crate::transport::distribution::{build_distribution, distribution_probability_2d};
 use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
 use crate::transport::lights::{light_power, triangle_power};
 
@@ -96,7 +96,7 @@ impl Lights {
                 ..SceneLight::default()
             });
             // The lights' table has one more entry than there are lights; the texels' begins behind it.
-            environment = environment_block(map, records.len() as u32 + 1);
+            environment = environment_block(map, &environment_cdf, records.len() as u32 + 1);
         }
         if has_unsampled && records.is_empty() {
             // Kernels that know of emission also sample lights: a dark one to choose.
@@ -173,8 +173,9 @@ fn environment_power(map: &Environment, radius: f64) -> f64 {
     integral * f64::from(map.strength) * std::f64::consts::PI * radius * radius
 }
 
-/// The block `SceneEnvironment`: axes, size, where its table begins, texels scaled by the strength.
-fn environment_block(map: &Environment, cdf_base: u32) -> Vec<u8> {
+/// The header `SceneEnvironment` (axes, size, where its table begins), then the texels: radiance scaled by the strength, and the density
+/// with which `environment_sample` finds a direction in them, sr⁻¹.
+fn environment_block(map: &Environment, cdf: &[f32], cdf_base: u32) -> Vec<u8> {
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (map.rotation * axis).to_array());
     let header = SceneEnvironment {
         right: axes[0],
@@ -184,9 +185,14 @@ fn environment_block(map: &Environment, cdf_base: u32) -> Vec<u8> {
         back: axes[2],
         cdf_base,
     };
+    let size = UVec2::new(map.width, map.height);
     let mut block = bytemuck::bytes_of(&header).to_vec();
-    for texel in &map.radiance {
-        block.extend_from_slice(bytemuck::bytes_of(&(*texel * map.strength).extend(0.0)));
+    for (row, texels) in (0..map.height).zip(map.radiance.chunks(map.width as usize)) {
+        let solid_angle = environment_texel_solid_angle(size, row);
+        for (column, texel) in (0..map.width).zip(texels) {
+            let density = distribution_probability_2d(cdf, 0, size, UVec2::new(column, row)) / solid_angle;
+            block.extend_from_slice(bytemuck::bytes_of(&(*texel * map.strength).extend(density as f32)));
+        }
     }
     block
 }

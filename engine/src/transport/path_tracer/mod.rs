@@ -26,8 +26,10 @@ use crate::gpu::{Access, Buffer, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
 
-/// Bounces recorded into one command buffer; a wave that needs more is submitted again.
-const BOUNCES_PER_SUBMISSION: usize = 12;
+/// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
+const BOUNCES_A_SUBMISSION: usize = 12;
+/// Device time of a submission, in seconds, from which on the next one has half the bounces: drivers end what runs for some seconds.
+const LONG_SUBMISSION: f64 = 0.5;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
 /// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
 const STALLS_MAX: u32 = 1 << 16;
@@ -57,6 +59,8 @@ pub struct PathTracer {
     buffers: WaveBuffers,
     film: GpuFilm,
     slots: u32,
+    /// Bounces of the next submission.
+    bounces: usize,
     pending: Option<Wave>,
     cursor: Cursor,
     counters: PathCounters,
@@ -95,6 +99,7 @@ impl PathTracer {
             buffers,
             film,
             slots,
+            bounces: BOUNCES_A_SUBMISSION,
             pending: None,
             cursor: Cursor::default(),
             counters: PathCounters::default(),
@@ -220,7 +225,7 @@ impl PathTracer {
             if let Some(resume) = resume.filter(|_| stalled == STALLED_SHADOW) {
                 self.record_shadow(&mut recorder, wave, status.rounds as usize % 2, resume)?;
             }
-            for bounce in 0..BOUNCES_PER_SUBMISSION {
+            for bounce in 0..self.bounces {
                 let resumed = resume.filter(|_| stalled == STALLED_EXTEND && bounce == 0);
                 let trace = resumed.unwrap_or(&self.pipelines.trace);
                 self.record_bounce(&mut recorder, wave, (status.rounds as usize + bounce) % 2, trace)?;
@@ -232,7 +237,15 @@ impl PathTracer {
                     self.buffers.readback.view(),
                 )
             })?;
-            timings.push(recorder.submit()?.wait()?);
+            let times = recorder.submit()?.wait()?;
+            // Software drivers end nothing, and there the passes are the same on every run.
+            self.bounces = match times.seconds() {
+                _ if self.gpu.caps().kind == "cpu" => BOUNCES_A_SUBMISSION,
+                long if long > LONG_SUBMISSION => (self.bounces / 2).max(1),
+                short if 4.0 * short < LONG_SUBMISSION => (2 * self.bounces).min(BOUNCES_A_SUBMISSION),
+                _ => self.bounces,
+            };
+            timings.push(times);
             self.pending = None;
             let before = status.rounds;
             status = self.buffers.readback.read::<Status>(0, 1)?[0];
