@@ -7,12 +7,17 @@
 //
 // With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);
+// and BVH2_RESUMES as a constant: false where every call begins at BVH2_START, which leaves the bookkeeping of resumption out.
 #ifndef CLERESTORY_ACCEL_BVH2_GLSL
 #define CLERESTORY_ACCEL_BVH2_GLSL
 
 #include "accel/ray.glsl"
 #include "accel/triangle.glsl"
 #include "accel/bvh2_bindings.glsl"
+
+#ifndef BVH2_RESUMES
+#define BVH2_RESUMES true
+#endif
 
 layout(constant_id = 100) const uint BVH2_QUOTA = 32768u;
 layout(constant_id = 101) const bool BVH2_COUNT = false;
@@ -64,7 +69,7 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     // Turns from the root to the node to go on with, the first in the lowest bit.
     uint trail = 0u;
     uint replay = 0u;
-    for (uint node = resume >> BVH2_COUNT_BITS; node != 0u; ++replay) {
+    for (uint node = BVH2_RESUMES ? resume >> BVH2_COUNT_BITS : 0u; node != 0u; ++replay) {
         uint parent = bvh2_quarter(BVH2_NODE_QUARTERS * node + 3u).z;
         trail = trail << 1 | (parent & 1u);
         node = parent >> 1;
@@ -93,17 +98,21 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             vec2 leave = min(vec2(span0.y, span1.y), vec2(hit.t));
             uint first = enter.y < enter.x ? 1u : 0u;
             bvec2 hits = lessThanEqual(enter, leave);
-            bool passed = replay > 0u && (trail & 1u) != first;
+            bool passed = BVH2_RESUMES && replay > 0u && (trail & 1u) != first;
             bool visit_first = (first == 0u ? hits.x : hits.y) && !passed;
             bool visit_second = first == 0u ? hits.y : hits.x;
             uint next = visit_first ? first : 1u - first;
-            replay = replay > 0u && next == (trail & 1u) ? replay - 1u : 0u;
-            trail >>= 1;
+            if (BVH2_RESUMES) {
+                replay = replay > 0u && next == (trail & 1u) ? replay - 1u : 0u;
+                trail >>= 1;
+            }
             if (visit_first && visit_second) {
                 stack[top++] = first == 0u ? children.y : children.x;
             }
             pop = !(visit_first || visit_second);
-            replay = pop ? 0u : replay;
+            if (BVH2_RESUMES) {
+                replay = pop ? 0u : replay;
+            }
             word = next == 0u ? children.x : children.y;
             if (BVH2_COUNT) {
                 ++bvh2_counters.x;

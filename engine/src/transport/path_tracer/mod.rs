@@ -82,7 +82,7 @@ impl PathTracer {
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let slots = match settings.paths_in_flight {
             // Enough for a dispatch to be worth its overhead, few enough for the caches of a processor.
-            0 if gpu.caps().kind == "cpu" => 1 << 17,
+            0 if gpu.caps().kind == "cpu" => 1 << 18,
             0 => 1 << 20,
             wanted => wanted.next_multiple_of(PATH_GROUP),
         };
