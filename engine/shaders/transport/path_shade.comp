@@ -179,7 +179,9 @@ void main() {
     uint slot = load_slot(place);
     vec3 radiance = vec3(0.0);
     uint flags = 0u;
-    flags |= shade(slot, place, load_path(slot), radiance, flags) ? FLAG_ALIVE : 0u;
+    if (shade(slot, place, load_path(slot), radiance, flags)) {
+        flags |= FLAG_ALIVE;
+    }
     if (radiance != vec3(0.0)) {
         path_gathered[slot].radiance += radiance;
     }

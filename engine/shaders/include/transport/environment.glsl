@@ -11,7 +11,9 @@
 
 vec2 environment_uv(vec3 w) {
     // The arc tangent keeps its precision at the poles, where the arc cosine loses it.
-    return vec2(atan(w.x, -w.z) * (0.5 * INV_PI) + 0.5, atan(length(w.xz), w.y) * INV_PI);
+    // At the poles themselves, where it is not defined, any azimuth does.
+    float azimuth = w.x == 0.0 && w.z == 0.0 ? 0.0 : atan(w.x, -w.z);
+    return vec2(azimuth * (0.5 * INV_PI) + 0.5, atan(length(w.xz), w.y) * INV_PI);
 }
 
 vec3 environment_direction(vec2 uv) {
@@ -20,7 +22,7 @@ vec3 environment_direction(vec2 uv) {
     return vec3(sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi));
 }
 
-uvec2 environment_texel(vec2 uv, uvec2 size) { return min(uvec2(uv * vec2(size)), size - 1u); }
+uvec2 environment_texel(vec2 uv, uvec2 size) { return min(uvec2(clamp(uv, 0.0, 1.0) * vec2(size)), size - 1u); }
 
 // A direction: u_texel chooses the texel, which is handed out too, u_within the direction inside it. Its density is that of the texel, which
 // the host computes: solid angles of thin texels are beyond the precision that devices promise for sines.

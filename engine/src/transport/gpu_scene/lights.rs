@@ -7,8 +7,8 @@ use super::LightKinds;
 use super::geometry::{Geometry, corners_of};
 use crate::Result;
 use crate::gpu::shaders::constants::{
-    LIGHT_DARK, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE, MATERIAL_BLEND,
-    MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
+    EXPONENT_BITS, LIGHT_DARK, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE,
+    MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT, RECIPROCAL_EXPONENTS,
 };
 use crate::gpu::shaders::types::{SceneEnvironment, SceneLight, SceneMaterial, SceneTriangle};
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
@@ -66,7 +66,10 @@ impl Lights {
                 }
                 continue;
             }
-            if area > 0.0 && area.is_finite() {
+            if area > 0.0 && surface_double_area(corners_of(&triangle)) == 0.0 {
+                // Too small or thin for the kernel's arithmetic to sample: what it shows to rays that meet it counts in full.
+                has_unsampled = true;
+            } else if area > 0.0 && area.is_finite() {
                 let emission = DVec3::from_array(material.emission.map(f64::from));
                 let double_sided = material.flags & MATERIAL_DOUBLE_SIDED != 0;
                 geometry.triangles[index].light = records.len() as u32;
@@ -128,6 +131,14 @@ impl Lights {
             environment: some(&[LIGHT_ENVIRONMENT]),
         }
     }
+}
+
+/// Twice the area of a triangle as `surface_at` has it in its f32 arithmetic.
+fn surface_double_area([a, b, c]: [Vec3; 3]) -> f32 {
+    let (e1, e2) = (b - a, c - a);
+    let longest = e1.abs().max(e2.abs()).max_element();
+    let scale = f32::from_bits(RECIPROCAL_EXPONENTS - (longest.to_bits() & EXPONENT_BITS));
+    (scale * e1).cross(scale * e2).length() / scale / scale
 }
 
 fn light_record(kind: &LightKind) -> SceneLight {

@@ -13,10 +13,11 @@ mod settings;
 mod wave;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use self::pipelines::{Pipelines, TracePipelines, camera_pipeline};
 pub use self::settings::PathTracerSettings;
-use self::wave::{Cursor, Status, Wave, WaveBuffers, group_counts, slots_of_device};
+use self::wave::{Cursor, Status, Wave, WaveBuffers, group_counts, slots_of_device, slots_of_picture};
 use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
 use crate::film::picture::Picture;
@@ -28,8 +29,8 @@ use crate::{Error, Result};
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
 const BOUNCES_A_SUBMISSION: usize = 12;
-/// Device time of a submission, in seconds, from which on the next one has half the bounces: drivers end what runs for some seconds.
-const LONG_SUBMISSION: f64 = 0.5;
+/// Device time that a submission may take where a driver watches: they end what runs for some seconds.
+const SUBMISSION_SECONDS: f64 = 0.25;
 /// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
 /// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
 const STALLS_MAX: u32 = 1 << 16;
@@ -59,8 +60,8 @@ pub struct PathTracer {
     buffers: WaveBuffers,
     film: GpuFilm,
     slots: u32,
-    /// Bounces of the next submission.
-    bounces: usize,
+    /// Device time of a path's bounce in the last submission.
+    seconds_a_ray: Option<f64>,
     pending: Option<Wave>,
     cursor: Cursor,
     counters: PathCounters,
@@ -86,10 +87,10 @@ impl PathTracer {
             0 => 1 << 20,
             wanted => wanted.next_multiple_of(PATH_GROUP),
         };
-        let slots = slots.min(slots_of_device(gpu));
+        let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
         let frame = CameraFrame::new(camera, size)?;
         let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
-        let buffers = WaveBuffers::new(gpu, slots, scene.has_lights(), settings.aovs)?;
+        let (buffers, slots) = WaveBuffers::within_memory(gpu, slots, scene.has_lights(), settings.aovs)?;
         Ok(Self {
             gpu: gpu.clone(),
             scene,
@@ -99,7 +100,7 @@ impl PathTracer {
             buffers,
             film,
             slots,
-            bounces: BOUNCES_A_SUBMISSION,
+            seconds_a_ray: None,
             pending: None,
             cursor: Cursor::default(),
             counters: PathCounters::default(),
@@ -112,9 +113,14 @@ impl PathTracer {
     /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         let frame = CameraFrame::new(camera, self.film.size())?;
-        self.pipelines.camera = camera_pipeline(&self.gpu, &self.settings, &frame, camera)?;
+        let pipeline = camera_pipeline(&self.gpu, &self.settings, &frame, camera)?;
+        // First what can fail: views must not mix.
+        self.film.clear()?;
+        self.pipelines.camera = pipeline;
         self.frame = frame;
-        self.clear()
+        self.pending = None;
+        self.cursor = Cursor::default();
+        Ok(())
     }
 
     /// Renders one more wave towards `samples` samples a pixel; `None` when all are there. The first wave also compiles the kernels.
@@ -132,7 +138,7 @@ impl PathTracer {
         self.cursor = next;
         Ok(Some(Step {
             timings,
-            done: self.cursor.done,
+            done: self.cursor.done.min(wanted),
             wanted,
         }))
     }
@@ -186,89 +192,31 @@ impl PathTracer {
         self.film.display(target, exposure, bgra)
     }
 
+    /// Renders a wave, in as many submissions as it takes.
     fn run(&mut self, wave: &Wave) -> Result<Vec<Timings>> {
         let paths = wave.pixels * wave.samples;
-        let mut timings = Vec::new();
         let mut status = Status {
             active_count: paths,
             ..Status::default()
         };
-        let mut first = true;
+        let mut timings = vec![self.submit_bounces(wave, &mut status, true)?];
         let mut stalls_in_a_row = 0;
-        while first || status.active_count > 0 || status.stalled != STALLED_NOT {
-            let mut recorder = self.gpu.recorder("path wave")?;
-            if let Some(pending) = &self.pending {
-                self.record_resolve(&mut recorder, pending)?;
+        while status.active_count > 0 || status.stalled != STALLED_NOT {
+            let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);
+            self.counters.stalls += u64::from(stalled);
+            timings.push(self.submit_bounces(wave, &mut status, false)?);
+            let stands = stalled && status.stalled != STALLED_NOT && status.rounds == rounds;
+            stalls_in_a_row = if stands { stalls_in_a_row + 1 } else { 0 };
+            if stalls_in_a_row > STALLS_MAX {
+                return Err(Error::Overflow {
+                    kernel: "path_extend".into(),
+                    what: "iterations of a ray".into(),
+                    needed: u64::from(stalls_in_a_row) * u64::from(self.settings.ray_quota),
+                    capacity: u64::from(STALLS_MAX) * u64::from(self.settings.ray_quota),
+                    instead: "rebuild the index".into(),
+                });
             }
-            // A stalled round leaves no groups to dispatch.
-            let groups = group_counts(status.active_count);
-            (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
-            status.shadow_groups = group_counts(status.shadow_count)[0];
-            let stalled = status.stalled;
-            (status.stalled, status.unfinished) = (STALLED_NOT, 0);
-            if stalled != STALLED_NOT && self.pipelines.resume.is_none() {
-                let quota = self.settings.ray_quota;
-                self.pipelines.resume = Some(TracePipelines::new(&self.gpu, &self.scene, quota, true)?);
-            }
-            let resume = self.pipelines.resume.as_ref().filter(|_| stalled != STALLED_NOT);
-            recorder.pass("path: begin", |pass| {
-                pass.update(self.buffers.status.view(), &[status])?;
-                pass.memory_barrier(
-                    Access::TRANSFER_WRITE | Access::COMPUTE,
-                    Access::COMPUTE | Access::INDIRECT_READ,
-                );
-                Ok(())
-            })?;
-            if first {
-                self.record_camera(&mut recorder, wave)?;
-            }
-            if let Some(resume) = resume.filter(|_| stalled == STALLED_SHADOW) {
-                self.record_shadow(&mut recorder, wave, status.rounds as usize % 2, resume)?;
-            }
-            for bounce in 0..self.bounces {
-                let resumed = resume.filter(|_| stalled == STALLED_EXTEND && bounce == 0);
-                let trace = resumed.unwrap_or(&self.pipelines.trace);
-                self.record_bounce(&mut recorder, wave, (status.rounds as usize + bounce) % 2, trace)?;
-            }
-            recorder.pass("path: read status", |pass| {
-                pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
-                pass.copy(
-                    self.buffers.status.slice(0, size_of::<Status>() as u64),
-                    self.buffers.readback.view(),
-                )
-            })?;
-            let times = recorder.submit()?.wait()?;
-            // Software drivers end nothing, and there the passes are the same on every run.
-            self.bounces = match times.seconds() {
-                _ if self.gpu.caps().kind == "cpu" => BOUNCES_A_SUBMISSION,
-                long if long > LONG_SUBMISSION => (self.bounces / 2).max(1),
-                short if 4.0 * short < LONG_SUBMISSION => (2 * self.bounces).min(BOUNCES_A_SUBMISSION),
-                _ => self.bounces,
-            };
-            timings.push(times);
-            self.pending = None;
-            let before = status.rounds;
-            status = self.buffers.readback.read::<Status>(0, 1)?[0];
-            if status.stalled != STALLED_NOT {
-                self.counters.stalls += 1;
-                stalls_in_a_row = if status.rounds == before {
-                    stalls_in_a_row + 1
-                } else {
-                    0
-                };
-                if stalls_in_a_row > STALLS_MAX {
-                    return Err(Error::Overflow {
-                        kernel: "path_extend".into(),
-                        what: "iterations of a ray".into(),
-                        needed: u64::from(stalls_in_a_row) * u64::from(self.settings.ray_quota),
-                        capacity: u64::from(STALLS_MAX) * u64::from(self.settings.ray_quota),
-                        instead: "rebuild the index".into(),
-                    });
-                }
-            }
-            first = false;
         }
-        let wide = |words: [u32; 2]| u64::from(words[0]) | u64::from(words[1]) << 32;
         self.counters.paths += u64::from(paths);
         self.counters.extend_rays += wide(status.extend_rays);
         self.counters.shadow_rays += wide(status.shadow_rays);
@@ -277,18 +225,92 @@ impl PathTracer {
         Ok(timings)
     }
 
-    /// Adds the last wave to the film.
-    fn flush(&mut self) -> Result<()> {
-        let Some(wave) = self.pending.take() else { return Ok(()) };
-        let mut recorder = self.gpu.recorder("path film")?;
-        self.record_resolve(&mut recorder, &wave)?;
-        recorder.submit()?.wait()?;
-        Ok(())
+    /// Submits some bounces of a wave, the first ones with its camera rays and the last wave's way to the film, and reads how far they came.
+    fn submit_bounces(&mut self, wave: &Wave, status: &mut Status, first: bool) -> Result<Timings> {
+        let stalled = status.stalled;
+        if stalled != STALLED_NOT && self.pipelines.resume.is_none() {
+            let quota = self.settings.ray_quota;
+            self.pipelines.resume = Some(TracePipelines::new(&self.gpu, &self.scene, quota, true)?);
+        }
+        let resume = self.pipelines.resume.as_ref().filter(|_| stalled != STALLED_NOT);
+        let mut recorder = self.gpu.recorder("path wave")?;
+        if let Some(pending) = &self.pending {
+            self.record_resolve(&mut recorder, pending)?;
+        }
+        // A stalled round leaves no groups to dispatch.
+        let groups = group_counts(status.active_count);
+        (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
+        status.shadow_groups = group_counts(status.shadow_count)[0];
+        (status.stalled, status.unfinished) = (STALLED_NOT, 0);
+        recorder.pass("path: begin", |pass| {
+            pass.update(self.buffers.status.view(), &[*status])?;
+            pass.memory_barrier(
+                Access::TRANSFER_WRITE | Access::COMPUTE,
+                Access::COMPUTE | Access::INDIRECT_READ,
+            );
+            Ok(())
+        })?;
+        if first {
+            self.record_camera(&mut recorder, wave)?;
+        }
+        if let Some(resume) = resume.filter(|_| stalled == STALLED_SHADOW) {
+            self.record_shadow(&mut recorder, wave, status.rounds as usize % 2, resume)?;
+        }
+        for bounce in 0..self.bounces_for(status.active_count) {
+            let resumed = resume.filter(|_| stalled == STALLED_EXTEND && bounce == 0);
+            let trace = resumed.unwrap_or(&self.pipelines.trace);
+            self.record_bounce(&mut recorder, wave, (status.rounds as usize + bounce) % 2, trace)?;
+        }
+        recorder.pass("path: read status", |pass| {
+            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
+            pass.copy(
+                self.buffers.status.slice(0, size_of::<Status>() as u64),
+                self.buffers.readback.view(),
+            )
+        })?;
+        let clock = Instant::now();
+        let submission = recorder.submit()?;
+        // Once submitted, the last wave reaches the film, whatever becomes of the wait.
+        self.pending = None;
+        let timings = submission.wait()?;
+        let seconds = timings
+            .untimed
+            .map_or(timings.seconds(), |_| clock.elapsed().as_secs_f64());
+        let rays_before = wide(status.extend_rays);
+        *status = self.buffers.readback.read::<Status>(0, 1)?[0];
+        let rays = wide(status.extend_rays) - rays_before;
+        if rays > 0 {
+            self.seconds_a_ray = Some(seconds / rays as f64);
+        }
+        Ok(timings)
     }
 
-    fn clear(&mut self) -> Result<()> {
-        self.pending = None;
-        self.cursor = Cursor::default();
-        self.film.clear()
+    /// Bounces of the next submission: as many as a watchdog has time for if no path ends, by the pace of the last one.
+    fn bounces_for(&self, paths: u32) -> usize {
+        // Software drivers end nothing, and there the passes are the same on every run.
+        if self.gpu.caps().kind == "cpu" {
+            return BOUNCES_A_SUBMISSION;
+        }
+        let Some(seconds_a_ray) = self.seconds_a_ray else {
+            return 1;
+        };
+        let bounces = SUBMISSION_SECONDS / (seconds_a_ray * f64::from(paths.max(1)));
+        (bounces as usize).clamp(1, BOUNCES_A_SUBMISSION)
     }
+
+    /// Adds the last wave to the film.
+    fn flush(&mut self) -> Result<()> {
+        let Some(wave) = &self.pending else { return Ok(()) };
+        let mut recorder = self.gpu.recorder("path film")?;
+        self.record_resolve(&mut recorder, wave)?;
+        let submission = recorder.submit()?;
+        self.pending = None;
+        submission.wait()?;
+        Ok(())
+    }
+}
+
+/// A 64-bit counter of two words, the low one first.
+fn wide(words: [u32; 2]) -> u64 {
+    u64::from(words[0]) | u64::from(words[1]) << 32
 }

@@ -4,7 +4,6 @@
 //! in order.
 
 use super::settings::SLOTS_MAX;
-use crate::Result;
 use crate::film::GpuFilm;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP};
@@ -12,12 +11,15 @@ use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::shaders::transport::path_camera;
 use crate::gpu::shaders::types::{GatheredLight, Hit, PathAov, PathState, ShadowRay};
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
+use crate::{Error, Result};
 
 /// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
 /// iterations in all.
 const SAMPLES_A_WAVE: u32 = 1024;
 /// Samples of a pixel that are best under way together, in neighbouring lanes.
 const SAMPLES_TOGETHER: u32 = 8;
+/// Slots below which a lack of memory is an error.
+const SLOTS_MIN: u32 = 1 << 14;
 /// Bytes of a texel of four words.
 const TEXEL_BYTES: u64 = 16;
 
@@ -110,12 +112,28 @@ pub(super) fn slots_of_device(gpu: &Gpu) -> u32 {
     slots - slots % PATH_GROUP
 }
 
+/// Slots that waves of a picture can fill, in whole workgroups.
+pub(super) fn slots_of_picture([width, height]: [u32; 2]) -> u32 {
+    let paths = u64::from(width) * u64::from(height) * u64::from(SAMPLES_A_WAVE);
+    paths.next_multiple_of(u64::from(PATH_GROUP)).min(u64::from(SLOTS_MAX)) as u32
+}
+
 /// Indirect arguments of stages with one invocation a place, and a chunk, of a queue.
 pub(super) fn group_counts(places: u32) -> [[u32; 3]; 2] {
     [places, places.div_ceil(COMPACT_CHUNK)].map(|count| [count.div_ceil(PATH_GROUP), 1, 1])
 }
 
 impl WaveBuffers {
+    /// For as many slots, up to `slots`, as there is memory for; a wave's size never changes the picture.
+    pub fn within_memory(gpu: &Gpu, mut slots: u32, lights: bool, aovs: bool) -> Result<(Self, u32)> {
+        loop {
+            match Self::new(gpu, slots, lights, aovs) {
+                Err(Error::OutOfMemory { .. }) if slots > SLOTS_MIN => slots = (slots / 2).next_multiple_of(PATH_GROUP),
+                made => return made.map(|buffers| (buffers, slots)),
+            }
+        }
+    }
+
     pub fn new(gpu: &Gpu, slots: u32, lights: bool, aovs: bool) -> Result<Self> {
         let work = |name: &str, bytes: usize, count: u32| {
             gpu.buffer(&BufferDesc::storage(
