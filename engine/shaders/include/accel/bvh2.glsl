@@ -2,6 +2,8 @@
 // conservative boxes and how a stopped ray goes on.
 //
 // One loop, in which an iteration visits an inner node or tests one triangle, so that its iterations are all that a driver's cap on loops counts.
+// With a filter of candidates a second one stands around it, and a subgroup may run as many iterations as its lanes have in sum: the quota
+// must be that much smaller.
 // A ray that its quota stops returns the word of the node to go on with; call again with it and the same hit. The quota must exceed
 // BVH2_MAX_DEPTH; leaves on the stack may add (BVH2_MAX_DEPTH + 1) × leaf size iterations to it.
 //
@@ -31,6 +33,30 @@ const uint BVH2_START = 0u;
 const uint BVH2_FINISHED = 0xFFFFFFFFu;
 const float BVH2_BOX_SLACK = 1.0 / 262144.0;
 const float BVH2_MIN_RELATIVE_COMPONENT = 8.6736174e-19;
+
+// Not at the end, and not stopped; a leaf that was begun is ended.
+#define BVH2_UNFINISHED (word != BVH2_FINISHED && (iterations < BVH2_QUOTA || (word & BVH2_COUNT_MASK) != 0u))
+
+#ifdef CLERESTORY_CANDIDATE_FILTER
+// The filter is asked outside of the loop, where lanes wait for each other with their candidates: inside, where subgroups run both sides of
+// branches, every iteration would pay for it.
+#define BVH2_BEGIN_CANDIDATES \
+    bool awaiting; \
+    Hit awaited; \
+    do { \
+        awaiting = false;
+#define BVH2_GOES_ON !awaiting && BVH2_UNFINISHED
+#define BVH2_END_CANDIDATES \
+        if (awaiting && accept_candidate(awaited.triangle, awaited.barycentrics)) { \
+            hit = awaited; \
+            word = any_hit ? BVH2_FINISHED : word; \
+        } \
+    } while (BVH2_UNFINISHED);
+#else
+#define BVH2_BEGIN_CANDIDATES
+#define BVH2_GOES_ON BVH2_UNFINISHED
+#define BVH2_END_CANDIDATES
+#endif
 
 // Inner nodes visited, triangles tested, iterations; filled when BVH2_COUNT is set.
 uvec3 bvh2_counters = uvec3(0u);
@@ -79,6 +105,7 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     uint top = 0u;
     uint word = BVH2_START;
     uint iterations = 0u;
+    BVH2_BEGIN_CANDIDATES
     do {
         ++iterations;
         bool pop = true;
@@ -125,13 +152,16 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             if (better) {
                 uint triangle = q2.y;
                 better = candidate.t < hit.t || triangle < hit.triangle;
-#ifdef CLERESTORY_CANDIDATE_FILTER
-                better = better && accept_candidate(triangle, candidate.barycentrics);
-#endif
                 if (better) {
-                    hit = Hit(candidate.t, candidate.barycentrics, triangle);
+                    Hit found = Hit(candidate.t, candidate.barycentrics, triangle);
+#ifdef CLERESTORY_CANDIDATE_FILTER
+                    awaiting = true;
+                    awaited = found;
+#else
+                    hit = found;
                     top = any_hit ? 0u : top;
                     pop = pop || any_hit;
+#endif
                 }
             }
             if (BVH2_COUNT) {
@@ -141,7 +171,8 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         if (pop) {
             word = top > 0u ? stack[--top] : BVH2_FINISHED;
         }
-    } while (word != BVH2_FINISHED && (iterations < BVH2_QUOTA || (word & BVH2_COUNT_MASK) != 0u));
+    } while (BVH2_GOES_ON);
+    BVH2_END_CANDIDATES
     if (BVH2_COUNT) {
         bvh2_counters.z += iterations;
     }

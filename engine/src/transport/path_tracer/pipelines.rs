@@ -11,6 +11,10 @@ use crate::scene::Camera;
 use crate::transport::GpuScene;
 use crate::transport::camera_frame::CameraFrame;
 
+/// Iterations after which a ray among surfaces with alpha goes on in a later dispatch, at most: a software driver's subgroup of 16 then
+/// stays below the 65,535 iterations after which it silently ends loops, even if its lanes take turns.
+const ALPHA_QUOTA_MAX: u32 = 2048;
+
 /// One kernel a stage.
 pub(super) struct Pipelines {
     pub camera: ComputePipeline<path_camera::Kernel>,
@@ -129,6 +133,7 @@ impl TracePipelines {
             });
         }
         let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
+        let bvh2_quota = bvh2_quota.min(ALPHA_QUOTA_MAX);
         let extend = path_extend_alpha::Spec {
             has_textures,
             has_vertex_colors,
