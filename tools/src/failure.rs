@@ -126,10 +126,9 @@ impl From<Error> for Failure {
                 // A setting that is read from text by itself repeats its name and value.
                 let inner = cause.strip_prefix(WITHIN).and_then(|inner| inner.split_once(": "));
                 let inner = inner.map_or(cause.as_str(), |(_, inner)| inner);
-                let inner = inner
-                    .strip_prefix(value.trim_matches('"'))
-                    .unwrap_or(inner)
-                    .trim_start();
+                let repeated = [value.as_str(), value.trim_matches('"')];
+                let rest = repeated.iter().find_map(|value| inner.strip_prefix(value));
+                let inner = rest.unwrap_or(inner).trim_start();
                 format!("setting {name}: {value} {inner}")
             }
             // The settings as a whole are long; the cause names the one that is wrong.

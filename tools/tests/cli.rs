@@ -288,7 +288,7 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     render(
         &["--settings", "{\"path_set\": \"foo\"}"],
         2,
-        &["setting path_set: \"foo\" "],
+        &["setting path_set: \"foo\" is not known"],
     )?;
     render(&["--settings", "@no-such-file"], 2, &["no-such-file"])?;
     render(&["--settings", "3"], 2, &["JSON object", "hint: "])?;
