@@ -77,6 +77,8 @@ fn modules_used(source: &str) -> BTreeSet<String> {
             }
         }
     }
+    // A comma after the last one.
+    used.remove("");
     used
 }
 
