@@ -345,6 +345,7 @@ const EVEN: TechniqueInfo = TechniqueInfo {
         let lit = !profile.has_environment();
         lit.then(|| "there is no sky".to_owned()).into_iter().collect()
     },
+    settings: &[],
     default_settings: || serde_json::json!({"radiance": 1.0}),
     create: |gpu, _, view, settings| {
         let radiance = settings["radiance"].as_f64().unwrap_or(1.0);

@@ -12,7 +12,7 @@ use crate::output;
 pub enum Code {
     /// The run failed: device lost, out of memory, a file that cannot be read or written.
     Run = 1,
-    /// The command line asks for what cannot be.
+    /// The command line asks for what cannot be, pictures of different sizes to compare included.
     Usage = 2,
     /// The scene cannot be read, or the technique cannot render it.
     Scene = 3,
@@ -90,6 +90,19 @@ impl Failure {
     }
 }
 
+/// How the causes of settings begin that are read from text by themselves.
+const WITHIN: &str = "does not fit: setting ";
+
+/// What a setting names, for those whose values are names.
+fn called(setting: &str) -> Option<&'static str> {
+    match setting {
+        "technique" => Some("technique"),
+        "camera" => Some("camera"),
+        "scenes" => Some("scene"),
+        _ => None,
+    }
+}
+
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
@@ -104,6 +117,19 @@ impl From<Error> for Failure {
                 let wanted = wanted.trim_end_matches(')');
                 let wanted = wanted.split_once('(').map_or(wanted, |(_, what)| what);
                 format!("no Vulkan device is called or numbered {wanted}; there is {found}")
+            }
+            Error::Setting { name, value, cause } if called(name).is_some() && cause.contains("; ") => {
+                let (_, there_is) = cause.split_once("; ").unwrap_or_default();
+                format!("no {} is called {value}; {there_is}", called(name).unwrap_or(name))
+            }
+            Error::Setting { name, value, cause } if cause.starts_with(WITHIN) => {
+                // A setting that is read from text by itself repeats its name and value.
+                let inner = cause.strip_prefix(WITHIN).and_then(|inner| inner.split_once(": "));
+                let inner = inner.map_or(cause.as_str(), |(_, inner)| inner);
+                let repeated = [value.as_str(), value.trim_matches('"')];
+                let rest = repeated.iter().find_map(|value| inner.strip_prefix(value));
+                let inner = rest.unwrap_or(inner).trim_start();
+                format!("setting {name}: {value} {inner}")
             }
             // The settings as a whole are long; the cause names the one that is wrong.
             Error::Setting { name, cause, .. } if name == "settings" => format!("--settings: {cause}"),

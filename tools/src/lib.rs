@@ -3,3 +3,4 @@
 pub mod agreement;
 pub mod machine;
 pub mod mitsuba;
+pub mod page;

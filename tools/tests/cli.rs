@@ -114,6 +114,11 @@ fn a_rendering_leaves_picture_preview_and_report() -> Tested {
         assert_eq!(control, None, "{}", said(&output));
     }
     assert_eq!(std::fs::read_dir(folder.path().join("new"))?.count(), 3);
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("made folder"),
+        "{}",
+        said(&output)
+    );
     Ok(())
 }
 
@@ -261,13 +266,30 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     };
     render(&["builtin:nothing"], 3, &["nothing", "cornell-box"])?;
     render(&["builtin:cornell-box?lihgt=1"], 3, &["lihgt", "allowed: light"])?;
+    render(&["builtin:cornel-box"], 3, &["did you mean builtin:cornell-box?"])?;
+    render(&["builtin:"], 3, &["builtin:: without a name", "ring"])?;
+    render(&["cornell-box"], 3, &["did you mean builtin:cornell-box?"])?;
     render(&["no-such-file.glb"], 3, &["no-such-file.glb", "hint:"])?;
-    render(&["--camera", "nobody"], 2, &["nobody", "hint: there is: main"])?;
-    render(&["--technique", "magic"], 2, &["magic", "path"])?;
+    render(
+        &["--camera", "nobody"],
+        2,
+        &["no camera is called nobody", "hint: there is: main"],
+    )?;
+    render(
+        &["--technique", "magic"],
+        2,
+        &["no technique is called magic", "hint: there is: path"],
+    )?;
     render(&["--device", "abacus"], 5, &["abacus", "there is"])?;
     render(&["--device", "99"], 5, &["99"])?;
     render(&["--path-set", "dirct"], 2, &["dirct", "indirect"])?;
     render(&["--settings", "{\"roulete\": 1}"], 2, &["roulete", "roulette_start"])?;
+    render(&["--settings", "{\"seed\": 1}"], 2, &["seed", "hint: use --seed"])?;
+    render(
+        &["--settings", "{\"path_set\": \"foo\"}"],
+        2,
+        &["setting path_set: \"foo\" is not known"],
+    )?;
     render(&["--settings", "@no-such-file"], 2, &["no-such-file"])?;
     render(&["--settings", "3"], 2, &["JSON object", "hint: "])?;
     render(
@@ -330,7 +352,10 @@ fn comparisons() -> Tested {
     // Too dark everywhere, by the whole scale.
     assert_eq!(image::open(&difference)?.into_rgb8().get_pixel(3, 3).0, [0, 0, 255]);
 
-    refuse(&["compare", a, small], 1, &["16×16", "8×8"])?;
+    refuse(&["compare", a, small], 2, &["16×16", "8×8"])?;
+    let sizes = ["render", "--size", "16", "--spp", "1", "--reference", small];
+    refuse(&sizes, 2, &["16 × 16", "8 × 8"])?;
+    refuse(&["compare", a, "no-such.exr"], 1, &["no-such.exr"])?;
     refuse(&["compare", a, broken], 1, &["broken.exr"])?;
     refuse(&["compare", a, "picture.gif"], 1, &["gif"])?;
     refuse(&["compare", a, "picture"], 1, &["has no ending", ".exr"])?;
@@ -355,6 +380,11 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
     assert!(names.iter().any(|name| *name == "cornell-box"), "{names:?}");
     let list = json(&succeed(&["list", "--json"])?.stdout)?;
     assert_eq!(list["techniques"][0]["id"], "path");
+    let settings = String::from_utf8(succeed(&["list", "path"])?.stdout)?;
+    assert!(
+        settings.contains("roulette_start") && settings.contains("bounces"),
+        "{settings}"
+    );
     assert!(list["techniques"][0]["default_settings"]["roulette_start"].is_u64());
     assert!(
         list["catalogue"]
@@ -440,7 +470,7 @@ fn a_report_has_a_table_for_its_scene() -> Tested {
     succeed(&[&arguments[..], &["--references", text(&references)]].concat())?;
     let written = std::fs::read_to_string(&page)?;
     assert!(
-        written.contains("### `builtin:cornell-box` (38 triangles)"),
+        written.contains("### `builtin:cornell-box` (38 triangles)") && written.contains("Smoke run"),
         "{written}"
     );
     assert_eq!(

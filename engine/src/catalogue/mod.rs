@@ -3,7 +3,7 @@
 //! Ids with the prefixes `BG-`, `DP-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility and media,
 //! photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
 //! the prefix `CL-` are the engine's own, for published methods outside of those documents. Guarantee: the tests below check that the
-//! module, every test and every experiment named here exist.
+//! module, every test and every experiment named here exist, and that `docs/catalogue.md` is [`markdown`].
 
 mod rows;
 #[cfg(test)]
@@ -62,6 +62,48 @@ const fn unbiased(row: Row) -> Row {
         bias: Some(Bias::Unbiased),
         ..row
     }
+}
+
+/// As [`part`], with the command that measures it.
+const fn measured(command: &'static str, row: Row) -> Row {
+    Row {
+        experiment: Some(command),
+        ..row
+    }
+}
+
+/// The catalogue as a page of Markdown.
+pub fn markdown() -> String {
+    let mut page = String::from(
+        "# Catalogue\n\nWhere each publication lives in the code. Written by `clerestory list --markdown`; `clerestory list ID` also names \
+         the tests of a system.\n\n| id | system | publication | module | bias | path set | needs | tests | measured by |\n\
+         |---|---|---|---|---|---|---|---:|---|\n",
+    );
+    for row in all() {
+        let bias = match row.bias {
+            None => "–".to_owned(),
+            Some(Bias::Unbiased) => "unbiased".to_owned(),
+            Some(Bias::Consistent(cause)) => format!("consistent: {cause}"),
+            Some(Bias::Biased(cause)) => format!("biased: {cause}"),
+        };
+        let path_set = row.path_set.map_or("–".to_owned(), |set| set.to_string());
+        let needs = if row.needs.is_empty() {
+            "baseline".to_owned()
+        } else {
+            row.needs.join(", ")
+        };
+        let experiment = row.experiment.map_or("–".to_owned(), |command| format!("`{command}`"));
+        page += &format!(
+            "| {} | {} | {} | [{}](../{}) | {bias} | {path_set} | {needs} | {} | {experiment} |\n",
+            row.id,
+            row.name,
+            row.publication,
+            row.module.trim_start_matches("engine/src/"),
+            row.module,
+            row.tests.len(),
+        );
+    }
+    page
 }
 
 /// All rows, ordered by document and id.

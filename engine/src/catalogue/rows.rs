@@ -1,6 +1,6 @@
 //! The rows, ordered by document and id. Tests that speak for several systems have a name of their own.
 
-use super::{Row, part, unbiased};
+use super::{Row, measured, part, unbiased};
 use crate::transport::PathSet;
 
 const RADIOMETRY: &[&str] = &[
@@ -37,20 +37,26 @@ const ESTIMATION: &[&str] = &[
 ];
 
 pub(super) const ROWS: &[Row] = &[
-    part(
-        "BG-1",
-        "radiometry and surface transport (the volumetric equation is not carried yet)",
-        "Veach 1997, chapter 3",
-        "engine/src/transport/lights.rs",
-        RADIOMETRY,
+    measured(
+        "tools/report",
+        part(
+            "BG-1",
+            "radiometry and surface transport (the volumetric equation is not carried yet)",
+            "Veach 1997, chapter 3",
+            "engine/src/transport/lights.rs",
+            RADIOMETRY,
+        ),
     ),
-    unbiased(part(
-        "BG-2",
-        "Monte Carlo and importance sampling",
-        "Veach 1997, chapters 2 and 9",
-        "engine/src/transport/warp.rs",
-        SAMPLING,
-    )),
+    measured(
+        "tools/report",
+        unbiased(part(
+            "BG-2",
+            "Monte Carlo and importance sampling",
+            "Veach 1997, chapters 2 and 9",
+            "engine/src/transport/warp.rs",
+            SAMPLING,
+        )),
+    ),
     Row {
         path_set: Some(PathSet::ALL),
         experiment: Some("tools/report"),
@@ -62,53 +68,65 @@ pub(super) const ROWS: &[Row] = &[
             PATH_TRACER,
         ))
     },
-    part(
-        "BG-14",
-        "ray index: binary BVH by binned surface-area heuristic",
-        "Wald 2007; Aila and Laine 2009; Laine 2010; Ize 2013",
-        "engine/src/accel/bvh2.rs",
-        &[
-            "engine/src/accel/bvh2/tests.rs::traversal_equals_trying_all_triangles_bit_for_bit",
-            "engine/src/accel/bvh2/tests.rs::hits_agree_with_f64_up_to_their_stated_error",
-            "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
-            "engine/src/accel/bvh2/tests.rs::stopped_traversals_go_on_without_loss_or_repetition",
-            "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
-            "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
-        ],
+    measured(
+        "clerestory bench",
+        part(
+            "BG-14",
+            "ray index: binary BVH by binned surface-area heuristic",
+            "Wald 2007; Aila and Laine 2009; Laine 2010; Ize 2013",
+            "engine/src/accel/bvh2.rs",
+            &[
+                "engine/src/accel/bvh2/tests.rs::traversal_equals_trying_all_triangles_bit_for_bit",
+                "engine/src/accel/bvh2/tests.rs::hits_agree_with_f64_up_to_their_stated_error",
+                "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
+                "engine/src/accel/bvh2/tests.rs::stopped_traversals_go_on_without_loss_or_repetition",
+                "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
+                "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
+            ],
+        ),
     ),
-    part(
-        "DP-1",
-        "latitude–longitude map (y up, as glTF)",
-        "Blinn and Newell 1976",
-        "engine/src/transport/environment.rs",
-        &["engine/src/transport/environment.rs::directions_and_coordinates_agree"],
+    measured(
+        "clerestory agreement --scene box-city-sky",
+        part(
+            "DP-1",
+            "latitude–longitude map (y up, as glTF)",
+            "Blinn and Newell 1976",
+            "engine/src/transport/environment.rs",
+            &["engine/src/transport/environment.rs::directions_and_coordinates_agree"],
+        ),
     ),
-    part(
-        "PM-F-1",
-        "radiometry of point and spot lights, split into direct and indirect light",
-        "Veach 1997, chapter 3; Khronos, KHR_lights_punctual",
-        "engine/src/transport/lights.rs",
-        &[
-            "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
-            "engine/src/transport/lights.rs::spot_flux_and_falloff",
-            "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
-            "tests/tests/path_tracer.rs::path_sets_are_a_partition",
-        ],
+    measured(
+        "clerestory agreement --scene cornell-point,sphere-flake",
+        part(
+            "PM-F-1",
+            "radiometry of point and spot lights, split into direct and indirect light",
+            "Veach 1997, chapter 3; Khronos, KHR_lights_punctual",
+            "engine/src/transport/lights.rs",
+            &[
+                "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
+                "engine/src/transport/lights.rs::spot_flux_and_falloff",
+                "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+                "tests/tests/path_tracer.rs::path_sets_are_a_partition",
+            ],
+        ),
     ),
-    unbiased(part(
-        "PM-F-2",
-        "surface models: Lambert, mirror, refraction (path tracer); modified Phong (function)",
-        "Lafortune and Willems 1994; Walter et al. 2007",
-        "engine/src/transport/phong.rs",
-        &[
-            "engine/src/transport/phong.rs::white_furnace",
-            "engine/src/transport/phong.rs::reciprocal",
-            "engine/src/transport/phong.rs::samples_follow_their_density",
-            "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
-            "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
-            "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
-        ],
-    )),
+    measured(
+        "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
+        unbiased(part(
+            "PM-F-2",
+            "surface models: Lambert, mirror, refraction (path tracer); modified Phong (function)",
+            "Lafortune and Willems 1994; Walter et al. 2007",
+            "engine/src/transport/phong.rs",
+            &[
+                "engine/src/transport/phong.rs::white_furnace",
+                "engine/src/transport/phong.rs::reciprocal",
+                "engine/src/transport/phong.rs::samples_follow_their_density",
+                "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
+                "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
+                "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
+            ],
+        )),
+    ),
     unbiased(part(
         "PM-F-3",
         "phase functions of Henyey and Greenstein and of Schlick (functions; no medium yet)",
@@ -136,24 +154,30 @@ pub(super) const ROWS: &[Row] = &[
         "engine/src/accel/triangle.rs",
         &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
     ),
-    part(
-        "MET-B1",
-        "radiometry and rendering equation",
-        "Kajiya 1986",
-        "engine/src/transport/lights.rs",
-        RADIOMETRY,
+    measured(
+        "clerestory agreement --scene cornell-box,cornell-point",
+        part(
+            "MET-B1",
+            "radiometry and rendering equation",
+            "Kajiya 1986",
+            "engine/src/transport/lights.rs",
+            RADIOMETRY,
+        ),
     ),
-    unbiased(part(
-        "MET-B2",
-        "microfacet product of distribution, masking and Fresnel factor",
-        "Walter et al. 2007; Heitz 2014",
-        "engine/src/transport/bsdf/mod.rs",
-        &[
-            "engine/src/transport/bsdf/tests.rs::white_furnace",
-            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
-            "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
-        ],
-    )),
+    measured(
+        "clerestory agreement --scene furnace-metal,furnace-glass",
+        unbiased(part(
+            "MET-B2",
+            "microfacet product of distribution, masking and Fresnel factor",
+            "Walter et al. 2007; Heitz 2014",
+            "engine/src/transport/bsdf/mod.rs",
+            &[
+                "engine/src/transport/bsdf/tests.rs::white_furnace",
+                "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+                "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
+            ],
+        )),
+    ),
     unbiased(part(
         "MET-B7",
         "coupled matte and specular reflection",
@@ -164,49 +188,65 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
         ],
     )),
-    unbiased(part(
-        "MET-B8",
-        "path estimation: light sampling, BRDF sampling, Russian roulette",
-        "Kajiya 1986; Veach 1997, chapters 9 and 10",
-        "engine/src/transport/path_tracer/mod.rs",
-        ESTIMATION,
-    )),
-    part(
-        "MET-F1",
-        "exact unpolarised conductor Fresnel",
-        "Born and Wolf, Principles of Optics, 14.2",
-        "engine/src/transport/fresnel.rs",
-        &["engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric"],
+    measured(
+        "tools/report",
+        unbiased(part(
+            "MET-B8",
+            "path estimation: light sampling, BRDF sampling, Russian roulette",
+            "Kajiya 1986; Veach 1997, chapters 9 and 10",
+            "engine/src/transport/path_tracer/mod.rs",
+            ESTIMATION,
+        )),
     ),
-    part(
-        "CL-FRESNEL",
-        "exact dielectric Fresnel",
-        "Born and Wolf, Principles of Optics, 1.5",
-        "engine/src/transport/fresnel.rs",
-        &["engine/src/transport/fresnel.rs::dielectric_equals_the_textbook_form_and_its_edges"],
+    measured(
+        "clerestory agreement --scene cornell-metals,ring-mirror",
+        part(
+            "MET-F1",
+            "exact unpolarised conductor Fresnel",
+            "Born and Wolf, Principles of Optics, 14.2",
+            "engine/src/transport/fresnel.rs",
+            &["engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric"],
+        ),
     ),
-    part(
-        "CL-METALS",
-        "measured metals: gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt",
-        "Johnson and Christy 1972, 1974; Rakić 1995",
-        "engine/src/scene/metals/mod.rs",
-        &[
-            "engine/src/scene/metals/mod.rs::spectra_reflect_what_others_computed_of_them",
-            "engine/src/scene/metals/mod.rs::channels_reflect_as_their_spectra_do",
-            "engine/src/scene/metals/mod.rs::channels_reflect_like_other_samples_of_the_metals",
-        ],
+    measured(
+        "clerestory agreement --scene cornell-glass",
+        part(
+            "CL-FRESNEL",
+            "exact dielectric Fresnel",
+            "Born and Wolf, Principles of Optics, 1.5",
+            "engine/src/transport/fresnel.rs",
+            &["engine/src/transport/fresnel.rs::dielectric_equals_the_textbook_form_and_its_edges"],
+        ),
     ),
-    unbiased(part(
-        "CL-GGX",
-        "GGX distribution, height-correlated masking, visible normals by spherical caps",
-        "Walter et al. 2007; Heitz 2014; Dupuy and Benyoub 2023",
-        "engine/src/transport/ggx.rs",
-        &[
-            "engine/src/transport/ggx.rs::densities_are_normalised",
-            "engine/src/transport/ggx.rs::visible_normals_follow_their_density",
-            "engine/src/transport/ggx.rs::masking_limits",
-        ],
-    )),
+    measured(
+        "clerestory agreement --scene cornell-metals",
+        part(
+            "CL-METALS",
+            "measured metals: gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt",
+            "Johnson and Christy 1972, 1974; Rakić 1995",
+            "engine/src/scene/metals/mod.rs",
+            &[
+                "engine/src/scene/metals/mod.rs::spectra_reflect_what_others_computed_of_them",
+                "engine/src/scene/metals/mod.rs::channels_reflect_as_their_spectra_do",
+                "engine/src/scene/metals/mod.rs::channels_reflect_like_other_samples_of_the_metals",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory agreement --scene cornell-frosted,ring-rough",
+        unbiased(part(
+            "CL-GGX",
+            "GGX distribution, height-correlated masking, visible normals by spherical caps",
+            "Walter et al. 2007; Heitz 2014; Dupuy and Benyoub 2023",
+            "engine/src/transport/ggx.rs",
+            &[
+                "engine/src/transport/ggx.rs::densities_are_normalised",
+                "engine/src/transport/ggx.rs::visible_normals_follow_their_density",
+                "engine/src/transport/ggx.rs::masking_limits",
+                "tests/tests/samplers.rs::visible_normals_follow_their_density",
+            ],
+        )),
+    ),
     part(
         "CL-MULTISCATTER",
         "compensation of rough metals for scattering among microfacets",
@@ -227,52 +267,64 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/transport/shading_normal.rs::flat_maps_keep_the_normal",
         ],
     ),
-    unbiased(part(
-        "CL-SOBOL",
-        "Owen-scrambled Sobol' points by hashing",
-        "Burley 2020; Laine and Karras 2011",
-        "engine/src/transport/random.rs",
-        &[
-            "engine/src/transport/random.rs::pascal_steps_equal_the_direction_numbers",
-            "engine/src/transport/random.rs::sobol_pairs_are_stratified_plain_and_scrambled",
-            "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
-            "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
-        ],
-    )),
-    unbiased(part(
-        "CL-PCG",
-        "counter-based random numbers by PCG hashes",
-        "Jarzynski and Olano 2020",
-        "engine/src/transport/random.rs",
-        &[
-            "engine/src/transport/random.rs::pcg_avalanche_and_means",
-            "engine/src/transport/random.rs::floats_stay_below_one",
-        ],
-    )),
-    unbiased(part(
-        "CL-ENVIRONMENT",
-        "environment light with importance sampling",
-        "Pharr, Jakob and Humphreys 2016, 14.2.4",
-        "engine/src/transport/environment.rs",
-        &[
-            "engine/src/transport/environment.rs::directions_and_coordinates_agree",
-            "engine/src/transport/environment.rs::samples_follow_the_density",
-            "engine/src/transport/environment.rs::light_is_never_missed_and_bad_maps_are_errors",
-            "tests/tests/samplers.rs::environments_are_sampled_by_their_texels_and_evenly_within",
-            "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
-        ],
-    )),
-    unbiased(part(
-        "CL-LIGHTS",
-        "choice of lights by power",
-        "Shirley, Wang and Zimmerman 1996 (inversion of the cumulative distribution)",
-        "engine/src/transport/distribution.rs",
-        &[
-            "engine/src/transport/distribution.rs::probabilities_follow_weights_and_none_is_lost",
-            "engine/src/transport/distribution.rs::cells_follow_their_probability",
-            "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
-        ],
-    )),
+    measured(
+        "tools/report",
+        unbiased(part(
+            "CL-SOBOL",
+            "Owen-scrambled Sobol' points by hashing",
+            "Burley 2020; Laine and Karras 2011",
+            "engine/src/transport/random.rs",
+            &[
+                "engine/src/transport/random.rs::pascal_steps_equal_the_direction_numbers",
+                "engine/src/transport/random.rs::sobol_pairs_are_stratified_plain_and_scrambled",
+                "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
+                "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory agreement",
+        unbiased(part(
+            "CL-PCG",
+            "counter-based random numbers by PCG hashes",
+            "Jarzynski and Olano 2020",
+            "engine/src/transport/random.rs",
+            &[
+                "engine/src/transport/random.rs::pcg_avalanche_and_means",
+                "engine/src/transport/random.rs::floats_stay_below_one",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory agreement --scene box-city-sky",
+        unbiased(part(
+            "CL-ENVIRONMENT",
+            "environment light with importance sampling",
+            "Pharr, Jakob and Humphreys 2016, 14.2.4",
+            "engine/src/transport/environment.rs",
+            &[
+                "engine/src/transport/environment.rs::directions_and_coordinates_agree",
+                "engine/src/transport/environment.rs::samples_follow_the_density",
+                "engine/src/transport/environment.rs::light_is_never_missed_and_bad_maps_are_errors",
+                "tests/tests/samplers.rs::environments_are_sampled_by_their_texels_and_evenly_within",
+                "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
+            ],
+        )),
+    ),
+    measured(
+        "tools/report",
+        unbiased(part(
+            "CL-LIGHTS",
+            "choice of lights by power",
+            "Shirley, Wang and Zimmerman 1996 (inversion of the cumulative distribution)",
+            "engine/src/transport/distribution.rs",
+            &[
+                "engine/src/transport/distribution.rs::probabilities_follow_weights_and_none_is_lost",
+                "engine/src/transport/distribution.rs::cells_follow_their_probability",
+                "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
+            ],
+        )),
+    ),
     part(
         "CL-PATHSET",
         "restriction of a picture to a set of light paths",
@@ -284,15 +336,18 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
         ],
     ),
-    part(
-        "CL-TRIANGLE",
-        "watertight triangle test",
-        "Woop, Benthin and Wald 2013",
-        "engine/src/accel/triangle.rs",
-        &[
-            "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
-            "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
-        ],
+    measured(
+        "clerestory bench",
+        part(
+            "CL-TRIANGLE",
+            "watertight triangle test",
+            "Woop, Benthin and Wald 2013",
+            "engine/src/accel/triangle.rs",
+            &[
+                "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
+                "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
+            ],
+        ),
     ),
     part(
         "CL-OFFSET",
@@ -314,25 +369,31 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
         ],
     ),
-    part(
-        "CL-ERROR",
-        "error metrics: MSE, relative MSE, bias, quantile, FLIP",
-        "Rousselle, Knaus and Zwicker 2011; Andersson et al. 2020",
-        "engine/src/film/metrics.rs",
-        &[
-            "engine/src/film/metrics.rs::formulas_on_numbers_done_by_hand",
-            "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
-        ],
+    measured(
+        "tools/report",
+        part(
+            "CL-ERROR",
+            "error metrics: MSE, relative MSE, bias, quantile, FLIP",
+            "Rousselle, Knaus and Zwicker 2011; Andersson et al. 2020",
+            "engine/src/film/metrics.rs",
+            &[
+                "engine/src/film/metrics.rs::formulas_on_numbers_done_by_hand",
+                "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
+            ],
+        ),
     ),
-    part(
-        "CL-ZTEST",
-        "agreement of two pictures by z-test with Šidák's correction",
-        "Subr and Arvo 2007; Šidák 1967",
-        "engine/src/film/z_test.rs",
-        &[
-            "engine/src/film/z_test.rs::false_alarms_come_at_the_stated_rate",
-            "engine/src/film/z_test.rs::a_bias_of_one_per_cent_is_found",
-        ],
+    measured(
+        "clerestory agreement",
+        part(
+            "CL-ZTEST",
+            "agreement of two pictures by z-test with Šidák's correction",
+            "Subr and Arvo 2007; Šidák 1967",
+            "engine/src/film/z_test.rs",
+            &[
+                "engine/src/film/z_test.rs::false_alarms_come_at_the_stated_rate",
+                "engine/src/film/z_test.rs::a_bias_of_one_per_cent_is_found",
+            ],
+        ),
     ),
     unbiased(part(
         "CL-ALPHA",
@@ -353,15 +414,18 @@ pub(super) const ROWS: &[Row] = &[
         "engine/src/transport/path_tracer/mod.rs",
         &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
     ),
-    part(
-        "CL-TEXTURE",
-        "texture look-ups: nearest, bilinear, three ways to wrap, sRGB",
-        "Khronos, glTF 2.0 specification, 3.8; IEC 61966-2-1",
-        "engine/src/scene/texture.rs",
-        &[
-            "engine/src/scene/texture.rs::half_texels_and_wrap_modes_meet_at_borders",
-            "tests/tests/twin_texture.rs::look_ups_agree_with_their_twins",
-        ],
+    measured(
+        "tools/models",
+        part(
+            "CL-TEXTURE",
+            "texture look-ups: nearest, bilinear, three ways to wrap, sRGB",
+            "Khronos, glTF 2.0 specification, 3.8; IEC 61966-2-1",
+            "engine/src/scene/texture.rs",
+            &[
+                "engine/src/scene/texture.rs::half_texels_and_wrap_modes_meet_at_borders",
+                "tests/tests/twin_texture.rs::look_ups_agree_with_their_twins",
+            ],
+        ),
     ),
     part(
         "CL-TANGENT",
@@ -373,15 +437,18 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/scene/tangents.rs::disagreeing_corners_split_vertices",
         ],
     ),
-    part(
-        "CL-CORNELL",
-        "Cornell box and thirteen more generated scenes",
-        "Goral, Torrance, Greenberg and Battaile 1984; Cornell University, Cornell Box Data; Haines 1987",
-        "engine/src/scene/builtin/mod.rs",
-        &[
-            "engine/src/scene/builtin/cornell.rs::the_areas_are_those_of_the_published_data",
-            "engine/src/scene/builtin/mod.rs::every_entry_builds_with_its_defaults_and_has_what_it_promises",
-        ],
+    measured(
+        "clerestory agreement",
+        part(
+            "CL-CORNELL",
+            "Cornell box and thirteen more generated scenes",
+            "Goral, Torrance, Greenberg and Battaile 1984; Cornell University, Cornell Box Data; Haines 1987",
+            "engine/src/scene/builtin/mod.rs",
+            &[
+                "engine/src/scene/builtin/cornell.rs::the_areas_are_those_of_the_published_data",
+                "engine/src/scene/builtin/mod.rs::every_entry_builds_with_its_defaults_and_has_what_it_promises",
+            ],
+        ),
     ),
     part(
         "CL-PROFILE",
@@ -416,36 +483,45 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/film/png.rs::a_written_file_reads_back_to_the_byte",
         ],
     ),
-    part(
-        "CL-SIDECAR",
-        "sidecar of a model: environment, metals, cameras, exposure, technique (media are read and reported only)",
-        "the engine's own",
-        "engine/src/scene/sidecar.rs",
-        &[
-            "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
-            "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
-        ],
+    measured(
+        "tools/models",
+        part(
+            "CL-SIDECAR",
+            "sidecar of a model: environment, metals, cameras, exposure, technique (media are read and reported only)",
+            "the engine's own",
+            "engine/src/scene/sidecar.rs",
+            &[
+                "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
+                "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
+            ],
+        ),
     ),
-    part(
-        "CL-MESH",
-        "readers of PLY and OBJ",
-        "Turk 1994; Wavefront, OBJ and MTL",
-        "engine/src/scene/ply.rs",
-        &[
-            "engine/src/scene/ply.rs::all_encodings_are_read",
-            "engine/src/scene/ply.rs::every_cut_is_an_error_and_no_panic",
-            "engine/src/scene/obj.rs::faces_materials_and_coordinates_are_read",
-        ],
+    measured(
+        "tools/models",
+        part(
+            "CL-MESH",
+            "readers of PLY and OBJ",
+            "Turk 1994; Wavefront, OBJ and MTL",
+            "engine/src/scene/ply.rs",
+            &[
+                "engine/src/scene/ply.rs::all_encodings_are_read",
+                "engine/src/scene/ply.rs::every_cut_is_an_error_and_no_panic",
+                "engine/src/scene/obj.rs::faces_materials_and_coordinates_are_read",
+            ],
+        ),
     ),
-    part(
-        "CL-GLTF",
-        "reader of glTF 2.0",
-        "Khronos, glTF 2.0 specification",
-        "engine/src/scene/gltf/mod.rs",
-        &[
-            "engine/src/scene/gltf/tests/features.rs::text_and_binary_containers_give_the_same_scene",
-            "engine/src/scene/gltf/tests/features.rs::material_extensions_are_carried_over",
-            "engine/src/scene/gltf/tests/malformed.rs::every_truncation_is_an_error",
-        ],
+    measured(
+        "tools/models",
+        part(
+            "CL-GLTF",
+            "reader of glTF 2.0",
+            "Khronos, glTF 2.0 specification",
+            "engine/src/scene/gltf/mod.rs",
+            &[
+                "engine/src/scene/gltf/tests/features.rs::text_and_binary_containers_give_the_same_scene",
+                "engine/src/scene/gltf/tests/features.rs::material_extensions_are_carried_over",
+                "engine/src/scene/gltf/tests/malformed.rs::every_truncation_is_an_error",
+            ],
+        ),
     ),
 ];

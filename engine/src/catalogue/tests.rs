@@ -8,16 +8,15 @@ fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Whether the source holds a test function of that name.
+/// Whether the source holds a test function of that name which runs by itself.
 fn has_test(source: &str, name: &str) -> bool {
     let lines: Vec<&str> = source.lines().map(str::trim).collect();
     lines.iter().enumerate().any(|(i, line)| {
+        let above = lines[..i].iter().rev();
+        let mut above = above.take_while(|above| above.starts_with("#[") || above.starts_with("///"));
         line.starts_with(&format!("fn {name}("))
-            && lines[..i]
-                .iter()
-                .rev()
-                .take_while(|above| above.starts_with("#[") || above.starts_with("///"))
-                .any(|above| *above == "#[test]")
+            && above.clone().any(|attribute| *attribute == "#[test]")
+            && !above.any(|attribute| attribute.starts_with("#[ignore"))
     })
 }
 
@@ -94,8 +93,12 @@ fn modules_tests_and_experiments_exist() {
                 .map(|f| format!("{}: {f}", row.id)),
         );
         if let Some(command) = row.experiment {
-            let program = command.split_whitespace().next().unwrap_or_default();
-            if !repository().join(program).is_file() {
+            let mut words = command.split_whitespace();
+            let program = match (words.next(), words.next()) {
+                (Some("clerestory"), Some(command)) => format!("tools/src/commands/{command}.rs"),
+                (program, _) => program.unwrap_or_default().to_owned(),
+            };
+            if !repository().join(&program).is_file() {
                 faults.push(format!("{}: no program {program}", row.id));
             }
         }
@@ -132,8 +135,31 @@ fn every_technique_has_a_row_with_its_path_set() {
 }
 
 #[test]
+fn the_page_is_up_to_date() {
+    let page = std::fs::read_to_string(repository().join("docs/catalogue.md")).unwrap_or_default();
+    assert!(
+        page == markdown(),
+        "write it anew: cargo run -p clerestory-tools --bin clerestory -- list --markdown > docs/catalogue.md"
+    );
+}
+
+#[test]
+fn scenes_of_experiments_are_compared() {
+    let list = std::fs::read_to_string(repository().join("tools/src/mitsuba/scenes.rs")).expect("scenes");
+    for row in all() {
+        let Some((_, names)) = row.experiment.and_then(|command| command.split_once("--scene ")) else {
+            continue;
+        };
+        for name in names.split(',') {
+            assert!(list.contains(&format!("\"{name}\"")), "{}: {name}", row.id);
+        }
+    }
+}
+
+#[test]
 fn only_test_functions_count() {
     let source = "#[test]\nfn real() {\n}\nfn helper() {\n}\n";
     assert!(has_test(source, "real"));
     assert!(!has_test(source, "helper") && !has_test(source, "rea"));
+    assert!(!has_test("#[test]\n#[ignore = \"slow\"]\nfn idle() {\n}\n", "idle"));
 }

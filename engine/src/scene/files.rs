@@ -1,7 +1,7 @@
 //! The one entrance for scenes: `builtin:` addresses, model files with their sidecar, and sidecars given directly.
 //!
 //! A model without a camera gets one that frames it, and a model without any light gets a uniform environment, so that a picture comes
-//! out; both are reported as notes.
+//! out; both are reported as notes, and so is a model without any geometry.
 
 use std::path::Path;
 
@@ -72,6 +72,12 @@ fn model(path: &Path) -> Result<Scene> {
                 _ => format!("{other:?} is no known kind of scene file"),
             };
             let known = "known: gltf, glb, ply, obj, toml, and builtin: addresses";
+            let text = path.display().to_string();
+            let name = text.split_once('?').map_or(text.as_str(), |(name, _)| name);
+            let known = match builtin::nearest(name) {
+                Some(near) => format!("did you mean {}{near}? {known}", builtin::PREFIX),
+                None => known.to_owned(),
+            };
             Err(Error::scene(
                 path.display().to_string(),
                 "file name",
@@ -84,6 +90,13 @@ fn model(path: &Path) -> Result<Scene> {
 /// Adds what a picture needs and the file did not say.
 fn complete(scene: &mut Scene) {
     let profile = SceneProfile::of(scene);
+    if profile.triangles == 0 {
+        scene.notes.push(Note {
+            feature: "no geometry".into(),
+            at: "meshes".into(),
+            instead: "the picture shows the background alone".into(),
+        });
+    }
     if scene.cameras.is_empty() {
         scene.cameras.push(framing_camera(&profile));
         scene.notes.push(Note {

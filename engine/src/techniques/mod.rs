@@ -57,10 +57,25 @@ pub struct TechniqueInfo {
     pub path_set: PathSet,
     /// Why it cannot model a scene; empty when it can.
     pub refusals: fn(&SceneProfile) -> Vec<String>,
+    /// What each of its settings means, in the order to explain them in.
+    pub settings: &'static [SettingInfo],
     /// Default settings as JSON.
     pub default_settings: fn() -> serde_json::Value,
     /// Makes the technique. Whoever wants one calls [`TechniqueInfo::prepare`], which looks at device and scene first.
     pub create: Create,
+}
+
+/// A setting of a technique, in words. Its default is in [`TechniqueInfo::default_settings`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct SettingInfo {
+    /// Its name in the JSON.
+    pub name: &'static str,
+    /// What it may be.
+    pub range: &'static str,
+    /// Its unit; empty for what has none.
+    pub unit: &'static str,
+    /// What it does, and whether it changes the expected picture.
+    pub meaning: &'static str,
 }
 
 /// Makes a technique for a view, with its settings as JSON; [`from_json`](crate::settings::from_json) reads them.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Bias, Skipped, Technique, TechniqueInfo};
+use super::{Bias, SettingInfo, Skipped, Technique, TechniqueInfo};
 use crate::Result;
 use crate::film::Step;
 use crate::film::picture::Picture;
@@ -22,6 +22,7 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     needs: &[],
     path_set: PathSet::ALL,
     refusals: |_| Vec::new(),
+    settings: &SETTINGS,
     default_settings: || serde_json::to_value(PathTracerSettings::default()).unwrap_or_default(),
     create: |gpu, scene, view, settings| {
         let mut settings: PathTracerSettings = from_json(settings)?;
@@ -30,6 +31,57 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
         Ok(Box::new(PathTracer::new(gpu, scene, view.camera, view.size, settings)?))
     },
 };
+
+const SETTINGS: [SettingInfo; 8] = [
+    SettingInfo {
+        name: "path_set",
+        range: "all | emitted | direct | indirect | bounces=A..B, each with lobes=diffuse+glossy+…",
+        unit: "",
+        meaning: "which light paths the picture contains",
+    },
+    SettingInfo {
+        name: "sampler",
+        range: "sobol | pcg",
+        unit: "",
+        meaning: "Owen-scrambled Sobol' points, or independent samples; changes the noise only",
+    },
+    SettingInfo {
+        name: "roulette_start",
+        range: "0 … 4096",
+        unit: "bounces",
+        meaning: "first bounce at which Russian roulette may end a path; changes the noise only",
+    },
+    SettingInfo {
+        name: "roulette_cap",
+        range: "above 0, at most 0.999",
+        unit: "probability",
+        meaning: "most likely survival of a round of roulette; changes the noise only",
+    },
+    SettingInfo {
+        name: "multiple_scattering",
+        range: "true | false",
+        unit: "",
+        meaning: "compensates rough metals for scattering among microfacets; changes the picture",
+    },
+    SettingInfo {
+        name: "separable_masking",
+        range: "true | false",
+        unit: "",
+        meaning: "uncorrelated instead of height-correlated masking of microfacets; changes the picture",
+    },
+    SettingInfo {
+        name: "paths_in_flight",
+        range: "0 … 4194304",
+        unit: "paths",
+        meaning: "0 chooses by the kind of device; never changes the picture",
+    },
+    SettingInfo {
+        name: "ray_quota",
+        range: "128 … 60000",
+        unit: "loop iterations",
+        meaning: "after which a ray goes on in a later dispatch; never changes the picture",
+    },
+];
 
 /// What each specialization constant of the shading stage stands for, and why it may be off.
 const FEATURES: [(&str, &str, &str); 16] = [
@@ -123,5 +175,25 @@ impl Technique for PathTracer {
             .filter(|(name, ..)| off(name))
             .map(|&(_, what, why)| Skipped { what, why })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setting_is_explained() {
+        let defaults = (INFO.default_settings)();
+        let mut names: Vec<&str> = INFO.settings.iter().map(|setting| setting.name).collect();
+        names.sort_unstable();
+        let mut known: Vec<&str> = defaults
+            .as_object()
+            .expect("object")
+            .keys()
+            .map(String::as_str)
+            .collect();
+        known.sort_unstable();
+        assert_eq!(names, known);
     }
 }

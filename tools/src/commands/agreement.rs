@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use clerestory_tools::agreement::{AgreementOptions, run_with};
 use clerestory_tools::mitsuba::scenes::scenes;
+use clerestory_tools::page::Block;
 
 use super::check_validation;
 use crate::failure::{Code, Failure, Outcome};
@@ -20,7 +21,7 @@ Run it from the repository's root. It needs a Python that has the package `mitsu
 Examples:
   clerestory agreement --list
   clerestory agreement --scene cornell --timing-rounds 0
-  clerestory agreement --python ~/mitsuba/bin/python --results results")]
+  clerestory agreement --python ~/mitsuba/bin/python --results tools/mitsuba/results --page RESULTS.md")]
 pub struct Arguments {
     /// Only these scenes
     #[arg(long = "scene", value_name = "NAME", value_delimiter = ',')]
@@ -52,12 +53,20 @@ pub struct Arguments {
     /// Writes the report to NAME.md and NAME.json
     #[arg(long, value_name = "NAME")]
     results: Option<PathBuf>,
+    /// Writes speed and error beside Mitsuba's into a marked part of this page; the rest of it stays
+    #[arg(long, value_name = "FILE.md")]
+    page: Option<PathBuf>,
     /// Prints the report as JSON, else as Markdown
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     device: DeviceOptions,
 }
+
+const BLOCK: Block = Block {
+    name: "error and speed beside Mitsuba 3",
+    command: "clerestory agreement",
+};
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
@@ -68,6 +77,11 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         }
         output::print(&table.text())?;
         return Ok(ExitCode::SUCCESS);
+    }
+    if arguments.page.is_some() && arguments.timing_rounds == 0 {
+        return Err(Failure::usage(
+            "--page wants speeds, and --timing-rounds 0 measures none",
+        ));
     }
     let defaults = AgreementOptions::default();
     let options = AgreementOptions {
@@ -88,6 +102,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let log = gpu.validation_log();
     drop(gpu);
     check_validation(&log)?;
+    if let Some(page) = &arguments.page {
+        BLOCK.write(page, &report.to_results_block())?;
+        output::note(&format!("wrote {}", page.display()));
+    }
     if arguments.json {
         output::print_json(&report)?;
     } else {

@@ -162,6 +162,16 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         pictures::read(&arguments.picture)?,
         pictures::read(&arguments.reference)?,
     );
+    let size = |picture: &Picture| format!("{}×{}", picture.width(), picture.height());
+    if size(&test) != size(&reference) {
+        return Err(Failure::usage(format!(
+            "{} has {} pixels, {} has {}: only pictures of one size can be compared",
+            arguments.picture.display(),
+            size(&test),
+            arguments.reference.display(),
+            size(&reference)
+        )));
+    }
     let options = CompareOptions {
         tone: ToneMap {
             exposure: arguments.exposure,

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::catalogue::{self, Row};
-use clerestory::techniques::{self, Bias, TechniqueInfo};
+use clerestory::techniques::{self, Bias, SettingInfo, TechniqueInfo};
 
 use crate::failure::{Failure, Outcome};
 use crate::output::{self, Table};
@@ -15,7 +15,8 @@ use crate::output::{self, Table};
 Examples:
   clerestory list
   clerestory list BG-3                 one system, with its module and tests
-  clerestory list path                 one technique, with its settings
+  clerestory list path                 one technique, with the meaning, range, unit and default of each setting
+  clerestory list --markdown > docs/catalogue.md
   clerestory list --json | jq '.techniques[].default_settings'
   clerestory render --technique path --settings '{\"roulette_start\": 8}'")]
 pub struct Arguments {
@@ -24,6 +25,9 @@ pub struct Arguments {
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    /// Prints the catalogue as a page of Markdown
+    #[arg(long, conflicts_with_all = ["id", "json"])]
+    markdown: bool,
 }
 
 /// A technique as it is printed.
@@ -35,6 +39,7 @@ struct Technique {
     path_set: String,
     bias: Bias,
     needs: &'static [&'static str],
+    settings: &'static [SettingInfo],
     default_settings: serde_json::Value,
 }
 
@@ -47,6 +52,7 @@ impl From<&TechniqueInfo> for Technique {
             path_set: info.path_set.to_string(),
             bias: info.bias,
             needs: info.needs,
+            settings: info.settings,
             default_settings: (info.default_settings)(),
         }
     }
@@ -54,6 +60,10 @@ impl From<&TechniqueInfo> for Technique {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    if arguments.markdown {
+        output::print(&catalogue::markdown())?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let wanted = |id: &str| {
         arguments
             .id
@@ -74,6 +84,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     }
     let mut texts: Vec<String> = techniques.iter().map(text).collect();
     if arguments.id.is_some() {
+        texts.extend(techniques.iter().map(settings_table));
         texts.extend(rows.into_iter().map(row_text));
     } else {
         // What is longest comes last: lines that a narrow terminal breaks stay readable.
@@ -149,4 +160,19 @@ fn text(technique: &Technique) -> String {
             ("settings", technique.default_settings.to_string()),
         ],
     )
+}
+
+/// What each setting means.
+fn settings_table(technique: &Technique) -> String {
+    let mut table = Table::new(&["setting", "default", "unit", "range", "meaning"], &[1, 2, 3, 4]);
+    for setting in technique.settings {
+        table.row([
+            setting.name.to_owned(),
+            technique.default_settings[setting.name].to_string(),
+            if setting.unit.is_empty() { "-" } else { setting.unit }.to_owned(),
+            setting.range.to_owned(),
+            setting.meaning.to_owned(),
+        ]);
+    }
+    table.text()
 }

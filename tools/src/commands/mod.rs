@@ -42,9 +42,9 @@ Each command explains itself: clerestory render --help
 
 Exit codes:
   0    done
-  1    the run failed: device lost, out of memory, a file that cannot be read or written
-  2    the command line or a setting asks for what cannot be
-  3    the scene cannot be read, or the technique cannot render it
+  1    the run failed: device lost, out of memory, a picture that cannot be read, a file that cannot be written
+  2    the command line or a setting asks for what cannot be; pictures to compare have different sizes
+  3    the scene is missing or cannot be read, or the technique cannot render it
   4    pictures differ beyond a --threshold, or renderers beyond their noise
   5    no Vulkan device, or none that can do it
   130  stopped by Ctrl-C or a request to end, after writing what was there";

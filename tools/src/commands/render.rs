@@ -46,7 +46,8 @@ pub struct Arguments {
     /// A scene file (gltf, glb, ply, obj, toml) or `builtin:` address
     #[arg(default_value = "builtin:cornell-box")]
     scene: String,
-    /// The picture to write: NAME.exr with NAME.png and NAME.json beside it, or NAME.png with NAME.json; by default out/SCENE.exr
+    /// The picture to write: NAME.exr with NAME.png and NAME.json beside it, or NAME.png with NAME.json; by default out/SCENE.exr.
+    /// A folder that is not there is made, which the error output says
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Technique; by default the scene's, else `path`
@@ -279,8 +280,12 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
         .collect();
     if let Some(unknown) = settings.keys().find(|key| !names.contains(&key.as_str())) {
         return Err(
-            Failure::usage(format!("--settings: technique {} has no {unknown:?}", info.id))
-                .hint(format!("it has: {}", names.join(", "))),
+            Failure::usage(format!("--settings: technique {} has no {unknown:?}", info.id)).hint(
+                match option_of(unknown) {
+                    Some(option) => format!("use {option}"),
+                    None => format!("it has: {}", names.join(", ")),
+                },
+            ),
         );
     }
     for (key, value) in &settings {
@@ -309,6 +314,22 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
     })
 }
 
+/// The option of the command line for what is no technique's setting.
+fn option_of(name: &str) -> Option<&'static str> {
+    match name {
+        "seed" => Some("--seed"),
+        "spp" | "samples" => Some("--spp"),
+        "size" | "width" | "height" => Some("--size"),
+        "camera" => Some("--camera"),
+        "technique" => Some("--technique"),
+        "aov" | "aovs" => Some("--aov"),
+        "time_budget" => Some("--time-budget"),
+        "exposure" => Some("--exposure"),
+        "tone" => Some("--tone"),
+        _ => None,
+    }
+}
+
 fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
     let (text, from) = match text.strip_prefix('@') {
         Some(path) => {
@@ -320,7 +341,7 @@ fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
     };
     serde_json::from_str(&text).map_err(|cause| {
         Failure::usage(format!("--settings: {from} is no JSON object: {cause}"))
-            .hint("write for example --settings '{\"roulette_start\": 8}'; `clerestory list` shows all settings")
+            .hint("write for example --settings '{\"roulette_start\": 8}'; `clerestory list path` explains all settings of a technique")
     })
 }
 

@@ -16,6 +16,7 @@ use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::{Error, Result, scene};
 use clerestory_tools::machine::{self, median};
+use clerestory_tools::page::Block;
 
 use super::check_validation;
 use crate::failure::{Failure, Outcome};
@@ -58,8 +59,10 @@ const SCENES: [&str; 4] = [
     "builtin:passage",
     "builtin:ring",
 ];
-const BEGIN: &str = "<!-- begin: error against time, written by clerestory report -->";
-const END: &str = "<!-- end: error against time -->";
+const BLOCK: Block = Block {
+    name: "error against time",
+    command: "clerestory report",
+};
 /// Samples of the reference over the most samples of a row.
 const REFERENCE_FACTOR: u32 = 16;
 /// Far from the seeds of the rows.
@@ -70,6 +73,7 @@ struct Plan {
     size: [u32; 2],
     spp: [u32; 3],
     repeat: u32,
+    smoke: bool,
 }
 
 impl Plan {
@@ -83,6 +87,7 @@ struct Row {
     spp: u32,
     seconds: f64,
     gpu_seconds: f64,
+    paths_per_second: f64,
     rays_per_second: f64,
     relative_mse: f64,
     bias: f64,
@@ -100,6 +105,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         size,
         spp,
         repeat: arguments.repeat,
+        smoke: arguments.smoke,
     };
     let gpu = arguments.device.open()?;
     let mut text = head(&gpu, &plan);
@@ -115,7 +121,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let log = gpu.validation_log();
     drop(gpu);
     check_validation(&log)?;
-    write_between_marks(&arguments.output, &text)?;
+    BLOCK.write(&arguments.output, &text)?;
     output::note(&format!("wrote {}", arguments.output.display()));
     Ok(ExitCode::SUCCESS)
 }
@@ -157,12 +163,16 @@ fn measure(renderer: &Renderer, reference: &Picture, plan: &Plan, spp: u32) -> R
     for seed in 0..plan.repeat {
         let rendered = render(renderer, plan, spp, seed)?;
         let error = compare(&rendered.picture, reference, &CompareOptions::default())?;
-        let rays = rendered.report.counters.get("rays").copied().unwrap_or(0) as f64;
+        let rate = |what: &str| {
+            let count = rendered.report.counters.get(what).copied().unwrap_or(0);
+            count as f64 / rendered.report.render_seconds
+        };
         rows.push(Row {
             spp,
             seconds: rendered.report.render_seconds,
             gpu_seconds: rendered.report.gpu_seconds,
-            rays_per_second: rays / rendered.report.render_seconds,
+            paths_per_second: rate("paths"),
+            rays_per_second: rate("rays"),
             relative_mse: error.relative_mse,
             bias: error.relative_bias,
             flip: error.flip,
@@ -173,6 +183,7 @@ fn measure(renderer: &Renderer, reference: &Picture, plan: &Plan, spp: u32) -> R
         spp,
         seconds: median(|row| row.seconds),
         gpu_seconds: median(|row| row.gpu_seconds),
+        paths_per_second: median(|row| row.paths_per_second),
         rays_per_second: median(|row| row.rays_per_second),
         relative_mse: median(|row| row.relative_mse),
         bias: median(|row| row.bias),
@@ -183,11 +194,16 @@ fn measure(renderer: &Renderer, reference: &Picture, plan: &Plan, spp: u32) -> R
 fn head(gpu: &Gpu, plan: &Plan) -> String {
     let caps = gpu.caps();
     let load = machine::load().map_or(String::new(), |load| format!("; load average {load} when it began"));
+    let smoke = if plan.smoke {
+        "- **Smoke run** (`--smoke`): the smallest form, which shows that everything works; its pictures are too small to judge speed by.\n"
+    } else {
+        ""
+    };
     format!(
-        "- Device: {}; driver: {}.\n- Machine: {}, {} threads{load}.\n- Clerestory {}, technique `path` with its default settings, {} × {} \
+        "{smoke}- Device: {}; driver: {}.\n- Machine: {}, {} threads{load}.\n- Clerestory {}, technique `path` with its default settings, {} × {} \
          pixels; each row is the median of {} renderings with different seeds.\n- References: {} samples a pixel, a seed of their own.\n\
-         - Seconds: wall clock of the rendering after one picture that warms the driver's cache; GPU: by its timestamps. Rays: closest \
-         hits and shadow rays, over wall clock.\n\n",
+         - Seconds: wall clock of the rendering after one picture that warms the driver's cache; GPU: by its timestamps. Paths (from \
+         the camera) and rays (closest hits and shadow rays): over wall clock.\n\n",
         caps.device,
         caps.driver,
         machine::processor(),
@@ -205,20 +221,21 @@ fn table(text: &mut String, address: &str, renderer: &Renderer, rows: &[Row]) {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "### `{address}` ({triangles} triangles)\n");
     text.push_str(
-        "| samples a pixel | seconds | GPU seconds | million rays/s | relative MSE | relative bias | FLIP |\n",
+        "| samples a pixel | relative MSE | relative bias | FLIP | seconds | GPU seconds | million paths/s | million rays/s |\n",
     );
-    text.push_str("|---:|---:|---:|---:|---:|---:|---:|\n");
+    text.push_str("|---:|---:|---:|---:|---:|---:|---:|---:|\n");
     for row in rows {
         let _ = writeln!(
             text,
-            "| {} | {:.3} | {:.3} | {:.2} | {:.3e} | {:+.1e} | {:.4} |",
+            "| {} | {:.3e} | {:+.1e} | {:.4} | {:.3} | {:.3} | {:.3} | {:.2} |",
             row.spp,
-            row.seconds,
-            row.gpu_seconds,
-            row.rays_per_second * 1e-6,
             row.relative_mse,
             row.bias,
-            row.flip
+            row.flip,
+            row.seconds,
+            row.gpu_seconds,
+            row.paths_per_second * 1e-6,
+            row.rays_per_second * 1e-6
         );
     }
     if let [first, .., last] = rows {
@@ -227,49 +244,5 @@ fn table(text: &mut String, address: &str, renderer: &Renderer, rows: &[Row]) {
             text,
             "\nRelative MSE falls as samples^({slope:.2}) from the first row to the last; independent samples give −1.\n"
         );
-    }
-}
-
-/// Replaces what stands between the marks, or appends it with its heading.
-fn write_between_marks(path: &Path, text: &str) -> Result<()> {
-    let old = match std::fs::read_to_string(path) {
-        Ok(old) => old,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            "# Results\n\nMeasured, not promised: every table says on what machine and driver, and how to repeat it.\n"
-                .to_owned()
-        }
-        Err(error) => return Err(Error::io(path, error)),
-    };
-    let marked = format!("{BEGIN}\n\n{}\n\n{END}", text.trim_end());
-    let new = match (old.find(BEGIN), old.find(END)) {
-        (Some(begin), Some(end)) if begin < end => format!("{}{marked}{}", &old[..begin], &old[end + END.len()..]),
-        _ => format!(
-            "{}\n\n## Error against time: `clerestory report`\n\n{marked}\n",
-            old.trim_end()
-        ),
-    };
-    std::fs::write(path, new).map_err(|error| Error::io(path, error))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_the_marked_part_is_replaced() -> std::result::Result<(), Box<dyn std::error::Error>> {
-        let folder = tempfile::tempdir()?;
-        let path = folder.path().join("results.md");
-        write_between_marks(&path, "first\n")?;
-        let made = std::fs::read_to_string(&path)?;
-        assert!(made.starts_with("# Results") && made.contains("first"));
-        std::fs::write(&path, format!("before\n{made}after\n"))?;
-        write_between_marks(&path, "second\n")?;
-        let text = std::fs::read_to_string(&path)?;
-        assert!(
-            text.starts_with("before\n") && text.ends_with("after\n") && text.contains("second"),
-            "{text}"
-        );
-        assert!(!text.contains("first") && text.matches(BEGIN).count() == 1, "{text}");
-        Ok(())
     }
 }

@@ -59,6 +59,29 @@ pub fn catalogue() -> &'static [Entry] {
     ]
 }
 
+/// The generated scene whose name is this one, or almost: up to two letters too many, too few or other ones.
+pub(super) fn nearest(name: &str) -> Option<&'static str> {
+    const MISTAKES: usize = 2;
+    let names = catalogue().iter().map(|entry| (distance(name, entry.name), entry.name));
+    let (mistakes, nearest) = names.min()?;
+    (mistakes <= MISTAKES).then_some(nearest)
+}
+
+/// Levenshtein's distance: how many letters to add, leave out or change.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, letter) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, other) in b.iter().enumerate() {
+            let changed = diagonal + usize::from(letter != *other);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
 /// Generates the scene of a `builtin:` address.
 ///
 /// # Errors
@@ -68,8 +91,20 @@ pub fn generate(address: &str) -> Result<Scene> {
     let (name, query) = rest.split_once('?').unwrap_or((rest, ""));
     let Some(entry) = catalogue().iter().find(|entry| entry.name == name) else {
         let known: Vec<&str> = catalogue().iter().map(|entry| entry.name).collect();
-        let cause = format!("no such generated scene; there are: {}", known.join(", "));
-        return Err(Error::scene(address, format!("name {name:?}"), cause));
+        let known = format!("there are: {}", known.join(", "));
+        return Err(match nearest(name) {
+            _ if name.is_empty() => Error::scene(address, "without a name", known),
+            Some(near) => Error::scene(
+                address,
+                format!("name {name:?}"),
+                format!("no such generated scene; did you mean {PREFIX}{near}? {known}"),
+            ),
+            None => Error::scene(
+                address,
+                format!("name {name:?}"),
+                format!("no such generated scene; {known}"),
+            ),
+        });
     };
     let values = Values::parse(address, query, entry.parameters)?;
     let mut scene = (entry.build)(&values)?;
@@ -130,6 +165,13 @@ mod tests {
     #[test]
     fn mistakes_are_answered_with_what_is_allowed() {
         assert!(message("builtin:nothing").contains("cornell-box"));
+        assert!(!message("builtin:nothing").contains("did you mean"));
+        assert!(message("builtin:cornel-box?light=2").contains("did you mean builtin:cornell-box?"));
+        assert!(message("builtin:").starts_with("builtin:: without a name: there are"));
+        assert_eq!(
+            (distance("kitten", "sitting"), distance("", "ab"), distance("a", "a")),
+            (3, 2, 0)
+        );
         assert!(message("builtin:cornell-box?lihgt=1").contains("unknown; allowed: light"));
         assert!(message("builtin:cornell-box?light=1&light=2").contains("given twice"));
         assert!(message("builtin:cornell-box?light").contains("key=value"));

@@ -24,6 +24,13 @@ pub fn open(bytes: &[u8], source: &str) -> Result<Container> {
         // A byte order mark is not allowed, but common.
         (bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), None)
     };
+    if !json.trim_ascii_start().starts_with(b"{") {
+        return Err(Error::scene(
+            source,
+            "first bytes",
+            "neither GLB (no magic `glTF`) nor JSON (no object)",
+        ));
+    }
     let bad_json = |error: serde_json::Error| {
         let place = format!("line {} column {}", error.line(), error.column());
         let text = error.to_string();

@@ -76,11 +76,13 @@ impl Files {
         })
     }
 
-    /// Makes the folder, so that a rendering does not fail at its end.
+    /// Makes the folder where there is none, and says so: a rendering is not to fail at its end, nor a slip of the pen to go unseen.
     pub fn prepare(&self) -> Outcome {
         match self.png.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => {
-                Ok(std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?)
+            Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+                std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?;
+                output::note(&format!("made folder {}", folder.display()));
+                Ok(())
             }
             _ => Ok(()),
         }

@@ -1,0 +1,187 @@
+//! The rules of the house that text alone can break: floors use only what lies below them, and pages name files that exist.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// All files below a folder with one of these endings, without what builds leave behind.
+fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder)
+        .expect("folder")
+        .map(|entry| entry.expect("entry"))
+    {
+        let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+        let left_out = name.starts_with('.') || ["target", "out", "shared", "node_modules"].contains(&name.as_str());
+        if path.is_dir() && !left_out {
+            found.extend(files(&path, endings));
+        } else if path
+            .extension()
+            .is_some_and(|e| endings.iter().any(|ending| e == *ending))
+        {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The floors from below; those of one line stand side by side and do not know each other.
+const FLOORS: [&[&str]; 6] = [
+    &["gpu"],
+    &["kernels", "scene", "film"],
+    &["accel", "maps", "raster"],
+    &["transport"],
+    &["techniques"],
+    &["render"],
+];
+
+fn height(floor: &str) -> Option<usize> {
+    FLOORS.iter().position(|names| names.contains(&floor))
+}
+
+/// The first names after each `crate::`, those in braces included.
+fn modules_used(source: &str) -> BTreeSet<String> {
+    let code: String = source
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .collect();
+    let mut used = BTreeSet::new();
+    for after in code.split("crate::").skip(1) {
+        let name = |text: &str| {
+            text.trim()
+                .chars()
+                .take_while(|c| c.is_alphanumeric() || *c == '_')
+                .collect()
+        };
+        let Some(group) = after.strip_prefix('{') else {
+            used.insert(name(after));
+            continue;
+        };
+        let (mut depth, mut start) = (0, 0);
+        for (i, c) in group.char_indices() {
+            match c {
+                '{' => depth += 1,
+                '}' if depth > 0 => depth -= 1,
+                ',' | '}' if depth == 0 => {
+                    used.insert(name(&group[start..i]));
+                    start = i + 1;
+                    if c == '}' {
+                        break;
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    // A comma after the last one.
+    used.remove("");
+    used
+}
+
+/// The floors of the files that a shader includes.
+fn floors_included(source: &str) -> BTreeSet<String> {
+    let names = source
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("#include \""));
+    names
+        .filter_map(|name| Some(name.split_once('/')?.0.to_owned()))
+        .collect()
+}
+
+#[test]
+fn floors_use_only_what_lies_below() {
+    let mut faults = Vec::new();
+    let mut seen = 0;
+    for (root, ending) in [
+        ("engine/src", "rs"),
+        ("engine/shaders", "glsl"),
+        ("engine/shaders", "comp"),
+    ] {
+        let root = repository().join(root);
+        for path in files(&root, &[ending]) {
+            let below = path.strip_prefix(&root).expect("below the root");
+            let below = below.strip_prefix("include").unwrap_or(below);
+            let floor = below.iter().next().expect("name").to_string_lossy();
+            let floor = floor.trim_end_matches(".rs");
+            let Some(own) = height(floor) else { continue };
+            seen += 1;
+            let source = std::fs::read_to_string(&path).expect("source");
+            let used = if ending == "rs" {
+                modules_used(&source)
+            } else {
+                floors_included(&source)
+            };
+            let wrong = used
+                .iter()
+                .filter(|name| *name != floor && height(name).is_some_and(|other| other >= own));
+            faults.extend(wrong.map(|name| format!("{}: {name}", path.display())));
+        }
+    }
+    assert!(seen > 100, "{seen} files");
+    assert!(faults.is_empty(), "not from below:\n{}", faults.join("\n"));
+}
+
+#[test]
+fn uses_are_found_in_all_their_forms() {
+    let source = "use crate::gpu::Gpu;\nuse crate::{\n    film::{a, b},\n    Error,\n};\n// crate::render\nfn f() { crate::scene::load(); }\n";
+    let expected = ["Error", "film", "gpu", "scene"].map(str::to_owned);
+    assert_eq!(modules_used(source).into_iter().collect::<Vec<_>>(), expected);
+    assert_eq!(floors_included("#include \"film/a.glsl\"\n").len(), 1);
+}
+
+/// Whether the text between back-quotes is meant as a file or folder of the repository.
+fn is_path(text: &str) -> bool {
+    const FOLDERS: [&str; 7] = [
+        "engine/",
+        "tests/",
+        "tools/",
+        "samples/",
+        "docs/",
+        "third_party_notes/",
+        ".github/",
+    ];
+    const ENDINGS: [&str; 7] = [".rs", ".glsl", ".comp", ".py", ".sh", ".md", ".toml"];
+    let plain = text.chars().all(|c| c.is_alphanumeric() || "/._-".contains(c));
+    plain
+        && (FOLDERS.iter().any(|folder| text.starts_with(folder))
+            || text.contains('/') && ENDINGS.iter().any(|ending| text.ends_with(ending)))
+}
+
+#[test]
+fn pages_name_files_that_exist() {
+    let root = repository();
+    let mut faults = Vec::new();
+    let mut seen = 0;
+    for page in files(&root, &["md"]) {
+        let text = std::fs::read_to_string(&page).expect("page");
+        // Code blocks show commands and files of the reader.
+        let prose: String = text.split("\n```").step_by(2).collect::<Vec<_>>().join("\n");
+        let beside = page.parent().expect("folder");
+        let quoted = prose.split('`').skip(1).step_by(2);
+        // A command's first word is its program, and a test's file stands before `::`.
+        let quoted = quoted.filter_map(|text| text.split_whitespace().next()?.split("::").next());
+        for name in quoted.filter(|name| is_path(name) && !name.starts_with("out/")) {
+            seen += 1;
+            let roots = ["", "engine/src", "engine/shaders/include", "engine/shaders"].map(|below| root.join(below));
+            if !roots.iter().any(|folder| folder.join(name).exists()) && !beside.join(name).exists() {
+                faults.push(format!("{}: `{name}`", page.display()));
+            }
+        }
+        for link in prose.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let file = link.split('#').next().unwrap_or_default();
+            if !link.contains("://") && !file.is_empty() && !beside.join(file).exists() {
+                faults.push(format!("{}: link to {link}", page.display()));
+            }
+        }
+    }
+    assert!(seen > 50, "{seen} paths");
+    assert!(
+        faults.is_empty(),
+        "pages name what is not there:\n{}",
+        faults.join("\n")
+    );
+}

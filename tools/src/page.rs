@@ -1,0 +1,71 @@
+//! Pages of results whose measured parts are replaced by the commands that measure them, while all other text stays.
+
+use std::path::Path;
+
+use clerestory::{Error, Result};
+
+/// A measured part of a page, between two marks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Block {
+    /// What it holds; unique within a page.
+    pub name: &'static str,
+    /// The command that writes it.
+    pub command: &'static str,
+}
+
+impl Block {
+    /// Replaces what stands between the marks, or appends it with a heading; a page that is not there is made.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&self, path: &Path, text: &str) -> Result<()> {
+        let old = match std::fs::read_to_string(path) {
+            Ok(old) => old,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                "# Results\n\nMeasured, not promised: every table says on what machine and driver, and how to repeat it.\n"
+                    .to_owned()
+            }
+            Err(error) => return Err(Error::io(path, error)),
+        };
+        let begin_mark = format!("<!-- begin: {}, written by {} -->", self.name, self.command);
+        let end_mark = format!("<!-- end: {} -->", self.name);
+        let marked = format!("{begin_mark}\n\n{}\n\n{end_mark}", text.trim_end());
+        let new = match (old.find(&begin_mark), old.find(&end_mark)) {
+            (Some(begin), Some(end)) if begin < end => {
+                format!("{}{marked}{}", &old[..begin], &old[end + end_mark.len()..])
+            }
+            _ => {
+                let (first, rest) = self.name.split_at(1);
+                let heading = format!("{}{rest}: `{}`", first.to_uppercase(), self.command);
+                format!("{}\n\n## {heading}\n\n{marked}\n", old.trim_end())
+            }
+        };
+        std::fs::write(path, new).map_err(|error| Error::io(path, error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_marked_part_is_replaced() -> std::result::Result<(), Box<dyn std::error::Error>> {
+        let block = |name| Block { name, command: "test" };
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("results.md");
+        block("one").write(&path, "first\n")?;
+        let made = std::fs::read_to_string(&path)?;
+        assert!(made.starts_with("# Results") && made.contains("## One: `test`") && made.contains("first"));
+        std::fs::write(&path, format!("before\n{made}after\n"))?;
+        block("two").write(&path, "other\n")?;
+        block("one").write(&path, "second\n")?;
+        let text = std::fs::read_to_string(&path)?;
+        assert!(text.starts_with("before\n") && text.contains("after\n"), "{text}");
+        assert!(text.contains("second") && text.contains("other"), "{text}");
+        assert!(
+            !text.contains("first") && text.matches("begin: one").count() == 1,
+            "{text}"
+        );
+        Ok(())
+    }
+}
