@@ -86,7 +86,7 @@ fn float(name: &str, value: &str) -> String {
         .join(" ")
 }
 
-/// The expression without the `u` of its literals; digits of hexadecimal ones and exponents stay.
+/// The expression without the `u` of its literals.
 fn unsuffixed(value: &str) -> String {
     let characters: Vec<char> = value.chars().collect();
     let mut in_number = false;
