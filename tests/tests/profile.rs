@@ -42,6 +42,8 @@ fn texture(image: u32) -> Texture {
     }
 }
 
+type Change<'a> = &'a dyn Fn(&mut Scene);
+
 /// Passes of one wave by name, rounds of bounces counted once.
 fn passes(tracer: &mut PathTracer) -> BTreeMap<String, usize> {
     let mut counts = BTreeMap::new();
@@ -153,7 +155,7 @@ fn what_is_absent_costs_no_byte() {
         assert_eq!((bare_bytes[0], bare_bytes[3]), (2 * 48, 0), "{bare_bytes:?}");
         // Attributes are 16 bytes a vertex, and with any of them each triangle has 16 bytes that say which vertices are its own.
         let attribute = 4 * 16 + 2 * 16;
-        let more = |change: &dyn Fn(&mut Scene)| {
+        let more = |change: Change| {
             let mut scene = bare();
             change(&mut scene);
             let bytes = bytes(gpu, &scene);
@@ -197,7 +199,7 @@ fn what_is_absent_costs_no_byte() {
         };
         let lamp = |s: &mut Scene| s.materials[0].emission = Vec3::ONE;
         let sky = |s: &mut Scene| s.environment = Some(Environment::uniform(Vec3::ONE));
-        let all: [(&str, &dyn Fn(&mut Scene)); 3] = [("sun", &sun), ("lamp", &lamp), ("sky", &sky)];
+        let all: [(&str, Change); 3] = [("sun", &sun), ("lamp", &lamp), ("sky", &sky)];
         for (what, change) in all {
             let lights = more(change);
             assert_eq!(lights[..3], [0; 3], "{what}");
@@ -419,7 +421,6 @@ fn lights_that_are_compiled_in_without_need_change_no_bit() {
         lamp(&mut lamp_room, glowing(4.0), Vec3::new(-0.5, 1.5, -0.5), 1.5);
         let mut point_room = room();
         point_light(&mut point_room, Vec3::new(0.5, 1.5, -0.5), 2.0);
-        type Change<'a> = &'a dyn Fn(&mut Scene);
         let make = |scene: &Scene, changes: &[Change]| {
             let mut scene = scene.clone();
             changes.iter().for_each(|change| change(&mut scene));

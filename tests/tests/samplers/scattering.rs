@@ -13,7 +13,7 @@ use clerestory::transport::phase::{henyey_greenstein, schlick_phase};
 use clerestory::transport::phong::phong_pdf;
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::warp::orthonormal_basis;
-use clerestory_tests::statistics::expect_counts;
+use clerestory_tests::statistics::{FALSE_ALARM, chi_square_test, expect_counts};
 use clerestory_tests::twin::Case;
 use clerestory_tests::{twin_kernel, with_gpu};
 use glam::{DVec3, Vec3};
@@ -28,8 +28,14 @@ const COLUMNS: usize = 16;
 /// Points of the midpoint rule along each side of a cell.
 const STEPS: usize = 16;
 
-/// Holds directions to a density over the sphere, sr⁻¹, by cells about `axis`; what was not drawn is a cell of its own.
+/// Fails when directions do not follow a density over the sphere, sr⁻¹.
 fn expect_density(what: &str, axis: DVec3, directions: &[Option<DVec3>], density: impl Fn(DVec3) -> f64) {
+    let p = density_test(what, axis, directions, density);
+    assert!(p >= FALSE_ALARM, "{what}: chi-square p = {p:.3e}");
+}
+
+/// p-value of directions against a density over the sphere, by cells about `axis`; draws without a direction are a cell of their own.
+fn density_test(what: &str, axis: DVec3, directions: &[Option<DVec3>], density: impl Fn(DVec3) -> f64) -> f64 {
     let (x, y) = orthonormal_basis(axis);
     let mut counts = vec![0.0; ROWS * COLUMNS + 1];
     for direction in directions {
@@ -64,7 +70,7 @@ fn expect_density(what: &str, axis: DVec3, directions: &[Option<DVec3>], density
         1.0 - total
     };
     expected.push(missing * DRAWS as f64);
-    expect_counts(what, &counts, &expected);
+    chi_square_test(&counts, &expected)
 }
 
 #[test]
@@ -112,6 +118,11 @@ fn phong_lobes_follow_their_density() {
             expect_density(&format!("exponent {exponent}"), mirror, &directions, |wi| {
                 phong_pdf(exponent.into(), wo, wi)
             });
+            // The test tells exponents apart.
+            let other = density_test("another exponent", mirror, &directions, |wi| {
+                phong_pdf(1.05 * f64::from(exponent) + 0.05, wo, wi)
+            });
+            assert!(other < FALSE_ALARM, "exponent {exponent}: {other}");
         }
     });
 }
