@@ -1,8 +1,8 @@
-//! Carries the whole-number constants of the shaders' include files (`const uint NAME = VALUE;`) to Rust, so that no flag, size or
-//! code is written down twice.
+//! Carries the constants of the shaders' include files (`const uint NAME = VALUE;`, likewise `int` and `float`) to Rust as `u32`, `i32`
+//! and `f32`, so that no flag, size, bound or code is written down twice.
 //!
-//! A value may be an expression of literals and earlier constants: Rust reads it as GLSL does once the suffixes are gone. Names are
-//! unique, as they must be where includes meet.
+//! A value may be an expression of literals and earlier constants of its type: Rust reads it as GLSL does once the suffixes are gone.
+//! Names are unique, as they must be where includes meet.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -14,12 +14,12 @@ pub fn generate(root: &Path) -> Result<String, String> {
     find(root, &mut files)?;
     files.sort();
     let mut from: BTreeMap<String, String> = BTreeMap::new();
-    let mut text = String::from("/// Whole-number constants of the include files.\npub mod constants {\n");
+    let mut text = String::from("/// Constants of the include files.\npub mod constants {\n");
     for file in &files {
         let place = file.strip_prefix(root).unwrap_or(file);
         let place = place.strip_prefix("include").unwrap_or(place).display().to_string();
         let source = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-        for (name, value, comment) in source.lines().filter_map(constant) {
+        for (kind, name, value, comment) in source.lines().filter_map(constant) {
             if let Some(other) = from.insert(name.to_owned(), place.clone()) {
                 return Err(format!("constant {name} of {place} is also in {other}"));
             }
@@ -30,8 +30,11 @@ pub fn generate(root: &Path) -> Result<String, String> {
             };
             let _ = writeln!(
                 text,
-                "    /// In `{place}`{remark}.\n    pub const {name}: u32 = {};",
-                unsuffixed(value)
+                "    /// In `{place}`{remark}.\n    pub const {name}: {kind} = {};",
+                match kind {
+                    "f32" => float(name, value),
+                    _ => unsuffixed(value),
+                }
             );
         }
     }
@@ -52,12 +55,35 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), String> {
     Ok(())
 }
 
-/// Name, value and comment of a line that defines a constant.
-fn constant(line: &str) -> Option<(&str, &str, &str)> {
-    let (name, rest) = line.strip_prefix("const uint ")?.split_once('=')?;
+/// Rust type, name, value and comment of a line that defines a constant.
+fn constant(line: &str) -> Option<(&'static str, &str, &str, &str)> {
+    const KINDS: [(&str, &str); 3] = [("const uint ", "u32"), ("const int ", "i32"), ("const float ", "f32")];
+    let (kind, definition) = KINDS
+        .iter()
+        .find_map(|(prefix, kind)| Some((*kind, line.strip_prefix(prefix)?)))?;
+    let (name, rest) = definition.split_once('=')?;
     let (value, rest) = rest.split_once(';')?;
     let comment = rest.trim().trim_start_matches('/').trim().trim_end_matches('.');
-    Some((name.trim(), value.trim(), comment))
+    Some((kind, name.trim(), value.trim(), comment))
+}
+
+/// The expression with its literals as short as f32 tells them apart; Rust's own constants where it has them.
+fn float(name: &str, value: &str) -> String {
+    const RUSTS_OWN: [(&str, &str); 2] = [
+        ("PI", "std::f32::consts::PI"),
+        ("INV_PI", "std::f32::consts::FRAC_1_PI"),
+    ];
+    if let Some((_, own)) = RUSTS_OWN.iter().find(|(known, _)| *known == name) {
+        return (*own).to_owned();
+    }
+    let words = value.split_whitespace();
+    words
+        .map(|word| {
+            word.parse::<f32>()
+                .map_or_else(|_| word.to_owned(), |number| format!("{number:?}"))
+        })
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// The expression without the `u` of its literals.

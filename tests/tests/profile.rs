@@ -4,11 +4,15 @@
 use std::collections::BTreeMap;
 
 use clerestory::gpu::{Category, Gpu, PipelineInfo};
-use clerestory::scene::{Environment, Filter, Image, LightKind, Material, Mesh, Scene, Texture, Wrap};
+use clerestory::scene::{
+    AlphaMode, Camera, Environment, Filter, Image, LightKind, Material, Mesh, Scene, Texture, Wrap,
+};
 use clerestory::transport::{PathTracer, PathTracerSettings};
-use clerestory_tests::render::{builtin, camera_down, finish, floor, independent, point_triangle, render, tracer};
+use clerestory_tests::render::{
+    Rendered, builtin, camera_down, finish, floor, independent, point_triangle, render, tracer,
+};
 use clerestory_tests::with_gpu;
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 /// A Lambert floor under nothing at all.
 fn bare() -> Scene {
@@ -37,6 +41,8 @@ fn texture(image: u32) -> Texture {
         transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
     }
 }
+
+type Change<'a> = &'a dyn Fn(&mut Scene);
 
 /// Passes of one wave by name, rounds of bounces counted once.
 fn passes(tracer: &mut PathTracer) -> BTreeMap<String, usize> {
@@ -149,7 +155,7 @@ fn what_is_absent_costs_no_byte() {
         assert_eq!((bare_bytes[0], bare_bytes[3]), (2 * 48, 0), "{bare_bytes:?}");
         // Attributes are 16 bytes a vertex, and with any of them each triangle has 16 bytes that say which vertices are its own.
         let attribute = 4 * 16 + 2 * 16;
-        let more = |change: &dyn Fn(&mut Scene)| {
+        let more = |change: Change| {
             let mut scene = bare();
             change(&mut scene);
             let bytes = bytes(gpu, &scene);
@@ -191,9 +197,19 @@ fn what_is_absent_costs_no_byte() {
                 },
             )
         };
-        let lights = more(&sun);
-        assert_eq!(lights[..3], [0; 3]);
-        assert!(lights[3] > 0, "{lights:?}");
+        let lamp = |s: &mut Scene| s.materials[0].emission = Vec3::ONE;
+        let sky = |s: &mut Scene| s.environment = Some(Environment::uniform(Vec3::ONE));
+        let all: [(&str, Change); 3] = [("sun", &sun), ("lamp", &lamp), ("sky", &sky)];
+        for (what, change) in all {
+            let lights = more(change);
+            assert_eq!(lights[..3], [0; 3], "{what}");
+            assert!(lights[3] > 0, "{what}: {lights:?}");
+        }
+        assert_eq!(
+            more(&|s| s.environment = Some(Environment::uniform(Vec3::ZERO))),
+            [0; 4],
+            "a black sky"
+        );
         let table = more(&|s| s.materials[0].specular = 1.0);
         assert!(
             table[2] > 10_000 && table[0] == 0 && table[3] == 0,
@@ -294,18 +310,174 @@ fn features_that_are_compiled_in_without_need_change_no_bit() {
                 assert!(compiled.contains(&feature), "{feature}: {compiled:?}");
             }
             let full = finish(&mut full_tracer, 16);
-            let different = full
-                .radiance
-                .iter()
-                .zip(&lean.radiance)
-                .filter(|(a, b)| a.to_bits() != b.to_bits())
-                .count();
-            assert_eq!(
-                different,
-                0,
-                "{address}: {different} of {} values differ",
-                lean.radiance.len()
-            );
+            expect_same_bits(address, &lean, &full);
         }
+    });
+}
+
+fn expect_same_bits(what: &str, lean: &Rendered, full: &Rendered) {
+    assert!(lean.radiance.iter().any(|value| *value > 0.0), "{what}: black");
+    let bits = lean.bits();
+    let different = bits.iter().zip(full.bits()).filter(|(a, b)| **a != *b).count();
+    assert_eq!(different, 0, "{what}: {different} of {} values differ", bits.len());
+}
+
+/// Half the side of the room, metres, and the place of the cupboard's centre in it.
+const ROOM: f32 = 2.0;
+const CUPBOARD: Vec3 = Vec3::new(-1.0, -1.0, -1.0);
+/// Emission (radiance) and area of the lamp in the cupboard. Its power π·emission·area is that of every light that no path can reach.
+const HIDDEN_EMISSION: f32 = 8.0;
+const HIDDEN_AREA: f32 = 1.0 / 32.0;
+
+/// A closed cube of the first material.
+fn cube(name: &str, centre: Vec3, half: f32) -> Mesh {
+    let corner = |i: u32| centre + half * Vec3::from_array([0, 1, 2].map(|a| if i >> a & 1 == 1 { 1.0 } else { -1.0 }));
+    let sides = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    Mesh {
+        name: name.into(),
+        positions: (0..8).map(corner).collect(),
+        triangles: sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        material: Some(0),
+        ..Mesh::default()
+    }
+}
+
+/// A triangle that faces down, of two legs of a right angle at `place`.
+fn lamp(scene: &mut Scene, material: Material, place: Vec3, leg: f32) {
+    let material = scene.add_material(material);
+    scene.place(Mesh {
+        name: "lamp".into(),
+        positions: vec![place, place + Vec3::X * leg, place + Vec3::Z * leg],
+        triangles: vec![[0, 1, 2]],
+        material: Some(material),
+        ..Mesh::default()
+    });
+}
+
+fn glowing(emission: f32) -> Material {
+    Material {
+        emission: Vec3::splat(emission),
+        double_sided: false,
+        ..Material::lambert("glowing", Vec3::splat(0.5))
+    }
+}
+
+fn point_light(scene: &mut Scene, position: Vec3, intensity: f32) {
+    let intensity = Vec3::splat(intensity);
+    scene.add_light("point", LightKind::Point { position, intensity });
+}
+
+/// A closed room without light, seen from inside, and in it a closed cupboard.
+fn room() -> Scene {
+    let mut scene = bare();
+    scene.name = "room".into();
+    scene.meshes.clear();
+    scene.instances.clear();
+    scene.place(cube("room", Vec3::ZERO, ROOM));
+    scene.place(cube("cupboard", CUPBOARD, 0.5));
+    let (eye, target) = (DVec3::new(1.5, 0.5, 1.5), DVec3::new(-1.0, 0.0, -1.0));
+    scene.cameras[0] = Camera::look_at("inside", eye, target, DVec3::Y, 1.2);
+    scene
+}
+
+/// Lights of each kind that no path reaches. The choice of a light gives every light its share, so one that is added changes what the others
+/// are divided by: the pictures are compared with a light in the last place of the table that is unreachable, too, and of the same power.
+#[test]
+fn lights_that_are_compiled_in_without_need_change_no_bit() {
+    with_gpu(|gpu| {
+        let hidden_lamp = |s: &mut Scene| lamp(s, glowing(HIDDEN_EMISSION), CUPBOARD, (2.0 * HIDDEN_AREA).sqrt());
+        // 4π·intensity.
+        let hidden_point = |s: &mut Scene| point_light(s, CUPBOARD, 0.25 * HIDDEN_EMISSION * HIDDEN_AREA);
+        // 4π·radiance·π·(radius of the scene)².
+        let sky = |s: &mut Scene| {
+            let radiance = HIDDEN_EMISSION * HIDDEN_AREA / (4.0 * std::f32::consts::PI * 3.0 * ROOM * ROOM);
+            s.environment = Some(Environment::uniform(Vec3::splat(radiance)));
+        };
+        // Of two triangles in one place, the first with alpha, the second shines but is not among the lights to choose from.
+        let unsampled_lamp = |s: &mut Scene| {
+            let mask = Material {
+                alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+                ..Material::lambert("mask", Vec3::splat(0.5))
+            };
+            lamp(s, mask, CUPBOARD, 0.25);
+            lamp(s, glowing(HIDDEN_EMISSION), CUPBOARD, 0.25);
+        };
+        let blend = |s: &mut Scene| {
+            let half = Material {
+                alpha_mode: AlphaMode::Blend,
+                base_color: Vec4::splat(0.5),
+                ..Material::lambert("half", Vec3::splat(0.5))
+            };
+            point_triangle(s, half, Vec3::splat(ROOM));
+        };
+        let mut lamp_room = room();
+        lamp(&mut lamp_room, glowing(4.0), Vec3::new(-0.5, 1.5, -0.5), 1.5);
+        let mut point_room = room();
+        point_light(&mut point_room, Vec3::new(0.5, 1.5, -0.5), 2.0);
+        let make = |scene: &Scene, changes: &[Change]| {
+            let mut scene = scene.clone();
+            changes.iter().for_each(|change| change(&mut scene));
+            scene
+        };
+        let check = |scene: &Scene, lean: &[Change], lean_features: &[&str], full: &[(&str, &[Change], &[&str])]| {
+            let tracer_of = |changes: &[Change]| tracer(gpu, &make(scene, changes), [16, 16], &independent());
+            let mut tracer = tracer_of(lean);
+            assert_eq!(features(&tracer.pipelines()), lean_features);
+            let expected = finish(&mut tracer, 16);
+            expected.expect_sound("lean", 16);
+            for (what, changes, full_features) in full {
+                let mut tracer = tracer_of(changes);
+                assert_eq!(features(&tracer.pipelines()), *full_features, "{what}");
+                expect_same_bits(what, &expected, &finish(&mut tracer, 16));
+            }
+        };
+        check(
+            &lamp_room,
+            &[&hidden_lamp],
+            &["has_area_lights"],
+            &[
+                (
+                    "a point light",
+                    &[&hidden_point],
+                    &["has_area_lights", "has_punctual_lights"],
+                ),
+                ("a sky", &[&sky], &["has_environment", "has_area_lights"]),
+                ("alpha", &[&hidden_lamp, &blend], &["has_area_lights", "has_alpha"]),
+            ],
+        );
+        check(
+            &point_room,
+            &[&hidden_point],
+            &["has_punctual_lights"],
+            &[
+                (
+                    "a sky beside points",
+                    &[&sky],
+                    &["has_environment", "has_punctual_lights"],
+                ),
+                (
+                    "a lamp",
+                    &[&hidden_point, &unsampled_lamp],
+                    &["has_area_lights", "has_punctual_lights", "has_alpha"],
+                ),
+            ],
+        );
+        // The comparison would see a light that can be reached.
+        let lit = render(
+            gpu,
+            &make(&lamp_room, &[&|s| point_light(s, Vec3::Y, 1.0)]),
+            [16, 16],
+            16,
+            &independent(),
+        );
+        let unlit = render(gpu, &make(&lamp_room, &[&hidden_point]), [16, 16], 16, &independent());
+        assert_ne!(lit.bits(), unlit.bits());
     });
 }

@@ -29,10 +29,9 @@ macro_rules! trace {
             bvh2_count: true,
         };
         let pipeline = gpu.compute_pipeline::<$shader::Kernel>(&spec).unwrap();
-        let parts = $bvh.buffers();
         let format = clerestory::gpu::ash::vk::Format::R32G32B32A32_UINT;
         let quarters = gpu
-            .texels_with(parts[0].name, Category::Index, format, parts[0].bytes)
+            .texels_with($bvh.name(), Category::Index, format, $bvh.texels())
             .unwrap();
         let index = Bvh2Set {
             bvh2_quarters: &quarters,

@@ -1,8 +1,11 @@
 //! What the device's samplers draw, against their densities: chi-square tests of 131,072 draws each from the device's own random numbers.
 //!
-//! Seeds are fixed. Each check has a false-alarm rate of 10⁻⁶ (`clerestory_tests::statistics`), some fifteen of them: below 2·10⁻⁵
+//! Seeds are fixed. Each check has a false-alarm rate of 10⁻⁶ (`clerestory_tests::statistics`), some forty of them: below 5·10⁻⁵
 //! for a driver that was never seen before. Draws of one Sobol' pixel are stratified, so their counts are too even for the test; those are
 //! drawn one sample a pixel.
+
+#[path = "samplers/scattering.rs"]
+mod scattering;
 
 use std::f64::consts::{PI, TAU};
 

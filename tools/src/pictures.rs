@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use clerestory::film::tone::linear_from_srgb;
+use clerestory::film::srgb::linear_from_srgb;
 use clerestory::film::{Picture, exr, hdr};
 use clerestory::{Error, Result};
 

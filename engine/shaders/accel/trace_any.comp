@@ -3,32 +3,5 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
-#include "accel/trace_interface.glsl"
-#include "accel/bvh2.glsl"
-
-void main() {
-    uint index = trace_constants.first_ray + gl_GlobalInvocationID.x;
-    if (gl_GlobalInvocationID.x >= trace_constants.ray_count) {
-        return;
-    }
-    uint resume = trace_resume[index];
-    if (resume == BVH2_FINISHED) {
-        return;
-    }
-    Ray ray = trace_rays[index];
-    Hit hit = no_hit(ray.t_max);
-    if (resume != BVH2_START) {
-        hit = trace_hits[index];
-    }
-    resume = any_hit(ray, resume, hit);
-    trace_hits[index] = hit;
-    trace_resume[index] = resume;
-    if (resume != BVH2_FINISHED) {
-        atomicAdd(trace_status.unfinished, 1u);
-    }
-    if (BVH2_COUNT) {
-        atomicAdd(trace_status.node_visits, bvh2_counters.x);
-        atomicAdd(trace_status.triangle_tests, bvh2_counters.y);
-        atomicAdd(trace_status.iterations, bvh2_counters.z);
-    }
-}
+#define TRACE any_hit
+#include "accel/trace.glsl"

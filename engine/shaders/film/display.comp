@@ -6,6 +6,7 @@
 layout(local_size_x = 64) in;
 
 #include "film/film_pixel.glsl"
+#include "film/srgb.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first_pixel;  // of this part of the film, in the picture
@@ -17,9 +18,6 @@ layout(push_constant, scalar) uniform Push {
 layout(set = 0, binding = 0, scalar) restrict readonly buffer FilmPixels { FilmPixel film_pixels[]; };
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer DisplayPixels { uint display_pixels[]; };
 
-// IEC 61966-2-1.
-float srgb_from_linear(float x) { return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055; }
-
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= push.pixel_count) {
@@ -28,6 +26,6 @@ void main() {
     FilmPixel film = film_pixels[i];
     float scale = film.samples > 0u ? push.scale / float(film.samples) : 0.0;
     vec3 linear = clamp(vec3(film.sum[0].hi, film.sum[1].hi, film.sum[2].hi) * scale, 0.0, 1.0);
-    vec3 srgb = vec3(srgb_from_linear(linear.r), srgb_from_linear(linear.g), srgb_from_linear(linear.b));
+    vec3 srgb = srgb_from_linear(linear);
     display_pixels[push.first_pixel + i] = packUnorm4x8(vec4(push.bgra != 0u ? srgb.bgr : srgb, 1.0));
 }

@@ -44,11 +44,11 @@ void main() {
                 continue;
             }
             aov.hits += 1u;
-            for (int c = 0; c < 3; ++c) {
-                aov.sum[c] = two_float_add(aov.sum[c], a.albedo[c]);
-                aov.sum[3 + c] = two_float_add(aov.sum[3 + c], a.normal[c]);
+            for (uint c = 0u; c < 3u; ++c) {
+                aov.sum[AOV_ALBEDO + c] = two_float_add(aov.sum[AOV_ALBEDO + c], a.albedo[c]);
+                aov.sum[AOV_NORMAL + c] = two_float_add(aov.sum[AOV_NORMAL + c], a.normal[c]);
             }
-            aov.sum[6] = two_float_add(aov.sum[6], a.depth);
+            aov.sum[AOV_DEPTH] = two_float_add(aov.sum[AOV_DEPTH], a.depth);
         }
         film_aovs[target] = aov;
     }

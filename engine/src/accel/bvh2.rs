@@ -15,7 +15,7 @@ mod traverse;
 pub use build::Bvh2Settings;
 pub use traverse::{FINISHED, Traversal};
 
-use super::{CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, RayIndexBuffer, TraversalCounters};
+use super::{CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
 use crate::Result;
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
@@ -48,10 +48,10 @@ pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);
 ///
 /// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. This
 /// replaces a relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013), which covers only the last item.
-pub const BOX_SLACK: f32 = 1.0 / 262_144.0;
+pub const BOX_SLACK: f32 = constants::BVH2_BOX_SLACK;
 
 /// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).
-pub const MIN_RELATIVE_COMPONENT: f32 = 8.673_617_4e-19;
+pub const MIN_RELATIVE_COMPONENT: f32 = constants::BVH2_MIN_RELATIVE_COMPONENT;
 
 /// Bytes of a quarter of a node, the unit in which kernels read.
 const QUARTER: usize = 16;
@@ -145,11 +145,6 @@ impl Bvh2 {
         &self.nodes
     }
 
-    /// Nodes and triangles as the kernels read them, in units of 16 bytes: the one buffer of their set.
-    pub fn packed(&self) -> &[[u32; 4]] {
-        &self.packed
-    }
-
     /// Triangles in leaf order.
     pub fn positions(&self) -> &[[Vec3; 3]] {
         &self.positions
@@ -185,12 +180,8 @@ impl RayIndex for Bvh2 {
         self.statistics
     }
 
-    fn buffers(&self) -> Vec<RayIndexBuffer<'_>> {
-        vec![RayIndexBuffer {
-            binding: 0,
-            name: "bvh2",
-            bytes: bytemuck::cast_slice(&self.packed),
-        }]
+    fn texels(&self) -> &[[u32; 4]] {
+        &self.packed
     }
 
     fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit {

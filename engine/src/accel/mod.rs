@@ -1,9 +1,24 @@
 //! Spatial indexes and their traversal: what a ray meets first, and whether it meets anything.
 //!
-//! Every index implements [`RayIndex`]: it is built on the CPU or holds what a device build read back, offers the buffers that the
+//! Every index implements [`RayIndex`]: it is built on the CPU or holds what a device build read back, offers the texels that the
 //! kernels bind as set 1, and carries the twin of its traversal. All indexes report the same hit for the same ray, bit for bit on one
 //! machine: the triangle test is shared ([`triangle`]), boxes are conservative for everything that test can report, and of candidates
 //! with equal distance the lowest triangle index wins.
+//!
+//! # How to add an index
+//!
+//! Beside its [`RayIndex`] it has an include `accel/<name>.glsl`, which declares set 1 in `accel/<name>_bindings.glsl` (one texel buffer) and
+//! the functions that trace kernels and path tracer call,
+//!
+//! ```glsl
+//! uint closest_hit(Ray ray, uint resume, inout Hit hit);
+//! uint any_hit(Ray ray, uint resume, inout Hit hit);
+//! ```
+//!
+//! both of which return its constant `…_FINISHED`, or where to go on when the quota has stopped the ray; `resume` is `…_START` at first and
+//! `hit` is `no_hit(ray.t_max)`. With `CLERESTORY_CANDIDATE_FILTER` defined they ask `accept_candidate` before a hit counts, and the
+//! constant `…_RESUMES` leaves the bookkeeping out where rays never stop. The kernels that include it are `accel/trace.glsl` and
+//! `transport/path_candidates.glsl`, `path_extend.glsl` and `path_shadow.glsl`, where the names of the index's constants stand.
 
 pub mod bvh2;
 pub mod offset;
@@ -20,13 +35,13 @@ use bytemuck::{Pod, Zeroable};
 pub const NO_HIT: u32 = constants::NO_HIT;
 
 /// Smallest largest-component of a ray direction that is traced; shorter directions, zero among them, meet nothing.
-pub const MIN_DIRECTION: f32 = 1.0 / MAX_DIRECTION;
+pub const MIN_DIRECTION: f32 = constants::MIN_DIRECTION;
 
 /// Largest direction component that is traced (2²⁸); beyond it products of the triangle test could overflow.
-pub const MAX_DIRECTION: f32 = 268_435_456.0;
+pub const MAX_DIRECTION: f32 = constants::MAX_DIRECTION;
 
 /// Largest coordinate, metres, of an indexed vertex or a ray origin (2³⁰); what lies beyond is left out and counted.
-pub const MAX_COORDINATE: f32 = 1_073_741_824.0;
+pub const MAX_COORDINATE: f32 = constants::MAX_COORDINATE;
 
 /// A ray segment as the kernels read it (32 bytes, scalar layout).
 ///
@@ -84,17 +99,6 @@ impl Hit {
     }
 }
 
-/// One storage buffer of an index, bound as set 1.
-#[derive(Debug, Clone, Copy)]
-pub struct RayIndexBuffer<'a> {
-    /// Binding within set 1.
-    pub binding: u32,
-    /// Name for the memory report.
-    pub name: &'static str,
-    /// The bytes to upload; never empty.
-    pub bytes: &'a [u8],
-}
-
 /// Size and quality of an index.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct IndexStatistics {
@@ -138,8 +142,8 @@ pub trait RayIndex: Send + Sync {
     /// Size and quality.
     fn statistics(&self) -> IndexStatistics;
 
-    /// The storage buffers of set 1, in binding order.
-    fn buffers(&self) -> Vec<RayIndexBuffer<'_>>;
+    /// What kernels read: the texels, four words each (`R32G32B32A32_UINT`), of the uniform texel buffer that is set 1; never empty.
+    fn texels(&self) -> &[[u32; 4]];
 
     /// Twin of the closest-hit kernel: the accepted candidate of least `t`, of equal ones that of least index.
     fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit;

@@ -13,16 +13,17 @@
 //! distance is not skipped. Limits: within the offset distance of an edge at which surfaces fold more sharply towards the ray, the start can lie
 //! behind the neighbour; a needle thinner than some 10⁻⁵ of its length has no dependable normal.
 
+use crate::gpu::shaders::constants;
 use glam::Vec3;
 
 /// Offset from a plane as a share of the scene's reach, 2⁻¹⁷ = 128u.
-pub const SURFACE_SLACK: f32 = 1.0 / 131_072.0;
+pub const SURFACE_SLACK: f32 = constants::SURFACE_SLACK;
 
 /// Bound of the rounding of a position and of its offset copy, relative to the coordinate: u each and one to spare.
-pub const POSITION_ROUNDING: f32 = 3.0 / 16_777_216.0;
+pub const POSITION_ROUNDING: f32 = constants::POSITION_ROUNDING;
 
 /// Bound of the rounding of an interpolated edge vector, relative to its terms (difference, product, sum: γ₃, doubled).
-pub const EDGE_ROUNDING: f32 = 6.0 / 16_777_216.0;
+pub const EDGE_ROUNDING: f32 = constants::EDGE_ROUNDING;
 
 /// A point on a triangle with the distance, by component, to keep from the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]

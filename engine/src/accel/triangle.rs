@@ -18,10 +18,11 @@
 //! - Two-sided. A triangle of which two vertices coincide, or that is seen exactly edge-on, is missed. NaN anywhere is a miss.
 
 use super::Ray;
+use crate::gpu::shaders::constants;
 use glam::{DVec3, Vec3};
 
 /// Veltkamp's splitting factor for 24-bit significands, 2¹² + 1.
-const SPLITTER: f32 = 4097.0;
+const SPLITTER: f32 = constants::SPLITTER;
 
 /// What the test needs of a ray, computed once (Woop et al. 2013, §3.1).
 #[derive(Debug, Clone, Copy)]

@@ -10,6 +10,8 @@
 //! Guarantees: deterministic for a fixed order of samples. One addition errs by at most 2⁻⁴⁶ of the operands' magnitudes, so n additions of
 //! one sign err by at most n · 2⁻⁴⁶ relative: 1.5e-8 for 10⁶ samples, below half an f32 ulp.
 
+use crate::gpu::shaders::constants;
+
 /// The unevaluated sum `hi + lo`, with |lo| at most half an ulp of `hi`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C)]
@@ -31,7 +33,7 @@ impl TwoFloat {
 }
 
 /// Veltkamp's constant 2¹² + 1 for a 24-bit significand.
-const TWO_FLOAT_SPLITTER: f32 = 4097.0;
+const TWO_FLOAT_SPLITTER: f32 = constants::TWO_FLOAT_SPLITTER;
 
 /// `a + b = hi + lo` exactly, whatever the magnitudes, unless the sum overflows (Knuth's six operations).
 pub fn two_sum(a: f32, b: f32) -> TwoFloat {

@@ -6,6 +6,7 @@
 
 use super::accumulate::TwoFloat;
 use super::picture::{ALBEDO, DEPTH, NORMAL, Picture, RADIANCE, SAMPLES, VARIANCE};
+use crate::gpu::shaders::constants::{AOV_ALBEDO, AOV_DEPTH, AOV_NORMAL};
 use crate::gpu::shaders::film::display;
 use crate::gpu::shaders::sets::FilmSet;
 use crate::gpu::shaders::types::{FilmAov, FilmPixel};
@@ -126,7 +127,8 @@ impl GpuFilm {
         picture.add_layer(VARIANCE, 3, film.iter().flat_map(|pixel| statistics(pixel).1).collect())?;
         picture.add_layer(SAMPLES, 1, film.iter().map(|pixel| pixel.samples as f32).collect())?;
         if self.aovs {
-            let mean = |aov: &FilmAov, i: usize| {
+            let mean = |aov: &FilmAov, i: u32| {
+                let i = i as usize;
                 let sum = TwoFloat {
                     hi: aov.sum[i].hi,
                     lo: aov.sum[i].lo,
@@ -134,14 +136,14 @@ impl GpuFilm {
                 .to_f64();
                 (sum / f64::from(aov.hits.max(1))) as f32
             };
-            let layer = |first: usize| {
+            let layer = |first: u32| {
                 aovs.iter()
                     .flat_map(|a| [0, 1, 2].map(|i| mean(a, first + i)))
                     .collect::<Vec<_>>()
             };
-            picture.add_layer(ALBEDO, 3, layer(0))?;
-            picture.add_layer(NORMAL, 3, layer(3))?;
-            picture.add_layer(DEPTH, 1, aovs.iter().map(|a| mean(a, 6)).collect())?;
+            picture.add_layer(ALBEDO, 3, layer(AOV_ALBEDO))?;
+            picture.add_layer(NORMAL, 3, layer(AOV_NORMAL))?;
+            picture.add_layer(DEPTH, 1, aovs.iter().map(|a| mean(a, AOV_DEPTH)).collect())?;
         }
         Ok((picture, film.iter().map(|pixel| u64::from(pixel.non_finite)).sum()))
     }

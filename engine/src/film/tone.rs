@@ -3,6 +3,8 @@
 //! Sources: the sRGB transfer function, IEC 61966-2-1:1999; PBR Neutral, the Khronos tone mapper specification (Khronos Group, 2024).
 //! Guarantees: evaluated in f64, monotone and total: every input, NaN and infinity included, has a stated output.
 
+use super::srgb::srgb_byte;
+
 /// How linear values become display values in [0, 1], before the sRGB transfer function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -41,30 +43,7 @@ impl ToneMap {
             ToneCurve::Srgb => exposed,
             ToneCurve::PbrNeutral => pbr_neutral(exposed),
         };
-        display.map(|v| quantize(srgb_from_linear(v.clamp(0.0, 1.0))))
-    }
-}
-
-/// Rounds a value in [0, 1] to the nearest of 0…255 (halves up).
-pub fn quantize(value: f64) -> u8 {
-    (value * 255.0 + 0.5).floor().clamp(0.0, 255.0) as u8
-}
-
-/// IEC 61966-2-1: linear value in [0, 1] to sRGB value in [0, 1].
-pub fn srgb_from_linear(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
-}
-
-/// IEC 61966-2-1: sRGB value in [0, 1] to linear value in [0, 1].
-pub fn linear_from_srgb(srgb: f64) -> f64 {
-    if srgb <= 0.040_45 {
-        srgb / 12.92
-    } else {
-        ((srgb + 0.055) / 1.055).powf(2.4)
+        display.map(srgb_byte)
     }
 }
 
@@ -99,25 +78,6 @@ pub fn pbr_neutral(color: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn srgb_and_its_inverse_agree_at_every_code() {
-        for code in 0..=255u8 {
-            let linear = linear_from_srgb(f64::from(code) / 255.0);
-            assert_eq!(quantize(srgb_from_linear(linear)), code);
-        }
-        // Middle grey of the standard: 18 % reflectance is code 118 (0.4613…).
-        assert_eq!(quantize(srgb_from_linear(0.18)), 118);
-        // The two branches of the standard meet within its rounded constants.
-        let (below, above) = (srgb_from_linear(0.003_130_8), srgb_from_linear(0.003_130_800_01));
-        assert!((below - above).abs() < 1e-7);
-    }
-
-    #[test]
-    fn quantize_rounds_to_nearest() {
-        assert_eq!((quantize(0.5 / 255.0 - 1e-9), quantize(0.5 / 255.0 + 1e-9)), (0, 1));
-        assert_eq!((quantize(0.0), quantize(1.0)), (0, 255));
-    }
 
     #[test]
     fn pbr_neutral_keeps_base_colours_and_is_monotone() {

@@ -9,6 +9,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::{Material, Mesh, Scene, files};
+use crate::film::srgb::linear_from_srgb;
 use crate::{Error, Result};
 
 /// Reads a PLY file as one grey mesh.
@@ -317,21 +318,15 @@ fn vertices(body: &mut Body<'_>, element: &Element, mesh: &mut Mesh) -> Result<(
             mesh.uv0.push(Vec2::new(row[a], 1.0 - row[b]));
         }
         if let [Some(a), Some(b), Some(c)] = rgb {
-            let color = [a, b, c].map(|k| srgb_to_linear(row[k] / element.properties[k].kind.color_scale()));
+            let color = [a, b, c].map(|k| linear_color(row[k] / element.properties[k].kind.color_scale()));
             mesh.colors.push(Vec3::from_array(color).extend(1.0));
         }
     }
     Ok(())
 }
 
-/// The sRGB transfer function (IEC 61966-2-1).
-fn srgb_to_linear(x: f32) -> f32 {
-    let x = x.clamp(0.0, 1.0);
-    if x <= 0.040_45 {
-        x / 12.92
-    } else {
-        ((x + 0.055) / 1.055).powf(2.4)
-    }
+fn linear_color(encoded: f32) -> f32 {
+    linear_from_srgb(f64::from(encoded.clamp(0.0, 1.0))) as f32
 }
 
 fn faces(body: &mut Body<'_>, element: &Element, mesh: &mut Mesh) -> Result<(), Fault> {

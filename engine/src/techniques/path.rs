@@ -83,9 +83,9 @@ const SETTINGS: [SettingInfo; 8] = [
     },
 ];
 
-/// What each specialization constant of the shading stage stands for, and why it may be off.
+/// What each specialization constant of the shading stage stands for, and why it is off where nothing else is known.
 const FEATURES: [(&str, &str, &str); 16] = [
-    ("has_metal", "metal lobes", "no material is metal"),
+    (HAS_METAL, "metal lobes", "no material is metal"),
     (
         "has_conductor",
         "exact conductors",
@@ -98,9 +98,9 @@ const FEATURES: [(&str, &str, &str); 16] = [
     ),
     ("has_transmission", "transmission", "no material transmits"),
     (
-        "has_multiple_scattering",
+        HAS_MULTIPLE_SCATTERING,
         "multiple-scattering compensation",
-        "there is no metal, or it is switched off",
+        "no material is metal",
     ),
     ("has_textures", "texture look-ups", "no material has a texture"),
     ("has_shading_normals", "shading normals", "no mesh interpolates normals"),
@@ -118,6 +118,8 @@ const FEATURES: [(&str, &str, &str); 16] = [
         "the scene has none",
     ),
 ];
+const HAS_METAL: &str = "has_metal";
+const HAS_MULTIPLE_SCATTERING: &str = "has_multiple_scattering";
 
 impl Technique for PathTracer {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
@@ -170,10 +172,18 @@ impl Technique for PathTracer {
                 .flat_map(|pipeline| &pipeline.specialization)
                 .any(|(known, value)| *known == name && *value == 0)
         };
+        let switched_off = !off(HAS_METAL) && !PathTracer::settings(self).multiple_scattering;
         FEATURES
             .iter()
             .filter(|(name, ..)| off(name))
-            .map(|&(_, what, why)| Skipped { what, why })
+            .map(|&(name, what, why)| Skipped {
+                what,
+                why: if name == HAS_MULTIPLE_SCATTERING && switched_off {
+                    "the setting multiple_scattering is off"
+                } else {
+                    why
+                },
+            })
             .collect()
     }
 }
@@ -195,5 +205,21 @@ mod tests {
             .collect();
         known.sort_unstable();
         assert_eq!(names, known);
+    }
+
+    #[test]
+    fn features_are_constants_of_the_shading_stage() {
+        let constants: Vec<&str> = path_shade::INFO.spec_constants.iter().map(|c| c.name).collect();
+        for (i, (name, ..)) in FEATURES.iter().enumerate() {
+            assert!(constants.contains(name), "{name} is none of {constants:?}");
+            assert!(
+                FEATURES[..i].iter().all(|(other, ..)| other != name),
+                "{name} is there twice"
+            );
+        }
+        // And nothing that is left out goes unsaid.
+        for name in constants.iter().filter(|name| name.starts_with("has_")) {
+            assert!(FEATURES.iter().any(|(known, ..)| known == name), "{name} is not said");
+        }
     }
 }

@@ -25,7 +25,7 @@ pub const ALPHA_NODES: usize = constants::ALPHA_NODES as usize;
 /// Layers for exact dielectrics.
 pub const ETA_NODES: usize = constants::ETA_NODES as usize;
 /// (η − 1)/(η + 1) of the last of them (η = 3); larger indices use that layer, which only loses energy.
-pub const ETA_PARAMETER_MAX: f64 = 0.5;
+pub const ETA_PARAMETER_MAX: f64 = constants::ETA_PARAMETER_MAX as f64;
 /// Number of the layer with Schlick's weight.
 pub const SCHLICK_LAYER: usize = constants::SCHLICK_LAYER as usize;
 const LAYERS: usize = ETA_NODES + 2;
@@ -37,7 +37,7 @@ pub const TABLE_LENGTH: usize = AVERAGE_BASE + LAYERS * ALPHA_NODES;
 /// Points of the quadrature and the generator of its rule: a Fibonacci lattice, which a jump at the horizon does not upset.
 const QUADRATURE: [u32; 2] = [1597, 987];
 /// α^¼ at [`ALPHA_MIN`].
-const ALPHA_ROOT_MIN: f64 = 0.177_827_941_003_892_3;
+pub(super) const ALPHA_ROOT_MIN: f64 = 0.177_827_941_003_892_3;
 
 /// The table as uploaded.
 #[derive(Debug, Clone)]

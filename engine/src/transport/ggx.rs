@@ -8,7 +8,8 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-/// Below this the lobe is a Dirac delta: half vectors carry f32 errors of 1e-7, a part in 10⁴ of this width.
+/// Below this the lobe is a Dirac delta: half vectors carry f32 errors of 1e-7, a part in 10⁴ of this width. The shader has it rounded;
+/// the albedo table is laid out by the exact value.
 pub const ALPHA_MIN: f64 = 1e-3;
 
 /// Density of microfacet normals.
@@ -58,6 +59,15 @@ pub fn ggx_sample_visible(wo: DVec3, alpha: f64, u: DVec2) -> DVec3 {
 mod tests {
     use super::super::testing::{random3, sphere_test};
     use super::*;
+    use crate::gpu::shaders::constants;
+    use crate::transport::albedo::ALPHA_ROOT_MIN;
+
+    #[test]
+    fn the_shaders_least_width_is_the_rounded_one() {
+        assert_eq!(ALPHA_MIN as f32, constants::ALPHA_MIN);
+        assert_eq!(ALPHA_ROOT_MIN as f32, constants::ALPHA_ROOT_MIN);
+        assert!((ALPHA_ROOT_MIN.powi(4) - ALPHA_MIN).abs() < 1e-17);
+    }
 
     /// ∫ over the sphere's upper half of `f`, by a midpoint rule in θ² / φ that resolves narrow lobes at the pole.
     fn integrate(f: impl Fn(DVec3) -> f64) -> f64 {

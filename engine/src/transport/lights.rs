@@ -5,12 +5,13 @@
 //! `transport/lights.glsl`.
 
 use super::warp::square_to_triangle;
+use crate::gpu::shaders::constants;
 use crate::scene::LightKind;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
 /// `KHR_lights_punctual`'s least difference of the cosines of the cone angles.
-const SPOT_COS_RANGE_MIN: f64 = 0.001;
+const SPOT_COS_RANGE_MIN: f64 = constants::SPOT_COS_RANGE_MIN as f64;
 
 /// Uniform point of a triangle given by a vertex and its two edges.
 pub fn triangle_point(p0: DVec3, e1: DVec3, e2: DVec3, u: DVec2) -> DVec3 {

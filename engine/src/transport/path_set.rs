@@ -4,7 +4,7 @@
 //! packed form is that of `transport/path_set.glsl`.
 
 use super::bsdf::{LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION};
-use crate::gpu::shaders::constants;
+use crate::gpu::shaders::constants::{self, PATH_SET_MAX_SHIFT, PATH_SET_MIN_SHIFT};
 use crate::{Error, Result};
 use std::fmt;
 use std::str::FromStr;
@@ -122,7 +122,9 @@ impl PathSet {
 
     /// One word for a push constant: bits 0–5 lobes, 6–17 least and 18–29 greatest number of bounces.
     pub fn packed(&self) -> u32 {
-        self.lobes | self.min_bounces << 6 | self.max_bounces.unwrap_or(PATH_SET_UNBOUNDED) << 18
+        self.lobes
+            | self.min_bounces << PATH_SET_MIN_SHIFT
+            | self.max_bounces.unwrap_or(PATH_SET_UNBOUNDED) << PATH_SET_MAX_SHIFT
     }
 }
 
@@ -310,7 +312,7 @@ mod tests {
     fn packed_form_holds_everything() {
         let set = PathSet::new(3, Some(9), LOBE_GLOSSY | LOBE_TRANSMISSION).unwrap();
         let p = set.packed();
-        assert_eq!((p & PATH_SET_LOBES, (p >> 6) & 0xfff, (p >> 18) & 0xfff), (18, 3, 9));
+        assert_eq!((p & PATH_SET_LOBES, (p >> 6) & 0xfff, p >> 18), (18, 3, 9));
         assert_eq!(PathSet::ALL.packed() >> 18, PATH_SET_UNBOUNDED);
         assert!(!set.contains(2) && set.contains(3) && set.contains(9) && !set.contains(10));
         assert!(set.continues(8) && !set.continues(9) && PathSet::ALL.continues(1 << 20));

@@ -6,10 +6,11 @@
 //! `transport/phase.glsl`.
 
 use super::warp::{UNIFORM_SPHERE_PDF, direction_below_pole, orthonormal_basis};
+use crate::gpu::shaders::constants;
 use glam::DVec3;
 
 /// Below this |g| the inversion loses its digits in f32 and the lobe is sampled as isotropic.
-const HENYEY_GREENSTEIN_MIN: f64 = 1e-3;
+const HENYEY_GREENSTEIN_MIN: f64 = constants::HENYEY_GREENSTEIN_MIN as f64;
 
 /// Henyey and Greenstein's density, sr⁻¹; `g` in (−1, 1) is its mean cosine.
 pub fn henyey_greenstein(c: f64, g: f64) -> f64 {

@@ -7,12 +7,13 @@
 //! `transport/shading_normal.glsl`.
 
 use super::warp::orthonormal_basis;
+use crate::gpu::shaders::constants;
 use glam::{DVec3, DVec4};
 
 /// Least cosine between the adapted normal and ωo: far above rounding errors, far below what the eye sees of a bent normal.
-pub const VISIBLE_COS_MIN: f64 = 1e-3;
+pub const VISIBLE_COS_MIN: f64 = constants::VISIBLE_COS_MIN as f64;
 /// Tangents whose part normal to n is shorter than this are replaced.
-const TANGENT_LENGTH_MIN: f64 = 1e-4;
+const TANGENT_LENGTH_MIN: f64 = constants::TANGENT_LENGTH_MIN as f64;
 
 /// The shading normal to use, on the side of `wo`; `ng` must already face `wo`.
 ///

@@ -87,6 +87,26 @@ mod tests {
     use super::super::testing::{chi_square_test, random3, sphere_test};
     use super::*;
 
+    #[test]
+    fn the_shaders_constants_are_the_rounded_ones() {
+        use crate::gpu::shaders::constants;
+        assert_eq!(UNIFORM_SPHERE_PDF as f32, constants::UNIFORM_SPHERE_PDF);
+        assert_eq!(UNIFORM_HEMISPHERE_PDF as f32, constants::UNIFORM_HEMISPHERE_PDF);
+        // Rust's own constants stand for the shaders' in `constants`: here is what the file says.
+        let source = include_str!("../../shaders/include/transport/warp.glsl");
+        for (name, value) in [("PI", std::f64::consts::PI), ("INV_PI", FRAC_1_PI)] {
+            let line = source
+                .lines()
+                .find_map(|line| line.strip_prefix(&format!("const float {name} = ")));
+            let written: f32 = line
+                .and_then(|rest| rest.strip_suffix(';'))
+                .unwrap_or("")
+                .parse()
+                .unwrap();
+            assert_eq!(value as f32, written, "{name}");
+        }
+    }
+
     /// Chi-square tests at p = 1e-5 each.
     const SIGNIFICANCE: f64 = 1e-5;
 

@@ -12,9 +12,15 @@ struct FilmPixel {
     uint non_finite;
 };
 
+// First channels of the AOVs in FilmAov, and their number.
+const uint AOV_ALBEDO = 0u;
+const uint AOV_NORMAL = 3u;
+const uint AOV_DEPTH = 6u;
+const uint AOV_CHANNELS = 7u;
+
 // Sums of albedo, normal and depth over the samples that hit something.
 struct FilmAov {
-    TwoFloat sum[7];
+    TwoFloat sum[AOV_CHANNELS];
     uint hits;
 };
 

@@ -3,6 +3,7 @@
 #ifndef CLERESTORY_SCENE_TEXTURE_GLSL
 #define CLERESTORY_SCENE_TEXTURE_GLSL
 
+#include "film/srgb.glsl"
 #include "scene/bindings.glsl"
 
 const uint TEXTURE_SRGB = 1u;
@@ -14,11 +15,8 @@ const uint WRAP_REPEAT = 0u;
 const uint WRAP_MIRRORED = 1u;
 const uint WRAP_CLAMP = 2u;
 const uint WRAP_MASK = 3u;
-
-// IEC 61966-2-1.
-vec3 linear_from_srgb(vec3 c) {
-    return mix(c * (1.0 / 12.92), pow((c + 0.055) * (1.0 / 1.055), vec3(2.4)), greaterThan(c, vec3(0.04045)));
-}
+// Distance from the origin, in texels, beyond which coordinates no longer tell neighbouring texels apart.
+const float TEXTURE_COORDINATE_LIMIT = 16777216.0;
 
 uint wrap_texel(int i, uint size, uint mode) {
     int n = int(size);
@@ -48,8 +46,8 @@ vec4 sample_texture(uint index, vec4 uvs) {
     SceneTexture t = load_texture(index);
     vec3 uv = vec3((t.flags & TEXTURE_UV1) != 0u ? uvs.zw : uvs.xy, 1.0);
     vec2 size = vec2(float(t.size & 0xFFFFu), float(t.size >> 16u));
-    const float limit = 16777216.0;
-    vec2 p = clamp(vec2(dot(t.transform_u, uv), dot(t.transform_v, uv)) * size, vec2(-limit), vec2(limit));
+    vec2 p = clamp(vec2(dot(t.transform_u, uv), dot(t.transform_v, uv)) * size, vec2(-TEXTURE_COORDINATE_LIMIT),
+                   vec2(TEXTURE_COORDINATE_LIMIT));
     if ((t.flags & TEXTURE_NEAREST) != 0u) {
         return fetch_texel(t, ivec2(floor(p)));
     }

@@ -19,8 +19,7 @@ const uint CANDIDATES_SHADOW = 1u;
 #define CLERESTORY_SAMPLER SAMPLER_PCG
 #include "transport/random.glsl"
 
-layout(constant_id = 6) const bool HAS_TEXTURES = true;
-layout(constant_id = 9) const bool HAS_VERTEX_COLORS = true;
+#include "transport/attribute_features.glsl"
 #include "scene/material.glsl"
 
 layout(push_constant, scalar) uniform Push {

@@ -2,16 +2,16 @@
 #ifndef CLERESTORY_TRANSPORT_PATH_FEATURES_GLSL
 #define CLERESTORY_TRANSPORT_PATH_FEATURES_GLSL
 
+#include "transport/attribute_features.glsl"
+
 layout(constant_id = 0) const bool HAS_METAL = true;
 layout(constant_id = 1) const bool HAS_CONDUCTOR = true;               // exact complex index of refraction
 layout(constant_id = 2) const bool HAS_SPECULAR_LAYER = true;          // dielectric reflection
 layout(constant_id = 3) const bool HAS_TRANSMISSION = true;
 layout(constant_id = 4) const bool HAS_MULTIPLE_SCATTERING = true;     // compensation of rough metals
 layout(constant_id = 5) const bool SEPARABLE_MASKING = false;          // uncorrelated Smith masking, for comparisons
-layout(constant_id = 6) const bool HAS_TEXTURES = true;
 layout(constant_id = 7) const bool HAS_SHADING_NORMALS = true;
 layout(constant_id = 8) const bool HAS_NORMAL_MAPS = true;
-layout(constant_id = 9) const bool HAS_VERTEX_COLORS = true;
 layout(constant_id = 10) const bool HAS_ABSORPTION = true;            // absorbing solids
 layout(constant_id = 11) const bool HAS_UNLIT = true;
 layout(constant_id = 12) const bool HAS_ENVIRONMENT = true;

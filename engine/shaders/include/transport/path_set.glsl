@@ -8,10 +8,12 @@
 const uint LOBE_VOLUME = 32u;
 const uint PATH_SET_LOBES = 63u;
 const uint PATH_SET_UNBOUNDED = 0xfffu;
+const uint PATH_SET_MIN_SHIFT = 6u;
+const uint PATH_SET_MAX_SHIFT = 18u;
 
 uint path_set_lobes(uint packed_set) { return packed_set & PATH_SET_LOBES; }
-uint path_set_min(uint packed_set) { return (packed_set >> 6u) & PATH_SET_UNBOUNDED; }
-uint path_set_max(uint packed_set) { return (packed_set >> 18u) & PATH_SET_UNBOUNDED; }
+uint path_set_min(uint packed_set) { return (packed_set >> PATH_SET_MIN_SHIFT) & PATH_SET_UNBOUNDED; }
+uint path_set_max(uint packed_set) { return (packed_set >> PATH_SET_MAX_SHIFT) & PATH_SET_UNBOUNDED; }
 
 // Whether paths may have more than `bounce` bounces.
 bool path_set_continues(uint packed_set, uint bounce) {

@@ -5,17 +5,12 @@
 use glam::{Quat, Vec3};
 
 use super::noise::value_noise;
+use crate::film::srgb;
 use crate::scene::{Environment, Filter, Image, Texture, Wrap};
 
 /// Encodes a linear value as an sRGB byte (IEC 61966-2-1), rounded to the nearest.
 pub fn srgb_byte(linear: f32) -> u8 {
-    let x = linear.clamp(0.0, 1.0);
-    let encoded = if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    };
-    unorm_byte(encoded)
+    srgb::srgb_byte(linear.into())
 }
 
 /// Encodes a value in [0, 1] as a byte, rounded to the nearest.

@@ -48,9 +48,9 @@ pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
 pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
 
 /// A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
-pub const ETA_MATCHED: f64 = 1.001;
+pub const ETA_MATCHED: f64 = constants::ETA_MATCHED as f64;
 /// Below this 1 − E_avg there is no multiple scattering to speak of.
-const LOSS_MIN: f64 = 1e-5;
+const LOSS_MIN: f64 = constants::LOSS_MIN as f64;
 
 /// One sampled direction.
 #[derive(Debug, Clone, Copy, PartialEq)]

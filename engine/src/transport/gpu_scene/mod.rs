@@ -74,7 +74,7 @@ impl GpuScene {
         let mut geometry = Geometry::flatten(scene, &profile)?;
         let bounds = geometry.bounds();
         let bvh = Bvh2::build(&geometry.corners(), &Bvh2Settings::default())?;
-        let index = gpu.texels_with(bvh.name(), Category::Index, vk::Format::R32G32B32A32_UINT, bvh.packed())?;
+        let index = gpu.texels_with(bvh.name(), Category::Index, vk::Format::R32G32B32A32_UINT, bvh.texels())?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
         let placed = materials.iter().filter(|(_, placed)| *placed);
