@@ -107,7 +107,8 @@ fn a_package_needs_no_compiler_until_its_shaders_change() {
     assert!(packed[0].embedded.starts_with(tree.path("spirv")));
     assert_eq!(std::fs::read(&packed[0].embedded).unwrap(), bytes);
     assert_eq!(packed[0].sources, made[0].sources);
-    let interface = build::reflect::reflect(&std::fs::read(&packed[0].reflected).unwrap()).unwrap();
+    let read = |file| std::fs::read(file).unwrap();
+    let interface = build::reflect::reflect(&read(&packed[0].reflected), &read(&packed[0].embedded)).unwrap();
     let paths = build::Paths {
         gpu: "engine::gpu",
         shaders: "own::shaders",

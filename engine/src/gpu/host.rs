@@ -107,7 +107,7 @@ impl EnabledFeatures {
         optional: OptionalFeatures::NONE,
     };
 
-    /// Takes away what the host did not enable.
+    /// Takes away what is not enabled.
     pub(super) fn restrict(&self, caps: &mut Caps) {
         let optional = &self.optional;
         caps.robust_buffer_access &= optional.robust_buffer_access;

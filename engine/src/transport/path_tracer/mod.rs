@@ -22,7 +22,7 @@ use super::gpu_scene::GpuScene;
 use crate::film::picture::Picture;
 use crate::film::{GpuFilm, Step};
 use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
-use crate::gpu::{Access, Buffer, Gpu, PipelineInfo, Timings};
+use crate::gpu::{Access, Buffer, DeviceKind, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
 
@@ -82,7 +82,7 @@ impl PathTracer {
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let slots = match settings.paths_in_flight {
             // Enough for a dispatch to be worth its overhead, few enough for the caches of a processor.
-            0 if gpu.caps().kind == "cpu" => 1 << 18,
+            0 if gpu.caps().kind == DeviceKind::Cpu => 1 << 18,
             0 => 1 << 20,
             wanted => wanted.next_multiple_of(PATH_GROUP),
         };
@@ -240,7 +240,7 @@ impl PathTracer {
             let times = recorder.submit()?.wait()?;
             // Software drivers end nothing, and there the passes are the same on every run.
             self.bounces = match times.seconds() {
-                _ if self.gpu.caps().kind == "cpu" => BOUNCES_A_SUBMISSION,
+                _ if self.gpu.caps().kind == DeviceKind::Cpu => BOUNCES_A_SUBMISSION,
                 long if long > LONG_SUBMISSION => (self.bounces / 2).max(1),
                 short if 4.0 * short < LONG_SUBMISSION => (2 * self.bounces).min(BOUNCES_A_SUBMISSION),
                 _ => self.bounces,
