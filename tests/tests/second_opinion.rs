@@ -1,8 +1,8 @@
 //! spirv-reflect's opinion on the interfaces that the build reads with rspirv.
 //!
-//! spirv-reflect understands the storage classes of SPIR-V 1.0 only, so every shader is compiled for Vulkan 1.0
-//! here, and both readers must agree on sets, bindings, descriptor types, and the offsets, counts, strides and widths of all that is in
-//! blocks and push constants. That the first reading is the one that the generated Rust code came from is shown by its fingerprint.
+//! spirv-reflect understands the storage classes of SPIR-V 1.0 only, so every shader is compiled for Vulkan 1.0 here, and both readers must
+//! agree on sets, bindings, descriptor types, and the offsets, counts, strides and widths of all that is in blocks and push constants. That
+//! the first reading is the one that the generated Rust code came from is shown by its fingerprint.
 
 use std::ffi::CStr;
 use std::path::{Path, PathBuf};
@@ -238,7 +238,10 @@ fn spirv_reflect_reads_the_same_interfaces() {
     let of_tests = clerestory_tests::shaders::ALL
         .iter()
         .map(|info| ("tests/shaders", *info));
-    let all: Vec<_> = of_engine.chain(of_tests).collect();
+    let of_samples = clerestory_samples::shaders::ALL
+        .iter()
+        .map(|info| ("samples/shaders", *info));
+    let all: Vec<_> = of_engine.chain(of_tests).chain(of_samples).collect();
     let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {

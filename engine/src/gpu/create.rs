@@ -115,6 +115,9 @@ impl Gpu {
         enabled.check(&summary.name, "choose another device")?;
         // Nothing uses it yet.
         enabled.optional.descriptor_indexing = false;
+        if let Some(features) = options.lesser.features {
+            enabled.optional = enabled.optional.and(features);
+        }
         // SAFETY: the physical device belongs to the instance.
         let families = unsafe {
             instance
@@ -187,7 +190,8 @@ impl Gpu {
             }
             error
         };
-        let memory = Memory::new(&instance.raw, &device, physical_device, options.lesser.heap_bytes).map_err(give_up)?;
+        let memory =
+            Memory::new(&instance.raw, &device, physical_device, options.lesser.heap_bytes).map_err(give_up)?;
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: timelineSemaphore is enabled on every device that comes here.

@@ -96,7 +96,10 @@ impl HeapLimits {
         let properties = unsafe { instance.get_physical_device_memory_properties(physical_device) };
         let heaps = &properties.memory_heaps[..properties.memory_heap_count as usize];
         let sum = |flags| {
-            let sizes = heaps.iter().filter(|heap| heap.flags.contains(flags)).map(|heap| heap.size);
+            let sizes = heaps
+                .iter()
+                .filter(|heap| heap.flags.contains(flags))
+                .map(|heap| heap.size);
             sizes.fold(0, u64::saturating_add).min(at_most.unwrap_or(u64::MAX))
         };
         Self {

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::caps::DescriptorLimits;
 use super::fault::FaultPlan;
+use super::host::OptionalFeatures;
 use super::instance::DeviceSummary;
 use crate::{Error, Result};
 
@@ -81,11 +82,7 @@ impl Validation {
             "core" => Ok(Self::Core),
             "gpu" => Ok(Self::GpuAssisted),
             "off" | "" => Ok(Self::Off),
-            other => Err(Error::setting(
-                VALIDATION_VARIABLE,
-                other,
-                "it can be off, core or gpu",
-            )),
+            other => Err(Error::setting(VALIDATION_VARIABLE, other, "it can be off, core or gpu")),
         }
     }
 }
@@ -115,6 +112,8 @@ pub struct Lesser {
     pub descriptors: Option<DescriptorLimits>,
     /// At most as many bits of a timestamp count.
     pub timestamp_valid_bits: Option<u32>,
+    /// At most these optional features are enabled.
+    pub features: Option<OptionalFeatures>,
     /// At most as many bytes in the device's heaps.
     pub heap_bytes: Option<u64>,
 }

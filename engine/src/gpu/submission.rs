@@ -98,9 +98,12 @@ impl Submission {
             let mut values = vec![0u64; queries.len()];
             // SAFETY: the queries were written by the submission that has just finished.
             unsafe {
-                inner
-                    .device
-                    .get_query_pool_results(pool, queries.start as u32, &mut values, vk::QueryResultFlags::TYPE_64)
+                inner.device.get_query_pool_results(
+                    pool,
+                    queries.start as u32,
+                    &mut values,
+                    vk::QueryResultFlags::TYPE_64,
+                )
             }
             .ok()?;
             Some(values)

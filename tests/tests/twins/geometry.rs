@@ -3,8 +3,8 @@
 use clerestory::accel::offset::{SURFACE_SLACK, scene_reach, surface_point};
 use clerestory::accel::sphere::{closest_approach, intersect_sphere};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
-use clerestory_tests::twin::{Results, U, compare};
 use clerestory::gpu::DeviceKind;
+use clerestory_tests::twin::{Results, U, compare};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
