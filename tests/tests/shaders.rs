@@ -15,7 +15,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Matrix columns of three rows without padding: naga knows the standard layouts only, not the scalar one.
     ("layout_probe.comp", "UnsupportedMatrixStride"),
-    // Vertices of eight bytes with a colour behind a position: the scalar layout again.
+    // A colour of three numbers right behind a position of two: the scalar layout again.
     ("triangle.vert", "MemberOffset"),
     // Texel buffers.
     ("twin_texture.comp", "SampledBuffer"),
