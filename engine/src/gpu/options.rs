@@ -82,7 +82,11 @@ impl Validation {
             "core" => Ok(Self::Core),
             "gpu" => Ok(Self::GpuAssisted),
             "off" | "" => Ok(Self::Off),
-            other => Err(Error::setting(VALIDATION_VARIABLE, other, "it can be off, core or gpu")),
+            other => Err(Error::setting(
+                VALIDATION_VARIABLE,
+                other,
+                "is none of off, core and gpu",
+            )),
         }
     }
 }
