@@ -48,7 +48,7 @@ pub struct Shader {
     pub head: Vec<String>,
     /// The module that goes into the library.
     pub embedded: PathBuf,
-    /// The same module unoptimized with all names, for reflection.
+    /// The same module unoptimized with all names, for the reflection of names and layouts.
     pub reflected: PathBuf,
     /// Text of the entry file and of everything that it used, by path: below the folder of shaders, or `include/…`.
     pub sources: BTreeMap<String, String>,

@@ -194,8 +194,11 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         let (reads, writes) = access(&binding.resource);
         let _ = writeln!(
             text,
-            "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes} }},",
-            binding.set, binding.binding, binding.name
+            "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes}, used: {} }},",
+            binding.set,
+            binding.binding,
+            binding.name,
+            interface.used.contains(&(binding.set, binding.binding))
         );
     }
     text += "    ],\n    spec_constants: &[\n";

@@ -2,7 +2,7 @@
 //!
 //! Rests on `rspirv`; `third_party_notes/crates.md` says why.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, ExecutionModel, Op, StorageClass};
@@ -106,6 +106,8 @@ pub struct SpecConstant {
 pub struct Interface {
     pub stage: &'static str,
     pub bindings: Vec<Binding>,
+    /// Set and number of the bindings that the optimized module touches.
+    pub used: BTreeSet<(u32, u32)>,
     pub push: Option<Struct>,
     pub spec: Vec<SpecConstant>,
     /// Workgroup size; an entry that a specialization constant sets holds its id.
@@ -122,8 +124,8 @@ struct Reader {
 }
 
 impl Interface {
-    /// A hash of all that the generated Rust code depends on: equal for two versions of a shader that can stand in for each other. The
-    /// defaults of specialization constants are left out, since the host always sets them.
+    /// A hash of all that the host's code is written against. The defaults of specialization constants are left out, since the host always
+    /// sets them, and so is which bindings are used: a version of a shader that uses no more of them than another can stand in for it.
     pub fn fingerprint(&self) -> u64 {
         let spec: Vec<_> = self.spec.iter().map(|c| (c.id, &c.name, c.kind)).collect();
         let text = format!(
@@ -141,8 +143,8 @@ pub fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
     })
 }
 
-/// Reflects a module that was compiled with all its names.
-pub fn reflect(module: &[u8]) -> Result<Interface, String> {
+/// Reflects a shader from its module that was compiled with all its names; the optimized one says which bindings are used.
+pub fn reflect(module: &[u8], optimized: &[u8]) -> Result<Interface, String> {
     let reader = Reader::new(rspirv::dr::load_bytes(module).map_err(|error| error.to_string())?);
     let entry = reader.module.entry_points.first().ok_or("no entry point")?;
     let stage = match entry.operands[0] {
@@ -179,10 +181,69 @@ pub fn reflect(module: &[u8]) -> Result<Interface, String> {
     Ok(Interface {
         stage,
         bindings,
+        used: used_bindings(optimized)?,
         push,
         spec,
         local_size,
     })
+}
+
+/// The bindings that an instruction of a function refers to.
+fn used_bindings(module: &[u8]) -> Result<BTreeSet<(u32, u32)>, String> {
+    let module = rspirv::dr::load_bytes(without_sources(module)).map_err(|error| error.to_string())?;
+    let touched: BTreeSet<u32> = module
+        .functions
+        .iter()
+        .flat_map(|function| function.all_inst_iter())
+        .flat_map(|instruction| &instruction.operands)
+        .filter_map(|operand| match operand {
+            Operand::IdRef(id) => Some(*id),
+            _ => None,
+        })
+        .collect();
+    let (mut sets, mut bindings) = (BTreeMap::new(), BTreeMap::new());
+    for note in &module.annotations {
+        if let [
+            Operand::IdRef(id),
+            Operand::Decoration(what),
+            Operand::LiteralBit32(value),
+        ] = note.operands.as_slice()
+        {
+            match what {
+                Decoration::DescriptorSet => drop(sets.insert(*id, *value)),
+                Decoration::Binding => drop(bindings.insert(*id, *value)),
+                _ => {}
+            }
+        }
+    }
+    let used = bindings.into_iter().filter(|(id, _)| touched.contains(id));
+    Ok(used
+        .map(|(id, binding)| (sets.get(&id).copied().unwrap_or(0), binding))
+        .collect())
+}
+
+/// A module without sources and line numbers: the compiler cuts its sources in the middle of multi-byte characters, which `rspirv` refuses.
+fn without_sources(module: &[u8]) -> Vec<u8> {
+    const HEADER_BYTES: usize = 20;
+    const LEFT_OUT: [u16; 6] = [
+        Op::SourceContinued as u16,
+        Op::Source as u16,
+        Op::String as u16,
+        Op::Line as u16,
+        Op::NoLine as u16,
+        Op::ModuleProcessed as u16,
+    ];
+    let (header, mut rest) = module.split_at(HEADER_BYTES.min(module.len()));
+    let mut kept = header.to_vec();
+    while let [code_low, code_high, words_low, words_high, ..] = rest {
+        let words = usize::from(u16::from_le_bytes([*words_low, *words_high]));
+        let (instruction, after) = rest.split_at((4 * words.max(1)).min(rest.len()));
+        if !LEFT_OUT.contains(&u16::from_le_bytes([*code_low, *code_high])) {
+            kept.extend_from_slice(instruction);
+        }
+        rest = after;
+    }
+    kept
 }
 
 impl Reader {

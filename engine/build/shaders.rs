@@ -57,9 +57,9 @@ fn run(root: &Path, engine: &Path, out: &Path, paths: &Paths) -> Result<(), Stri
     let interfaces = shaders
         .iter()
         .map(|shader| {
-            std::fs::read(&shader.reflected)
-                .map_err(|error| error.to_string())
-                .and_then(|module| reflect::reflect(&module))
+            let read = |file| std::fs::read(file).map_err(|error| error.to_string());
+            read(&shader.reflected)
+                .and_then(|module| reflect::reflect(&module, &read(&shader.embedded)?))
                 .map_err(|message| format!("{}: {message}", shader.name))
         })
         .collect::<Result<Vec<_>, _>>()?;

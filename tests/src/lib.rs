@@ -1,6 +1,8 @@
 //! Helpers shared by the integration tests.
 //!
-//! Tests never skip for want of a device: without one they fail. Which validation layers run is decided by `CLERESTORY_VALIDATION`.
+//! Tests never skip for want of a device: without one they fail. Which validation layers run is decided by the environment variable
+//! `CLERESTORY_VALIDATION` (`off`, `core`, `gpu`). Unlike for programs, unset means `core` here, so that a bare `cargo test` checks every
+//! call; an unknown value fails the tests.
 
 #[path = "../../engine/src/test_random.rs"]
 pub mod random;
@@ -9,16 +11,31 @@ pub mod shaders;
 pub mod statistics;
 pub mod twin;
 
-use clerestory::gpu::{Gpu, GpuOptions};
+use clerestory::gpu::{Gpu, GpuOptions, Validation};
+
+/// The validation layers of the tests, `core` unless the environment says otherwise; panics on an unknown value.
+pub fn validation() -> Validation {
+    if std::env::var_os("CLERESTORY_VALIDATION").is_none() {
+        return Validation::Core;
+    }
+    match Validation::Environment.resolve() {
+        Ok(validation) => validation,
+        Err(error) => panic!("{error}"),
+    }
+}
 
 /// A headless device for a test; the test fails when there is none.
 pub fn gpu() -> Gpu {
     gpu_with(&GpuOptions::default())
 }
 
-/// As [`gpu`], with options.
+/// As [`gpu`], with options; where they leave validation to the environment, it is that of [`validation`].
 pub fn gpu_with(options: &GpuOptions) -> Gpu {
-    match Gpu::headless(options) {
+    let mut options = options.clone();
+    if options.validation == Validation::Environment {
+        options.validation = validation();
+    }
+    match Gpu::headless(&options) {
         Ok(gpu) => gpu,
         Err(error) => panic!("the tests need a Vulkan device: {error}"),
     }

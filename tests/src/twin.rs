@@ -7,7 +7,7 @@
 use crate::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 use clerestory::gpu::interface::{ComputeShader, SpecConstants};
-use clerestory::gpu::{BufferDesc, Category, ComputePipeline, Gpu};
+use clerestory::gpu::{BufferDesc, Category, ComputePipeline, DeviceKind, Gpu};
 
 /// Numbers of a case.
 pub const INPUTS: usize = constants::TWIN_INPUTS as usize;
@@ -64,7 +64,7 @@ pub struct Tolerance {
 /// Absolute error of sine, cosine and arc tangent: 2⁻²⁰ is what the software driver's polynomials keep with room to spare; Vulkan's
 /// precision rules allow 2⁻¹¹, which is all that can be asked of other drivers.
 pub fn trigonometric_error(gpu: &Gpu) -> f64 {
-    if gpu.caps().kind == "cpu" {
+    if gpu.caps().kind == DeviceKind::Cpu {
         1.0 / 1_048_576.0
     } else {
         1.0 / 2048.0

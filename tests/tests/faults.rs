@@ -19,7 +19,7 @@ fn faulty(call: FaultCall, nth: u32, result: vk::Result) -> (MutexGuard<'static,
     let options = GpuOptions {
         fault: Some(FaultPlan { call, nth, result }),
         // GPU-assisted validation submits by another command than the one that fails here.
-        validation: match GpuOptions::default().validation {
+        validation: match clerestory_tests::validation() {
             Validation::GpuAssisted => Validation::Core,
             other => other,
         },

@@ -2,8 +2,8 @@
 
 use clerestory::Error;
 use clerestory::gpu::{
-    Access, BufferBarrier, BufferDesc, Category, DeviceSelection, Gpu, GpuOptions, rw_compute_to_compute,
-    transfer_to_compute,
+    Access, BufferBarrier, BufferDesc, Caps, Category, DeviceSelection, Gpu, GpuOptions, Lesser, OptionalFeatures,
+    rw_compute_to_compute, transfer_to_compute,
 };
 use clerestory_tests::shaders::types::{ProbeInner, ProbeRecord};
 use clerestory_tests::shaders::{layout_probe, out_of_bounds, uniform_probe};
@@ -259,6 +259,79 @@ fn timestamps_and_statistics_are_plausible() {
             assert_eq!(timings.passes[1].invocations, Some(10));
         }
     });
+}
+
+#[test]
+fn invocations_are_counted_from_where_it_was_asked_for() {
+    with_gpu(|gpu| {
+        if !gpu.caps().pipeline_statistics {
+            return;
+        }
+        let words = gpu.buffer_with("words", Category::Work, &[0u32; 16]).unwrap();
+        let pipeline = gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).unwrap();
+        let mut recorder = gpu.recorder("counted late").unwrap();
+        for groups in 1..=4 {
+            if groups == 3 {
+                recorder.count_invocations();
+            }
+            let set = out_of_bounds::Set0 { words: words.view() };
+            let push = out_of_bounds::Push { index: 3, value: 9 };
+            recorder
+                .pass("dispatch", |pass| {
+                    pass.dispatch(&pipeline, &[&set], &push, [groups, 1, 1])?;
+                    pass.barrier(&[rw_compute_to_compute(&words)]);
+                    Ok(())
+                })
+                .unwrap();
+            // To ask again changes nothing.
+            if groups == 4 {
+                recorder.count_invocations();
+            }
+        }
+        let timings = recorder.submit().unwrap().wait().unwrap();
+        let counts: Vec<_> = timings.passes.iter().map(|pass| pass.invocations).collect();
+        assert_eq!(counts, [None, None, Some(3), Some(4)]);
+    });
+}
+
+/// Capabilities that rest on optional features.
+fn optional(caps: &Caps) -> [bool; 10] {
+    [
+        caps.robust_buffer_access,
+        caps.geometry_shader,
+        caps.pipeline_statistics,
+        caps.int64,
+        caps.float64,
+        caps.fragment_stores,
+        caps.vertex_stores,
+        caps.int64_atomics,
+        caps.ray_query,
+        caps.descriptor_indexing,
+    ]
+}
+
+#[test]
+fn the_capabilities_are_those_that_are_enabled() {
+    let enabling = |features| {
+        let gpu = gpu_with(&GpuOptions {
+            lesser: Lesser {
+                features,
+                ..Lesser::default()
+            },
+            ..GpuOptions::default()
+        });
+        assert_no_messages(&gpu);
+        gpu
+    };
+    assert_eq!(optional(enabling(Some(OptionalFeatures::NONE)).caps()), [false; 10]);
+    let gpu = enabling(None);
+    let devices = Gpu::list().unwrap();
+    let mut offered = devices.iter().map(|(_, offered)| offered);
+    let offered = offered.find(|offered| offered.device == gpu.caps().device).unwrap();
+    let [common @ .., ray_query, descriptor_indexing] = optional(gpu.caps());
+    assert_eq!(common, optional(offered)[..8]);
+    // Offered or not, nothing enables these.
+    assert!(!ray_query && !descriptor_indexing);
 }
 
 #[test]

@@ -2,6 +2,8 @@
 
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
+use clerestory::gpu::interface::{BindingInfo, BindingKind};
+use clerestory::gpu::shaders::transport::path_compact_count;
 use clerestory::gpu::{
     Access, BufferDesc, Category, DescriptorLimits, Gpu, GpuOptions, ImageDesc, Lesser, Pass, Timings,
 };
@@ -269,5 +271,74 @@ fn the_path_tracer_says_what_a_device_of_the_least_limits_lacks() {
         Err(other) => panic!("expected a missing feature, got {other}"),
         Ok(_) => panic!("the path tracer has more than four storage buffers"),
     }
+    assert_no_messages(&gpu);
+}
+
+#[test]
+fn a_pipeline_takes_of_the_limits_what_its_shader_uses() {
+    let info = &path_compact_count::INFO;
+    let count = |bindings: &mut dyn Iterator<Item = &BindingInfo>, kind| {
+        bindings.filter(|binding| binding.kind == kind).count() as u32
+    };
+    let used = |kind| count(&mut info.used_bindings(), kind);
+    let declared = |kind| count(&mut info.bindings.iter(), kind);
+    let (storage, texels) = (BindingKind::StorageBuffer, BindingKind::TexelBuffer);
+    assert!(used(storage) < declared(storage) && used(texels) < declared(texels));
+    let with = |storage_buffers| {
+        let descriptors = gpu_with(&GpuOptions::default()).caps().descriptors;
+        gpu_with(&GpuOptions {
+            lesser: Lesser {
+                descriptors: Some(DescriptorLimits {
+                    per_stage_storage_buffers: storage_buffers,
+                    per_pipeline_storage_buffers: storage_buffers,
+                    per_stage_sampled_images: used(texels),
+                    per_stage_resources: used(storage) + used(texels),
+                    ..descriptors
+                }),
+                ..Lesser::default()
+            },
+            ..GpuOptions::default()
+        })
+    };
+    let gpu = with(used(storage));
+    gpu.compute_pipeline::<path_compact_count::Kernel>(&Default::default())
+        .unwrap();
+    assert_no_messages(&gpu);
+    let error = with(used(storage) - 1)
+        .compute_pipeline::<path_compact_count::Kernel>(&Default::default())
+        .unwrap_err();
+    assert!(matches!(error, Error::MissingFeature { .. }), "{error}");
+}
+
+#[test]
+fn more_than_the_heaps_hold_is_refused_with_its_cause() {
+    const MIB: u64 = 1 << 20;
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            heap_bytes: Some(16 * MIB),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    assert_eq!(gpu.caps().device_heap, 16 * MIB);
+    let buffer = |name, mib| gpu.buffer(&BufferDesc::storage(name, mib * MIB, Category::Work));
+    let first = buffer("first", 10).unwrap();
+    let report = gpu.memory_report();
+    match buffer("second", 10) {
+        Err(Error::OutOfMemory { name, bytes, cause, .. }) => {
+            assert_eq!((name.as_str(), bytes), ("second", 10 * MIB));
+            assert!(cause.contains(&format!("of the {}", 16 * MIB)), "{cause}");
+        }
+        other => panic!("expected no memory, got {other:?}"),
+    }
+    // A refused allocation leaves nothing behind, and what is freed can be had again.
+    assert_eq!(gpu.memory_report(), report);
+    let rest = buffer("rest", 5).unwrap();
+    drop(first);
+    let second = buffer("second", 10).unwrap();
+    // The host's side counts as well.
+    let staging = gpu.buffer(&BufferDesc::readback("readback", 2 * MIB));
+    assert!(matches!(staging, Err(Error::OutOfMemory { .. })), "{staging:?}");
+    drop((rest, second));
     assert_no_messages(&gpu);
 }

@@ -1,5 +1,4 @@
 //! Hot reload: a changed source takes effect, a faulty one or one with another interface is refused and the old kernel stays.
-#![cfg(feature = "hot-reload")]
 
 use std::path::Path;
 use std::time::{Duration, SystemTime};

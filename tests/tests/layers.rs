@@ -2,7 +2,9 @@
 
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::{Access, BufferDesc, Category, Gpu, GpuOptions, Validation, ValidationMessage};
+use clerestory::gpu::shaders::accel::trace_closest;
+use clerestory::gpu::shaders::sets::Bvh2Set;
+use clerestory::gpu::{Access, BufferDesc, Category, Gpu, GpuOptions, TexelView, Validation, ValidationMessage};
 use clerestory_tests::shaders::out_of_bounds;
 use clerestory_tests::{assert_no_messages, gpu_with};
 
@@ -115,4 +117,46 @@ fn the_recorder_catches_a_missing_barrier_between_dispatches() {
         pass.dispatch(&pipeline, &[&set], &push, [1, 1, 1])
     });
     assert!(matches!(result, Err(Error::MissingBarrier { .. })), "{result:?}");
+}
+
+#[test]
+#[cfg(debug_assertions)]
+fn the_recorder_catches_a_dispatch_that_reads_by_texels_what_it_writes() {
+    let gpu = validated(Validation::Core);
+    let pipeline = gpu
+        .compute_pipeline::<trace_closest::Kernel>(&Default::default())
+        .unwrap();
+    let texels = |name| {
+        gpu.storage_texels(name, Category::Work, vk::Format::R32G32B32A32_UINT, 64)
+            .unwrap()
+    };
+    let (one, other) = (texels("one"), texels("other"));
+    let buffer = |name| gpu.buffer(&BufferDesc::storage(name, 1024, Category::Work)).unwrap();
+    let (rays, resume, status) = (buffer("rays"), buffer("resume"), buffer("status"));
+    let record = |hits: &TexelView| {
+        let set = trace_closest::Set0 {
+            trace_rays: rays.view(),
+            trace_hits: hits.buffer().view(),
+            trace_resume: resume.view(),
+            trace_status: status.view(),
+        };
+        let bvh = Bvh2Set { bvh2_quarters: &one };
+        let mut recorder = gpu.recorder("texels")?;
+        // No group runs: it is about the bindings.
+        recorder.pass("trace", |pass| {
+            pass.dispatch(&pipeline, &[&set, &bvh], &Default::default(), [0, 1, 1])
+        })
+    };
+    record(&other).unwrap();
+    match record(&one) {
+        Err(Error::Shader { name, message }) => {
+            assert_eq!(name, "accel/trace_closest.comp");
+            assert!(
+                message.contains("bvh2_quarters") && message.contains("hits"),
+                "{message}"
+            );
+        }
+        other => panic!("expected a refused dispatch, got {other:?}"),
+    }
+    assert_no_messages(&gpu);
 }

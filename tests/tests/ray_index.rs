@@ -8,7 +8,7 @@ use clerestory::accel::triangle::moller_trumbore;
 use clerestory::accel::{Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::shaders::accel::{trace_any, trace_closest};
 use clerestory::gpu::shaders::sets::Bvh2Set;
-use clerestory::gpu::{Category, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute};
+use clerestory::gpu::{Category, DeviceKind, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute};
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
 use glam::Vec3;
@@ -165,7 +165,7 @@ fn check_against_f64(what: &str, triangles: &[[Vec3; 3]], ray: &Ray, hit: &Hit) 
 }
 
 fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[Ray], quotas: &[u32]) {
-    let exact = gpu.caps().kind == "cpu";
+    let exact = gpu.caps().kind == DeviceKind::Cpu;
     let bvh = Bvh2::build(triangles, &Bvh2Settings::default()).unwrap();
     let mut first: Option<Vec<[u32; 4]>> = None;
     for quota in quotas {

@@ -51,7 +51,7 @@ fn what_failed_is_done_again_without_a_trace() {
                     result: vk::Result::ERROR_OUT_OF_HOST_MEMORY,
                 }),
                 // GPU-assisted validation submits by another command than the one that fails here.
-                validation: match GpuOptions::default().validation {
+                validation: match clerestory_tests::validation() {
                     Validation::GpuAssisted => Validation::Core,
                     other => other,
                 },

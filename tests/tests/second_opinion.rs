@@ -1,8 +1,8 @@
 //! spirv-reflect's opinion on the interfaces that the build reads with rspirv.
 //!
-//! spirv-reflect understands the storage classes of SPIR-V 1.0 only, so every kernel that also compiles for Vulkan 1.0 is compiled for it
-//! here, and both readers must agree on sets, bindings, descriptor types, and the offsets, counts, strides and widths of all that is in
-//! blocks and push constants. That the first reading is the one that the generated Rust code came from is shown by its fingerprint.
+//! spirv-reflect understands the storage classes of SPIR-V 1.0 only, so every shader is compiled for Vulkan 1.0 here, and both readers must
+//! agree on sets, bindings, descriptor types, and the offsets, counts, strides and widths of all that is in blocks and push constants. That
+//! the first reading is the one that the generated Rust code came from is shown by its fingerprint.
 
 use std::ffi::CStr;
 use std::path::{Path, PathBuf};
@@ -18,9 +18,6 @@ use spirv_reflect::ffi;
 mod reflect;
 
 use reflect::{Member, Resource, Type};
-
-/// The kernels that do not compile for Vulkan 1.0, each with words of the compiler's reason. One that starts to must leave the list.
-const NOT_FOR_VULKAN_1_0: &[(&str, &str)] = &[];
 
 fn folder(below: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(below)
@@ -47,18 +44,16 @@ fn compiled(file: &Path, environment: &[&str]) -> Result<Vec<u8>, String> {
 /// Checks one kernel; the count of members and bindings that were compared.
 fn check(root: &Path, info: &ShaderInfo) -> Result<usize, String> {
     let file = root.join(info.name);
-    let ours = reflect::reflect(&compiled(&file, &["--target-env=vulkan1.1", "--target-spv=spv1.3"])?)?;
+    let named = compiled(&file, &["--target-env=vulkan1.1", "--target-spv=spv1.3"])?;
+    let ours = reflect::reflect(&named, info.spirv)?;
     if ours.fingerprint() != info.fingerprint {
         return Err("the generated code came from another interface".into());
     }
-    let known = NOT_FOR_VULKAN_1_0.iter().find(|(name, _)| *name == info.name);
-    let module = match (compiled(&file, &["--target-env=vulkan1.0"]), known) {
-        (Ok(module), None) => module,
-        (Ok(_), Some(_)) => return Err("compiles for Vulkan 1.0 now; take it off the list".into()),
-        (Err(reason), Some((_, words))) if reason.contains(words) => return Ok(0),
-        (Err(reason), _) => return Err(reason),
-    };
-    let theirs = Reflected::new(&module)?;
+    let used: Vec<_> = info.used_bindings().map(|b| (b.set, b.binding)).collect();
+    if !ours.used.iter().eq(&used) {
+        return Err("the generated code came from another optimized module".into());
+    }
+    let theirs = Reflected::new(&compiled(&file, &["--target-env=vulkan1.0"])?)?;
     if theirs.bindings.len() != ours.bindings.len() {
         return Err(format!(
             "{} bindings, not {}",
@@ -243,7 +238,10 @@ fn spirv_reflect_reads_the_same_interfaces() {
     let of_tests = clerestory_tests::shaders::ALL
         .iter()
         .map(|info| ("tests/shaders", *info));
-    let all: Vec<_> = of_engine.chain(of_tests).collect();
+    let of_samples = clerestory_samples::shaders::ALL
+        .iter()
+        .map(|info| ("samples/shaders", *info));
+    let all: Vec<_> = of_engine.chain(of_tests).chain(of_samples).collect();
     let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
@@ -261,10 +259,4 @@ fn spirv_reflect_reads_the_same_interfaces() {
     // The comparison does compare: there are hundreds of members.
     let compared: usize = results.iter().flatten().sum();
     assert!(compared > 200, "{compared}");
-    for (name, _) in NOT_FOR_VULKAN_1_0 {
-        assert!(
-            all.iter().any(|(_, info)| info.name == *name),
-            "{name}: there is no such shader"
-        );
-    }
 }

@@ -107,7 +107,8 @@ fn a_package_needs_no_compiler_until_its_shaders_change() {
     assert!(packed[0].embedded.starts_with(tree.path("spirv")));
     assert_eq!(std::fs::read(&packed[0].embedded).unwrap(), bytes);
     assert_eq!(packed[0].sources, made[0].sources);
-    let interface = build::reflect::reflect(&std::fs::read(&packed[0].reflected).unwrap()).unwrap();
+    let read = |file| std::fs::read(file).unwrap();
+    let interface = build::reflect::reflect(&read(&packed[0].reflected), &read(&packed[0].embedded)).unwrap();
     let paths = build::Paths {
         gpu: "engine::gpu",
         shaders: "own::shaders",
@@ -146,4 +147,44 @@ fn only_what_changed_is_compiled_and_what_is_gone_is_removed() {
     tree.write("my shaders/kernels/write.comp", &KERNEL.replace("VALUE;", "MISSING;"));
     let error = tree.build("glslc").map(|_| ()).unwrap_err();
     assert!(error.contains("MISSING") && error.contains("write.comp"), "{error}");
+}
+
+#[test]
+fn a_binding_is_used_when_the_optimized_module_touches_it() {
+    let tree = Tree::new();
+    let unused = KERNEL.replace(
+        "void main",
+        "layout(set = 1, binding = 3) readonly buffer Other { uint other[]; };\nvoid main",
+    );
+    let used = |text: &str| {
+        tree.write("my shaders/kernels/write.comp", text);
+        let made = tree.build("glslc").unwrap();
+        let read = |file| std::fs::read(file).unwrap();
+        let interface = build::reflect::reflect(&read(&made[0].reflected), &read(&made[0].embedded)).unwrap();
+        let declared: Vec<_> = interface.bindings.iter().map(|b| (b.set, b.binding)).collect();
+        assert_eq!(declared, [(0, 0), (1, 3)]);
+        (interface.fingerprint(), interface.used.into_iter().collect::<Vec<_>>())
+    };
+    let (without, only_first) = used(&unused);
+    assert_eq!(only_first, [(0, 0)]);
+    // Loaded, and dropped by the optimizer.
+    let (dropped, still_first) = used(&unused.replace("words[0] =", "uint never = other[2]; words[0] ="));
+    assert_eq!(still_first, [(0, 0)]);
+    let (with, both) = used(&unused.replace("= VALUE", "= other[VALUE]"));
+    assert_eq!(both, [(0, 0), (1, 3)]);
+    // What is used is not part of the declared interface.
+    assert_eq!([without, without], [dropped, with]);
+}
+
+#[test]
+fn the_package_carries_licences_and_readme() {
+    let output = std::process::Command::new(env!("CARGO"))
+        .args(["package", "--list", "--allow-dirty", "--offline", "-p", "clerestory"])
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
+        .output()
+        .unwrap();
+    let list = String::from_utf8_lossy(&output.stdout);
+    for file in ["LICENSE-APACHE", "LICENSE-MIT", "README.md", "build.rs", "src/lib.rs"] {
+        assert!(list.lines().any(|line| line == file), "{file} is not in {list}");
+    }
 }

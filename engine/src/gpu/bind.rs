@@ -1,6 +1,6 @@
 //! Descriptor sets: allocated, written from typed resources, bound, and every use noted for the barrier checks.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use ash::vk;
@@ -39,6 +39,36 @@ fn access(stage: Stage, binding: &BindingInfo) -> Access {
     read | write
 }
 
+/// Fails when one command would read a buffer by texels and write it: texel fetches may see the memory as it was before, whatever the
+/// shader's own barriers.
+fn check_texels(shaders: &[&'static ShaderInfo], sets: &[&dyn BindingSet<'_>]) -> Result<()> {
+    let (mut read, mut written) = (BTreeMap::new(), BTreeMap::new());
+    for set in sets {
+        let resources = set.resources();
+        for (shader, binding) in shaders.iter().flat_map(|s| s.used_bindings().map(move |b| (s.name, b))) {
+            if binding.set != set.set() {
+                continue;
+            }
+            for (_, resource) in resources.iter().filter(|(at, _)| *at == binding.binding) {
+                match resource {
+                    BoundResource::Texels(view) => drop(read.insert(view.buffer().inner.id, binding.name)),
+                    BoundResource::Buffer(view) if binding.writes => {
+                        written.insert(view.buffer.inner.id, (shader, binding.name));
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    match written.iter().find_map(|(id, by)| Some((by, read.get(id)?))) {
+        None => Ok(()),
+        Some(((shader, output), input)) => Err(Error::Shader {
+            name: (*shader).into(),
+            message: format!("{input} is read by texels and {output} is written, and both are one buffer"),
+        }),
+    }
+}
+
 impl Pass<'_> {
     /// Allocates, writes and binds the descriptor sets of the shaders of one pipeline. Shaders may share sets; several givers of one set
     /// number make one set together.
@@ -51,9 +81,12 @@ impl Pass<'_> {
         sets: &[&dyn BindingSet<'_>],
     ) -> Result<()> {
         let inner = Arc::clone(&self.recorder.gpu.inner);
+        if cfg!(debug_assertions) {
+            check_texels(shaders, sets)?;
+        }
         let numbers: BTreeSet<u32> = shaders
             .iter()
-            .flat_map(|shader| shader.bindings)
+            .flat_map(|shader| shader.used_bindings())
             .map(|binding| binding.set)
             .collect();
         for number in numbers {
@@ -67,7 +100,7 @@ impl Pass<'_> {
                 .collect();
             let raw = self.recorder.resources().descriptor_set(&inner, *set_layout)?;
             for shader in shaders {
-                for binding in shader.bindings.iter().filter(|binding| binding.set == number) {
+                for binding in shader.used_bindings().filter(|binding| binding.set == number) {
                     let resource = given.iter().find(|(at, _)| *at == binding.binding);
                     let (_, resource) = resource.ok_or_else(|| Error::Shader {
                         name: shader.name.into(),

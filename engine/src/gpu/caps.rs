@@ -13,8 +13,8 @@ pub struct Caps {
     pub driver: String,
     /// Vulkan version as `major.minor.patch`.
     pub api: String,
-    /// `cpu`, `integrated`, `discrete`, `virtual` or `other`.
-    pub kind: &'static str,
+    /// What kind of device it is.
+    pub kind: DeviceKind,
     /// Lanes of a subgroup.
     pub subgroup_size: u32,
     /// Subgroup operations usable in compute shaders.
@@ -37,9 +37,9 @@ pub struct Caps {
     pub vertex_stores: bool,
     /// The queue takes draws as well as dispatches.
     pub graphics: bool,
-    /// `VK_KHR_ray_query` is offered.
+    /// `VK_KHR_ray_query` is enabled (of devices in a list: offered).
     pub ray_query: bool,
-    /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing` are offered.
+    /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing` are enabled (of devices in a list: offered).
     pub descriptor_indexing: bool,
     /// Nanoseconds a timestamp tick; 0 when the queue has no timestamps.
     pub timestamp_period: f32,
@@ -49,7 +49,7 @@ pub struct Caps {
     pub descriptors: DescriptorLimits,
     /// `maxStorageBufferRange`, bytes.
     pub max_storage_buffer_range: u64,
-    /// `maxTexelBufferElements`.
+    /// `maxTexelBufferElements`, but no more than kernels can number: they index texels by `int`.
     pub max_texel_buffer_elements: u64,
     /// `minStorageBufferOffsetAlignment`, bytes.
     pub storage_buffer_alignment: u64,
@@ -72,6 +72,46 @@ pub struct Caps {
     /// Vendor id, device id and pipeline cache UUID: the key of the pipeline cache.
     #[serde(skip)]
     pub cache_key: String,
+}
+
+/// Kinds of devices; as text in lower case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DeviceKind {
+    /// A software driver.
+    Cpu,
+    /// A GPU that shares the host's memory.
+    Integrated,
+    /// A GPU with memory of its own.
+    Discrete,
+    /// A GPU of a virtual machine.
+    Virtual,
+    /// Any other.
+    Other,
+}
+
+impl DeviceKind {
+    pub(super) fn of(kind: vk::PhysicalDeviceType) -> Self {
+        match kind {
+            vk::PhysicalDeviceType::CPU => Self::Cpu,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => Self::Integrated,
+            vk::PhysicalDeviceType::DISCRETE_GPU => Self::Discrete,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => Self::Virtual,
+            _ => Self::Other,
+        }
+    }
+}
+
+impl std::fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Cpu => "cpu",
+            Self::Integrated => "integrated",
+            Self::Discrete => "discrete",
+            Self::Virtual => "virtual",
+            Self::Other => "other",
+        })
+    }
 }
 
 /// Subgroup operation classes.
@@ -137,11 +177,19 @@ impl DescriptorLimits {
     }
 }
 
+/// The texels that `texelFetch` can reach, whose index is a GLSL `int`.
+fn indexable_texels(offered: u32) -> u64 {
+    u64::from(offered.min(i32::MAX as u32))
+}
+
 impl Caps {
     /// Lowers what was read to what a test pretends.
     pub(super) fn pretend(&mut self, lesser: &Lesser) {
         if let Some(descriptors) = lesser.descriptors {
             self.descriptors = descriptors;
+        }
+        if let Some(bytes) = lesser.heap_bytes {
+            self.device_heap = self.device_heap.min(bytes);
         }
         if let Some(bits) = lesser.timestamp_valid_bits {
             self.timestamp_valid_bits = self.timestamp_valid_bits.min(bits);
@@ -227,7 +275,7 @@ impl Caps {
             timestamp_valid_bits,
             descriptors: DescriptorLimits::of(&limits),
             max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
-            max_texel_buffer_elements: u64::from(limits.max_texel_buffer_elements),
+            max_texel_buffer_elements: indexable_texels(limits.max_texel_buffer_elements),
             storage_buffer_alignment: limits.min_storage_buffer_offset_alignment,
             max_uniform_buffer_range: u64::from(limits.max_uniform_buffer_range),
             uniform_buffer_alignment: limits.min_uniform_buffer_offset_alignment,
@@ -246,6 +294,34 @@ impl Caps {
                 "{:04x}-{:04x}-{:08x}-{uuid}",
                 properties.vendor_id, properties.device_id, properties.driver_version
             ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texels_are_no_more_than_an_int_can_number() {
+        assert_eq!(indexable_texels(65_536), 65_536);
+        assert_eq!(indexable_texels(i32::MAX as u32), 0x7FFF_FFFF);
+        assert_eq!(indexable_texels(u32::MAX), 0x7FFF_FFFF);
+    }
+
+    #[test]
+    fn kinds_are_written_and_serialized_in_the_same_words() {
+        let kinds = [
+            vk::PhysicalDeviceType::CPU,
+            vk::PhysicalDeviceType::INTEGRATED_GPU,
+            vk::PhysicalDeviceType::DISCRETE_GPU,
+            vk::PhysicalDeviceType::VIRTUAL_GPU,
+            vk::PhysicalDeviceType::OTHER,
+        ];
+        let words = ["cpu", "integrated", "discrete", "virtual", "other"];
+        for (kind, word) in kinds.map(DeviceKind::of).into_iter().zip(words) {
+            assert_eq!(kind.to_string(), word);
+            assert_eq!(serde_json::json!(kind), word);
         }
     }
 }

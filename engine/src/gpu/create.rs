@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use ash::{ext, khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
-use super::caps::Caps;
+use super::caps::{Caps, DeviceKind};
 use super::device::{Gpu, Inner, Queue};
 use super::fault;
 use super::host::{DeviceFeatures, EnabledFeatures, HostDevice};
@@ -22,7 +22,8 @@ impl Gpu {
     /// A device without a window system.
     ///
     /// # Errors
-    /// [`Error::NoVulkan`] without a loader, [`Error::NoDevice`] when none matches, [`Error::MissingFeature`] when it lacks the baseline.
+    /// [`Error::NoVulkan`] without a loader, [`Error::NoDevice`] when none matches, [`Error::MissingFeature`] when it lacks the baseline,
+    /// [`Error::Setting`] for an unknown value of `CLERESTORY_VALIDATION` where the options leave it to that.
     pub fn headless(options: &GpuOptions) -> Result<Self> {
         let instance = Instance::new(options.validation, &[])?;
         Self::create(instance, options, None)
@@ -51,9 +52,10 @@ impl Gpu {
     /// [`Gpu::lock_queue`] around the host's own submissions.
     ///
     /// # Errors
-    /// [`Error::MissingFeature`] naming the required features that the host did not enable.
+    /// [`Error::MissingFeature`] naming the required features that the host did not enable; [`Error::Setting`] as [`Gpu::headless`].
     pub unsafe fn from_host(host: HostDevice, options: &GpuOptions) -> Result<Self> {
-        let instance = Instance::from_host(host.entry, host.instance, host.debug_utils);
+        let validation = options.validation.resolve()?;
+        let instance = Instance::from_host(host.entry, host.instance, host.debug_utils, validation);
         let name = instance.summary(0, host.physical_device).name;
         host.enabled.check(&name, "enable it when creating the device")?;
         let mut caps = Caps::read(&instance, host.physical_device, host.queue_family);
@@ -69,7 +71,7 @@ impl Gpu {
         )
     }
 
-    /// The devices of this machine.
+    /// The devices of this machine, with what they offer; a `Gpu` made of one has the capabilities that it enables.
     ///
     /// # Errors
     /// [`Error::NoVulkan`] without a loader.
@@ -85,11 +87,11 @@ impl Gpu {
     fn create(instance: Instance, options: &GpuOptions, surface: Option<ProbeSurface>) -> Result<Self> {
         let devices = instance.devices()?;
         let rank = |summary: &DeviceSummary| match summary.kind {
-            "discrete" => 0,
-            "integrated" => 1,
-            "virtual" => 2,
-            "cpu" => 3,
-            _ => 4,
+            DeviceKind::Discrete => 0,
+            DeviceKind::Integrated => 1,
+            DeviceKind::Virtual => 2,
+            DeviceKind::Cpu => 3,
+            DeviceKind::Other => 4,
         };
         let chosen = devices
             .iter()
@@ -109,8 +111,13 @@ impl Gpu {
                 },
             });
         };
-        let offered = DeviceFeatures::offered(&instance.raw, physical_device);
-        EnabledFeatures::from_vulkan(&offered).check(&summary.name, "choose another device")?;
+        let mut enabled = EnabledFeatures::from_vulkan(&DeviceFeatures::offered(&instance.raw, physical_device));
+        enabled.check(&summary.name, "choose another device")?;
+        // Nothing uses it yet.
+        enabled.optional.descriptor_indexing = false;
+        if let Some(features) = options.lesser.features {
+            enabled.optional = enabled.optional.and(features);
+        }
         // SAFETY: the physical device belongs to the instance.
         let families = unsafe {
             instance
@@ -140,8 +147,16 @@ impl Gpu {
                 device: summary.name.clone(),
                 instead: "choose another device".into(),
             })?;
-        let caps = Caps::read(&instance, physical_device, queue_family);
-        let device = create_device(&instance, physical_device, queue_family, surface.is_some(), options)?;
+        let mut caps = Caps::read(&instance, physical_device, queue_family);
+        enabled.restrict(&mut caps);
+        let device = create_device(
+            &instance,
+            physical_device,
+            queue_family,
+            &enabled,
+            surface.is_some(),
+            options,
+        )?;
         let presents = surface.is_some();
         // It must go before the instance, which `finish` drops when it fails.
         drop(surface);
@@ -175,7 +190,8 @@ impl Gpu {
             }
             error
         };
-        let memory = Memory::new(&instance.raw, &device, physical_device).map_err(give_up)?;
+        let memory =
+            Memory::new(&instance.raw, &device, physical_device, options.lesser.heap_bytes).map_err(give_up)?;
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: timelineSemaphore is enabled on every device that comes here.
@@ -203,7 +219,7 @@ impl Gpu {
             pipelines: Mutex::new(BTreeMap::new()),
             pipeline_cache,
             crash_markers: options.crash_markers,
-            validation: options.validation,
+            validation: instance.validation,
             in_flight: Mutex::default(),
             presents,
             lost: OnceLock::new(),
@@ -233,6 +249,7 @@ fn create_device(
     instance: &Instance,
     physical_device: vk::PhysicalDevice,
     queue_family: u32,
+    enabled: &EnabledFeatures,
     present: bool,
     options: &GpuOptions,
 ) -> Result<ash::Device> {
@@ -240,11 +257,8 @@ fn create_device(
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(queue_family)
         .queue_priorities(&priorities)];
-    let mut enabled = EnabledFeatures::from_vulkan(&DeviceFeatures::offered(&instance.raw, physical_device));
-    // Nothing uses it yet.
-    enabled.optional.descriptor_indexing = false;
     let mut features = enabled.to_vulkan();
-    features.vulkan12.buffer_device_address = (options.validation == Validation::GpuAssisted).into();
+    features.vulkan12.buffer_device_address = (instance.validation == Validation::GpuAssisted).into();
     let extensions: Vec<&CStr> = if present {
         vec![khr::swapchain::NAME]
     } else {

@@ -144,7 +144,7 @@ fn check_shaders(gpu: &Inner, shaders: [&'static ShaderInfo; 2]) -> Result<()> {
         (vertex, gpu.caps.vertex_stores, "vertexPipelineStoresAndAtomics"),
         (fragment, gpu.caps.fragment_stores, "fragmentStoresAndAtomics"),
     ] {
-        if !stores && shader.bindings.iter().any(|binding| binding.writes) {
+        if !stores && shader.used_bindings().any(|binding| binding.writes) {
             return Err(missing(feature, shader, "write from a compute shader"));
         }
     }

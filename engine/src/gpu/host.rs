@@ -84,6 +84,23 @@ impl OptionalFeatures {
         ray_query: false,
         descriptor_indexing: false,
     };
+
+    /// What is in both.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self {
+            robust_buffer_access: self.robust_buffer_access && other.robust_buffer_access,
+            geometry_shader: self.geometry_shader && other.geometry_shader,
+            pipeline_statistics_query: self.pipeline_statistics_query && other.pipeline_statistics_query,
+            shader_int64: self.shader_int64 && other.shader_int64,
+            shader_float64: self.shader_float64 && other.shader_float64,
+            fragment_stores_and_atomics: self.fragment_stores_and_atomics && other.fragment_stores_and_atomics,
+            vertex_pipeline_stores_and_atomics: self.vertex_pipeline_stores_and_atomics
+                && other.vertex_pipeline_stores_and_atomics,
+            shader_buffer_int64_atomics: self.shader_buffer_int64_atomics && other.shader_buffer_int64_atomics,
+            ray_query: self.ray_query && other.ray_query,
+            descriptor_indexing: self.descriptor_indexing && other.descriptor_indexing,
+        }
+    }
 }
 
 impl EnabledFeatures {
@@ -107,7 +124,7 @@ impl EnabledFeatures {
         optional: OptionalFeatures::NONE,
     };
 
-    /// Takes away what the host did not enable.
+    /// Takes away what is not enabled.
     pub(super) fn restrict(&self, caps: &mut Caps) {
         let optional = &self.optional;
         caps.robust_buffer_access &= optional.robust_buffer_access;

@@ -4,6 +4,7 @@
 //! reflected by the same code as in the build. It takes the place of the pipeline only when it compiles and its interface is the one that
 //! the program was built with; else the old one stays.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -69,15 +70,18 @@ impl<K: ComputeShader> HotReload<K> {
         self.seen = Some(now);
         let info = K::info();
         let compile = |purpose| glsl::compile(info, &self.source, &self.includes, purpose);
-        let reflected = compile(Purpose::Reflection)?;
-        let interface = reflect::reflect(&reflected).map_err(|message| shader_error(info, message))?;
-        if interface.fingerprint() != info.fingerprint {
+        let (reflected, spirv) = (compile(Purpose::Reflection)?, compile(Purpose::Execution)?);
+        let interface = reflect::reflect(&reflected, &spirv).map_err(|message| shader_error(info, message))?;
+        // Layouts hold what the embedded module uses.
+        let held: BTreeSet<_> = info.used_bindings().map(|b| (b.set, b.binding)).collect();
+        if interface.fingerprint() != info.fingerprint || !interface.used.is_subset(&held) {
             return Err(shader_error(
                 info,
-                "the new source has another interface (bindings, blocks, constants or workgroup size); build the program anew".into(),
+                "the new source has another interface (bindings declared or used, blocks, constants or workgroup size); build the program \
+                 anew"
+                    .into(),
             ));
         }
-        let spirv = compile(Purpose::Execution)?;
         self.pipeline = ComputePipeline::from_spirv(&self.gpu, &spirv, &self.spec)?;
         Ok(true)
     }

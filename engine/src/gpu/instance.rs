@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use ash::{ext, khr, vk};
 
+use super::caps::DeviceKind;
 use super::options::Validation;
 use crate::{Error, Result};
 
@@ -40,6 +41,8 @@ pub(super) struct Instance {
     pub raw: ash::Instance,
     pub messages: Messages,
     pub debug_utils: bool,
+    /// Resolved: what runs.
+    pub validation: Validation,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     /// False when a host owns the instance.
     owned: bool,
@@ -52,8 +55,8 @@ pub struct DeviceSummary {
     pub index: usize,
     /// Its name.
     pub name: String,
-    /// `cpu`, `integrated`, `discrete`, `virtual` or `other`.
-    pub kind: &'static str,
+    /// What kind of device it is.
+    pub kind: DeviceKind,
     /// Driver name and version.
     pub driver: String,
     /// Vulkan version.
@@ -63,6 +66,7 @@ pub struct DeviceSummary {
 impl Instance {
     /// Creates an instance with the extensions that the surface wants.
     pub fn new(validation: Validation, surface_extensions: &[&CStr]) -> Result<Self> {
+        let validation = validation.resolve()?;
         // SAFETY: the loader stays loaded as long as `Entry` lives, which `Instance` owns.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| Error::NoVulkan(error.to_string()))?;
         // SAFETY: plain query.
@@ -86,7 +90,7 @@ impl Instance {
         let messages = Messages::default();
         let mut creation_messenger = messenger_info(&messages);
         let enabled: &[vk::ValidationFeatureEnableEXT] = match validation {
-            Validation::Off => &[],
+            Validation::Off | Validation::Environment => &[],
             Validation::Core => &[vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION],
             Validation::GpuAssisted => &[
                 vk::ValidationFeatureEnableEXT::GPU_ASSISTED,
@@ -127,6 +131,7 @@ impl Instance {
             raw,
             messages,
             debug_utils,
+            validation,
             messenger: None,
             owned: true,
         };
@@ -142,12 +147,13 @@ impl Instance {
     }
 
     /// Wraps a host's instance, which the host destroys.
-    pub fn from_host(entry: ash::Entry, raw: ash::Instance, debug_utils: bool) -> Self {
+    pub fn from_host(entry: ash::Entry, raw: ash::Instance, debug_utils: bool, validation: Validation) -> Self {
         Self {
             entry,
             raw,
             messages: Messages::default(),
             debug_utils,
+            validation,
             messenger: None,
             owned: false,
         }
@@ -179,13 +185,7 @@ impl Instance {
         DeviceSummary {
             index,
             name: text(&properties.device_name),
-            kind: match properties.device_type {
-                vk::PhysicalDeviceType::CPU => "cpu",
-                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
-                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
-                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
-                _ => "other",
-            },
+            kind: DeviceKind::of(properties.device_type),
             driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info))
                 .trim()
                 .to_owned(),

@@ -17,7 +17,7 @@ pub struct ShaderInfo {
     pub fingerprint: u64,
     /// Workgroup size (compute).
     pub local_size: [LocalSize; 3],
-    /// Bindings by set and number.
+    /// Bindings by set and number, those included that the shader declares and does not use.
     pub bindings: &'static [BindingInfo],
     /// Specialization constants by id.
     pub spec_constants: &'static [SpecInfo],
@@ -60,6 +60,15 @@ pub struct BindingInfo {
     pub reads: bool,
     /// Not declared `readonly`.
     pub writes: bool,
+    /// The optimized module touches it. Only used bindings take part in layouts, limits and barrier checks.
+    pub used: bool,
+}
+
+impl ShaderInfo {
+    /// The bindings that the shader uses.
+    pub fn used_bindings(&self) -> impl Iterator<Item = &'static BindingInfo> + use<> {
+        self.bindings.iter().filter(|binding| binding.used)
+    }
 }
 
 /// Descriptor types in use.

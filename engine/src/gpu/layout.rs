@@ -1,6 +1,7 @@
 //! Pipeline layouts made from reflected shaders, checked against the device's limits first, and specialization constants.
 //!
-//! Bindings that a shader declares and does not use count, too: sets are shared between shaders, so their layouts hold all of them.
+//! Sets are declared once for several shaders, of which each uses a part: layouts hold what the pipeline's shaders use, so that they fit
+//! devices whose limits the whole set would exceed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -50,7 +51,7 @@ impl PipelineObjects {
             all | stage_flags(shader.stage)
         });
         let mut bindings: BTreeMap<(u32, u32), BindingKind> = BTreeMap::new();
-        for binding in shaders.iter().flat_map(|shader| shader.bindings) {
+        for binding in shaders.iter().flat_map(|shader| shader.used_bindings()) {
             bindings.insert((binding.set, binding.binding), binding.kind);
         }
         for set in 0..bindings.keys().map(|(set, _)| set + 1).max().unwrap_or(0) {
@@ -127,7 +128,7 @@ impl Wanted {
     fn by(shaders: &[&ShaderInfo], attachments: u32) -> Self {
         let kinds: BTreeMap<_, _> = shaders
             .iter()
-            .flat_map(|shader| shader.bindings)
+            .flat_map(|shader| shader.used_bindings())
             .map(|binding| ((binding.set, binding.binding), binding.kind))
             .collect();
         let count = |of: &[BindingKind]| kinds.values().filter(|kind| of.contains(kind)).count() as u32;
@@ -275,6 +276,7 @@ mod tests {
             kind,
             reads: true,
             writes: false,
+            used: true,
         }
     }
 
@@ -304,12 +306,16 @@ mod tests {
             binding(0, 0, BindingKind::StorageBuffer),
             binding(2, 3, BindingKind::SampledImage),
             binding(2, 4, BindingKind::StorageImage),
+            BindingInfo {
+                used: false,
+                ..binding(5, 0, BindingKind::StorageBuffer)
+            },
         ],
         0,
     );
 
     #[test]
-    fn shared_bindings_count_once_and_texel_buffers_as_sampled_images() {
+    fn shared_bindings_count_once_unused_ones_not_and_texel_buffers_as_sampled_images() {
         let expected = Wanted {
             sets: 3,
             storage_buffers: 1,

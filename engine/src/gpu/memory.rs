@@ -76,19 +76,79 @@ pub struct AllocationInfo {
 
 /// The device's memory.
 pub(super) struct Memory {
+    limits: HeapLimits,
     state: Mutex<State>,
+}
+
+/// How many bytes there are. Drivers need not refuse to allocate more than that: software drivers take it from the host, whose system
+/// ends the process when the pages are touched.
+#[derive(Debug, Clone, Copy)]
+struct HeapLimits {
+    /// Of the device-local heaps.
+    device_local: u64,
+    /// Of all heaps.
+    all: u64,
+}
+
+impl HeapLimits {
+    fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice, at_most: Option<u64>) -> Self {
+        // SAFETY: the physical device belongs to the instance.
+        let properties = unsafe { instance.get_physical_device_memory_properties(physical_device) };
+        let heaps = &properties.memory_heaps[..properties.memory_heap_count as usize];
+        let sum = |flags| {
+            let sizes = heaps
+                .iter()
+                .filter(|heap| heap.flags.contains(flags))
+                .map(|heap| heap.size);
+            sizes.fold(0, u64::saturating_add).min(at_most.unwrap_or(u64::MAX))
+        };
+        Self {
+            device_local: sum(vk::MemoryHeapFlags::DEVICE_LOCAL),
+            all: sum(vk::MemoryHeapFlags::empty()),
+        }
+    }
 }
 
 struct State {
     /// `None` only while the owner drops.
     allocator: Option<Allocator>,
     bytes: [u64; CATEGORIES.len()],
-    /// By memory object and offset.
-    live: BTreeMap<(u64, u64), AllocationInfo>,
+    /// Bytes in memory that the host need not reach.
+    device_only: u64,
+    /// By memory object and offset, each with its place.
+    live: BTreeMap<(u64, u64), (AllocationInfo, MemoryLocation)>,
+}
+
+impl State {
+    /// Fails when `more` bytes and all that are in use are more than there are.
+    fn check(&self, limits: &HeapLimits, name: &str, more: u64, location: MemoryLocation) -> Result<()> {
+        let all: u64 = self.bytes.iter().sum();
+        let mut places = vec![("the memory heaps", all, limits.all)];
+        if location == MemoryLocation::GpuOnly {
+            places.push(("the device-local memory heaps", self.device_only, limits.device_local));
+        }
+        for (heaps, used, limit) in places {
+            if used.saturating_add(more) > limit {
+                return Err(Error::OutOfMemory {
+                    memory: "device",
+                    name: name.into(),
+                    bytes: more,
+                    cause: format!("{used} bytes of the {limit} in {heaps} are in use"),
+                });
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Memory {
-    pub fn new(instance: &ash::Instance, device: &ash::Device, physical_device: vk::PhysicalDevice) -> Result<Self> {
+    /// `at_most` makes the heaps look smaller than they are.
+    pub fn new(
+        instance: &ash::Instance,
+        device: &ash::Device,
+        physical_device: vk::PhysicalDevice,
+        at_most: Option<u64>,
+    ) -> Result<Self> {
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
@@ -99,9 +159,11 @@ impl Memory {
         })
         .map_err(|error| out_of_memory("allocator", 0, &error))?;
         Ok(Self {
+            limits: HeapLimits::of(instance, physical_device, at_most),
             state: Mutex::new(State {
                 allocator: Some(allocator),
                 bytes: [0; CATEGORIES.len()],
+                device_only: 0,
                 live: BTreeMap::new(),
             }),
         })
@@ -117,6 +179,7 @@ impl Memory {
         linear: bool,
     ) -> Result<Allocation> {
         let mut state = self.lock();
+        state.check(&self.limits, name, requirements.size, location)?;
         let Some(allocator) = state.allocator.as_mut() else {
             return Err(Error::OutOfMemory {
                 memory: "device",
@@ -135,13 +198,19 @@ impl Memory {
             })
             .map_err(|error| out_of_memory(name, requirements.size, &error))?;
         state.bytes[category as usize] += requirements.size;
+        if location == MemoryLocation::GpuOnly {
+            state.device_only += requirements.size;
+        }
         state.live.insert(
             place(&allocation),
-            AllocationInfo {
-                name: name.into(),
-                category,
-                bytes: requirements.size,
-            },
+            (
+                AllocationInfo {
+                    name: name.into(),
+                    category,
+                    bytes: requirements.size,
+                },
+                location,
+            ),
         );
         Ok(allocation)
     }
@@ -149,7 +218,9 @@ impl Memory {
     /// Gives an allocation back. `bytes` is the size that was required.
     pub fn free(&self, category: Category, bytes: u64, allocation: Allocation) {
         let mut state = self.lock();
-        state.live.remove(&place(&allocation));
+        if let Some((_, MemoryLocation::GpuOnly)) = state.live.remove(&place(&allocation)) {
+            state.device_only -= bytes;
+        }
         if let Some(allocator) = state.allocator.as_mut()
             && let Err(error) = allocator.free(allocation)
         {
@@ -173,7 +244,7 @@ impl Memory {
 
     /// Every live allocation, by name and then size.
     pub fn allocations(&self) -> Vec<AllocationInfo> {
-        let mut list: Vec<_> = self.lock().live.values().cloned().collect();
+        let mut list: Vec<_> = self.lock().live.values().map(|(info, _)| info.clone()).collect();
         list.sort_by(|a, b| (&a.name, a.bytes).cmp(&(&b.name, b.bytes)));
         list
     }

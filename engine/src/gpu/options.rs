@@ -5,7 +5,9 @@ use std::str::FromStr;
 
 use super::caps::DescriptorLimits;
 use super::fault::FaultPlan;
+use super::host::OptionalFeatures;
 use super::instance::DeviceSummary;
+use crate::{Error, Result};
 
 /// Which device to take.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -22,7 +24,7 @@ pub enum DeviceSelection {
 impl FromStr for DeviceSelection {
     type Err = std::convert::Infallible;
 
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
+    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
         Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
     }
 }
@@ -47,8 +49,11 @@ impl DeviceSelection {
 /// Which validation layers run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Validation {
-    /// None.
+    /// As the environment variable `CLERESTORY_VALIDATION` says: `off`, `core` or `gpu`; off when it is unset or empty. Any other value is
+    /// an [`Error::Setting`] when a device is made.
     #[default]
+    Environment,
+    /// None.
     Off,
     /// Core and synchronization checks.
     Core,
@@ -56,12 +61,42 @@ pub enum Validation {
     GpuAssisted,
 }
 
+/// The variable that [`Validation::Environment`] obeys.
+const VALIDATION_VARIABLE: &str = "CLERESTORY_VALIDATION";
+
+impl Validation {
+    /// One of the others in place of [`Validation::Environment`].
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when the environment variable has an unknown value.
+    pub fn resolve(self) -> Result<Self> {
+        match self {
+            Self::Environment => std::env::var_os(VALIDATION_VARIABLE)
+                .map_or(Ok(Self::Off), |value| Self::of_variable(&value.to_string_lossy())),
+            chosen => Ok(chosen),
+        }
+    }
+
+    fn of_variable(value: &str) -> Result<Self> {
+        match value {
+            "core" => Ok(Self::Core),
+            "gpu" => Ok(Self::GpuAssisted),
+            "off" | "" => Ok(Self::Off),
+            other => Err(Error::setting(
+                VALIDATION_VARIABLE,
+                other,
+                "is none of off, core and gpu",
+            )),
+        }
+    }
+}
+
 /// How to make a device.
 #[derive(Debug, Clone)]
 pub struct GpuOptions {
     /// Which device.
     pub device: DeviceSelection,
-    /// Validation layers; the default obeys the environment variable `CLERESTORY_VALIDATION` (`off`, `core`, `gpu`).
+    /// Validation layers; the default obeys the environment variable `CLERESTORY_VALIDATION`.
     pub validation: Validation,
     /// Folder of the pipeline cache; `None` keeps none. The default is `$XDG_CACHE_HOME/clerestory`, else `~/.cache/clerestory`.
     pub cache_folder: Option<PathBuf>,
@@ -81,29 +116,49 @@ pub struct Lesser {
     pub descriptors: Option<DescriptorLimits>,
     /// At most as many bits of a timestamp count.
     pub timestamp_valid_bits: Option<u32>,
+    /// At most these optional features are enabled.
+    pub features: Option<OptionalFeatures>,
+    /// At most as many bytes in the device's heaps.
+    pub heap_bytes: Option<u64>,
 }
 
 impl Default for GpuOptions {
     fn default() -> Self {
-        let validation = match std::env::var("CLERESTORY_VALIDATION").as_deref() {
-            Ok("core") => Validation::Core,
-            Ok("gpu") => Validation::GpuAssisted,
-            Ok("off" | "") | Err(_) => Validation::Off,
-            Ok(other) => {
-                tracing::warn!("CLERESTORY_VALIDATION is {other:?}; it can be off, core or gpu");
-                Validation::Off
-            }
-        };
         let cache = std::env::var_os("XDG_CACHE_HOME")
             .map(PathBuf::from)
             .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")));
         Self {
             device: DeviceSelection::default(),
-            validation,
+            validation: Validation::default(),
             cache_folder: cache.map(|folder| folder.join("clerestory")),
             crash_markers: true,
             fault: None,
             lesser: Lesser::default(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_value_of_the_variable_is_an_error() {
+        let known = [
+            ("", Validation::Off),
+            ("off", Validation::Off),
+            ("core", Validation::Core),
+            ("gpu", Validation::GpuAssisted),
+        ];
+        for (value, expected) in known {
+            assert_eq!(Validation::of_variable(value).ok(), Some(expected));
+        }
+        match Validation::of_variable("Core") {
+            Err(Error::Setting { name, value, .. }) => {
+                assert_eq!((name.as_str(), value.as_str()), ("CLERESTORY_VALIDATION", "Core"));
+            }
+            other => panic!("expected a refused setting, got {other:?}"),
+        }
+        assert_eq!(Validation::Core.resolve().ok(), Some(Validation::Core));
     }
 }

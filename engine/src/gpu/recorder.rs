@@ -40,7 +40,8 @@ pub struct Recorder {
     passes: Vec<String>,
     kept: Kept,
     tracker: Option<Tracker>,
-    statistics: bool,
+    /// The first pass whose invocations are counted.
+    counted_from: Option<usize>,
 }
 
 /// One pass: what is recorded between two timestamps.
@@ -79,7 +80,7 @@ impl Gpu {
             passes: Vec::new(),
             kept: Kept::new(),
             tracker: cfg!(debug_assertions).then(Tracker::default),
-            statistics: false,
+            counted_from: None,
         };
         recorder.begin()?;
         Ok(recorder)
@@ -89,7 +90,9 @@ impl Gpu {
 impl Recorder {
     /// Counts the shader invocations of every compute pass from here on, where the device can.
     pub fn count_invocations(&mut self) {
-        self.statistics = self.gpu.caps().pipeline_statistics;
+        if self.gpu.caps().pipeline_statistics {
+            self.counted_from.get_or_insert(self.passes.len());
+        }
     }
 
     /// Records a pass: a debug label, a timestamp pair and a crash marker around what `record` does.
@@ -115,7 +118,7 @@ impl Recorder {
             ..
         } = *self.resources;
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-        let (device, counted) = (&inner.device, self.statistics);
+        let (device, counted) = (&inner.device, self.counted_from.is_some());
         // SAFETY: the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
         unsafe {
             if let Some(debug) = &inner.debug {
@@ -207,7 +210,7 @@ impl Recorder {
             resources: self.resources,
             passes: self.passes,
             _kept: self.kept,
-            statistics: self.statistics,
+            counted_from: self.counted_from,
             finished: false,
         })
     }

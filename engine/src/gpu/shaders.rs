@@ -49,10 +49,11 @@
 //!    ```
 //!
 //! 4. **Mind the limits** of small devices: a pipeline has [`Caps::descriptors`](super::Caps) to live with (Vulkan promises
-//!    no more than 4 storage buffers a stage), and bindings that are declared and not used count; loops end in silence after 65,535 iterations on the software driver; a
+//!    no more than 4 storage buffers a stage), where the bindings count that the optimized module uses; loops end in silence after 65,535 iterations on the software driver; a
 //!    submission must be over within seconds, so split work by the [`Timings`](super::Timings) of the last.
 //!
-//! 5. **Test it** against its twin, like `tests/tests/twins/`; every module is also read by `spirv-val`, naga and spirv-reflect.
+//! 5. **Test it** against its twin, like `tests/tests/twins/`; every module is also read by
+//!    `spirv-val`, spirv-reflect reads it compiled for Vulkan 1.0, and naga what it can (no texel buffers, for one; the test lists the rest).
 //!
 //! Kernels that only tests or samples use are in those crates' own folders `shaders/`, whose build scripts share `engine/build/shaders.rs`
 //! and may include the engine's GLSL; a host's crate can do the same.

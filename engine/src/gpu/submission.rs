@@ -1,5 +1,6 @@
 //! Work that the queue has taken, and waiting for it.
 
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use ash::vk;
@@ -23,7 +24,8 @@ pub struct Submission {
     pub(super) resources: Lease,
     pub(super) passes: Vec<String>,
     pub(super) _kept: Kept,
-    pub(super) statistics: bool,
+    /// The first pass whose invocations were counted.
+    pub(super) counted_from: Option<usize>,
     /// The device is known to have finished.
     pub(super) finished: bool,
 }
@@ -89,26 +91,27 @@ impl Submission {
         let inner = &self.gpu.inner;
         inner.in_flight().end(self.value, true);
         let count = self.passes.len();
-        let read = |pool: vk::QueryPool, queries: usize| -> Option<Vec<u64>> {
-            let mut values = vec![0u64; queries];
-            if pool == vk::QueryPool::null() || queries == 0 {
+        let read = |pool: vk::QueryPool, queries: Range<usize>| -> Option<Vec<u64>> {
+            if pool == vk::QueryPool::null() || queries.is_empty() {
                 return None;
             }
+            let mut values = vec![0u64; queries.len()];
             // SAFETY: the queries were written by the submission that has just finished.
             unsafe {
-                inner
-                    .device
-                    .get_query_pool_results(pool, 0, &mut values, vk::QueryResultFlags::TYPE_64)
+                inner.device.get_query_pool_results(
+                    pool,
+                    queries.start as u32,
+                    &mut values,
+                    vk::QueryResultFlags::TYPE_64,
+                )
             }
             .ok()?;
             Some(values)
         };
-        let timestamps = read(self.resources.timestamps, 2 * count);
-        let invocations = if self.statistics {
-            read(self.resources.statistics, count)
-        } else {
-            None
-        };
+        let timestamps = read(self.resources.timestamps, 0..2 * count);
+        // Queries of passes before the first counted one never began, and to read one would give nothing at all.
+        let counted_from = self.counted_from.unwrap_or(count);
+        let invocations = read(self.resources.statistics, counted_from..count);
         let (period, valid_bits) = (f64::from(inner.caps.timestamp_period), inner.caps.timestamp_valid_bits);
         let nanoseconds = |index: usize| {
             let ticks = timestamps.as_ref()?;
@@ -117,7 +120,9 @@ impl Submission {
         let passes = self.passes.iter().enumerate().map(|(index, name)| PassTiming {
             name: name.clone(),
             nanoseconds: nanoseconds(index),
-            invocations: invocations.as_ref().map(|counts| counts[index]),
+            invocations: invocations
+                .as_ref()
+                .and_then(|counts| counts.get(index.checked_sub(counted_from)?).copied()),
         });
         Timings {
             passes: passes.collect(),

@@ -3,6 +3,7 @@
 use clerestory::accel::offset::{SURFACE_SLACK, scene_reach, surface_point};
 use clerestory::accel::sphere::{closest_approach, intersect_sphere};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
+use clerestory::gpu::DeviceKind;
 use clerestory_tests::twin::{Results, U, compare};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
@@ -143,12 +144,12 @@ fn triangles() {
                 case.0[15],
                 case.0[16],
             );
-            if gpu.caps().kind == "cpu" {
+            if gpu.caps().kind == DeviceKind::Cpu {
                 assert_eq!(result.bits(0) == 1, twin.is_some(), "{:?}", case.0);
             }
             if let (Some(hit), 1) = (twin, result.bits(0)) {
                 met += 1;
-                if gpu.caps().kind == "cpu" {
+                if gpu.caps().kind == DeviceKind::Cpu {
                     assert_eq!(
                         [result.0[1], result.0[2], result.0[3]],
                         [hit.t, hit.u, hit.v],

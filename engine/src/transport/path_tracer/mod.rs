@@ -23,7 +23,7 @@ use super::gpu_scene::GpuScene;
 use crate::film::picture::Picture;
 use crate::film::{GpuFilm, Step};
 use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
-use crate::gpu::{Access, Buffer, Gpu, PipelineInfo, Timings};
+use crate::gpu::{Access, Buffer, DeviceKind, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
 
@@ -83,7 +83,7 @@ impl PathTracer {
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let slots = match settings.paths_in_flight {
             // Enough for a dispatch to be worth its overhead, few enough for the caches of a processor.
-            0 if gpu.caps().kind == "cpu" => 1 << 18,
+            0 if gpu.caps().kind == DeviceKind::Cpu => 1 << 18,
             0 => 1 << 20,
             wanted => wanted.next_multiple_of(PATH_GROUP),
         };
@@ -288,7 +288,7 @@ impl PathTracer {
     /// Bounces of the next submission: as many as a watchdog has time for if no path ends, by the pace of the last one.
     fn bounces_for(&self, paths: u32) -> usize {
         // Software drivers end nothing, and there the passes are the same on every run.
-        if self.gpu.caps().kind == "cpu" {
+        if self.gpu.caps().kind == DeviceKind::Cpu {
             return BOUNCES_A_SUBMISSION;
         }
         let Some(seconds_a_ray) = self.seconds_a_ray else {
