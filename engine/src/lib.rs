@@ -26,6 +26,7 @@ pub mod gpu;
 pub mod render;
 pub mod scene;
 pub mod settings;
+pub mod srgb;
 pub mod techniques;
 pub mod transport;
 

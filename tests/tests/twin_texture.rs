@@ -7,10 +7,10 @@
 
 use std::collections::BTreeSet;
 
-use clerestory::film::srgb::linear_from_srgb;
 use clerestory::gpu::Gpu;
 use clerestory::scene::texture::{fetch_texel, sample_texture, texel_coordinates, wrap_texel};
 use clerestory::scene::{Filter, Image, Material, Scene, Texture, Wrap};
+use clerestory::srgb::linear_from_srgb;
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{camera_down, floor, upload};
 use clerestory_tests::shaders::twin_texture as shader;

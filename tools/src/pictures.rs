@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use clerestory::film::srgb::linear_from_srgb;
 use clerestory::film::{Picture, exr, hdr};
+use clerestory::srgb::linear_from_srgb;
 use clerestory::{Error, Result};
 
 /// A path's ending in lower case.

@@ -6,7 +6,7 @@
 layout(local_size_x = 64) in;
 
 #include "film/film_pixel.glsl"
-#include "film/srgb.glsl"
+#include "srgb.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first_pixel;  // of this part of the film, in the picture

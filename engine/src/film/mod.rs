@@ -7,7 +7,6 @@ pub mod hdr;
 pub mod metrics;
 pub mod picture;
 pub mod png;
-pub mod srgb;
 pub mod tone;
 pub mod z_test;
 

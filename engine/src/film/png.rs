@@ -9,8 +9,8 @@ use std::path::Path;
 use image::ImageEncoder;
 
 use super::picture::Layer;
-use super::srgb::quantize;
 use super::tone::{NAN_COLOR, ToneMap};
+use crate::srgb::quantize;
 use crate::{Error, Result};
 
 /// An 8-bit sRGB picture, the top row first.

@@ -3,7 +3,7 @@
 //! Sources: the sRGB transfer function, IEC 61966-2-1:1999; PBR Neutral, the Khronos tone mapper specification (Khronos Group, 2024).
 //! Guarantees: evaluated in f64, monotone and total: every input, NaN and infinity included, has a stated output.
 
-use super::srgb::srgb_byte;
+use crate::srgb::srgb_byte;
 
 /// How linear values become display values in [0, 1], before the sRGB transfer function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]

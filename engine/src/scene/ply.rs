@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::{Material, Mesh, Scene, files};
-use crate::film::srgb::linear_from_srgb;
+use crate::srgb::linear_from_srgb;
 use crate::{Error, Result};
 
 /// Reads a PLY file as one grey mesh.

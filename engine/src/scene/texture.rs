@@ -7,8 +7,8 @@
 use glam::{DVec2, DVec3, DVec4};
 
 use super::{Filter, Image, Texture, Wrap};
-use crate::film::srgb::linear_from_srgb;
 use crate::gpu::shaders::constants::TEXTURE_COORDINATE_LIMIT;
+use crate::srgb::linear_from_srgb;
 
 /// Distance from the origin, in texels, beyond which f32 coordinates no longer tell neighbouring texels apart.
 const COORDINATE_LIMIT: f64 = TEXTURE_COORDINATE_LIMIT as f64;

@@ -3,7 +3,7 @@
 #ifndef CLERESTORY_SCENE_TEXTURE_GLSL
 #define CLERESTORY_SCENE_TEXTURE_GLSL
 
-#include "film/srgb.glsl"
+#include "srgb.glsl"
 #include "scene/bindings.glsl"
 
 const uint TEXTURE_SRGB = 1u;

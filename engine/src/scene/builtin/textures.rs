@@ -5,8 +5,8 @@
 use glam::{Quat, Vec3};
 
 use super::noise::value_noise;
-use crate::film::srgb;
 use crate::scene::{Environment, Filter, Image, Texture, Wrap};
+use crate::srgb;
 
 /// Encodes a linear value as an sRGB byte (IEC 61966-2-1), rounded to the nearest.
 pub fn srgb_byte(linear: f32) -> u8 {

@@ -1,6 +1,6 @@
 //! The transfer function of sRGB and its inverse (IEC 61966-2-1, with its rounded constants), and bytes.
 //!
-//! Guarantee: every byte comes back from [`linear_from_srgb`] by [`srgb_byte`]. Twin of `film/srgb.glsl`.
+//! Guarantee: every byte comes back from [`linear_from_srgb`] by [`srgb_byte`]. Twin of `srgb.glsl`.
 
 /// Linear value in [0, 1] to sRGB value in [0, 1].
 pub fn srgb_from_linear(linear: f64) -> f64 {

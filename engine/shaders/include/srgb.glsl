@@ -1,6 +1,6 @@
-// The transfer function of sRGB (IEC 61966-2-1) and its inverse, for values in [0, 1]; twin of clerestory::film::srgb.
-#ifndef CLERESTORY_FILM_SRGB_GLSL
-#define CLERESTORY_FILM_SRGB_GLSL
+// The transfer function of sRGB (IEC 61966-2-1) and its inverse, for values in [0, 1]; twin of clerestory::srgb.
+#ifndef CLERESTORY_SRGB_GLSL
+#define CLERESTORY_SRGB_GLSL
 
 const float SRGB_SLOPE = 12.92;
 const float SRGB_OFFSET = 0.055;
