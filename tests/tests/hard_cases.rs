@@ -209,6 +209,22 @@ fn scenes_without_light_are_black_and_cost_no_shadow_rays() {
     });
 }
 
+/// A triangle of a material, with edges along two axes; near `place` only as far as f32 tells them apart.
+fn emitting_triangle(scene: &mut Scene, material: &Material, place: Vec3, edge: f32) {
+    let material = scene.add_material(material.clone());
+    scene.place(Mesh {
+        name: "emitter".into(),
+        positions: vec![
+            place,
+            place + edge * Vec3::X + edge * Vec3::X,
+            place + edge * Vec3::Z + edge * Vec3::Z,
+        ],
+        triangles: vec![[0, 1, 2]],
+        material: Some(material),
+        ..Mesh::default()
+    });
+}
+
 #[test]
 fn lights_without_power_or_area_are_no_lights() {
     with_gpu(|gpu| {
@@ -242,6 +258,12 @@ fn lights_without_power_or_area_are_no_lights() {
         emitter.emission = Vec3::splat(1e6);
         point_triangle(&mut no_area, emitter.clone(), Vec3::Y);
 
+        // Corners that f32 holds, but not the edges between them; and a size whose squares vanish.
+        let mut no_place = floor_only.clone();
+        emitting_triangle(&mut no_place, &emitter, Vec3::splat(-3e38), 3e38);
+        let mut no_squares = floor_only.clone();
+        emitting_triangle(&mut no_squares, &emitter, Vec3::Y, 1e-30);
+
         let mut on_the_light = floor_only.clone();
         on_the_light.add_light(
             "in the plane",
@@ -254,6 +276,8 @@ fn lights_without_power_or_area_are_no_lights() {
         for (what, scene) in [
             ("no power", &no_power),
             ("no area", &no_area),
+            ("no place", &no_place),
+            ("no squares", &no_squares),
             ("light in the surface", &on_the_light),
         ] {
             let picture = render(gpu, scene, SMALL, 16, &independent());
@@ -276,6 +300,7 @@ fn lights_without_power_or_area_are_no_lights() {
                 intensity,
             },
         );
+        emitting_triangle(&mut lit, &emitter, Vec3::splat(-3e38), 3e38);
         point_triangle(&mut lit, emitter, Vec3::Y);
         let picture = render(gpu, &lit, SMALL, 16, &independent());
         assert!(picture.bits() == alone.bits() && alone.mean()[0].0 > 0.1);

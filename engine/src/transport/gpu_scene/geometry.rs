@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, Vec3};
 
+use crate::accel::MAX_COORDINATE;
 use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::scene::{Scene, SceneProfile};
@@ -127,7 +128,7 @@ impl Geometry {
     }
 
     pub(super) fn bounds(&self) -> [Vec3; 2] {
-        let corners = self.triangles.iter().flat_map(corners_of).filter(|p| p.is_finite());
+        let corners = self.triangles.iter().flat_map(corners_of).filter(is_traceable);
         let (lower, upper) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
             (lower.min(p), upper.max(p))
         });
@@ -137,6 +138,11 @@ impl Geometry {
             [Vec3::ZERO; 2]
         }
     }
+}
+
+/// Whether rays can meet a point at all: the index leaves the others out.
+pub(super) fn is_traceable(p: &Vec3) -> bool {
+    p.abs().cmple(Vec3::splat(MAX_COORDINATE)).all()
 }
 
 /// The corners of a triangle, metres.

@@ -4,7 +4,7 @@
 use glam::{DVec3, UVec2, Vec3};
 
 use super::LightKinds;
-use super::geometry::{Geometry, corners_of};
+use super::geometry::{Geometry, corners_of, is_traceable};
 use crate::Result;
 use crate::gpu::shaders::constants::{
     EXPONENT_BITS, LIGHT_DARK, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE,
@@ -53,6 +53,10 @@ impl Lights {
             let area = 0.5 * (b - a).cross(c - a).length();
             // Of triangles in one place rays meet the first that is there, so only the first one may be a light. What is behind one
             // with alpha shines too, but light sampling cannot tell how much of it: its hits alone count, in full.
+            // Rays never meet what the index leaves out.
+            if !corners_of(&triangle).iter().all(is_traceable) {
+                continue;
+            }
             let first = first_copies
                 .get(&Geometry::coincidence_key(&triangle))
                 .copied()
@@ -66,10 +70,10 @@ impl Lights {
                 }
                 continue;
             }
-            if area > 0.0 && surface_double_area(corners_of(&triangle)) == 0.0 {
-                // Too small or thin for the kernel's arithmetic to sample: what it shows to rays that meet it counts in full.
+            if area > 0.0 && !is_sampleable(corners_of(&triangle)) {
+                // What it shows to rays that meet it counts in full.
                 has_unsampled = true;
-            } else if area > 0.0 && area.is_finite() {
+            } else if area > 0.0 {
                 let emission = DVec3::from_array(material.emission.map(f64::from));
                 let double_sided = material.flags & MATERIAL_DOUBLE_SIDED != 0;
                 geometry.triangles[index].light = records.len() as u32;
@@ -133,12 +137,15 @@ impl Lights {
     }
 }
 
-/// Twice the area of a triangle as `surface_at` has it in its f32 arithmetic.
-fn surface_double_area([a, b, c]: [Vec3; 3]) -> f32 {
+/// Whether `surface_at` has a normal and an area of the triangle in its f32 arithmetic, clear of what devices may flush to zero.
+fn is_sampleable([a, b, c]: [Vec3; 3]) -> bool {
+    /// Least length of the normal of a triangle whose longest edge is 1 to 2, and least double area in m²: 2⁻⁶⁰ and 2⁻¹⁰⁰.
+    const LEAST: (f32, f32) = (8.673_617_4e-19, 7.888_609e-31);
     let (e1, e2) = (b - a, c - a);
     let longest = e1.abs().max(e2.abs()).max_element();
     let scale = f32::from_bits(RECIPROCAL_EXPONENTS - (longest.to_bits() & EXPONENT_BITS));
-    (scale * e1).cross(scale * e2).length() / scale / scale
+    let size = (scale * e1).cross(scale * e2).length();
+    size >= LEAST.0 && size / scale / scale >= LEAST.1
 }
 
 fn light_record(kind: &LightKind) -> SceneLight {

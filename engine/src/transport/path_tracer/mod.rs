@@ -15,7 +15,7 @@ mod wave;
 use std::sync::Arc;
 use std::time::Instant;
 
-use self::pipelines::{Pipelines, TracePipelines, camera_pipeline};
+use self::pipelines::{Pipelines, TracePipelines, camera_pipeline, ray_quota};
 pub use self::settings::PathTracerSettings;
 use self::wave::{Cursor, Status, Wave, WaveBuffers, group_counts, slots_of_device, slots_of_picture};
 use super::camera_frame::CameraFrame;
@@ -31,9 +31,9 @@ use crate::{Error, Result};
 const BOUNCES_A_SUBMISSION: usize = 12;
 /// Device time that a submission may take where a driver watches: they end what runs for some seconds.
 const SUBMISSION_SECONDS: f64 = 0.25;
-/// Submissions in a row that may end without finishing a bounce before the tracer gives up: each one advances every stopped ray by a
-/// whole quota, so this many stand for more iterations than any index of 2²⁸ triangles has.
-const STALLS_MAX: u32 = 1 << 16;
+/// Loop iterations that a ray may take in all before the tracer gives up, since no index of 2²⁸ triangles has as many: submissions in a row
+/// that end without finishing a bounce advance every stopped ray by a whole quota each.
+const RAY_ITERATIONS_MAX: u64 = 1 << 31;
 
 /// Exact counts of what the device did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -62,6 +62,8 @@ pub struct PathTracer {
     slots: u32,
     /// Device time of a path's bounce in the last submission.
     seconds_a_ray: Option<f64>,
+    /// Device time of submissions whose rays are not counted yet.
+    uncounted_seconds: f64,
     pending: Option<Wave>,
     cursor: Cursor,
     counters: PathCounters,
@@ -90,7 +92,7 @@ impl PathTracer {
         let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
         let frame = CameraFrame::new(camera, size)?;
         let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
-        let (buffers, slots) = WaveBuffers::within_memory(gpu, slots, scene.has_lights(), settings.aovs)?;
+        let (buffers, slots) = WaveBuffers::within_memory(gpu, slots, scene.has_lights(), &film)?;
         Ok(Self {
             gpu: gpu.clone(),
             scene,
@@ -101,6 +103,7 @@ impl PathTracer {
             film,
             slots,
             seconds_a_ray: None,
+            uncounted_seconds: 0.0,
             pending: None,
             cursor: Cursor::default(),
             counters: PathCounters::default(),
@@ -200,19 +203,20 @@ impl PathTracer {
             ..Status::default()
         };
         let mut timings = vec![self.submit_bounces(wave, &mut status, true)?];
-        let mut stalls_in_a_row = 0;
+        let quota = u64::from(ray_quota(&self.scene, &self.settings));
+        let mut iterations = 0;
         while status.active_count > 0 || status.stalled != STALLED_NOT {
             let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);
             self.counters.stalls += u64::from(stalled);
             timings.push(self.submit_bounces(wave, &mut status, false)?);
             let stands = stalled && status.stalled != STALLED_NOT && status.rounds == rounds;
-            stalls_in_a_row = if stands { stalls_in_a_row + 1 } else { 0 };
-            if stalls_in_a_row > STALLS_MAX {
+            iterations = if stands { iterations + quota } else { 0 };
+            if iterations > RAY_ITERATIONS_MAX {
                 return Err(Error::Overflow {
                     kernel: "path_extend".into(),
                     what: "iterations of a ray".into(),
-                    needed: u64::from(stalls_in_a_row) * u64::from(self.settings.ray_quota),
-                    capacity: u64::from(STALLS_MAX) * u64::from(self.settings.ray_quota),
+                    needed: iterations,
+                    capacity: RAY_ITERATIONS_MAX,
                     instead: "rebuild the index".into(),
                 });
             }
@@ -228,9 +232,11 @@ impl PathTracer {
     /// Submits some bounces of a wave, the first ones with its camera rays and the last wave's way to the film, and reads how far they came.
     fn submit_bounces(&mut self, wave: &Wave, status: &mut Status, first: bool) -> Result<Timings> {
         let stalled = status.stalled;
+        if first {
+            self.uncounted_seconds = 0.0;
+        }
         if stalled != STALLED_NOT && self.pipelines.resume.is_none() {
-            let quota = self.settings.ray_quota;
-            self.pipelines.resume = Some(TracePipelines::new(&self.gpu, &self.scene, quota, true)?);
+            self.pipelines.resume = Some(TracePipelines::new(&self.gpu, &self.scene, &self.settings, true)?);
         }
         let resume = self.pipelines.resume.as_ref().filter(|_| stalled != STALLED_NOT);
         let mut recorder = self.gpu.recorder("path wave")?;
@@ -279,8 +285,10 @@ impl PathTracer {
         let rays_before = wide(status.extend_rays);
         *status = self.buffers.readback.read::<Status>(0, 1)?[0];
         let rays = wide(status.extend_rays) - rays_before;
+        // A stalled submission counts its rays when they have gone on to their end.
+        self.uncounted_seconds += seconds;
         if rays > 0 {
-            self.seconds_a_ray = Some(seconds / rays as f64);
+            self.seconds_a_ray = Some(std::mem::take(&mut self.uncounted_seconds) / rays as f64);
         }
         Ok(timings)
     }

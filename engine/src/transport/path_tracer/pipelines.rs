@@ -15,6 +15,16 @@ use crate::transport::camera_frame::CameraFrame;
 /// stays below the 65,535 iterations after which it silently ends loops, even if its lanes take turns.
 const ALPHA_QUOTA_MAX: u32 = 2048;
 
+/// Loop iterations after which a ray goes on in a later dispatch.
+pub(super) fn ray_quota(scene: &GpuScene, settings: &PathTracerSettings) -> u32 {
+    let most = if scene.profile().has_alpha() {
+        ALPHA_QUOTA_MAX
+    } else {
+        u32::MAX
+    };
+    settings.ray_quota.min(most)
+}
+
 /// One kernel a stage.
 pub(super) struct Pipelines {
     pub camera: ComputePipeline<path_camera::Kernel>,
@@ -86,7 +96,7 @@ impl Pipelines {
         };
         Ok(Self {
             camera: camera_pipeline(gpu, settings, frame, camera)?,
-            trace: TracePipelines::new(gpu, scene, settings.ray_quota, false)?,
+            trace: TracePipelines::new(gpu, scene, settings, false)?,
             resume: None,
             shade: gpu.compute_pipeline(&shade)?,
             count: gpu.compute_pipeline(&())?,
@@ -116,8 +126,9 @@ impl Pipelines {
 }
 
 impl TracePipelines {
-    pub fn new(gpu: &Gpu, scene: &GpuScene, bvh2_quota: u32, resumes: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettings, resumes: bool) -> Result<Self> {
         let profile = scene.profile();
+        let bvh2_quota = ray_quota(scene, settings);
         if !profile.has_alpha() {
             return Ok(Self::Opaque {
                 extend: gpu.compute_pipeline(&path_extend::Spec {
@@ -133,7 +144,6 @@ impl TracePipelines {
             });
         }
         let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
-        let bvh2_quota = bvh2_quota.min(ALPHA_QUOTA_MAX);
         let extend = path_extend_alpha::Spec {
             has_textures,
             has_vertex_colors,

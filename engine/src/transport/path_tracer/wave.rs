@@ -9,7 +9,7 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP};
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::shaders::transport::path_camera;
-use crate::gpu::shaders::types::{GatheredLight, Hit, PathAov, PathState, ShadowRay};
+use crate::gpu::shaders::types::{FilmAov, FilmPixel, GatheredLight, Hit, PathAov, PathState, ShadowRay};
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 use crate::{Error, Result};
 
@@ -124,10 +124,15 @@ pub(super) fn group_counts(places: u32) -> [[u32; 3]; 2] {
 }
 
 impl WaveBuffers {
-    /// For as many slots, up to `slots`, as there is memory for; a wave's size never changes the picture.
-    pub fn within_memory(gpu: &Gpu, mut slots: u32, lights: bool, aovs: bool) -> Result<(Self, u32)> {
+    /// For as many slots, up to `slots`, as there is memory for beside what reading the film takes; a wave's size never changes the
+    /// picture.
+    pub fn within_memory(gpu: &Gpu, mut slots: u32, lights: bool, film: &GpuFilm) -> Result<(Self, u32)> {
+        let band = film.bands().iter().map(|band| u64::from(band.pixels())).max();
+        let pixel_bytes = size_of::<FilmPixel>().max(size_of::<FilmAov>()) as u64;
+        let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
         loop {
-            match Self::new(gpu, slots, lights, aovs) {
+            let made = Self::new(gpu, slots, lights, film.has_aovs());
+            match made.and_then(|buffers| gpu.buffer(&reading).map(|_| buffers)) {
                 Err(Error::OutOfMemory { .. }) if slots > SLOTS_MIN => slots = (slots / 2).next_multiple_of(PATH_GROUP),
                 made => return made.map(|buffers| (buffers, slots)),
             }
