@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::accel::IndexStatistics;
-use crate::film::picture::{Metadata, Picture};
+use crate::film::picture::{Metadata, NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
 use crate::scene::{Camera, Note, Scene, SceneProfile};
 use crate::techniques::{self, Skipped, Technique, TechniqueInfo, View};
@@ -92,8 +92,8 @@ pub struct FrameReport {
     pub seed: u32,
     /// True when it was stopped before all samples were there.
     pub stopped_early: bool,
-    /// Samples left out because they were NaN or infinite.
-    pub non_finite_samples: u64,
+    /// Samples left out because they were NaN or infinite, by kind.
+    pub non_finite_samples: NonFiniteSamples,
     /// Device name.
     pub device: String,
     /// Driver name and version.
@@ -346,7 +346,7 @@ impl Rendering {
         Ok(Rendered { picture, report })
     }
 
-    fn report(&self, picture: &Picture, non_finite_samples: u64, end: Instant) -> FrameReport {
+    fn report(&self, picture: &Picture, non_finite_samples: NonFiniteSamples, end: Instant) -> FrameReport {
         let caps = self.renderer.gpu.caps();
         let counters = self.technique.counters();
         let (steady_start, before) = self.first_step.clone().unwrap_or((end, counters.clone()));

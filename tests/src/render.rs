@@ -157,7 +157,7 @@ pub fn finish(tracer: &mut PathTracer, samples: u32) -> Rendered {
         radiance: layer("radiance"),
         variance: layer("variance"),
         samples: layer("samples"),
-        non_finite,
+        non_finite: non_finite.total(),
         counters: tracer.counters(),
     }
 }

@@ -17,7 +17,7 @@ fn picture(gpu: &Gpu, address: &str, spp: u32) -> Picture {
     };
     let rendered = render(gpu, &scene, &options).expect("a picture");
     assert_no_messages(gpu);
-    assert_eq!(rendered.report.non_finite_samples, 0);
+    assert_eq!(rendered.report.non_finite_samples.total(), 0);
     assert_eq!(rendered.report.samples, [spp, spp]);
     assert!(!rendered.report.stopped_early && rendered.report.counters["rays"] > 0);
     rendered.picture

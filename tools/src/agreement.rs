@@ -240,7 +240,7 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
             relative_bias: errors.relative_bias,
             values,
             blocks,
-            non_finite,
+            non_finite: non_finite.total(),
             speed,
         },
         theirs.renderer,

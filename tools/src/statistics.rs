@@ -134,10 +134,10 @@ fn rest(report: &FrameReport) -> String {
         text.push('\n');
     }
     let bad = format!(
-        "samples that were not finite and are left out: {}",
-        report.non_finite_samples
+        "samples that were not finite and are left out: {} NaN, {} infinite",
+        report.non_finite_samples.nan, report.non_finite_samples.infinite
     );
-    text += &if report.non_finite_samples > 0 {
+    text += &if report.non_finite_samples.total() > 0 {
         output::red(&bad, Stream::Output)
     } else {
         bad

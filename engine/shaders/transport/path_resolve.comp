@@ -1,6 +1,6 @@
 #version 460
 // Wavefront path tracer, last stage: adds the samples of a wave to their pixels' sums, in the order of the samples, so that the sums do
-// not depend on the size of the waves. A sample with a NaN or an infinity is counted and left out.
+// not depend on the size of the waves. A sample with a NaN or an infinity is counted by kind and left out.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -25,8 +25,12 @@ void main() {
     FilmPixel film = film_pixels[target];
     for (uint i = 0u; i < push.sample_count; ++i) {
         vec3 radiance = path_gathered[pixel * push.sample_count + i].radiance;
-        if (any(isnan(radiance)) || any(isinf(radiance))) {
-            film.non_finite += 1u;
+        if (any(isnan(radiance))) {
+            film.nan_samples += 1u;
+            continue;
+        }
+        if (any(isinf(radiance))) {
+            film.infinite_samples += 1u;
             continue;
         }
         film.samples += 1u;

@@ -5,7 +5,7 @@
 //! `maxStorageBufferRange`. Deterministic as long as each pixel is added to by one invocation at a time, in order.
 
 use super::accumulate::TwoFloat;
-use super::picture::{ALBEDO, DEPTH, NORMAL, Picture, RADIANCE, SAMPLES, VARIANCE};
+use super::picture::{ALBEDO, DEPTH, NORMAL, NonFiniteSamples, Picture, RADIANCE, SAMPLES, VARIANCE};
 use crate::gpu::shaders::constants::{AOV_ALBEDO, AOV_DEPTH, AOV_NORMAL};
 use crate::gpu::shaders::film::display;
 use crate::gpu::shaders::sets::FilmSet;
@@ -113,7 +113,7 @@ impl GpuFilm {
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn picture(&self) -> Result<(Picture, u64)> {
+    pub fn picture(&self) -> Result<(Picture, NonFiniteSamples)> {
         let mut film = Vec::new();
         let mut aovs: Vec<FilmAov> = Vec::new();
         for band in &self.bands {
@@ -145,7 +145,12 @@ impl GpuFilm {
             picture.add_layer(NORMAL, 3, layer(AOV_NORMAL))?;
             picture.add_layer(DEPTH, 1, aovs.iter().map(|a| mean(a, AOV_DEPTH)).collect())?;
         }
-        Ok((picture, film.iter().map(|pixel| u64::from(pixel.non_finite)).sum()))
+        let count = |kind: fn(&FilmPixel) -> u32| film.iter().map(|pixel| u64::from(kind(pixel))).sum();
+        let left_out = NonFiniteSamples {
+            nan: count(|pixel| pixel.nan_samples),
+            infinite: count(|pixel| pixel.infinite_samples),
+        };
+        Ok((picture, left_out))
     }
 
     /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped

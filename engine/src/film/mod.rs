@@ -15,6 +15,6 @@ mod atomic;
 pub use accumulate::{Accumulator, TwoFloat};
 pub use gpu_film::{FilmBand, GpuFilm, Step};
 pub use metrics::{CompareOptions, ErrorReport, compare};
-pub use picture::{Layer, Metadata, NonFinite, Picture};
+pub use picture::{Layer, Metadata, NonFinite, NonFiniteSamples, Picture};
 pub use tone::{ToneCurve, ToneMap};
 pub use z_test::{ZTest, z_test};

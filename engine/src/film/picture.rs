@@ -81,6 +81,22 @@ pub struct NonFinite {
     pub infinite: u64,
 }
 
+/// Samples that were left out of a picture since a channel of theirs was no finite number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct NonFiniteSamples {
+    /// Samples with a NaN.
+    pub nan: u64,
+    /// Samples with an infinity and no NaN.
+    pub infinite: u64,
+}
+
+impl NonFiniteSamples {
+    /// Samples of both kinds.
+    pub fn total(self) -> u64 {
+        self.nan + self.infinite
+    }
+}
+
 /// The facts of a picture's making. All of them travel with EXR files as string attributes.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Metadata {

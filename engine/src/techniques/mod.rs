@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::film::Step;
-use crate::film::picture::Picture;
+use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::transport::{GpuScene, PathSet};
@@ -114,7 +114,7 @@ pub trait Technique: Send {
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    fn picture(&mut self) -> Result<(Picture, u64)>;
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)>;
 
     /// Writes the picture so far to a buffer of four bytes a pixel on the device: `exposure` in stops, clipped, sRGB-encoded, blue first
     /// where `bgra` says so.

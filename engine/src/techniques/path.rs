@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Bias, SettingInfo, Skipped, Technique, TechniqueInfo};
 use crate::Result;
 use crate::film::Step;
-use crate::film::picture::Picture;
+use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::gpu::shaders::transport::path_shade;
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
@@ -126,7 +126,7 @@ impl Technique for PathTracer {
         PathTracer::step(self, samples)
     }
 
-    fn picture(&mut self) -> Result<(Picture, u64)> {
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
         PathTracer::picture(self)
     }
 

@@ -89,7 +89,7 @@ fn print(report: &FrameReport) {
     let rays = report.counters.get("rays").copied().unwrap_or(0);
     println!(
         "{rays} rays, {} samples that were not finite, {:.1} MB of index",
-        report.non_finite_samples,
+        report.non_finite_samples.total(),
         report.index.bytes as f64 * 1e-6
     );
 }

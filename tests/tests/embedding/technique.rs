@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use clerestory::film::{GpuFilm, Picture, Step};
+use clerestory::film::{GpuFilm, NonFiniteSamples, Picture, Step};
 use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
 use clerestory::gpu::{Access, Buffer, BufferDesc, Category, EnabledFeatures, Gpu, PipelineInfo};
 use clerestory::render::{RenderOptions, Renderer};
@@ -60,7 +60,8 @@ impl Technique for Even {
             sum: [times(self.radiance); 3],
             square: [times(self.radiance * self.radiance); 3],
             samples: self.samples,
-            non_finite: 0,
+            nan_samples: 0,
+            infinite_samples: 0,
         };
         let mut timings = Vec::new();
         let mut pixels = 0;
@@ -85,7 +86,7 @@ impl Technique for Even {
         }))
     }
 
-    fn picture(&mut self) -> Result<(Picture, u64)> {
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
         self.film.picture()
     }
 

@@ -385,10 +385,10 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
         }
     }
     let report = document.report;
-    if report.non_finite_samples > 0 && arguments.stats != Statistics::Table {
+    if report.non_finite_samples.total() > 0 && arguments.stats != Statistics::Table {
         output::warn(&format!(
-            "{} samples were not finite and are left out",
-            report.non_finite_samples
+            "{} samples were NaN and {} infinite; they are left out",
+            report.non_finite_samples.nan, report.non_finite_samples.infinite
         ));
     }
     if report.stopped_early {

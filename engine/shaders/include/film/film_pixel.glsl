@@ -9,7 +9,8 @@ struct FilmPixel {
     TwoFloat sum[3];
     TwoFloat square[3];
     uint samples;
-    uint non_finite;
+    uint nan_samples;       // left out
+    uint infinite_samples;  // left out
 };
 
 // First channels of the AOVs in FilmAov, and their number.

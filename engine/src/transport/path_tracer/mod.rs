@@ -20,7 +20,7 @@ pub use self::settings::PathTracerSettings;
 use self::wave::{Cursor, Status, Wave, WaveBuffers, group_counts, slots_of_device, slots_of_picture};
 use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
-use crate::film::picture::Picture;
+use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, Step};
 use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
 use crate::gpu::{Access, Buffer, DeviceKind, Gpu, PipelineInfo, Timings};
@@ -180,7 +180,7 @@ impl PathTracer {
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
-    pub fn picture(&mut self) -> Result<(Picture, u64)> {
+    pub fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
         self.flush()?;
         self.film.picture()
     }
