@@ -4,10 +4,12 @@
 //! f64 twin itself moves when its inputs move by some rounding units. The second part is what f32 arithmetic can promise where a
 //! function is ill-conditioned, and needs no bound written down for each.
 
-use crate::shaders::constants;
+use crate::shaders::types::{RandomCase, RandomWords};
+use crate::shaders::{constants, twin_random};
 use bytemuck::{Pod, Zeroable};
 use clerestory::gpu::interface::{ComputeShader, SpecConstants};
 use clerestory::gpu::{BufferDesc, Category, ComputePipeline, DeviceKind, Gpu};
+use clerestory::transport::random::SamplerKind;
 
 /// Numbers of a case.
 pub const INPUTS: usize = constants::TWIN_INPUTS as usize;
@@ -144,6 +146,38 @@ where
         gpu.read(output.view(), cases.len())
     };
     run().unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// What the device's random functions give for each case.
+pub fn random_words(gpu: &Gpu, kind: SamplerKind, table: &[RandomCase]) -> Vec<RandomWords> {
+    let pipeline = gpu
+        .compute_pipeline::<twin_random::Kernel>(&twin_random::Spec {
+            sampler_kind: kind as u32,
+        })
+        .unwrap();
+    let input = gpu.buffer_with("cases", Category::Work, table).unwrap();
+    let bytes = (table.len() * size_of::<RandomWords>()) as u64;
+    let output = gpu
+        .buffer(&BufferDesc::storage("results", bytes, Category::Work))
+        .unwrap();
+    let mut recorder = gpu.recorder("random").unwrap();
+    recorder
+        .pass("random", |pass| {
+            let set = twin_random::Set0 {
+                random_cases: input.view(),
+                random_results: output.view(),
+            };
+            let case_count = table.len() as u32;
+            pass.dispatch(
+                &pipeline,
+                &[&set],
+                &twin_random::Push { case_count },
+                [pipeline.groups_for(case_count), 1, 1],
+            )
+        })
+        .unwrap();
+    recorder.submit().unwrap().wait().unwrap();
+    gpu.read(output.view(), table.len()).unwrap()
 }
 
 /// Defines a function that runs a twin kernel: the generated sets and push constants of each shader are types of their own.

@@ -9,14 +9,13 @@ mod scattering;
 
 use std::f64::consts::{PI, TAU};
 
-use clerestory::gpu::{BufferDesc, Category, Gpu};
+use clerestory::gpu::Gpu;
 use clerestory::transport::distribution::{build_distribution, build_distribution_2d, distribution_probability};
 use clerestory::transport::ggx::ggx_visible_pdf;
 use clerestory::transport::random::SamplerKind;
-use clerestory_tests::shaders::twin_random;
-use clerestory_tests::shaders::types::{RandomCase, RandomWords};
+use clerestory_tests::shaders::types::RandomCase;
 use clerestory_tests::statistics::{FALSE_ALARM, chi_square_test, expect_counts};
-use clerestory_tests::twin::Case;
+use clerestory_tests::twin::{Case, random_words};
 use clerestory_tests::{twin_kernel, with_gpu};
 use glam::{DVec3, UVec2};
 
@@ -29,10 +28,6 @@ const SIDE: usize = 32;
 
 /// Pairs of numbers from the device: of slot `dimension`, one a pixel, or many of one pixel.
 fn pairs(gpu: &Gpu, kind: SamplerKind, dimension: u32, one_pixel: bool) -> Vec<[f32; 2]> {
-    let spec = twin_random::Spec {
-        sampler_kind: kind as u32,
-    };
-    let pipeline = gpu.compute_pipeline::<twin_random::Kernel>(&spec).unwrap();
     let cases: Vec<RandomCase> = (0..DRAWS as u32)
         .map(|i| RandomCase {
             pixel: if one_pixel { 17 } else { i },
@@ -41,25 +36,7 @@ fn pairs(gpu: &Gpu, kind: SamplerKind, dimension: u32, one_pixel: bool) -> Vec<[
             seed: 2026,
         })
         .collect();
-    let input = gpu.buffer_with("cases", Category::Work, &cases).unwrap();
-    let bytes = (DRAWS * size_of::<RandomWords>()) as u64;
-    let output = gpu
-        .buffer(&BufferDesc::storage("results", bytes, Category::Work))
-        .unwrap();
-    let mut recorder = gpu.recorder("random").unwrap();
-    recorder
-        .pass("random", |pass| {
-            let set = twin_random::Set0 {
-                random_cases: input.view(),
-                random_results: output.view(),
-            };
-            let case_count = DRAWS as u32;
-            let push = twin_random::Push { case_count };
-            pass.dispatch(&pipeline, &[&set], &push, [pipeline.groups_for(case_count), 1, 1])
-        })
-        .unwrap();
-    recorder.submit().unwrap().wait().unwrap();
-    let words: Vec<RandomWords> = gpu.read(output.view(), DRAWS).unwrap();
+    let words = random_words(gpu, kind, &cases);
     words.iter().map(|w| w.two).collect()
 }
 

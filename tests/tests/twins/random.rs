@@ -1,12 +1,11 @@
 //! Random numbers, bit for bit.
 
-use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::transport::random::{
     Sampler, SamplerKind, owen_scramble, pcg3d, pcg4d, sample_1d, sample_2d, sampler_bits, sobol_pascal,
 };
 use clerestory_tests::random::Random;
-use clerestory_tests::shaders::twin_random;
 use clerestory_tests::shaders::types::{RandomCase, RandomWords};
+use clerestory_tests::twin::random_words;
 use clerestory_tests::with_gpu;
 use glam::{UVec3, UVec4};
 
@@ -31,7 +30,7 @@ fn random_numbers_are_equal_bit_for_bit() {
             })
             .collect();
         for kind in [SamplerKind::Sobol, SamplerKind::Pcg] {
-            for (c, r) in table.iter().zip(run_random(gpu, kind, &table)) {
+            for (c, r) in table.iter().zip(random_words(gpu, kind, &table)) {
                 let mut s = Sampler {
                     pixel: c.pixel,
                     sample_index: c.sample_index,
@@ -54,35 +53,4 @@ fn random_numbers_are_equal_bit_for_bit() {
             }
         }
     });
-}
-
-fn run_random(gpu: &Gpu, kind: SamplerKind, table: &[RandomCase]) -> Vec<RandomWords> {
-    let pipeline = gpu
-        .compute_pipeline::<twin_random::Kernel>(&twin_random::Spec {
-            sampler_kind: kind as u32,
-        })
-        .unwrap();
-    let input = gpu.buffer_with("cases", Category::Work, table).unwrap();
-    let bytes = (table.len() * size_of::<RandomWords>()) as u64;
-    let output = gpu
-        .buffer(&BufferDesc::storage("results", bytes, Category::Work))
-        .unwrap();
-    let mut recorder = gpu.recorder("random").unwrap();
-    recorder
-        .pass("random", |pass| {
-            let set = twin_random::Set0 {
-                random_cases: input.view(),
-                random_results: output.view(),
-            };
-            let case_count = table.len() as u32;
-            pass.dispatch(
-                &pipeline,
-                &[&set],
-                &twin_random::Push { case_count },
-                [pipeline.groups_for(case_count), 1, 1],
-            )
-        })
-        .unwrap();
-    recorder.submit().unwrap().wait().unwrap();
-    gpu.read(output.view(), table.len()).unwrap()
 }

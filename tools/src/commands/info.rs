@@ -117,7 +117,7 @@ impl DeviceInfo {
         };
         let need = |feature: &&'static str| Need {
             feature,
-            present: has(&caps, feature),
+            present: techniques::offers(&caps, feature),
         };
         Self {
             unusable: fault_of(&options),
@@ -160,7 +160,7 @@ impl DeviceInfo {
             caps.subgroup_size,
             names(&operations)
         ));
-        let features = FEATURES.map(|(name, of)| (name, of(caps)));
+        let features = FEATURES.map(|name| (name, techniques::offers(caps, name) == Some(true)));
         lines.push(format!("  features     {}", names(&features)));
         lines.push(format!(
             "  memory       {} heap, {} an allocation, {} a storage buffer",
@@ -204,28 +204,19 @@ impl DeviceInfo {
     }
 }
 
-type Feature = (&'static str, fn(&Caps) -> bool);
-
-/// Device features by their Vulkan names.
-const FEATURES: [Feature; 10] = [
-    ("geometryShader", |caps| caps.geometry_shader),
-    ("shaderInt64", |caps| caps.int64),
-    ("shaderFloat64", |caps| caps.float64),
-    ("shaderBufferInt64Atomics", |caps| caps.int64_atomics),
-    ("robustBufferAccess", |caps| caps.robust_buffer_access),
-    ("pipelineStatisticsQuery", |caps| caps.pipeline_statistics),
-    ("fragmentStoresAndAtomics", |caps| caps.fragment_stores),
-    ("vertexPipelineStoresAndAtomics", |caps| caps.vertex_stores),
-    ("VK_KHR_ray_query", |caps| caps.ray_query),
-    ("runtimeDescriptorArray", |caps| caps.descriptor_indexing),
+/// Device features shown of every device, by their Vulkan names.
+const FEATURES: [&str; 10] = [
+    "geometryShader",
+    "shaderInt64",
+    "shaderFloat64",
+    "shaderBufferInt64Atomics",
+    "robustBufferAccess",
+    "pipelineStatisticsQuery",
+    "fragmentStoresAndAtomics",
+    "vertexPipelineStoresAndAtomics",
+    "VK_KHR_ray_query",
+    "runtimeDescriptorArray",
 ];
-
-fn has(caps: &Caps, feature: &str) -> Option<bool> {
-    FEATURES
-        .iter()
-        .find(|(name, _)| *name == feature)
-        .map(|(_, of)| of(caps))
-}
 
 fn names(list: &[(&str, bool)]) -> String {
     let there: Vec<&str> = list.iter().filter(|(_, there)| *there).map(|(name, _)| *name).collect();
