@@ -1,6 +1,7 @@
 //! What the command line program and its tests share.
 
 pub mod agreement;
+pub mod experiments;
 pub mod machine;
 pub mod mitsuba;
 pub mod page;

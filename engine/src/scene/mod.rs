@@ -7,6 +7,7 @@ pub mod builtin;
 pub mod check;
 mod files;
 pub mod gltf;
+pub mod medium;
 pub mod metals;
 mod mtl;
 mod obj;
@@ -17,6 +18,7 @@ pub mod tangents;
 pub mod texture;
 
 pub use files::load;
+pub use medium::{DensityGrid, Medium, Phase};
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, SceneProfile, TransmissionUse};
 
 use glam::{DAffine3, Vec2, Vec3, Vec4};
@@ -42,6 +44,10 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Radiance arriving from infinity; black without one.
     pub environment: Option<Environment>,
+    /// Participating media that [`Material::interior`] and [`Scene::surrounding`] refer to.
+    pub media: Vec<Medium>,
+    /// Index into [`Scene::media`] of the one that fills the space outside of all bodies.
+    pub surrounding: Option<u32>,
     /// Cameras in world space; the first is the default.
     pub cameras: Vec<Camera>,
     /// What the scene file asks of a render.
@@ -225,6 +231,10 @@ pub struct Material {
     pub attenuation_color: Vec3,
     /// Metres; infinite means clear.
     pub attenuation_distance: f32,
+    /// Index into [`Scene::media`] of the medium inside of a closed mesh.
+    pub interior: Option<u32>,
+    /// Bounds [`Material::interior`] and is otherwise not there: light goes through unchanged, and no bounce is counted.
+    pub boundary: bool,
     /// Exact conductor that replaces the metallic lobe's Schlick Fresnel (sidecar only).
     pub conductor: Option<ConductorIor>,
     /// Alpha mode.
@@ -258,6 +268,8 @@ impl Default for Material {
             thickness: 0.0,
             attenuation_color: Vec3::ONE,
             attenuation_distance: f32::INFINITY,
+            interior: None,
+            boundary: false,
             conductor: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,

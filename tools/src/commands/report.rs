@@ -15,6 +15,8 @@ use clerestory::film::picture::Picture;
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::{Error, Result, scene};
+use clerestory_tools::experiments;
+use clerestory_tools::experiments::measures::{self, Context};
 use clerestory_tools::machine::{self, median};
 use clerestory_tools::page::Block;
 
@@ -34,6 +36,15 @@ Examples:
 The part of the file between its two marks is replaced, the rest stays. References are rendered once with 16 times the samples, and \
 kept; delete their folder after a change that changes pictures.")]
 pub struct Arguments {
+    /// Experiments by name, into a folder each; without any, error against time of the path tracer, into RESULTS.md
+    #[arg(value_name = "EXPERIMENT")]
+    experiments: Vec<String>,
+    /// Lists the experiments
+    #[arg(long, conflicts_with = "experiments")]
+    list: bool,
+    /// Folder of the experiments' results
+    #[arg(long, value_name = "FOLDER", default_value = "out/report")]
+    folder: PathBuf,
     /// The smallest form: 48 × 48 pixels, 2 to 32 samples a pixel
     #[arg(long)]
     smoke: bool,
@@ -96,6 +107,12 @@ struct Row {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    if arguments.list {
+        return list();
+    }
+    if !arguments.experiments.is_empty() {
+        return run_experiments(arguments);
+    }
     let (size, spp) = if arguments.smoke {
         ([48, 48], [2, 8, 32])
     } else {
@@ -123,6 +140,53 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     check_validation(&log)?;
     BLOCK.write(&arguments.output, &text)?;
     output::note(&format!("wrote {}", arguments.output.display()));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list() -> Outcome<ExitCode> {
+    let mut table = output::Table::new(&["experiment", "systems", "shows"], &[1, 2]);
+    for name in experiments::names() {
+        let experiment = experiments::find(name)?;
+        table.row([experiment.name, experiment.systems.join(", "), experiment.title]);
+    }
+    output::print(&table.text())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Runs experiments by name; the tables go to standard output and, with all digits, into a folder for each.
+fn run_experiments(arguments: &Arguments) -> Outcome<ExitCode> {
+    let found: Result<Vec<_>> = arguments
+        .experiments
+        .iter()
+        .map(|name| experiments::find(name))
+        .collect();
+    let open = || Gpu::headless(&arguments.device.options());
+    let context = Context {
+        smoke: arguments.smoke,
+        gpu: &open,
+    };
+    for experiment in found? {
+        let measure = measures::find(&experiment.measure)?;
+        output::note(&format!("{}: {}", experiment.name, experiment.title));
+        let tables = (measure.run)(&context)?;
+        let folder = arguments.folder.join(&experiment.name);
+        std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, error))?;
+        let mut page = format!("# {}: {}\n", experiment.name, experiment.title);
+        for (index, table) in tables.iter().enumerate() {
+            page += &format!("\n{}", table.markdown());
+            let path = folder.join(format!("{}.csv", index + 1));
+            std::fs::write(&path, table.csv()).map_err(|error| Error::io(&path, error))?;
+        }
+        for (name, text) in [
+            ("report.md", page.clone()),
+            ("report.json", output::json_text("report.json", &tables)?),
+        ] {
+            let path = folder.join(name);
+            std::fs::write(&path, text).map_err(|error| Error::io(&path, error))?;
+        }
+        output::print(&page)?;
+        output::note(&format!("wrote {}", folder.display()));
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,0 +1,156 @@
+//! Tables of measured numbers, as text, Markdown, CSV and JSON.
+
+/// A cell of a [`Table`].
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[serde(untagged)]
+pub enum Cell {
+    /// Words.
+    Text(String),
+    /// A count, exact.
+    Count(u64),
+    /// A measured number.
+    Number(f64),
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<u64> for Cell {
+    fn from(count: u64) -> Self {
+        Self::Count(count)
+    }
+}
+
+impl From<f64> for Cell {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl std::fmt::Display for Cell {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Text(text) => f.write_str(text),
+            Self::Count(count) => write!(f, "{count}"),
+            Self::Number(number) if *number == 0.0 => f.write_str("0"),
+            Self::Number(number) if (1e-3..1e5).contains(&number.abs()) => {
+                // Four digits that count.
+                let digits = (3.0 - number.abs().log10().floor()).max(0.0) as usize;
+                write!(f, "{number:.digits$}")
+            }
+            Self::Number(number) => write!(f, "{number:.3e}"),
+        }
+    }
+}
+
+/// Measured numbers with heads that name their units.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Table {
+    /// What the numbers are.
+    pub title: String,
+    /// What each column holds, with its unit.
+    pub heads: Vec<String>,
+    /// The rows, each as long as the heads.
+    pub rows: Vec<Vec<Cell>>,
+    /// What a reader must know to judge the numbers.
+    pub notes: Vec<String>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new(title: impl Into<String>, heads: &[&str]) -> Self {
+        Self {
+            title: title.into(),
+            heads: heads.iter().map(|head| (*head).to_owned()).collect(),
+            rows: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    /// Adds a note.
+    pub fn note(&mut self, note: impl Into<String>) {
+        self.notes.push(note.into());
+    }
+
+    /// As Markdown below a heading of the third level.
+    pub fn markdown(&self) -> String {
+        let mut text = format!("### {}\n\n| {} |\n|", self.title, self.heads.join(" | "));
+        for (column, _) in self.heads.iter().enumerate() {
+            let words = self
+                .rows
+                .iter()
+                .all(|row| matches!(row.get(column), Some(Cell::Text(_))));
+            text.push_str(if words { "---|" } else { "---:|" });
+        }
+        text.push('\n');
+        for row in &self.rows {
+            let cells: Vec<String> = row.iter().map(|cell| cell.to_string().replace('|', "\\|")).collect();
+            text.push_str(&format!("| {} |\n", cells.join(" | ")));
+        }
+        for note in &self.notes {
+            text.push_str(&format!("\n{note}\n"));
+        }
+        text
+    }
+
+    /// As comma-separated values, all digits of every number.
+    pub fn csv(&self) -> String {
+        let quote = |text: &str| {
+            if text.contains([',', '"', '\n']) {
+                format!("\"{}\"", text.replace('"', "\"\""))
+            } else {
+                text.to_owned()
+            }
+        };
+        let line = |cells: Vec<String>| cells.join(",") + "\n";
+        let mut text = line(self.heads.iter().map(|head| quote(head)).collect());
+        for row in &self.rows {
+            text += &line(
+                row.iter()
+                    .map(|cell| match cell {
+                        Cell::Text(words) => quote(words),
+                        Cell::Count(count) => count.to_string(),
+                        Cell::Number(number) => format!("{number:e}"),
+                    })
+                    .collect(),
+            );
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_forms_hold_the_numbers() {
+        let mut table = Table::new("Errors", &["what", "error (ulp)", "rays"]);
+        table.row(["a, b".into(), 0.012345.into(), 7_u64.into()]);
+        table.note("A note.");
+        let text = table.markdown();
+        assert!(
+            text.contains("| a, b | 0.01235 | 7 |") && text.contains("|---|---:|---:|"),
+            "{text}"
+        );
+        assert!(text.ends_with("\nA note.\n"));
+        assert_eq!(table.csv(), "what,error (ulp),rays\n\"a, b\",1.2345e-2,7\n");
+        assert_eq!(Cell::Number(1234.5).to_string(), "1234");
+        assert_eq!(Cell::Number(-0.5).to_string(), "-0.5000");
+        assert_eq!(Cell::Number(1e-9).to_string(), "1.000e-9");
+    }
+}
