@@ -3,7 +3,7 @@
 //! Ids with the prefixes `BG-`, `DP-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility and media,
 //! photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
 //! the prefix `CL-` are the engine's own, for published methods outside of those documents. Guarantee: the tests below check that the
-//! module, every test and every experiment named here exist, and that `docs/catalogue.md` is [`markdown`].
+//! module, every test and every row's experiment exist, and that `docs/catalogue.md` is [`markdown`].
 
 mod rows;
 #[cfg(test)]
@@ -31,11 +31,11 @@ pub struct Row {
     pub needs: &'static [&'static str],
     /// Its tests as `file::function`, the file from the repository's root.
     pub tests: &'static [&'static str],
-    /// The command that measures it, from the repository's root; `None` while there is none.
-    pub experiment: Option<&'static str>,
+    /// The command that measures it, from the repository's root.
+    pub experiment: &'static str,
 }
 
-/// A row of something exact that runs everywhere and makes no picture by itself.
+/// A row of something exact that runs everywhere and makes no picture by itself; [`measured`] adds its experiment.
 const fn part(
     id: &'static str,
     name: &'static str,
@@ -52,7 +52,7 @@ const fn part(
         bias: None,
         needs: &[],
         tests,
-        experiment: None,
+        experiment: "",
     }
 }
 
@@ -67,7 +67,7 @@ const fn unbiased(row: Row) -> Row {
 /// As [`part`], with the command that measures it.
 const fn measured(command: &'static str, row: Row) -> Row {
     Row {
-        experiment: Some(command),
+        experiment: command,
         ..row
     }
 }
@@ -92,15 +92,15 @@ pub fn markdown() -> String {
         } else {
             row.needs.join(", ")
         };
-        let experiment = row.experiment.map_or("–".to_owned(), |command| format!("`{command}`"));
         page += &format!(
-            "| {} | {} | {} | [{}](../{}) | {bias} | {path_set} | {needs} | {} | {experiment} |\n",
+            "| {} | {} | {} | [{}](../{}) | {bias} | {path_set} | {needs} | {} | `{}` |\n",
             row.id,
             row.name,
             row.publication,
             row.module.trim_start_matches("engine/src/"),
             row.module,
             row.tests.len(),
+            row.experiment,
         );
     }
     page

@@ -59,7 +59,7 @@ pub(super) const ROWS: &[Row] = &[
     ),
     Row {
         path_set: Some(PathSet::ALL),
-        experiment: Some("tools/report"),
+        experiment: "tools/report",
         ..unbiased(part(
             "BG-3",
             "path tracer, surfaces (no media yet): technique `path`",
@@ -127,32 +127,41 @@ pub(super) const ROWS: &[Row] = &[
             ],
         )),
     ),
-    unbiased(part(
-        "PM-F-3",
-        "phase functions of Henyey and Greenstein and of Schlick (functions; no medium yet)",
-        "Henyey and Greenstein 1941; Blasi, Le Saëc and Schlick 1993",
-        "engine/src/transport/phase.rs",
-        &[
-            "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
-            "engine/src/transport/phase.rs::samples_follow_their_density",
-        ],
-    )),
-    part(
-        "PM-I-1",
-        "ray/sphere hit and closest approach",
-        "Haines et al. 2019",
-        "engine/src/accel/sphere.rs",
-        &[
-            "engine/src/accel/sphere.rs::approach_matches_the_definition",
-            "engine/src/accel/sphere.rs::sphere_hits_inside_outside_tangent_and_behind",
-        ],
+    measured(
+        "clerestory report phase-functions",
+        unbiased(part(
+            "PM-F-3",
+            "phase functions of Henyey and Greenstein and of Schlick (functions; no medium yet)",
+            "Henyey and Greenstein 1941; Blasi, Le Saëc and Schlick 1993",
+            "engine/src/transport/phase.rs",
+            &[
+                "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
+                "engine/src/transport/phase.rs::samples_follow_their_density",
+            ],
+        )),
     ),
-    part(
-        "PM-I-2",
-        "Möller–Trumbore triangle test (oracle in f64)",
-        "Möller and Trumbore 1997",
-        "engine/src/accel/triangle.rs",
-        &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
+    measured(
+        "clerestory report sphere-tests",
+        part(
+            "PM-I-1",
+            "ray/sphere hit and closest approach",
+            "Haines et al. 2019",
+            "engine/src/accel/sphere.rs",
+            &[
+                "engine/src/accel/sphere.rs::approach_matches_the_definition",
+                "engine/src/accel/sphere.rs::sphere_hits_inside_outside_tangent_and_behind",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report triangle-tests",
+        part(
+            "PM-I-2",
+            "Möller–Trumbore triangle test (oracle in f64)",
+            "Möller and Trumbore 1997",
+            "engine/src/accel/triangle.rs",
+            &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
+        ),
     ),
     measured(
         "clerestory agreement --scene cornell-box,cornell-point",
@@ -178,16 +187,19 @@ pub(super) const ROWS: &[Row] = &[
             ],
         )),
     ),
-    unbiased(part(
-        "MET-B7",
-        "coupled matte and specular reflection",
-        "Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997",
-        "engine/src/transport/bsdf/mod.rs",
-        &[
-            "engine/src/transport/bsdf/tests.rs::white_furnace",
-            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
-        ],
-    )),
+    measured(
+        "clerestory report coupled-reflection",
+        unbiased(part(
+            "MET-B7",
+            "coupled matte and specular reflection",
+            "Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997",
+            "engine/src/transport/bsdf/mod.rs",
+            &[
+                "engine/src/transport/bsdf/tests.rs::white_furnace",
+                "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+            ],
+        )),
+    ),
     measured(
         "tools/report",
         unbiased(part(
@@ -247,25 +259,31 @@ pub(super) const ROWS: &[Row] = &[
             ],
         )),
     ),
-    part(
-        "CL-MULTISCATTER",
-        "compensation of rough metals for scattering among microfacets",
-        "Kulla and Conty 2017",
-        "engine/src/transport/albedo.rs",
-        &[
-            "engine/src/transport/bsdf/tests.rs::white_furnace",
-            "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
-        ],
+    measured(
+        "clerestory report multiple-scattering",
+        part(
+            "CL-MULTISCATTER",
+            "compensation of rough metals for scattering among microfacets",
+            "Kulla and Conty 2017",
+            "engine/src/transport/albedo.rs",
+            &[
+                "engine/src/transport/bsdf/tests.rs::white_furnace",
+                "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
+            ],
+        ),
     ),
-    part(
-        "CL-NORMALS",
-        "shading normals and normal maps that never gain energy",
-        "Veach 1997, 5.3 (the problem; the bend towards the viewer is the engine's own)",
-        "engine/src/transport/shading_normal.rs",
-        &[
-            "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_lose_energy_only",
-            "engine/src/transport/shading_normal.rs::flat_maps_keep_the_normal",
-        ],
+    measured(
+        "clerestory report shading-normals",
+        part(
+            "CL-NORMALS",
+            "shading normals and normal maps that never gain energy",
+            "Veach 1997, 5.3 (the problem; the bend towards the viewer is the engine's own)",
+            "engine/src/transport/shading_normal.rs",
+            &[
+                "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_lose_energy_only",
+                "engine/src/transport/shading_normal.rs::flat_maps_keep_the_normal",
+            ],
+        ),
     ),
     measured(
         "tools/report",
@@ -325,16 +343,19 @@ pub(super) const ROWS: &[Row] = &[
             ],
         )),
     ),
-    part(
-        "CL-PATHSET",
-        "restriction of a picture to a set of light paths",
-        "Heckbert 1990, path notation",
-        "engine/src/transport/path_set.rs",
-        &[
-            "engine/src/transport/path_set.rs::text_round_trips",
-            "tests/tests/path_tracer.rs::path_sets_are_a_partition",
-            "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
-        ],
+    measured(
+        "clerestory report path-sets",
+        part(
+            "CL-PATHSET",
+            "restriction of a picture to a set of light paths",
+            "Heckbert 1990, path notation",
+            "engine/src/transport/path_set.rs",
+            &[
+                "engine/src/transport/path_set.rs::text_round_trips",
+                "tests/tests/path_tracer.rs::path_sets_are_a_partition",
+                "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
+            ],
+        ),
     ),
     measured(
         "clerestory bench",
@@ -349,25 +370,31 @@ pub(super) const ROWS: &[Row] = &[
             ],
         ),
     ),
-    part(
-        "CL-OFFSET",
-        "ray origins off their surface by error bounds",
-        "Pharr, Jakob and Humphreys 2016, 3.9",
-        "engine/src/accel/offset.rs",
-        &[
-            "engine/src/accel/offset/tests.rs::position_lies_within_its_rounding_bound",
-            "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
-        ],
+    measured(
+        "clerestory report ray-offsets",
+        part(
+            "CL-OFFSET",
+            "ray origins off their surface by error bounds",
+            "Pharr, Jakob and Humphreys 2016, 3.9",
+            "engine/src/accel/offset.rs",
+            &[
+                "engine/src/accel/offset/tests.rs::position_lies_within_its_rounding_bound",
+                "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
+            ],
+        ),
     ),
-    part(
-        "CL-SUM",
-        "sums of samples in pairs of floats",
-        "Dekker 1971; Joldes, Muller and Popescu 2017",
-        "engine/src/film/accumulate.rs",
-        &[
-            "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
-            "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
-        ],
+    measured(
+        "clerestory report sample-sums",
+        part(
+            "CL-SUM",
+            "sums of samples in pairs of floats",
+            "Dekker 1971; Joldes, Muller and Popescu 2017",
+            "engine/src/film/accumulate.rs",
+            &[
+                "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
+                "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
+            ],
+        ),
     ),
     measured(
         "tools/report",
@@ -395,24 +422,30 @@ pub(super) const ROWS: &[Row] = &[
             ],
         ),
     ),
-    unbiased(part(
-        "CL-ALPHA",
-        "alpha: masks, and blending by chance",
-        "Enderton, Sintorn, Shirley and Luebke 2010",
-        "engine/src/transport/path_tracer/mod.rs",
-        &[
-            "tests/tests/alpha.rs::masks_are_all_or_nothing",
-            "tests/tests/alpha.rs::blended_walls_thin_out_the_light_behind_them",
-            "tests/tests/alpha.rs::blended_surfaces_scatter_in_proportion_to_alpha",
-            "tests/tests/alpha.rs::textures_and_vertex_colours_carry_alpha",
-        ],
-    )),
-    part(
-        "CL-ABSORPTION",
-        "absorption inside of solids",
-        "Khronos, KHR_materials_volume (law of Beer and Lambert)",
-        "engine/src/transport/path_tracer/mod.rs",
-        &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
+    measured(
+        "clerestory report alpha",
+        unbiased(part(
+            "CL-ALPHA",
+            "alpha: masks, and blending by chance",
+            "Enderton, Sintorn, Shirley and Luebke 2010",
+            "engine/src/transport/path_tracer/mod.rs",
+            &[
+                "tests/tests/alpha.rs::masks_are_all_or_nothing",
+                "tests/tests/alpha.rs::blended_walls_thin_out_the_light_behind_them",
+                "tests/tests/alpha.rs::blended_surfaces_scatter_in_proportion_to_alpha",
+                "tests/tests/alpha.rs::textures_and_vertex_colours_carry_alpha",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory report absorption",
+        part(
+            "CL-ABSORPTION",
+            "absorption inside of solids",
+            "Khronos, KHR_materials_volume (law of Beer and Lambert)",
+            "engine/src/transport/path_tracer/mod.rs",
+            &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
+        ),
     ),
     measured(
         "tools/models",
@@ -427,15 +460,18 @@ pub(super) const ROWS: &[Row] = &[
             ],
         ),
     ),
-    part(
-        "CL-TANGENT",
-        "tangent frames of normal maps",
-        "Mikkelsen 2008 (MikkTSpace)",
-        "engine/src/scene/tangents.rs",
-        &[
-            "engine/src/scene/tangents.rs::tangents_follow_u_and_the_sign_follows_mirroring",
-            "engine/src/scene/tangents.rs::disagreeing_corners_split_vertices",
-        ],
+    measured(
+        "clerestory report tangents",
+        part(
+            "CL-TANGENT",
+            "tangent frames of normal maps",
+            "Mikkelsen 2008 (MikkTSpace)",
+            "engine/src/scene/tangents.rs",
+            &[
+                "engine/src/scene/tangents.rs::tangents_follow_u_and_the_sign_follows_mirroring",
+                "engine/src/scene/tangents.rs::disagreeing_corners_split_vertices",
+            ],
+        ),
     ),
     measured(
         "clerestory agreement",
@@ -450,38 +486,47 @@ pub(super) const ROWS: &[Row] = &[
             ],
         ),
     ),
-    part(
-        "CL-PROFILE",
-        "only what a scene needs: profile and specialization",
-        "Khronos, SPIR-V specification, 2.12 (specialization constants)",
-        "engine/src/scene/profile.rs",
-        &[
-            "tests/tests/profile.rs::what_is_absent_costs_no_pass",
-            "tests/tests/profile.rs::what_is_absent_costs_no_byte",
-            "tests/tests/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
-        ],
+    measured(
+        "clerestory report scene-profile",
+        part(
+            "CL-PROFILE",
+            "only what a scene needs: profile and specialization",
+            "Khronos, SPIR-V specification, 2.12 (specialization constants)",
+            "engine/src/scene/profile.rs",
+            &[
+                "tests/tests/profile.rs::what_is_absent_costs_no_pass",
+                "tests/tests/profile.rs::what_is_absent_costs_no_byte",
+                "tests/tests/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
+            ],
+        ),
     ),
-    part(
-        "CL-BARRIERS",
-        "hand-recorded passes whose missing barriers are errors",
-        "Khronos, Vulkan 1.3 specification, chapter 7",
-        "engine/src/gpu/recorder.rs",
-        &[
-            "tests/tests/gpu_floor.rs::missing_barrier_is_an_error_that_names_both_passes",
-            "tests/tests/gpu_floor.rs::write_after_read_and_wrong_scope_are_hazards",
-            "tests/tests/layers.rs::the_recorder_catches_a_missing_barrier_between_dispatches",
-        ],
+    measured(
+        "clerestory report barriers",
+        part(
+            "CL-BARRIERS",
+            "hand-recorded passes whose missing barriers are errors",
+            "Khronos, Vulkan 1.3 specification, chapter 7",
+            "engine/src/gpu/recorder.rs",
+            &[
+                "tests/tests/gpu_floor.rs::missing_barrier_is_an_error_that_names_both_passes",
+                "tests/tests/gpu_floor.rs::write_after_read_and_wrong_scope_are_hazards",
+                "tests/tests/layers.rs::the_recorder_catches_a_missing_barrier_between_dispatches",
+            ],
+        ),
     ),
-    part(
-        "CL-EXR",
-        "pictures as OpenEXR with layers and facts, Radiance HDR and PNG",
-        "Academy Software Foundation, Technical Introduction to OpenEXR; Ward 1991",
-        "engine/src/film/exr.rs",
-        &[
-            "engine/src/film/exr.rs::every_bit_and_every_attribute_comes_back",
-            "engine/src/film/hdr.rs::round_trip_errs_by_at_most_a_step_of_the_largest_channel",
-            "engine/src/film/png.rs::a_written_file_reads_back_to_the_byte",
-        ],
+    measured(
+        "clerestory report picture-formats",
+        part(
+            "CL-EXR",
+            "pictures as OpenEXR with layers and facts, Radiance HDR and PNG",
+            "Academy Software Foundation, Technical Introduction to OpenEXR; Ward 1991",
+            "engine/src/film/exr.rs",
+            &[
+                "engine/src/film/exr.rs::every_bit_and_every_attribute_comes_back",
+                "engine/src/film/hdr.rs::round_trip_errs_by_at_most_a_step_of_the_largest_channel",
+                "engine/src/film/png.rs::a_written_file_reads_back_to_the_byte",
+            ],
+        ),
     ),
     measured(
         "tools/models",

@@ -70,6 +70,29 @@ fn fault_of_test(test: &str) -> Option<String> {
     Some(format!("no test {name} in {file}; it is in {elsewhere:?}"))
 }
 
+/// What is wrong with the command that measures a system.
+fn fault_of_experiment(id: &str, command: &str) -> Option<String> {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let program = match words[..] {
+        [] => return Some("no experiment".into()),
+        ["clerestory", command, ..] => format!("tools/src/commands/{command}.rs"),
+        [program, ..] => program.into(),
+    };
+    if !repository().join(&program).is_file() {
+        return Some(format!("no program {program}"));
+    }
+    let ["clerestory", "report", ref names @ ..] = words[..] else {
+        return None;
+    };
+    names.iter().find_map(|name| {
+        let file = format!("tools/experiments/{name}.toml");
+        let text = std::fs::read_to_string(repository().join(&file)).unwrap_or_default();
+        let mut systems = text.lines().filter(|line| line.starts_with("systems = ["));
+        let found = systems.any(|line| line.contains(&format!("\"{id}\"")));
+        (!found).then(|| format!("{file} does not measure it"))
+    })
+}
+
 #[test]
 fn modules_tests_and_experiments_exist() {
     let mut faults = Vec::new();
@@ -92,16 +115,7 @@ fn modules_tests_and_experiments_exist() {
                 .filter_map(|test| fault_of_test(test))
                 .map(|f| format!("{}: {f}", row.id)),
         );
-        if let Some(command) = row.experiment {
-            let mut words = command.split_whitespace();
-            let program = match (words.next(), words.next()) {
-                (Some("clerestory"), Some(command)) => format!("tools/src/commands/{command}.rs"),
-                (program, _) => program.unwrap_or_default().to_owned(),
-            };
-            if !repository().join(&program).is_file() {
-                faults.push(format!("{}: no program {program}", row.id));
-            }
-        }
+        faults.extend(fault_of_experiment(row.id, row.experiment).map(|f| format!("{}: {f}", row.id)));
     }
     assert!(
         faults.is_empty(),
@@ -116,6 +130,15 @@ fn tests_that_are_not_there_are_found_out() {
     assert!(fault.contains("catalogue/tests.rs"), "{fault}");
     assert!(fault_of_test("engine/src/catalogue/tests.rs").is_some());
     assert!(fault_of_test("engine/src/catalogue/tests.rs::tests_that_are_not_there_are_found_out").is_none());
+}
+
+#[test]
+fn experiments_that_are_not_there_are_found_out() {
+    assert!(fault_of_experiment("CL-SUM", "").is_some());
+    assert!(fault_of_experiment("CL-SUM", "clerestory nothing").is_some());
+    assert!(fault_of_experiment("CL-SUM", "clerestory report no-such-experiment").is_some());
+    assert!(fault_of_experiment("CL-SUM", "clerestory report picture-formats").is_some());
+    assert!(fault_of_experiment("CL-SUM", "clerestory report sample-sums").is_none());
 }
 
 #[test]
@@ -147,7 +170,7 @@ fn the_page_is_up_to_date() {
 fn scenes_of_experiments_are_compared() {
     let list = std::fs::read_to_string(repository().join("tools/src/mitsuba/scenes.rs")).expect("scenes");
     for row in all() {
-        let Some((_, names)) = row.experiment.and_then(|command| command.split_once("--scene ")) else {
+        let Some((_, names)) = row.experiment.split_once("--scene ") else {
             continue;
         };
         for name in names.split(',') {

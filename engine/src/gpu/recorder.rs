@@ -38,6 +38,8 @@ pub struct Recorder {
     resources: Lease,
     markers: Option<Buffer>,
     passes: Vec<String>,
+    /// Barrier commands of each pass.
+    barriers: Vec<u32>,
     kept: Kept,
     tracker: Option<Tracker>,
     /// The first pass whose invocations are counted.
@@ -78,6 +80,7 @@ impl Gpu {
             resources: Lease::take(self)?,
             markers,
             passes: Vec::new(),
+            barriers: Vec::new(),
             kept: Kept::new(),
             tracker: cfg!(debug_assertions).then(Tracker::default),
             counted_from: None,
@@ -110,6 +113,7 @@ impl Recorder {
             });
         }
         self.passes.push(name.into());
+        self.barriers.push(0);
         let inner = Arc::clone(&self.gpu.inner);
         let FrameResources {
             command_buffer,
@@ -209,6 +213,7 @@ impl Recorder {
             value,
             resources: self.resources,
             passes: self.passes,
+            barriers: self.barriers,
             _kept: self.kept,
             counted_from: self.counted_from,
             finished: false,
@@ -445,7 +450,10 @@ impl Pass<'_> {
         (from.on(caps), to.on(caps))
     }
 
-    fn pipeline_barrier(&self, info: &vk::DependencyInfo<'_>) {
+    fn pipeline_barrier(&mut self, info: &vk::DependencyInfo<'_>) {
+        if let Some(count) = self.recorder.barriers.last_mut() {
+            *count += 1;
+        }
         // SAFETY: the command buffer is recording, outside of rendering.
         unsafe {
             self.recorder

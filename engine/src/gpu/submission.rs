@@ -23,6 +23,8 @@ pub struct Submission {
     /// Goes back before what its commands use does.
     pub(super) resources: Lease,
     pub(super) passes: Vec<String>,
+    /// Barrier commands of each pass.
+    pub(super) barriers: Vec<u32>,
     pub(super) _kept: Kept,
     /// The first pass whose invocations were counted.
     pub(super) counted_from: Option<usize>,
@@ -117,9 +119,11 @@ impl Submission {
             let ticks = timestamps.as_ref()?;
             Some((elapsed(ticks[2 * index], ticks[2 * index + 1], valid_bits) as f64 * period) as u64)
         };
-        let passes = self.passes.iter().enumerate().map(|(index, name)| PassTiming {
+        let passes = self.passes.iter().zip(&self.barriers).enumerate();
+        let passes = passes.map(|(index, (name, barriers))| PassTiming {
             name: name.clone(),
             nanoseconds: nanoseconds(index),
+            barriers: *barriers,
             invocations: invocations
                 .as_ref()
                 .and_then(|counts| counts.get(index.checked_sub(counted_from)?).copied()),

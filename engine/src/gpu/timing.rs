@@ -12,6 +12,8 @@ pub struct PassTiming {
     pub name: String,
     /// GPU time between the timestamps before and after it; `None` without timestamp support.
     pub nanoseconds: Option<u64>,
+    /// Barrier commands recorded in it, exact.
+    pub barriers: u32,
     /// Compute shader invocations, when pipeline statistics were asked for.
     pub invocations: Option<u64>,
 }
@@ -76,6 +78,7 @@ mod tests {
         let pass = |name: &str, nanoseconds| PassTiming {
             name: name.into(),
             nanoseconds,
+            barriers: 0,
             invocations: None,
         };
         let passes = vec![

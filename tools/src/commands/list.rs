@@ -143,7 +143,7 @@ fn row_text(row: &Row) -> String {
             ("bias", row.bias.map(bias_line).unwrap_or_default()),
             ("needs", needs_text(row.needs)),
             ("tests", row.tests.join("\n               ")),
-            ("experiment", row.experiment.unwrap_or_default().into()),
+            ("experiment", row.experiment.into()),
         ],
     )
 }

@@ -86,6 +86,25 @@ impl Table {
         self.notes.push(note.into());
     }
 
+    /// What is wrong with the table: no rows, a row that is not as long as the heads, a number that is not finite.
+    pub fn fault(&self) -> Option<String> {
+        if self.rows.is_empty() {
+            return Some("has no rows".into());
+        }
+        self.rows.iter().enumerate().find_map(|(index, row)| {
+            if row.len() != self.heads.len() {
+                return Some(format!(
+                    "row {index} has {} cells for {} heads",
+                    row.len(),
+                    self.heads.len()
+                ));
+            }
+            let bad = |cell: &Cell| matches!(cell, Cell::Number(number) if !number.is_finite());
+            let column = row.iter().position(bad)?;
+            Some(format!("row {index}, {}: {}", self.heads[column], row[column]))
+        })
+    }
+
     /// As Markdown below a heading of the third level.
     pub fn markdown(&self) -> String {
         let mut text = format!("### {}\n\n| {} |\n|", self.title, self.heads.join(" | "));
@@ -149,6 +168,12 @@ mod tests {
         );
         assert!(text.ends_with("\nA note.\n"));
         assert_eq!(table.csv(), "what,error (ulp),rays\n\"a, b\",1.2345e-2,7\n");
+        assert_eq!(table.fault(), None);
+        table.row(["b".into(), f64::NAN.into(), 7_u64.into()]);
+        assert_eq!(table.fault().as_deref(), Some("row 1, error (ulp): NaN"));
+        table.rows[1].pop();
+        assert!(table.fault().is_some_and(|fault| fault.contains("2 cells for 3 heads")));
+        assert!(Table::new("Empty", &["a"]).fault().is_some());
         assert_eq!(Cell::Number(1234.5).to_string(), "1234");
         assert_eq!(Cell::Number(-0.5).to_string(), "-0.5000");
         assert_eq!(Cell::Number(1e-9).to_string(), "1.000e-9");

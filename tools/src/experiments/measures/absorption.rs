@@ -1,0 +1,88 @@
+//! Absorption inside of solid bodies, seen straight through a slab.
+//!
+//! Oracle: e^−σd without refraction; with it, the series of reflections inside the slab, (1 − R)² a / (1 − R² a²) with a = e^−σd.
+
+use clerestory::Result;
+use clerestory::render::Renderer;
+use clerestory::scene::{Material, Mesh, Scene};
+use glam::{BVec3, Vec3};
+
+use super::Context;
+use super::pictures::{Image, emitter, z_score};
+use crate::experiments::table::Table;
+
+/// Twelve triangles that face outwards.
+fn solid_box(scene: &mut Scene, material: Material, lower: Vec3, upper: Vec3) {
+    let corner = |i: u32| Vec3::select(BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), upper, lower);
+    let faces = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let material = scene.add_material(material);
+    scene.place(Mesh {
+        name: "slab".into(),
+        positions: (0..8).map(corner).collect(),
+        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        material: Some(material),
+        ..Mesh::default()
+    });
+}
+
+/// The measure.
+pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
+    let (size, spp) = if context.smoke { (4, 16) } else { (32, 1024) };
+    let gpu = (context.gpu)()?;
+    let mut table = Table::new(
+        "Light straight through an absorbing slab",
+        &[
+            "index",
+            "thickness (m)",
+            "absorption (1/m)",
+            "expected",
+            "rendered",
+            "relative error",
+            "standard deviation",
+            "z",
+            "GPU ns a sample",
+        ],
+    );
+    for ior in [1.0_f32, 1.5] {
+        for (thickness, sigma) in [(0.5_f32, 0.0_f64), (0.5, 1.0), (2.0, 1.0), (2.0, 4.0), (5.0, 0.1)] {
+            let mut scene = emitter("slab", Vec3::ONE);
+            let material = Material {
+                attenuation_color: Vec3::splat((-sigma).exp() as f32),
+                attenuation_distance: 1.0,
+                ..Material::glass("slab", ior)
+            };
+            let (lower, upper) = (Vec3::new(-3.0, 0.5, -3.0), Vec3::new(3.0, 0.5 + thickness, 3.0));
+            solid_box(&mut scene, material, lower, upper);
+            let index = f64::from(ior);
+            let reflected = ((index - 1.0) / (index + 1.0)).powi(2);
+            // The colour is what the material holds, rounded.
+            let through = f64::from((-sigma).exp() as f32).powf(thickness.into());
+            let expected = (1.0 - reflected).powi(2) * through / (1.0 - (reflected * through).powi(2));
+            let image = Image::render(&Renderer::new(&gpu, &scene)?, size, spp, 4, "all")?;
+            let (mean, deviation) = image.mean(0);
+            let samples = f64::from(size * size) * f64::from(spp);
+            table.row([
+                index.into(),
+                f64::from(thickness).into(),
+                sigma.into(),
+                expected.into(),
+                mean.into(),
+                (mean / expected - 1.0).into(),
+                deviation.into(),
+                z_score(mean - expected, deviation, expected).into(),
+                (image.report.gpu_seconds * 1e9 / samples).into(),
+            ]);
+        }
+    }
+    table.note(format!(
+        "{size} × {size} pixels, {spp} independent samples each. Deviations below 2⁻¹⁷ of the value count as that much in z: they are rounding."
+    ));
+    Ok(vec![table])
+}

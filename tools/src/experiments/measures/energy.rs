@@ -1,0 +1,59 @@
+//! Albedos of the scattering function, for the measures of energy.
+
+use clerestory::transport::albedo::AlbedoTable;
+use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, GltfFactors, bsdf_sample};
+use clerestory::transport::random::{Sampler, SamplerKind, sample_1d, sample_2d};
+use glam::DVec3;
+
+/// A white, opaque coated surface.
+pub const WHITE: GltfFactors = GltfFactors {
+    base_color: DVec3::ONE,
+    metallic: 0.0,
+    roughness: 0.5,
+    transmission: 0.0,
+    ior: 1.5,
+    specular: 1.0,
+    specular_color: DVec3::ONE,
+    thickness: 0.0,
+};
+
+/// Cosines of the angles to look from, grazing ones included.
+pub const COSINES: [f64; 7] = [1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.02];
+/// Perceptual roughnesses.
+pub const ROUGHNESSES: [f64; 6] = [0.1, 0.2, 0.4, 0.6, 0.8, 1.0];
+
+/// The scattering function with the given features.
+pub fn context(features: BsdfFeatures) -> BsdfContext<'static> {
+    BsdfContext {
+        features,
+        table: AlbedoTable::shared(),
+    }
+}
+
+/// The direction of a cosine and an azimuth.
+pub fn direction(cos_theta: f64, phi: f64) -> DVec3 {
+    let sine = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+    DVec3::new(sine * phi.cos(), sine * phi.sin(), cos_theta)
+}
+
+/// Sobol' numbers of one sample.
+pub fn numbers(sample_index: u32) -> DVec3 {
+    let mut sampler = Sampler {
+        pixel: 1,
+        sample_index,
+        dimension: 0,
+        seed: 1,
+    };
+    let pair = sample_2d(&mut sampler, SamplerKind::Sobol);
+    pair.extend(sample_1d(&mut sampler, SamplerKind::Sobol))
+}
+
+/// The share of light that a surface seen at a cosine scatters: mean weight over Sobol' samples.
+pub fn albedo(context: &BsdfContext<'_>, surface: &Bsdf, cos_theta: f64, mask: u32, samples: u32) -> f64 {
+    let wo = direction(cos_theta, 0.0);
+    let weight = |i| {
+        let sample = bsdf_sample(context, surface, wo, numbers(i), mask);
+        if sample.flags == 0 { 0.0 } else { sample.weight.x }
+    };
+    (0..samples).map(weight).sum::<f64>() / f64::from(samples)
+}

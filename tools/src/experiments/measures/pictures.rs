@@ -1,0 +1,141 @@
+//! Small pictures for measures, and simple scenes with closed forms.
+
+use clerestory::Result;
+use clerestory::film::z_test::{ZTest, z_test};
+use clerestory::film::{Picture, picture};
+use clerestory::render::{FrameReport, RenderOptions, Renderer};
+use clerestory::scene::{Camera, Material, Mesh, Projection, Scene};
+use glam::{DVec3, Vec3};
+use serde_json::json;
+
+/// A picture with the variance of its means.
+pub struct Image {
+    /// RGB a pixel.
+    pub radiance: Vec<f32>,
+    /// Variance of each mean.
+    pub variance: Vec<f32>,
+    /// How it came about.
+    pub report: FrameReport,
+}
+
+/// The false-alarm rate of z-tests over a picture.
+const SIGNIFICANCE: f64 = clerestory::film::z_test::SIGNIFICANCE;
+
+impl Image {
+    /// Renders with independent samples, so that z-scores are standard normal, after a sample that compiles the kernels.
+    ///
+    /// # Errors
+    /// Those of rendering.
+    pub fn render(renderer: &Renderer, size: u32, spp: u32, seed: u32, paths: &str) -> Result<Self> {
+        let options = |spp, seed| RenderOptions {
+            technique: Some("path".into()),
+            size: [size; 2],
+            spp,
+            seed,
+            settings: json!({"sampler": "pcg", "path_set": paths}),
+            ..RenderOptions::default()
+        };
+        for options in [options(1, seed), options(spp, seed)] {
+            let mut rendering = renderer.start(&options)?;
+            while rendering.step()?.is_some() {}
+            if options.spp == spp {
+                let rendered = rendering.finish()?;
+                return Self::of(&rendered.picture, rendered.report);
+            }
+        }
+        Err(clerestory::Error::setting("spp", spp, "makes no picture"))
+    }
+
+    fn of(picture: &Picture, report: FrameReport) -> Result<Self> {
+        let values = |name| Ok(picture.require(name)?.values().to_vec());
+        Ok(Self {
+            radiance: values(picture::RADIANCE)?,
+            variance: values(picture::VARIANCE)?,
+            report,
+        })
+    }
+
+    /// Mean over all pixels and its standard deviation, of one channel.
+    pub fn mean(&self, channel: usize) -> (f64, f64) {
+        let of = |values: &[f32]| {
+            values
+                .iter()
+                .skip(channel)
+                .step_by(3)
+                .map(|v| f64::from(*v))
+                .sum::<f64>()
+        };
+        let pixels = (self.radiance.len() / 3).max(1) as f64;
+        (of(&self.radiance) / pixels, of(&self.variance).sqrt() / pixels)
+    }
+
+    /// This picture plus another one.
+    pub fn add(&mut self, other: &Self) {
+        let pairs = |a: &mut [f32], b: &[f32]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        pairs(&mut self.radiance, &other.radiance);
+        pairs(&mut self.variance, &other.variance);
+    }
+
+    /// The z-test of this picture against another.
+    ///
+    /// # Errors
+    /// [`clerestory::Error::Picture`] when the sizes differ.
+    pub fn z_test(&self, other: &Self) -> Result<ZTest> {
+        z_test(
+            &self.radiance,
+            &self.variance,
+            &other.radiance,
+            &other.variance,
+            SIGNIFICANCE,
+        )
+    }
+
+    /// An exact count of the report.
+    pub fn count(&self, name: &str) -> u64 {
+        self.report.counters.get(name).copied().unwrap_or(0)
+    }
+}
+
+/// A deviation in units of its standard deviation; 0 where both are 0 up to the rounding of f32.
+pub fn z_score(difference: f64, deviation: f64, scale: f64) -> f64 {
+    let rounding = clerestory::film::z_test::RELATIVE_DEVIATION_FLOOR * scale.abs();
+    difference / deviation.max(rounding).max(f64::MIN_POSITIVE)
+}
+
+/// An orthographic camera that looks down at [−1, 1]² from 10 m above.
+pub fn camera_down() -> Camera {
+    let mut camera = Camera::look_at("down", DVec3::Y * 10.0, DVec3::ZERO, -DVec3::Z, 1.0);
+    camera.projection = Projection::Orthographic { half_height: 1.0 };
+    camera
+}
+
+/// Adds a square of 8 m × 8 m at height `y` that faces up.
+pub fn add_square(scene: &mut Scene, material: Material, y: f32) {
+    let material = scene.add_material(material);
+    let corner = |x: f32, z: f32| Vec3::new(4.0 * x, y, 4.0 * z);
+    scene.place(Mesh {
+        name: "square".into(),
+        positions: vec![
+            corner(-1.0, 1.0),
+            corner(1.0, 1.0),
+            corner(1.0, -1.0),
+            corner(-1.0, -1.0),
+        ],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        material: Some(material),
+        ..Mesh::default()
+    });
+}
+
+/// A black square that shines upwards, seen from above.
+pub fn emitter(name: &str, radiance: Vec3) -> Scene {
+    let mut scene = Scene {
+        name: name.into(),
+        ..Scene::default()
+    };
+    let mut material = Material::lambert("emitter", Vec3::ZERO);
+    material.emission = radiance;
+    add_square(&mut scene, material, 0.0);
+    scene.cameras.push(camera_down());
+    scene
+}
