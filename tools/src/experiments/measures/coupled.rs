@@ -41,12 +41,13 @@ fn base_factor(form: Form, surface: &Bsdf, wo: DVec3, wi: DVec3) -> f64 {
     }
 }
 
+/// The scattering function without its cosine.
 fn value(form: Form, surface: &Bsdf, wo: DVec3, wi: DVec3) -> f64 {
     let context = bsdf(BsdfFeatures::ALL);
     if form == Form::Coupled {
-        return bsdf_eval(&context, surface, wo, wi, LOBE_ALL).x;
+        return bsdf_eval(&context, surface, wo, wi, LOBE_ALL).x / wi.z;
     }
-    let layer = bsdf_eval(&context, surface, wo, wi, LOBE_GLOSSY | LOBE_REFLECTION).x;
+    let layer = bsdf_eval(&context, surface, wo, wi, LOBE_GLOSSY | LOBE_REFLECTION).x / wi.z;
     layer + FRAC_1_PI * base_factor(form, surface, wo, wi)
 }
 

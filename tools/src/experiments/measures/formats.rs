@@ -109,7 +109,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "values changed",
             "worst error over the pixel's largest channel",
             "worst relative error up to 1",
-            "values above 1 that were cut",
+            "values above 1.01 that were cut",
             "bytes a pixel",
             "MB/s written",
             "MB/s read",
@@ -128,7 +128,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let (mut changed, mut cut) = (0_u64, 0_u64);
         for (i, (before, after)) in values.iter().zip(&back).enumerate() {
             changed += u64::from(before != after);
-            cut += u64::from(*before > 1.0 && *after <= 1.0);
+            cut += u64::from(*before > 1.01 && *after <= 1.0);
             of_pixel.add((after - before) / largest[i / 3]);
             if *before <= 1.0 {
                 shown.add((after - before) / before);

@@ -111,7 +111,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 let p = (phase.cumulative)(c, parameter);
                 worst = worst.max((p - u).abs().min((1.0 - p - u).abs()));
             }
-            let mut random = Random::new(3);
+            let mut random = Random::new(table.rows.len() as u32);
             let mut counts = [0; CELLS];
             let inputs: Vec<f64> = (0..samples).map(|_| random.unit()).collect();
             for u in &inputs {

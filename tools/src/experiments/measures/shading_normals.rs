@@ -103,7 +103,7 @@ fn beam(ns: DVec3, wi: DVec3, adapted: bool, samples: u32) -> f64 {
         let (o, i) = (frame.local(wo), frame.local(wi));
         if o.z > 0.0 && (!adapted || sides_agree(n, SURFACE, wi)) {
             // The scattering function holds the cosine to the shading normal.
-            sum += bsdf_eval(&context, &white, o, i, LOBE_ALL).x * i.z.abs() * wo.z / wi.z;
+            sum += bsdf_eval(&context, &white, o, i, LOBE_ALL).x * wo.z / wi.z;
         }
     }
     TAU * sum / f64::from(samples)

@@ -22,7 +22,7 @@ struct Surface {
     poles: f32,
     /// Texture coordinates of a place.
     uv: fn(f32, f32) -> Vec2,
-    /// Sign of the bitangent.
+    /// Sign of the bitangent, which points to smaller v as glTF has it.
     sign: f32,
 }
 
@@ -33,7 +33,7 @@ fn sphere(u: f32, v: f32) -> [Vec3; 3] {
 }
 
 fn torus(u: f32, v: f32) -> [Vec3; 3] {
-    let ((s, c), (st, ct)) = ((TAU * u).sin_cos(), (TAU * v).sin_cos());
+    let ((s, c), (st, ct)) = ((TAU * u).sin_cos(), (-TAU * v).sin_cos());
     let normal = Vec3::new(ct * c, st, -ct * s);
     let centre = Vec3::new(c, 0.0, -s);
     [centre + 0.4 * normal, normal, Vec3::new(-s, 0.0, -c)]
@@ -45,7 +45,7 @@ const SURFACES: [Surface; 3] = [
         at: sphere,
         poles: 0.1,
         uv: Vec2::new,
-        sign: -1.0,
+        sign: 1.0,
     },
     Surface {
         name: "torus",
