@@ -88,7 +88,7 @@ const CHANGES: [(&str, Change); 6] = [
     ("everything unseen", |scene| {
         let texture = texture(scene);
         let material = Material {
-            base_color_texture: Some(texture.clone()),
+            base_color_texture: Some(texture),
             normal_texture: Some(texture),
             metallic: 0.5,
             roughness: 0.5,

@@ -24,6 +24,8 @@ struct Input {
 
 /// Distance at the closest approach and, for a hit, the parameter of the entry.
 type Answer = (f64, Option<f64>);
+/// One way to compute them.
+type Form = fn(&Input) -> Answer;
 
 fn exact(input: &Input) -> Answer {
     let delta = WideVec::between(input.centre, input.origin);
@@ -119,7 +121,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "ns a ray",
         ],
     );
-    let forms: [(&str, fn(&Input) -> Answer); 4] = [
+    let forms: [(&str, Form); 4] = [
         ("engine, f32", engine_f32),
         ("textbook, f32", textbook_f32),
         ("engine, f64", engine_f64),

@@ -75,7 +75,10 @@ fn moller_trumbore_f64((ray, vertices): &Input) -> Answer {
     moller_trumbore(ray, vertices)
 }
 
-const FORMS: [(&str, fn(&Input) -> Answer); 4] = [
+/// One way to test.
+type Form = fn(&Input) -> Answer;
+
+const FORMS: [(&str, Form); 4] = [
     ("watertight, f32 (kernels)", watertight),
     ("Möller–Trumbore, f32", moller_trumbore_f32),
     ("watertight, f64 (oracle)", watertight_f64),
