@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use super::Context;
 use super::clock::nanoseconds;
-use super::energy::{COSINES, ROUGHNESSES, WHITE, albedo, context as bsdf, direction, numbers};
+use super::energy::{COSINES, Mean, ROUGHNESSES, WHITE, albedo, context as bsdf, direction, mean, numbers};
 use super::inputs::Random;
 use crate::experiments::table::Table;
 
@@ -51,15 +51,20 @@ fn value(form: Form, surface: &Bsdf, wo: DVec3, wi: DVec3) -> f64 {
     layer + FRAC_1_PI * base_factor(form, surface, wo, wi)
 }
 
-fn white_albedo(form: Form, surface: &Bsdf, cos_theta: f64, samples: u32) -> f64 {
+fn white_albedo(form: Form, surface: &Bsdf, cos_theta: f64, samples: u32) -> Mean {
     let context = bsdf(BsdfFeatures::ALL);
     if form == Form::Coupled {
         return albedo(&context, surface, cos_theta, LOBE_ALL, samples);
     }
     let layer = albedo(&context, surface, cos_theta, LOBE_GLOSSY | LOBE_REFLECTION, samples);
     let wo = direction(cos_theta, 0.0);
-    let base = |i| base_factor(form, surface, wo, square_to_cosine_hemisphere(numbers(i).truncate()));
-    layer + (0..samples).map(base).sum::<f64>() / f64::from(samples)
+    let base = mean(samples, |u| {
+        base_factor(form, surface, wo, square_to_cosine_hemisphere(u.truncate()))
+    });
+    Mean {
+        value: layer.value + base.value,
+        error: layer.error + base.error,
+    }
 }
 
 /// The measure.
@@ -74,6 +79,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "least albedo",
             "at cosine",
             "greatest albedo",
+            "its standard error",
             "at cosine",
             "reciprocity: worst relative difference",
             "ns an evaluation",
@@ -91,12 +97,12 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             .collect();
         for (name, form) in FORMS {
             let albedos = COSINES.map(|cosine| (white_albedo(form, &surface, cosine, samples), cosine));
-            let least = albedos
-                .into_iter()
-                .fold((f64::INFINITY, 0.0), |a, b| if b.0 < a.0 { b } else { a });
-            let greatest = albedos
-                .into_iter()
-                .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
+            let extreme = |better: fn(f64, f64) -> bool| {
+                albedos[1..]
+                    .iter()
+                    .fold(albedos[0], |a, b| if better(b.0.value, a.0.value) { *b } else { a })
+            };
+            let (least, greatest) = (extreme(|a, b| a < b), extreme(|a, b| a > b));
             let reciprocity = directions.iter().fold(0.0_f64, |worst, [a, b]| {
                 let (there, back) = (value(form, &surface, *a, *b), value(form, &surface, *b, *a));
                 worst.max((there - back).abs() / there.abs().max(back.abs()).max(f64::MIN_POSITIVE))
@@ -111,9 +117,10 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             table.row([
                 roughness.into(),
                 name.into(),
-                least.0.into(),
+                least.0.value.into(),
                 least.1.into(),
-                greatest.0.into(),
+                greatest.0.value.into(),
+                greatest.0.error.into(),
                 greatest.1.into(),
                 reciprocity.into(),
                 evaluation.into(),
@@ -123,7 +130,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     }
     table.note(format!(
         "Exact: albedo 1 at every angle, no difference when the directions change places. Albedos over cosines {COSINES:?} by {samples} Sobol' \
-         samples each. More than 1 is light out of nothing. Evaluations in f64 on one thread; the forms that are no part of the engine \
+         samples each. More than 1 beyond its standard error is light out of nothing. Evaluations in f64 on one thread; the forms that are no part of the engine \
          evaluate its layer and add their base."
     ));
     Ok(vec![table])

@@ -36,24 +36,55 @@ pub fn direction(cos_theta: f64, phi: f64) -> DVec3 {
     DVec3::new(sine * phi.cos(), sine * phi.sin(), cos_theta)
 }
 
-/// Sobol' numbers of one sample.
-pub fn numbers(sample_index: u32) -> DVec3 {
+/// Sobol' numbers of one sample of the sequence of that seed.
+pub fn numbers_of(seed: u32, sample_index: u32) -> DVec3 {
     let mut sampler = Sampler {
         pixel: 1,
         sample_index,
         dimension: 0,
-        seed: 1,
+        seed,
     };
     let pair = sample_2d(&mut sampler, SamplerKind::Sobol);
     pair.extend(sample_1d(&mut sampler, SamplerKind::Sobol))
 }
 
-/// The share of light that a surface seen at a cosine scatters: mean weight over Sobol' samples.
-pub fn albedo(context: &BsdfContext<'_>, surface: &Bsdf, cos_theta: f64, mask: u32, samples: u32) -> f64 {
+/// Sobol' numbers of one sample.
+pub fn numbers(sample_index: u32) -> DVec3 {
+    numbers_of(1, sample_index)
+}
+
+/// Independent sequences of a mean; their spread gives its error.
+const SEQUENCES: u32 = 16;
+
+/// A mean of samples and its standard error.
+#[derive(Debug, Clone, Copy)]
+pub struct Mean {
+    /// The mean.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+/// Mean of a function of Sobol' numbers, over `samples` of them in all, at least one a sequence.
+pub fn mean(samples: u32, function: impl Fn(DVec3) -> f64) -> Mean {
+    let each = (samples / SEQUENCES).max(1);
+    let means: Vec<f64> = (1..=SEQUENCES)
+        .map(|seed| (0..each).map(|i| function(numbers_of(seed, i))).sum::<f64>() / f64::from(each))
+        .collect();
+    let count = f64::from(SEQUENCES);
+    let value = means.iter().sum::<f64>() / count;
+    let spread = means.iter().map(|m| (m - value) * (m - value)).sum::<f64>() / (count - 1.0);
+    Mean {
+        value,
+        error: (spread / count).sqrt(),
+    }
+}
+
+/// The share of light that a surface seen at a cosine scatters: mean weight of samples.
+pub fn albedo(context: &BsdfContext<'_>, surface: &Bsdf, cos_theta: f64, mask: u32, samples: u32) -> Mean {
     let wo = direction(cos_theta, 0.0);
-    let weight = |i| {
-        let sample = bsdf_sample(context, surface, wo, numbers(i), mask);
+    mean(samples, |u| {
+        let sample = bsdf_sample(context, surface, wo, u, mask);
         if sample.flags == 0 { 0.0 } else { sample.weight.x }
-    };
-    (0..samples).map(weight).sum::<f64>() / f64::from(samples)
+    })
 }
