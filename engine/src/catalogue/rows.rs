@@ -329,9 +329,9 @@ pub(super) const ROWS: &[Row] = &[
         "CL-PATHSET",
         "restriction of a picture to a set of light paths",
         "Heckbert 1990, path notation",
-        "engine/src/transport/path_set.rs",
+        "engine/src/transport/path_set/mod.rs",
         &[
-            "engine/src/transport/path_set.rs::text_round_trips",
+            "engine/src/transport/path_set/tests.rs::text_round_trips",
             "tests/tests/path_tracer.rs::path_sets_are_a_partition",
             "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
         ],
