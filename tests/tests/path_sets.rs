@@ -63,8 +63,8 @@ fn expect_sum(gpu: &Gpu, scene: &Scene, what: &str, whole: &Rendered, parts: &[&
     whole.expect_same_as(what, &radiance, &variance);
 }
 
-/// Fails unless the sets are a partition of `whole`, in the algebra and in pictures.
-fn expect_partition(gpu: &Gpu, scene: &Scene, whole: &str, partitions: &[&[&str]]) {
+/// Fails unless the sets are a partition of `whole`, in the algebra and in pictures; `there` holds the paths that the scene has.
+fn expect_partition(gpu: &Gpu, scene: &Scene, [whole, there]: [&str; 2], partitions: &[&[&str]]) {
     let parsed = |text: &str| text.parse::<PathSet>().unwrap_or_else(|error| panic!("{error}"));
     let picture = blocks(&part(gpu, scene, whole, 7));
     for parts in partitions {
@@ -79,9 +79,10 @@ fn expect_partition(gpu: &Gpu, scene: &Scene, whole: &str, partitions: &[&[&str]
             );
             union.union(&set).unwrap_or_else(|error| panic!("{what}: {error}"))
         });
-        // Without media in the scene a part may leave them out.
-        let surfaces = parsed("L[^V]*E").intersection(&parsed(whole)).unwrap_or_default();
-        assert!(surfaces.is_subset_of(&union), "{what}: {union} is not all");
+        let needed = parsed(there)
+            .intersection(&parsed(whole))
+            .unwrap_or_else(|error| panic!("{what}: {error}"));
+        assert!(needed.is_subset_of(&union), "{what}: {union} is not all");
         expect_sum(gpu, scene, &what, &picture, parts);
     }
 }
@@ -93,7 +94,7 @@ fn glass_casts_caustics_that_are_a_part() {
         expect_partition(
             gpu,
             &scene,
-            "bounces=0..5",
+            ["bounces=0..5", "L[DS]*E"],
             &[
                 // By caustics; by what is scattered first, at the light; last, at the eye.
                 &["bounces=0..5,LS+DE", "bounces=0..5,!LS+DE"],
@@ -117,7 +118,7 @@ fn coats_over_diffuse_bases_are_told_apart() {
         expect_partition(
             gpu,
             &scene,
-            "bounces=0..4",
+            ["bounces=0..4", "L[^V]*E"],
             &[
                 &[
                     "bounces=0..4,L[^G]*E",
@@ -142,7 +143,7 @@ fn rough_metal_is_a_part() {
         expect_partition(
             gpu,
             &scene,
-            "bounces=0..4",
+            ["bounces=0..4", "L[^V]*E"],
             &[
                 &["bounces=0..4,LD*E", "bounces=0..4,L.*[^D].*E"],
                 &["bounces=0..4,LDG.*E", "bounces=0..4,!LDG.*E"],
@@ -155,14 +156,16 @@ fn rough_metal_is_a_part() {
 fn drawn_labels_agree_with_masks() {
     with_gpu(|gpu| {
         // At each vertex the second form allows one class; the first allows two and has to tell afterwards which it was.
-        for address in ["builtin:materials", "builtin:divider-room?roughness=0.3"] {
-            let scene = builtin(address);
-            let set: PathSet = "LDDE|LGGE".parse().unwrap_or_else(|error| panic!("{error}"));
-            assert!(set.tells_reflections_apart());
-            let labelled = blocks(&part(gpu, &scene, "LDDE|LGGE", 7));
-            expect_sum(gpu, &scene, address, &labelled, &["LDDE", "LGGE"]);
-            let labelled = blocks(&part(gpu, &scene, "LDGE|LGDE", 7));
-            expect_sum(gpu, &scene, address, &labelled, &["LDGE", "LGDE"]);
+        for (address, parts) in [
+            ("builtin:materials", ["LDDE", "LGGE"]),
+            ("builtin:materials", ["LDGE", "LGDE"]),
+            ("builtin:divider-room?roughness=0.3", ["LDGE", "LGDE"]),
+        ] {
+            let (scene, both) = (builtin(address), parts.join("|"));
+            let set: PathSet = both.parse().unwrap_or_else(|error| panic!("{error}"));
+            assert!(set.tells_reflections_apart(), "{both}");
+            let labelled = blocks(&part(gpu, &scene, &both, 7));
+            expect_sum(gpu, &scene, &format!("{address}: {both}"), &labelled, &parts);
         }
     });
 }

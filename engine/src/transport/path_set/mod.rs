@@ -2,7 +2,7 @@
 //!
 //! Errors are measured between pictures of equal path sets only. Notation: Heckbert, "Adaptive Radiosity Textures for Bidirectional Ray
 //! Tracing" (SIGGRAPH 1990), section 2, with classes and sides of lobes; the grammar is that of [`PathSet::from_str`], explained in
-//! `docs/path-sets.md`. A set is a range of lengths and a finite automaton; equal sets have equal values and equal text. The form that kernels
+//! `docs/path-sets.md`. A set is a range of lengths and a finite automaton; sets of the same paths are equal, however they are written. The form that kernels
 //! read is that of `transport/path_set.glsl`.
 
 mod automaton;
@@ -134,26 +134,19 @@ impl PathSet {
         if check_range(least, most).is_ok() && Dfa::repeated(symbols).of_lengths(least, most) == whole {
             return Ok(Self::simple(least, most, symbols));
         }
-        let (min, max, kept) = if whole.len() <= STATES {
-            (0, None, &whole)
-        } else {
-            // Bounds that change nothing are left out, the others are as tight as can be.
-            let shortest = dfa.extent().map_or(0, |(shortest, ..)| shortest);
-            (if shortest >= min { 0 } else { least }, max.and(most), dfa)
+        // A range beside a short expression, or all in one: what is shorter to say. Bounds that change nothing are left out.
+        let shortest = dfa.extent().map_or(0, |(shortest, ..)| shortest);
+        let (min, max) = (if shortest >= min { 0 } else { least }, max.and(most));
+        let length = |dfa: &Dfa, range: usize| {
+            let node = Some(dfa).filter(|dfa| dfa.len() <= STATES).and_then(Node::of_automaton);
+            node.map(|node| node.text().len() + range)
         };
-        if kept.len() > STATES {
-            let cause = format!(
-                "needs an automaton of {} states, but a path can carry {STATES}: use smaller counts, leave long counts to bounces=A..B, or \
-                 render the parts one by one",
-                kept.len()
-            );
-            return Err(Error::setting(NAME, "the expression", cause));
-        }
-        // What cannot be written down could not be told from another set in a report.
-        if Node::of_automaton(kept).is_none() {
-            let cause = "has no expression of a reasonable length: render the parts one by one";
-            return Err(Error::setting(NAME, "the expression", cause));
-        }
+        let lengths = (length(&whole, 0), length(dfa, Self::range_text(min, max).len() + 1));
+        let (min, max, kept) = match lengths {
+            (None, None) => return Err(too_many_states(dfa.len())),
+            (Some(one), both) if both.is_none_or(|both| one <= both) => (0, None, &whole),
+            _ => (min, max, dfa),
+        };
         let mut set = Self {
             min_bounces: min,
             max_bounces: max,
@@ -317,7 +310,7 @@ impl PathSet {
         (self.min_bounces, self.max_bounces, self.successors, self.accepting)
     }
 
-    /// Whether a range stands beside an automaton: only such sets have more than one form.
+    /// Whether a range stands beside an automaton: such sets have more than one form.
     fn has_both(&self) -> bool {
         (self.min_bounces, self.max_bounces) != (0, None) && self.has_automaton()
     }
@@ -325,7 +318,7 @@ impl PathSet {
 
 impl PartialEq for PathSet {
     fn eq(&self, other: &Self) -> bool {
-        self.fields() == other.fields() || (self.has_both() && other.has_both() && self.whole() == other.whole())
+        self.fields() == other.fields() || ((self.has_both() || other.has_both()) && self.whole() == other.whole())
     }
 }
 
@@ -333,7 +326,8 @@ impl Eq for PathSet {}
 
 impl Hash for PathSet {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
-        if !self.has_both() {
+        // Equal sets of different forms have automata.
+        if !self.has_automaton() {
             self.fields().hash(hasher);
         }
     }
@@ -341,6 +335,18 @@ impl Hash for PathSet {
 
 fn too_large(_: TooLarge) -> Error {
     let cause = "needs too large an automaton: use smaller counts, or render the parts one by one";
+    Error::setting(NAME, "the expression", cause)
+}
+
+fn too_many_states(states: usize) -> Error {
+    let cause = if states <= STATES {
+        "has no expression of a reasonable length: render the parts one by one".into()
+    } else {
+        format!(
+            "needs an automaton of {states} states, but a path can carry {STATES}: use smaller counts, leave long counts to \
+             bounces=A..B, or render the parts one by one"
+        )
+    };
     Error::setting(NAME, "the expression", cause)
 }
 

@@ -47,7 +47,7 @@ impl PathSet {
     }
 
     /// The range in words; nothing where there is none.
-    fn range_text(min: u32, max: Option<u32>) -> String {
+    pub(super) fn range_text(min: u32, max: Option<u32>) -> String {
         let named = RANGE_NAMES.iter().find(|(_, a, b)| (*a, *b) == (min, max));
         match (named, min, max) {
             (Some((name, ..)), ..) => (*name).into(),
@@ -60,7 +60,7 @@ impl PathSet {
 }
 
 impl fmt::Display for PathSet {
-    /// The one text of a set: the words of [`PathSet::from_str`] where they suffice, else an expression from light to eye.
+    /// The words of [`PathSet::from_str`] where they suffice, else an expression from light to eye, beside a range where that is shorter.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (min, max) = (self.min_bounces(), self.max_bounces());
         let range = Self::range_text(min, max);
