@@ -285,7 +285,7 @@ fn words() -> impl Strategy<Value = Vec<u32>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(192))]
+    #![proptest_config(ProptestConfig::with_cases(1024))]
 
     #[test]
     fn automata_accept_what_backtracking_accepts(
