@@ -404,6 +404,43 @@ fn masks_divide_the_whole() {
     }
 }
 
+/// What labels gather is what masks let through; the sum does not change, and the draw can be used again.
+#[test]
+fn labels_divide_samples_without_bias() {
+    let c = context(BsdfFeatures::ALL);
+    let n = 4096u32;
+    let wo = direction(0.6, 0.1);
+    for (name, b) in zoo() {
+        for lobe in [LOBE_DIFFUSE & LOBE_REFLECTION, LOBE_GLOSSY & LOBE_REFLECTION] {
+            let (expected, e) = albedo(&c, &b, wo, lobe, n);
+            let (mut sum, mut squares, mut draws) = (0.0, 0.0, 0.0);
+            for i in 0..n {
+                let s = bsdf_sample(&c, &b, wo, random3(i, 31), LOBE_ALL);
+                let mut u = random3(i, 32).x;
+                let labelled = bsdf_label(&c, &b, wo, s, LOBE_ALL, false, &mut u);
+                assert!(
+                    (0.0..1.0).contains(&u) && (s.wi, s.pdf) == (labelled.wi, labelled.pdf),
+                    "{name}"
+                );
+                draws += u;
+                if labelled.flags == lobe {
+                    sum += labelled.weight.x;
+                    squares += labelled.weight.x.powi(2);
+                }
+            }
+            let n = f64::from(n);
+            let mean = sum / n;
+            let variance = (squares / n - mean * mean).max(0.0) / n;
+            let bound = 5.0 * (variance + e * e).sqrt() + 1e-4;
+            assert!((mean - expected.x).abs() < bound, "{name}: {mean} {expected}");
+            assert!(
+                (draws / n - 0.5).abs() < 5.0 * (1.0 / (12.0 * n)).sqrt(),
+                "{name}: draws"
+            );
+        }
+    }
+}
+
 #[test]
 fn absent_features_change_nothing() {
     let all = context(BsdfFeatures::ALL);
