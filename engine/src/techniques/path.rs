@@ -35,7 +35,7 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
 const SETTINGS: [SettingInfo; 8] = [
     SettingInfo {
         name: "path_set",
-        range: "all | emitted | direct | indirect | bounces=A..B, each with lobes=diffuse+glossy+…",
+        range: "all | emitted | direct | indirect | bounces=A..B, with lobes=diffuse+glossy+…; or path expressions: LDE, LS+DE, L[DG]{1,3}E, !L.*S.*E …",
         unit: "",
         meaning: "which light paths the picture contains",
     },
@@ -84,7 +84,7 @@ const SETTINGS: [SettingInfo; 8] = [
 ];
 
 /// What each specialization constant of the shading stage stands for, and why it is off where nothing else is known.
-const FEATURES: [(&str, &str, &str); 16] = [
+const FEATURES: [(&str, &str, &str); 18] = [
     (HAS_METAL, "metal lobes", "no material is metal"),
     (
         "has_conductor",
@@ -116,6 +116,16 @@ const FEATURES: [(&str, &str, &str); 16] = [
         "has_punctual_lights",
         "point, spot and directional lights",
         "the scene has none",
+    ),
+    (
+        "has_path_automaton",
+        "path expressions",
+        "the path set is a range of bounces and lobes",
+    ),
+    (
+        "has_lobe_labels",
+        "telling overlapping lobes apart",
+        "the path set goes on alike after each, or the scene has but one",
     ),
 ];
 const HAS_METAL: &str = "has_metal";

@@ -74,6 +74,7 @@ impl Pipelines {
         camera: &Camera,
     ) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
+        let overlapping = bsdf.metal || bsdf.specular_layer;
         let shade = path_shade::Spec {
             has_metal: bsdf.metal,
             has_conductor: bsdf.conductor,
@@ -93,6 +94,8 @@ impl Pipelines {
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
             has_alpha: profile.has_alpha(),
+            has_path_automaton: settings.path_set.has_automaton(),
+            has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
         };
         Ok(Self {
             camera: camera_pipeline(gpu, settings, frame, camera)?,

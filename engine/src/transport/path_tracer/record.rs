@@ -77,6 +77,8 @@ impl PathTracer {
             path_set: self.settings.path_set.packed(),
             roulette_start: self.settings.roulette_start,
             roulette_cap: self.settings.roulette_cap,
+            accepting: self.settings.path_set.accepting(),
+            successors: self.settings.path_set.successors(),
         };
         recorder.pass("path: shade", |pass| {
             pass.dispatch_indirect(&p.shade, &[&paths, &scene], &push, items)?;

@@ -47,7 +47,7 @@ fn value(form: Form, surface: &Bsdf, wo: DVec3, wi: DVec3) -> f64 {
     if form == Form::Coupled {
         return bsdf_eval(&context, surface, wo, wi, LOBE_ALL).x / wi.z;
     }
-    let layer = bsdf_eval(&context, surface, wo, wi, LOBE_GLOSSY | LOBE_REFLECTION).x / wi.z;
+    let layer = bsdf_eval(&context, surface, wo, wi, LOBE_GLOSSY & LOBE_REFLECTION).x / wi.z;
     layer + FRAC_1_PI * base_factor(form, surface, wo, wi)
 }
 
@@ -56,7 +56,7 @@ fn white_albedo(form: Form, surface: &Bsdf, cos_theta: f64, samples: u32) -> Mea
     if form == Form::Coupled {
         return albedo(&context, surface, cos_theta, LOBE_ALL, samples);
     }
-    let layer = albedo(&context, surface, cos_theta, LOBE_GLOSSY | LOBE_REFLECTION, samples);
+    let layer = albedo(&context, surface, cos_theta, LOBE_GLOSSY & LOBE_REFLECTION, samples);
     let wo = direction(cos_theta, 0.0);
     let base = mean(samples, |u| {
         base_factor(form, surface, wo, square_to_cosine_hemisphere(u.truncate()))
