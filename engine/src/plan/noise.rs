@@ -10,6 +10,8 @@ use crate::{Error, Result};
 
 /// Pixels to each side of the neighbourhood.
 const REACH: usize = 2;
+/// Inverse of the relative variance at which a pixel and its neighbourhood are believed alike.
+const MISTRUST: f64 = 20.0;
 
 /// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + `offset`) over pixels and channels, as
 /// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it.
@@ -36,13 +38,11 @@ pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64
             .collect();
         let (near_squares, near_variances) = (blurred(&squares, width), blurred(&variances, width));
         for i in 0..width * height {
-            // The pixel's own estimate as far as the noise around it lets it be trusted.
-            let (signal, noise) = (near_squares[i].max(0.0), near_variances[i]);
-            let own = if signal + noise > 0.0 {
-                signal / (signal + noise)
-            } else {
-                1.0
-            };
+            // The pixel's own estimate only where there is little noise: a large difference makes the product small, and the two
+            // must not meet in one quotient.
+            let (signal, noise) = (near_squares[i].max(0.0), MISTRUST * near_variances[i]);
+            let all = signal * signal + noise * noise;
+            let own = if all > 0.0 { signal * signal / all } else { 1.0 };
             let square = (own * squares[i] + (1.0 - own) * signal).max(0.0);
             sum += variances[i] / (square + offset);
         }
