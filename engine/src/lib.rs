@@ -15,7 +15,7 @@
 //! ```
 //!
 //! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`scene`] and [`film`], [`accel`] (spatial
-//! indexes), [`transport`] (what light does), [`techniques`], and [`render`], which ties them together. [`catalogue`] says where each
+//! indexes), [`transport`] (what light does), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] says where each
 //! published method lives.
 
 pub mod accel;
@@ -23,6 +23,7 @@ pub mod catalogue;
 pub mod error;
 pub mod film;
 pub mod gpu;
+pub mod plan;
 pub mod render;
 pub mod scene;
 pub mod settings;

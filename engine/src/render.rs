@@ -12,7 +12,7 @@ use crate::film::picture::{Metadata, NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
 use crate::scene::{Camera, Note, Scene, SceneProfile};
 use crate::techniques::{self, Skipped, Technique, TechniqueInfo, View};
-use crate::transport::GpuScene;
+use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
 /// What to render and how.
@@ -292,6 +292,22 @@ impl Rendering {
             seconds,
             rays,
         }))
+    }
+
+    /// Asks for another number of samples a pixel; those that are there stay.
+    pub fn set_spp(&mut self, spp: u32) {
+        self.options.spp = spp;
+        self.finished = false;
+    }
+
+    /// Pixels across and down.
+    pub fn size(&self) -> [u32; 2] {
+        self.options.size
+    }
+
+    /// The light paths of the picture.
+    pub fn path_set(&self) -> PathSet {
+        self.technique.path_set()
     }
 
     /// Looks through another camera, from the first sample and second on.

@@ -30,13 +30,14 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
 }
 
 /// The floors from below; those of one line stand side by side and do not know each other.
-const FLOORS: [&[&str]; 6] = [
+const FLOORS: [&[&str]; 7] = [
     &["gpu"],
     &["kernels", "scene", "film"],
     &["accel", "maps", "raster"],
     &["transport"],
     &["techniques"],
     &["render"],
+    &["plan"],
 ];
 
 fn height(floor: &str) -> Option<usize> {

@@ -53,6 +53,12 @@ pub fn note(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{}", one_line(line));
 }
 
+/// Prints a table to the error output.
+pub fn explain(text: &str) {
+    // A closed error output leaves nobody to tell.
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
 /// Prints a warning to the error output.
 pub fn warn(line: &str) {
     let _ = writeln!(

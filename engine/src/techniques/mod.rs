@@ -61,8 +61,20 @@ pub struct TechniqueInfo {
     pub settings: &'static [SettingInfo],
     /// Default settings as JSON.
     pub default_settings: fn() -> serde_json::Value,
+    /// Settings that an automatic choice tries ([`plan`](mod@crate::plan)): all of them give the same expected picture. The first are the
+    /// defaults.
+    pub variants: &'static [Variant],
     /// Makes the technique. Whoever wants one calls [`TechniqueInfo::prepare`], which looks at device and scene first.
     pub create: Create,
+}
+
+/// Settings that may suit one scene better than another.
+#[derive(Debug, Clone, Copy)]
+pub struct Variant {
+    /// What distinguishes them, in a word or two.
+    pub name: &'static str,
+    /// Settings as JSON; missing ones take their defaults.
+    pub settings: fn() -> serde_json::Value,
 }
 
 /// A setting of a technique, in words. Its default is in [`TechniqueInfo::default_settings`].

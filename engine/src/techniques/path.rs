@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Bias, SettingInfo, Skipped, Technique, TechniqueInfo};
+use super::{Bias, SettingInfo, Skipped, Technique, TechniqueInfo, Variant};
 use crate::Result;
 use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -24,6 +24,24 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     refusals: |_| Vec::new(),
     settings: &SETTINGS,
     default_settings: || serde_json::to_value(PathTracerSettings::default()).unwrap_or_default(),
+    variants: &[
+        Variant {
+            name: "defaults",
+            settings: || serde_json::json!({}),
+        },
+        Variant {
+            name: "independent samples",
+            settings: || serde_json::json!({ "sampler": "pcg" }),
+        },
+        Variant {
+            name: "late roulette",
+            settings: || serde_json::json!({ "roulette_start": 12 }),
+        },
+        Variant {
+            name: "early roulette",
+            settings: || serde_json::json!({ "roulette_start": 1 }),
+        },
+    ],
     create: |gpu, scene, view, settings| {
         let mut settings: PathTracerSettings = from_json(settings)?;
         settings.seed = view.seed;

@@ -35,6 +35,7 @@ const EVEN: TechniqueInfo = TechniqueInfo {
     },
     settings: &[],
     default_settings: || serde_json::json!({"radiance": 1.0}),
+    variants: &[],
     create: |gpu, _, view, settings| {
         let radiance = settings["radiance"].as_f64().unwrap_or(1.0);
         Ok(Box::new(Even {

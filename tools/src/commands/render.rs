@@ -1,5 +1,6 @@
 //! `clerestory render`: a scene to a picture, with a report of how it came about and, against a reference, how wrong it is.
 
+mod choice;
 mod files;
 mod progress;
 
@@ -11,6 +12,7 @@ use clap::{Args, ValueEnum};
 use clerestory::Error;
 use clerestory::film::picture::{ALBEDO, DEPTH, NORMAL, SAMPLES, VARIANCE};
 use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
+use clerestory::plan::Goal;
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{self, Scene};
 use clerestory::techniques;
@@ -33,6 +35,8 @@ Examples:
   clerestory render                                          the Cornell box
   clerestory render 'builtin:cornell-box?sphere=glass' --spp 256 -o out/glass.exr
   clerestory render model.glb --camera front --size 1280x720 --time-budget 30s --tone neutral
+  clerestory render model.glb --error 0.02 --explain         as many samples as it takes, by the settings that suit the scene
+  clerestory render model.glb --time 20s                     the best picture in that time
   clerestory render --path-set direct --aov normal,albedo,depth
   clerestory render --spp 4096 -o reference.exr
   clerestory render --spp 16 --seed 1 --reference reference.exr
@@ -65,6 +69,15 @@ pub struct Arguments {
     /// Camera by name; by default the scene's first
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
+    /// Chooses technique, settings and samples for this error: the root of the relative MSE, 0.02 is 2 %
+    #[arg(long, value_name = "ERROR", value_parser = positive, conflicts_with_all = ["spp", "time_budget"])]
+    error: Option<f64>,
+    /// Chooses technique, settings and samples for this time, pilots included; with --error, its limit: 10s, 500ms, 2min
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with_all = ["spp", "time_budget"])]
+    time: Option<Duration>,
+    /// Shows what could have been chosen, and why it was not
+    #[arg(long)]
+    explain: bool,
     /// Which light paths: words or an expression from light to eye, e.g. direct, LS+DE; --help says more
     ///
     /// Words: all, none, emitted, direct, indirect, bounces=1..3, lobes=diffuse+glossy+…. Expressions: L events E, with the events D
@@ -171,6 +184,13 @@ enum Statistics {
     None,
 }
 
+fn positive(text: &str) -> Result<f64, String> {
+    match finite(text)? {
+        number if number > 0.0 => Ok(number),
+        _ => Err("is not above 0".into()),
+    }
+}
+
 fn parse_path_set(text: &str) -> Result<PathSet, String> {
     text.parse().map_err(|error: Error| match error {
         Error::Setting { value, cause, .. } => format!("{value} {cause}"),
@@ -191,7 +211,22 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
     let watch = Watch::start()?;
-    let (rendered, interrupted) = watch.render(&Renderer::new(&gpu, &scene)?, &options)?;
+    let renderer = Renderer::new(&gpu, &scene)?;
+    let goal = Goal {
+        error: arguments.error,
+        time: arguments.time,
+    };
+    let plan = if goal.error.is_some() || goal.time.is_some() {
+        Some(watch.plan(&renderer, &options, goal)?)
+    } else {
+        None
+    };
+    let options = match &plan {
+        Some(plan) => choice::announce(plan, &options, arguments.explain)?,
+        None => options,
+    };
+    let (rendered, interrupted) = watch.render(&renderer, &options)?;
+    drop(renderer);
     let validation = gpu.validation_log();
     drop(gpu);
     let tone = ToneMap {
@@ -206,6 +241,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         report: &rendered.report,
         interrupted,
         tone,
+        choice: plan
+            .as_ref()
+            .map(|plan| choice::Outcome::new(plan, &rendered, error.as_ref()))
+            .transpose()?,
         error,
     };
     let layers: Vec<&str> = arguments.aov.iter().map(|aov| aov.layer()).collect();
@@ -393,6 +432,9 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
             }
             output::print(&text)?;
         }
+    }
+    if let Some(choice) = &document.choice {
+        output::note(&choice.text());
     }
     let report = document.report;
     if report.non_finite_samples.total() > 0 && arguments.stats != Statistics::Table {

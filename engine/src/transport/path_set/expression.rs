@@ -203,15 +203,16 @@ impl Node {
             if k == 0 {
                 return Some(around.then(end[0].clone())).filter(|node| node.nodes() <= NODES_MAX);
             }
+            let onward = to[k][..k].to_vec();
             for i in 0..k {
                 let into = std::mem::replace(&mut to[i][k], Self::NEVER);
                 if into == Self::NEVER {
                     continue;
                 }
                 let into = into.then(around.clone());
-                for j in 0..k {
-                    let way = into.clone().then(to[k][j].clone());
-                    to[i][j] = std::mem::replace(&mut to[i][j], Self::NEVER).or(way);
+                for (way, onward) in to[i].iter_mut().zip(&onward) {
+                    let through = into.clone().then(onward.clone());
+                    *way = std::mem::replace(way, Self::NEVER).or(through);
                 }
                 end[i] = std::mem::replace(&mut end[i], Self::NEVER).or(into.then(end[k].clone()));
                 if to[i].iter().chain(&end[i..=i]).any(|node| node.nodes() > NODES_MAX) {

@@ -7,6 +7,7 @@ use clerestory::film::picture::RADIANCE;
 use clerestory::film::{ErrorReport, Picture, ToneMap, exr, png};
 use clerestory::render::FrameReport;
 
+use super::choice;
 use crate::failure::{Failure, Outcome};
 use crate::{output, pictures};
 
@@ -20,6 +21,8 @@ pub struct Document<'a> {
     pub interrupted: bool,
     /// How the PNG was tone mapped.
     pub tone: ToneMap,
+    /// What was asked for, predicted and reached, when technique and samples were chosen.
+    pub choice: Option<choice::Outcome<'a>>,
     /// The error, when there was a reference.
     pub error: Option<ErrorAgainst>,
 }

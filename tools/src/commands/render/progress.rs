@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use clerestory::plan::{self, Goal, Plan};
 use clerestory::render::{Progress, RenderOptions, Rendered, Renderer};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -12,6 +13,8 @@ use crate::output;
 
 /// Steps of the bar.
 const LENGTH: u64 = 1000;
+/// Between two pictures of the bar.
+const TICK: Duration = Duration::from_millis(120);
 
 /// The bar and the wish to stop.
 pub struct Watch {
@@ -43,6 +46,15 @@ impl Watch {
         Ok(Self { bar, stop })
     }
 
+    /// Renders pilots and chooses. A wish to stop ends the pilots after the one at hand, and the picture after its first step.
+    pub fn plan(&self, renderer: &Renderer, options: &RenderOptions, goal: Goal) -> Outcome<Plan> {
+        self.bar.set_message("pilot pictures…");
+        self.bar.enable_steady_tick(TICK);
+        Ok(plan::plan(renderer, options, goal, &mut || {
+            !self.stop.load(Ordering::SeqCst)
+        })?)
+    }
+
     /// Renders until done, out of time or told to stop; says whether it was told. The first step is always done.
     pub fn render(&self, renderer: &Renderer, options: &RenderOptions) -> Outcome<(Rendered, bool)> {
         let result = self.steps(renderer, options);
@@ -53,7 +65,7 @@ impl Watch {
     fn steps(&self, renderer: &Renderer, options: &RenderOptions) -> Outcome<(Rendered, bool)> {
         tracing::info!("rendering; the first step compiles the kernels");
         self.bar.set_message("compiling kernels…");
-        self.bar.enable_steady_tick(Duration::from_millis(120));
+        self.bar.enable_steady_tick(TICK);
         let mut rendering = renderer.start(options)?;
         let mut first = None;
         while let Some(progress) = rendering.step()? {

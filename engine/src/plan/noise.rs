@@ -1,0 +1,124 @@
+//! The error of a picture without a reference: what two independent renderings of one view say of each other.
+//!
+//! Half the squared difference of two independent, equally distributed pixels is an unbiased estimate of their variance, whatever the
+//! samples within each are like (stratified samples of one pixel are not independent, so their own spread says nothing). The relative
+//! error also needs the true radiance, for which the product of the two stands: it is unbiased for its square. Where noise hides a
+//! pixel, that square is taken from its neighbourhood.
+
+use crate::film::picture::{Picture, VARIANCE};
+use crate::{Error, Result};
+
+/// Pixels to each side of the neighbourhood.
+const REACH: usize = 2;
+/// Inverse of the relative variance at which a pixel and its neighbourhood are believed alike.
+const MISTRUST: f64 = 20.0;
+
+/// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + `offset`) over pixels and channels, as
+/// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it.
+///
+/// # Errors
+/// [`Error::Setting`] when the sizes differ; [`Error::Picture`] without radiance.
+pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64> {
+    let (width, height) = (a.width() as usize, a.height() as usize);
+    if (b.width() as usize, b.height() as usize) != (width, height) {
+        return Err(Error::setting(
+            "pair of pictures",
+            format!("{width} × {height}"),
+            "have different sizes",
+        ));
+    }
+    let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
+    let mut sum = 0.0;
+    for channel in 0..3 {
+        let pair = |i: usize| (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
+        let squares: Vec<f64> = (0..width * height).map(pair).map(|(a, b)| a * b).collect();
+        let variances: Vec<f64> = (0..width * height)
+            .map(pair)
+            .map(|(a, b)| (a - b) * (a - b) / 2.0)
+            .collect();
+        let (near_squares, near_variances) = (blurred(&squares, width), blurred(&variances, width));
+        for i in 0..width * height {
+            // The pixel's own estimate only where there is little noise: a large difference makes the product small, and the two
+            // must not meet in one quotient.
+            let (signal, noise) = (near_squares[i].max(0.0), MISTRUST * near_variances[i]);
+            let all = signal * signal + noise * noise;
+            let own = if all > 0.0 { signal * signal / all } else { 1.0 };
+            let square = (own * squares[i] + (1.0 - own) * signal).max(0.0);
+            sum += variances[i] / (square + offset);
+        }
+    }
+    Ok(sum / (3 * width * height).max(1) as f64)
+}
+
+/// Relative mean squared error that the `variance` layer of a picture stands for: what independent samples of that spread would have.
+/// Samples that are stratified within a pixel have less.
+///
+/// # Errors
+/// [`Error::Picture`] without radiance or variance.
+pub fn relative_mse_by_variance(picture: &Picture, offset: f64) -> Result<f64> {
+    let radiance = picture.main_layer()?.values();
+    let variance = picture.require(VARIANCE)?.values();
+    let each = radiance.iter().zip(variance).map(|(radiance, variance)| {
+        let (radiance, variance) = (f64::from(*radiance), f64::from(*variance));
+        // The square of a noisy mean is too large by its variance.
+        variance / ((radiance * radiance - variance).max(0.0) + offset)
+    });
+    Ok(each.sum::<f64>() / radiance.len().max(1) as f64)
+}
+
+/// Means over the square neighbourhood of each pixel, as far as it lies in the picture.
+fn blurred(values: &[f64], width: usize) -> Vec<f64> {
+    let height = values.len() / width.max(1);
+    let along = |count: usize, at: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(count);
+    let rows: Vec<f64> = (0..values.len())
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            let range = along(width, x);
+            let count = range.len() as f64;
+            range.map(|x| values[y * width + x]).sum::<f64>() / count
+        })
+        .collect();
+    (0..values.len())
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            let range = along(height, y);
+            let count = range.len() as f64;
+            range.map(|y| rows[y * width + x]).sum::<f64>() / count
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_random::Random;
+
+    /// A picture of 64 × 64 pixels whose left half is dim, with noise of the given relative deviation.
+    fn noisy(deviation: f64, random: &mut Random) -> Picture {
+        let values = (0..64 * 64 * 3).map(|i| {
+            let truth = if (i / 3) % 64 < 32 { 0.2 } else { 2.0 };
+            // Sum of twelve uniform numbers: nearly normal, variance 1.
+            let normal = (0..12).map(|_| f64::from(random.unit())).sum::<f64>() - 6.0;
+            (truth * (1.0 + deviation * normal)) as f32
+        });
+        Picture::from_radiance(64, 64, values.collect()).unwrap()
+    }
+
+    #[test]
+    fn pairs_know_their_error() {
+        let mut random = Random(7);
+        for deviation in [0.01, 0.1, 0.5, 1.0] {
+            let (a, b) = (noisy(deviation, &mut random), noisy(deviation, &mut random));
+            let expected = 0.5 * deviation * deviation * (0.04 / 0.05 + 4.0 / 4.01);
+            let found = relative_mse_of_pair(&a, &b, 0.01).unwrap();
+            // Noise of the estimate: √(2 ∕ 12288) = 1.3 %; the trust in noisy pixels costs the rest.
+            let allowed = if deviation > 0.3 { 0.25 } else { 0.08 };
+            assert!(
+                (found / expected - 1.0).abs() < allowed,
+                "{deviation}: {found} for {expected}"
+            );
+        }
+        let black = Picture::from_radiance(8, 8, vec![0.0; 192]).unwrap();
+        assert_eq!(relative_mse_of_pair(&black, &black, 0.01).unwrap(), 0.0);
+    }
+}

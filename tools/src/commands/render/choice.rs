@@ -1,0 +1,106 @@
+//! What an automatic choice says: prediction, candidates, and the outcome beside the prediction.
+
+use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
+use clerestory::plan::{Plan, relative_mse_by_variance};
+use clerestory::render::{RenderOptions, Rendered};
+
+use super::files::ErrorAgainst;
+use crate::failure::Outcome as Result;
+use crate::output::{self, Table};
+
+/// The plan and what came of it.
+#[derive(serde::Serialize)]
+pub struct Outcome<'a> {
+    /// What was asked for, looked at and predicted.
+    #[serde(flatten)]
+    plan: &'a Plan,
+    /// Seconds of pilots and picture together.
+    seconds: f64,
+    /// Root of the relative MSE that the picture's own spread stands for. Stratified samples have less.
+    error_by_variance: f64,
+    /// Root of the relative MSE against the reference, when there is one.
+    error_against_reference: Option<f64>,
+}
+
+impl<'a> Outcome<'a> {
+    /// What came of a plan.
+    pub fn new(plan: &'a Plan, rendered: &Rendered, error: Option<&ErrorAgainst>) -> Result<Self> {
+        Ok(Self {
+            plan,
+            seconds: plan.pilot_seconds + rendered.report.render_seconds,
+            error_by_variance: relative_mse_by_variance(&rendered.picture, RELATIVE_MSE_OFFSET)?.sqrt(),
+            error_against_reference: error.map(|error| error.metrics.relative_mse.sqrt()),
+        })
+    }
+
+    /// One line.
+    pub fn text(&self) -> String {
+        let choice = self.plan.choice();
+        let error = match self.error_against_reference {
+            Some(error) => format!("{error:.4} against the reference"),
+            None => format!("{:.4} or less by the picture's own spread", self.error_by_variance),
+        };
+        format!(
+            "predicted: error {:.4}, {:.2} s; outcome: error {error}, {:.2} s, of which pilots {:.2} s",
+            choice.error,
+            choice.seconds + self.plan.pilot_seconds,
+            self.seconds,
+            self.plan.pilot_seconds
+        )
+    }
+}
+
+/// Says what is going to be rendered, and returns its options.
+pub fn announce(plan: &Plan, options: &RenderOptions, explain: bool) -> Result<RenderOptions> {
+    if explain {
+        output::explain(&candidates(plan));
+    }
+    if !plan.shortfall.is_empty() {
+        output::warn(&plan.shortfall);
+    }
+    let choice = plan.choice();
+    output::note(&format!(
+        "chosen: {}, {}, {} samples a pixel; predicted: error {:.4}, {:.2} s after {:.2} s of pilots",
+        choice.technique, choice.variant, choice.spp, choice.error, choice.seconds, plan.pilot_seconds
+    ));
+    Ok(plan.options(options))
+}
+
+fn candidates(plan: &Plan) -> String {
+    let heads = [
+        "technique",
+        "settings",
+        "pilots",
+        "pilot error",
+        "slope",
+        "s a sample",
+        "samples",
+        "error",
+        "seconds",
+        "verdict",
+    ];
+    let mut table = Table::new(&heads, &[1, 9]);
+    for (index, candidate) in plan.candidates.iter().enumerate() {
+        let tried = candidate.pilot_spp > 0;
+        let cell = |text: String| if tried { text } else { "-".into() };
+        let verdict = match &candidate.reason {
+            _ if index == plan.chosen => "chosen",
+            reason if !reason.is_empty() => reason,
+            _ if plan.goal.error.is_some() => "takes longer",
+            _ => "errs more",
+        };
+        table.row([
+            candidate.technique.to_owned(),
+            candidate.variant.to_owned(),
+            cell(candidate.pilot_spp.to_string()),
+            cell(format!("{:.4}", candidate.pilot_error)),
+            cell(format!("{:.2}", -candidate.slope / 2.0)),
+            cell(format!("{:.4}", candidate.seconds_a_sample)),
+            cell(candidate.spp.to_string()),
+            cell(format!("{:.4}", candidate.error)),
+            cell(format!("{:.2}", candidate.seconds)),
+            verdict.to_owned(),
+        ]);
+    }
+    table.text()
+}
