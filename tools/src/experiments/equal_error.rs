@@ -92,7 +92,12 @@ mod tests {
         let common = common_error([&a[..], &b[..]]).unwrap();
         assert_eq!(common, 0.2);
         assert_eq!(cost_of(&a, common), Some(Cost::Measured(4.0)));
-        assert!(cost_of(&b, common).unwrap().measured().is_some_and(|cost| cost > 1.0 && cost < 4.0));
+        assert!(
+            cost_of(&b, common)
+                .unwrap()
+                .measured()
+                .is_some_and(|cost| cost > 1.0 && cost < 4.0)
+        );
         assert_eq!(common_error([]), None);
     }
 }

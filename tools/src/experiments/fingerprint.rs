@@ -100,7 +100,11 @@ mod tests {
         let load = |address: &str| clerestory::scene::load(address).unwrap();
         let print = |address: &str| scene(&mut load(address));
         let plain = print("builtin:cornell-box");
-        assert_eq!(plain, print("builtin:cornell-box?boxes=both"), "another address of the same scene");
+        assert_eq!(
+            plain,
+            print("builtin:cornell-box?boxes=both"),
+            "another address of the same scene"
+        );
         assert_ne!(plain, print("builtin:cornell-box?light=17,12,4.0001"));
         let mut kept = load("builtin:cornell-box");
         scene(&mut kept);
@@ -116,7 +120,13 @@ mod tests {
         }]);
         assert_eq!(now.len(), 1);
         assert!(kernels_are_current(&now));
-        assert!(!kernels_are_current(&BTreeMap::from([(info.name.to_owned(), "0".to_owned())])));
-        assert!(!kernels_are_current(&BTreeMap::from([("gone.comp".to_owned(), "0".to_owned())])));
+        assert!(!kernels_are_current(&BTreeMap::from([(
+            info.name.to_owned(),
+            "0".to_owned()
+        )])));
+        assert!(!kernels_are_current(&BTreeMap::from([(
+            "gone.comp".to_owned(),
+            "0".to_owned()
+        )])));
     }
 }

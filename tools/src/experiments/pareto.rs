@@ -16,9 +16,20 @@ mod tests {
 
     #[test]
     fn only_what_nothing_beats_is_on_the_front() {
-        let points = [(1.0, 9.0), (2.0, 4.0), (3.0, 5.0), (4.0, 1.0), (4.0, 2.0), (f64::NAN, 0.0)];
+        let points = [
+            (1.0, 9.0),
+            (2.0, 4.0),
+            (3.0, 5.0),
+            (4.0, 1.0),
+            (4.0, 2.0),
+            (f64::NAN, 0.0),
+        ];
         assert_eq!(front(&points), [true, true, false, true, false, false]);
-        assert_eq!(front(&[(1.0, 1.0), (1.0, 1.0)]), [true, true], "equals do not beat each other");
+        assert_eq!(
+            front(&[(1.0, 1.0), (1.0, 1.0)]),
+            [true, true],
+            "equals do not beat each other"
+        );
         assert!(front(&[]).is_empty());
     }
 }

@@ -94,7 +94,9 @@ pub fn log_log(words: Words<'_>, curves: &[Curve]) -> Result<Option<String>> {
 /// The range of the values above 0, with room; `None` without any.
 fn span(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let sound = values.filter(|value| *value > 0.0 && value.is_finite());
-    let (least, most) = sound.fold((f64::INFINITY, 0.0f64), |(least, most), value| (least.min(value), most.max(value)));
+    let (least, most) = sound.fold((f64::INFINITY, 0.0f64), |(least, most), value| {
+        (least.min(value), most.max(value))
+    });
     (most > 0.0).then(|| (least / MARGIN, most * MARGIN))
 }
 
@@ -108,7 +110,11 @@ fn ticks((least, most): (f64, f64)) -> Vec<f64> {
         all.filter(|tick| (least..=most).contains(tick)).collect()
     };
     let powers = with(&[1.0]);
-    if powers.len() < 3 { with(&[1.0, 2.0, 5.0]) } else { powers }
+    if powers.len() < 3 {
+        with(&[1.0, 2.0, 5.0])
+    } else {
+        powers
+    }
 }
 
 fn tick_text(value: &f64) -> String {
@@ -152,7 +158,11 @@ impl<C, DB: DrawingBackend> Drawable<DB> for Glyph<C> {
             let (mut x, y) = (x, y);
             if let Some((dash, gap)) = self.legend {
                 let (dash, gap) = (dash as i32, gap as i32);
-                let (dash, step) = if gap == 0 { (LEGEND_LINE, LEGEND_LINE) } else { (dash, dash + gap) };
+                let (dash, step) = if gap == 0 {
+                    (LEGEND_LINE, LEGEND_LINE)
+                } else {
+                    (dash, dash + gap)
+                };
                 for start in (0..LEGEND_LINE).step_by(step.max(1) as usize) {
                     let end = (start + dash).min(LEGEND_LINE);
                     backend.draw_line((x + start, y), (x + end, y), &line)?;
@@ -165,7 +175,11 @@ impl<C, DB: DrawingBackend> Drawable<DB> for Glyph<C> {
                 Some(0) => backend.draw_circle((x, y), MARKER as u32, &self.color, true)?,
                 Some(1) => backend.draw_rect(corners.0, corners.1, &line, false)?,
                 Some(2) => {
-                    let up = [(x, y - MARKER - 2), (x - MARKER - 1, y + MARKER), (x + MARKER + 1, y + MARKER)];
+                    let up = [
+                        (x, y - MARKER - 2),
+                        (x - MARKER - 1, y + MARKER),
+                        (x + MARKER + 1, y + MARKER),
+                    ];
                     backend.fill_polygon(up, &self.color)?;
                 }
                 Some(3) => {
@@ -225,12 +239,13 @@ fn draw(
         .y_label_formatter(&tick_text)
         .draw()
         .map_err(|e| failed(&e))?;
-    // Through the first point of the first curve, cut off where it leaves the plot.
-    if let Some(first) = curves.iter().find_map(|curve| curve.points.first()) {
-        let height = |at: f64| first.y * (at / first.x).powf(GUIDE_SLOPE);
-        let end = x.1.min(first.x * (y.0 / first.y).powf(1.0 / GUIDE_SLOPE));
+    // Through the last point of the first curve, where fixed costs weigh least; cut off where it leaves the plot.
+    if let Some(last) = curves.iter().find_map(|curve| curve.points.last()) {
+        let height = |at: f64| last.y * (at / last.x).powf(GUIDE_SLOPE);
+        let start = x.0.max(last.x * (y.1 / last.y).powf(1.0 / GUIDE_SLOPE));
+        let end = x.1.min(last.x * (y.0 / last.y).powf(1.0 / GUIDE_SLOPE));
         let style = GUIDE_GREY.stroke_width(1);
-        let ends = vec![(first.x, first.y), (end, height(end))];
+        let ends = vec![(start, height(start)), (end, height(end))];
         chart
             .draw_series(std::iter::once(line(ends, GUIDE_DASH, style)))
             .map_err(|e| failed(&e))?
@@ -310,13 +325,27 @@ mod tests {
 
     #[test]
     fn a_plot_has_its_words_and_is_sound_xml() {
-        let svg = log_log(WORDS, &[curve("first", 1.0), curve("se<cond>", 0.5)]).unwrap().unwrap();
-        for word in ["time (s)", "relative RMSE", "first", "slope −½", "a &lt; b &amp; c", "se&lt;cond&gt;"] {
+        let svg = log_log(WORDS, &[curve("first", 1.0), curve("se<cond>", 0.5)])
+            .unwrap()
+            .unwrap();
+        for word in [
+            "time (s)",
+            "relative RMSE",
+            "first",
+            "slope −½",
+            "a &lt; b &amp; c",
+            "se&lt;cond&gt;",
+        ] {
             assert!(svg.contains(word), "{word}: {svg}");
         }
         assert!(svg.trim_start().starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        assert_eq!(svg, log_log(WORDS, &[curve("first", 1.0), curve("se<cond>", 0.5)]).unwrap().unwrap());
+        assert_eq!(
+            svg,
+            log_log(WORDS, &[curve("first", 1.0), curve("se<cond>", 0.5)])
+                .unwrap()
+                .unwrap()
+        );
     }
 
     #[test]
@@ -328,7 +357,10 @@ mod tests {
         let svg = log_log(WORDS, &[odd]).unwrap().unwrap();
         assert!(!svg.contains("NaN"), "{svg}");
         assert_eq!(log_log(WORDS, &[]).unwrap(), None);
-        let alone = Curve { points: vec![curve("x", 1.0).points[0]], name: "x".into() };
+        let alone = Curve {
+            points: vec![curve("x", 1.0).points[0]],
+            name: "x".into(),
+        };
         assert!(log_log(WORDS, &[alone]).unwrap().is_some());
     }
 

@@ -71,7 +71,10 @@ pub fn slug(address: &str) -> String {
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' })
         .collect();
-    let words: Vec<&str> = dashed.split('-').filter(|word| !word.trim_matches('.').is_empty()).collect();
+    let words: Vec<&str> = dashed
+        .split('-')
+        .filter(|word| !word.trim_matches('.').is_empty())
+        .collect();
     words.join("-")
 }
 
@@ -84,7 +87,12 @@ pub fn kept(path: &Path) -> Result<Option<Picture>> {
         return Ok(None);
     }
     let picture = exr::read(path)?;
-    let kernels = picture.metadata.other.get(KERNELS).map(String::as_str).unwrap_or_default();
+    let kernels = picture
+        .metadata
+        .other
+        .get(KERNELS)
+        .map(String::as_str)
+        .unwrap_or_default();
     let kernels: Option<BTreeMap<String, String>> = serde_json::from_str(kernels).ok();
     let current = kernels.is_some_and(|kernels| fingerprint::kernels_are_current(&kernels));
     Ok((current && picture.layer(VARIANCE).is_some()).then_some(picture))
@@ -133,18 +141,44 @@ mod tests {
         let key = identity.key().unwrap();
         assert_eq!(key, identity.clone().key().unwrap());
         for changed in [
-            Identity { scene: "t", ..identity.clone() },
-            Identity { camera: Some("a"), ..identity.clone() },
-            Identity { size: [8, 9], ..identity.clone() },
-            Identity { technique: "light", ..identity.clone() },
-            Identity { settings: &other, ..identity.clone() },
-            Identity { spp: 65, ..identity.clone() },
-            Identity { seed: 1, ..identity.clone() },
-            Identity { engine: "0.2.0", ..identity.clone() },
+            Identity {
+                scene: "t",
+                ..identity.clone()
+            },
+            Identity {
+                camera: Some("a"),
+                ..identity.clone()
+            },
+            Identity {
+                size: [8, 9],
+                ..identity.clone()
+            },
+            Identity {
+                technique: "light",
+                ..identity.clone()
+            },
+            Identity {
+                settings: &other,
+                ..identity.clone()
+            },
+            Identity {
+                spp: 65,
+                ..identity.clone()
+            },
+            Identity {
+                seed: 1,
+                ..identity.clone()
+            },
+            Identity {
+                engine: "0.2.0",
+                ..identity.clone()
+            },
         ] {
             assert_ne!(key, changed.key().unwrap(), "{changed:?}");
         }
-        let path = identity.path(Path::new("r"), "builtin:cornell-box?light=1,2,3").unwrap();
+        let path = identity
+            .path(Path::new("r"), "builtin:cornell-box?light=1,2,3")
+            .unwrap();
         let start = "r/cornell-box-light-1-2-3-8x8-64-";
         assert!(path.to_string_lossy().starts_with(start), "{path:?}");
     }

@@ -364,13 +364,7 @@ fn keep_picture(path: &Path, picture: &Picture) -> Result<()> {
     exr::write(path, &kept)
 }
 
-fn judge(
-    rendered: &Rendered,
-    reference: &Picture,
-    task: &Task,
-    budget: Budget,
-    tone: ToneMap,
-) -> Result<Measurement> {
+fn judge(rendered: &Rendered, reference: &Picture, task: &Task, budget: Budget, tone: ToneMap) -> Result<Measurement> {
     let options = CompareOptions {
         tone,
         ..CompareOptions::default()

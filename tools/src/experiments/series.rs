@@ -152,7 +152,10 @@ fn scene(results: &SceneResults) -> SceneSeries {
         point.on_front = on_front;
     }
     let curve = |series: &Series, work: Work| -> Vec<(f64, f64)> {
-        let pairs = series.points.iter().map(|point| (point.work(work), point.relative_rmse));
+        let pairs = series
+            .points
+            .iter()
+            .map(|point| (point.work(work), point.relative_rmse));
         pairs.filter(|(_, error)| error.is_finite()).collect()
     };
     let curves: Vec<Vec<(f64, f64)>> = series.iter().map(|series| curve(series, Work::Seconds)).collect();
@@ -210,7 +213,11 @@ fn point(results: &Point) -> SeriesPoint {
     // A root of what is not above 0 is not a number, or 0, neither of which has a place on a logarithmic axis.
     let root = |mse: f64| if mse > 0.0 { mse.sqrt() } else { f64::NAN };
     let seconds = all(&|one| Work::Seconds.of(one));
-    let biases: Vec<f64> = results.measurements.iter().filter_map(|one| one.relative_bias).collect();
+    let biases: Vec<f64> = results
+        .measurements
+        .iter()
+        .filter_map(|one| one.relative_bias)
+        .collect();
     SeriesPoint {
         budget: results.budget,
         samples: median(all(&|one| Work::Samples.of(one))),
@@ -278,8 +285,16 @@ pub(super) mod tests {
             .iter()
             .filter_map(|series| series.seconds_to_error.and_then(Cost::measured))
             .collect();
-        assert!((seconds[0] - 6.4).abs() < 1e-9 && (seconds[1] - 3.2).abs() < 1e-9, "{seconds:?}");
-        let front: Vec<bool> = scene.series.iter().flat_map(|s| &s.points).map(|p| p.on_front).collect();
+        assert!(
+            (seconds[0] - 6.4).abs() < 1e-9 && (seconds[1] - 3.2).abs() < 1e-9,
+            "{seconds:?}"
+        );
+        let front: Vec<bool> = scene
+            .series
+            .iter()
+            .flat_map(|s| &s.points)
+            .map(|p| p.on_front)
+            .collect();
         assert_eq!(front, [false, false, false, true, true, true]);
         let point = scene.series[0].points[1];
         assert!((point.relative_mse - 2.0 / 16.0).abs() < 1e-15 && (point.rmse - 0.25).abs() < 1e-15);

@@ -67,7 +67,12 @@ pub fn of(results: &SceneResults) -> Result<Strip> {
         Ok(Column {
             name: name.clone(),
             picture: shown(picture)?,
-            difference: png::difference(picture.main_layer()?, reference.main_layer()?, picture.width(), full_scale)?,
+            difference: png::difference(
+                picture.main_layer()?,
+                reference.main_layer()?,
+                picture.width(),
+                full_scale,
+            )?,
             flip: png::false_color(&flip, picture.width(), FLIP_FULL_SCALE)?,
         })
     });
@@ -92,7 +97,10 @@ impl Strip {
         place(&mut whole, &self.reference, 0, 0);
         for (index, column) in self.columns.iter().enumerate() {
             let x = (index as u32 + 1) * (width + GAP);
-            for (row, picture) in [&column.picture, &column.difference, &column.flip].into_iter().enumerate() {
+            for (row, picture) in [&column.picture, &column.difference, &column.flip]
+                .into_iter()
+                .enumerate()
+            {
                 place(&mut whole, picture, x, row as u32 * (height + GAP));
             }
         }
@@ -120,7 +128,12 @@ fn place(whole: &mut Rgb8, part: &Rgb8, x: u32, y: u32) {
 pub fn png_bytes(picture: &Rgb8, name: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     image::codecs::png::PngEncoder::new(&mut bytes)
-        .write_image(&picture.bytes, picture.width, picture.height, image::ExtendedColorType::Rgb8)
+        .write_image(
+            &picture.bytes,
+            picture.width,
+            picture.height,
+            image::ExtendedColorType::Rgb8,
+        )
         .map_err(|cause| Error::Picture {
             path: name.display().to_string(),
             cause: cause.to_string(),
@@ -138,7 +151,11 @@ mod tests {
         let strip = of(&made_up_scene()).unwrap();
         assert_eq!(strip.columns.len(), 2);
         assert_eq!(strip.full_scale, 0.25);
-        assert_eq!(strip.columns[0].difference.bytes, [255, 0, 0, 255, 0, 0], "twice too bright");
+        assert_eq!(
+            strip.columns[0].difference.bytes,
+            [255, 0, 0, 255, 0, 0],
+            "twice too bright"
+        );
         let whole = strip.composed();
         assert_eq!((whole.width, whole.height), (3 * 2 + 2 * GAP, 3 + 2 * GAP));
         let at = |x: u32, y: u32| {

@@ -52,7 +52,10 @@ pub fn facts(results: &Results) -> Vec<String> {
         facts.push("**Interrupted**: the same command goes on where this stopped.".to_owned());
     }
     if results.smoke {
-        facts.push("**Smoke run** (`--smoke`): shows that everything works; its pictures are too small to judge speed by.".to_owned());
+        facts.push(
+            "**Smoke run** (`--smoke`): shows that everything works; its pictures are too small to judge speed by."
+                .to_owned(),
+        );
     }
     let load = results
         .load
@@ -94,7 +97,10 @@ pub fn overview(scenes: &[SceneSeries]) -> Table {
         ],
     );
     for scene in scenes {
-        let base = scene.series.first().and_then(|series| series.seconds_to_error?.measured());
+        let base = scene
+            .series
+            .first()
+            .and_then(|series| series.seconds_to_error?.measured());
         for series in &scene.series {
             let text = |text: String| Cell::Text(text);
             if let Some(cause) = &series.refused {
@@ -112,8 +118,15 @@ pub fn overview(scenes: &[SceneSeries]) -> Table {
                 text(slope_text(series.time_slope)),
                 scene.common_error.map_or(NONE.into(), Cell::Number),
                 text(series.seconds_to_error.map_or(NONE.into(), |cost| cost.to_string())),
-                text(series.rays_to_error.map_or(NONE.into(), |cost| million(cost).to_string())),
-                text(base.zip(seconds).map_or(NONE.into(), |(base, seconds)| format!("{:.2}", base / seconds))),
+                text(
+                    series
+                        .rays_to_error
+                        .map_or(NONE.into(), |cost| million(cost).to_string()),
+                ),
+                text(
+                    base.zip(seconds)
+                        .map_or(NONE.into(), |(base, seconds)| format!("{:.2}", base / seconds)),
+                ),
             ]);
         }
     }
@@ -166,7 +179,9 @@ pub fn budgets(scene: &SceneSeries) -> Table {
                 point.relative_mse.into(),
                 point.relative_rmse.into(),
                 format!("{} … {}", Cell::Number(least), Cell::Number(greatest)).into(),
-                point.relative_bias.map_or(NONE.into(), |bias| Cell::Text(format!("{bias:+.1e}"))),
+                point
+                    .relative_bias
+                    .map_or(NONE.into(), |bias| Cell::Text(format!("{bias:+.1e}"))),
                 point.flip.into(),
                 Cell::Text(format!("{:.1} %", 100.0 * share)),
                 if point.on_front { "yes" } else { "" }.into(),
@@ -289,7 +304,14 @@ pub(super) mod tests {
         let results = made_up_results();
         let scenes = series::of(&results);
         let text = markdown(&results, &scenes);
-        for word in ["-0.500 ± 0.000 | yes", "| 6.400 |", "| 2.00 |", "Smoke run", "load average 0.5", "`builtin:ring` (138 triangles)"] {
+        for word in [
+            "-0.500 ± 0.000 | yes",
+            "| 6.400 |",
+            "| 2.00 |",
+            "Smoke run",
+            "load average 0.5",
+            "`builtin:ring` (138 triangles)",
+        ] {
             assert!(text.contains(word), "{word}: {text}");
         }
         let csv = measurements(&results).csv();
@@ -303,7 +325,12 @@ pub(super) mod tests {
         let mut series = series::of(&results)[0].series[0].clone();
         assert_eq!(verdict(&series), "yes");
         for (value, error, expected) in [(-0.54, 0.0, "yes"), (-0.6, 0.01, "no"), (-0.6, 0.03, "within noise")] {
-            series.slope = Some(Slope { value, standard_error: Some(error), budgets: 3, hidden: 0 });
+            series.slope = Some(Slope {
+                value,
+                standard_error: Some(error),
+                budgets: 3,
+                hidden: 0,
+            });
             assert_eq!(verdict(&series), expected);
         }
         series.expected_slope = None;

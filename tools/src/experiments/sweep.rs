@@ -222,7 +222,9 @@ impl Sweep {
             _ => return Err(wrong("spp", "seconds", "exactly one of spp and seconds is wanted")),
         };
         let shown = format!("{budgets:?}");
-        let sound = budgets.iter().all(|budget| *budget > 0.0 && *budget <= f64::from(SPP_MAX));
+        let sound = budgets
+            .iter()
+            .all(|budget| *budget > 0.0 && *budget <= f64::from(SPP_MAX));
         if budgets.is_empty() || !sound || !budgets.is_sorted_by(|a, b| a < b) {
             return Err(wrong("spp", shown, "needs rising budgets above 0"));
         }
@@ -317,7 +319,10 @@ mod tests {
             let variant = &sweep.variants[index];
             sweep.settings(&variant.technique, &variant.settings).unwrap()
         };
-        assert_eq!((&settings(0)["sampler"], &settings(1)["sampler"]), (&"pcg".into(), &"sobol".into()));
+        assert_eq!(
+            (&settings(0)["sampler"], &settings(1)["sampler"]),
+            (&"pcg".into(), &"sobol".into())
+        );
         assert_eq!(settings(0)["path_set"], "all");
         assert_eq!(sweep.reference_settings().unwrap()["sampler"], "pcg");
     }

@@ -39,7 +39,11 @@ fn sum(values: &[f64]) -> f64 {
 /// # Errors
 /// [`Error::Picture`] when sizes differ or the reference has no variance layer.
 pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
-    let (a, b, variance) = (test.main_layer()?, reference.main_layer()?, reference.require(VARIANCE)?);
+    let (a, b, variance) = (
+        test.main_layer()?,
+        reference.main_layer()?,
+        reference.require(VARIANCE)?,
+    );
     if a.values().len() != b.values().len() || b.values().len() != variance.values().len() {
         return Err(Error::Picture {
             path: "comparison".into(),
@@ -54,7 +58,12 @@ pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
         for channel in 0..3 {
             let [a, b, variance] = [a, b, variance].map(|pixel| f64::from(pixel[channel]));
             let (error, weight) = ((a - b) * (a - b), 1.0 / (b * b + RELATIVE_MSE_OFFSET));
-            let of = [error - variance, (error - variance) * weight, variance, variance * weight];
+            let of = [
+                error - variance,
+                (error - variance) * weight,
+                variance,
+                variance * weight,
+            ];
             for (terms, term) in terms.iter_mut().zip(of) {
                 terms.push(term);
             }
@@ -79,7 +88,9 @@ mod tests {
         let test = Picture::from_radiance(2, 1, vec![1.0, 2.0, 3.0, 0.0, f32::NAN, 0.0]).unwrap();
         let mut reference = Picture::from_radiance(2, 1, vec![1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).unwrap();
         assert!(measure(&test, &reference).is_err(), "without variance");
-        reference.add_layer(VARIANCE, 3, vec![0.25, 0.25, 0.5, 9.0, 9.0, 9.0]).unwrap();
+        reference
+            .add_layer(VARIANCE, 3, vec![0.25, 0.25, 0.5, 9.0, 9.0, 9.0])
+            .unwrap();
         let error = measure(&test, &reference).unwrap();
         // Errors² 0, 1, 4; the second pixel is not finite.
         assert_eq!(error.mse, (5.0 - 1.0) / 3.0);

@@ -48,7 +48,11 @@ fn inline(text: &str) -> String {
         let parts: Vec<&str> = out.split(mark).collect();
         if parts.len() % 2 == 1 {
             let tags = [begin, end].into_iter().cycle().take(parts.len() - 1).chain([""]);
-            out = parts.iter().zip(tags).map(|(part, tag)| format!("{part}{tag}")).collect();
+            out = parts
+                .iter()
+                .zip(tags)
+                .map(|(part, tag)| format!("{part}{tag}"))
+                .collect();
         }
     }
     out
@@ -62,13 +66,26 @@ fn table_html(table: &Table) -> String {
         })
         .collect();
     let cell = |tag: &str, column: usize, text: &str| {
-        let class = if words.get(column) == Some(&true) { " class=\"w\"" } else { "" };
+        let class = if words.get(column) == Some(&true) {
+            " class=\"w\""
+        } else {
+            ""
+        };
         format!("<{tag}{class}>{}</{tag}>", inline(text))
     };
-    let heads: String = table.heads.iter().enumerate().map(|(i, head)| cell("th", i, head)).collect();
+    let heads: String = table
+        .heads
+        .iter()
+        .enumerate()
+        .map(|(i, head)| cell("th", i, head))
+        .collect();
     let mut html = format!("<table><thead><tr>{heads}</tr></thead><tbody>\n");
     for row in &table.rows {
-        let cells: String = row.iter().enumerate().map(|(i, one)| cell("td", i, &one.to_string())).collect();
+        let cells: String = row
+            .iter()
+            .enumerate()
+            .map(|(i, one)| cell("td", i, &one.to_string()))
+            .collect();
         html += &format!("<tr>{cells}</tr>\n");
     }
     html += "</tbody></table>\n";
@@ -121,7 +138,14 @@ fn picture(of: &Rgb8, alt: &str) -> Result<String> {
 
 fn strip_html(strip: &Strip) -> Result<String> {
     let mut rows = [
-        format!("<th>reference</th>{}", strip.columns.iter().map(|c| format!("<th>{}</th>", escaped(&c.name))).collect::<String>()),
+        format!(
+            "<th>reference</th>{}",
+            strip
+                .columns
+                .iter()
+                .map(|c| format!("<th>{}</th>", escaped(&c.name)))
+                .collect::<String>()
+        ),
         format!("<td>{}</td>", picture(&strip.reference, "reference")?),
         format!(
             "<td>difference: red too bright, blue too dark; full colour is {:.3e}</td>",
@@ -131,7 +155,11 @@ fn strip_html(strip: &Strip) -> Result<String> {
     ];
     for column in &strip.columns {
         let pictures = [&column.picture, &column.difference, &column.flip];
-        for (row, (one, what)) in rows[1..].iter_mut().zip(pictures.into_iter().zip(["picture", "difference", "FLIP error"])) {
+        for (row, (one, what)) in
+            rows[1..]
+                .iter_mut()
+                .zip(pictures.into_iter().zip(["picture", "difference", "FLIP error"]))
+        {
             *row += &format!("<td>{}</td>", picture(one, &format!("{}: {what}", column.name))?);
         }
     }
@@ -153,7 +181,11 @@ pub fn html(results: &Results, scenes: &[SceneSeries], strips: &[Strip]) -> Resu
         // Writing to a string cannot fail.
         let _ = writeln!(page, "<li>{}</li>", inline(&fact));
     }
-    let _ = writeln!(page, "<li>Measures: {}.</li>\n</ul>", escaped(&results.systems.join(", ")));
+    let _ = writeln!(
+        page,
+        "<li>Measures: {}.</li>\n</ul>",
+        escaped(&results.systems.join(", "))
+    );
     let overview = summary::overview(scenes);
     let _ = write!(page, "<h2>{}</h2>\n{}", escaped(&overview.title), table_html(&overview));
     for (index, scene) in scenes.iter().enumerate() {
@@ -186,9 +218,14 @@ mod tests {
         let page = html(&results, &scenes, &strips).unwrap();
         assert_eq!(page.matches("<svg").count(), 3);
         assert_eq!(page.matches("data:image/png;base64,").count(), 1 + 2 * 3);
-        assert!(page.contains("numbers &lt;without&gt; pictures") && page.contains("&lt;fast&gt; &amp; &quot;good&quot;"));
+        assert!(
+            page.contains("numbers &lt;without&gt; pictures") && page.contains("&lt;fast&gt; &amp; &quot;good&quot;")
+        );
         assert!(page.contains("<b>Smoke run</b>") && page.contains("<code>builtin:ring</code>"));
-        assert_eq!(page.matches("http").count(), page.matches("http://www.w3.org/2000/svg").count());
+        assert_eq!(
+            page.matches("http").count(),
+            page.matches("http://www.w3.org/2000/svg").count()
+        );
         for tag in ["<script", "<link", "url(", "@import"] {
             assert!(!page.contains(tag), "{tag}");
         }

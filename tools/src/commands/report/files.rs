@@ -63,7 +63,10 @@ pub fn sweep(folder: &Path, results: &Results) -> Outcome<String> {
     write(&folder.join("report.md"), &page)?;
     write(&folder.join("measurements.csv"), &summary::measurements(results).csv())?;
     let document = serde_json::json!({ "results": results, "statistics": scenes });
-    write(&folder.join("report.json"), &output::json_text("report.json", &document)?)?;
+    write(
+        &folder.join("report.json"),
+        &output::json_text("report.json", &document)?,
+    )?;
     // Last, so that a page that is there has all that stands beside it.
     write(&folder.join("index.html"), &web_page::html(results, &scenes, &made)?)?;
     Ok(text)

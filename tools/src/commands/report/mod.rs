@@ -61,7 +61,13 @@ pub struct Arguments {
     #[arg(long)]
     fresh: bool,
     /// File whose marked part is replaced when no experiment is named; it is made if there is none
-    #[arg(short, long, value_name = "FILE", default_value = "RESULTS.md", conflicts_with = "experiments")]
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        default_value = "RESULTS.md",
+        conflicts_with = "experiments"
+    )]
     output: PathBuf,
     /// Folder that keeps the references
     #[arg(long, value_name = "FOLDER", default_value = "out/references")]
