@@ -12,7 +12,7 @@ use clerestory::film::picture::RADIANCE;
 use clerestory::film::{Picture, ToneCurve, ToneMap, exr};
 use clerestory::gpu::Gpu;
 use clerestory::render::{Progress, RenderOptions, Rendered, Renderer};
-use clerestory::scene::{self, Scene, SceneProfile};
+use clerestory::scene::{Scene, SceneProfile};
 use clerestory::{Error, Result};
 use serde_json::Value;
 
@@ -48,7 +48,7 @@ pub struct Places {
     pub fresh: bool,
 }
 
-/// Renders what is missing and returns everything.
+/// Renders what is missing and returns everything; `load` reads a scene by its address.
 ///
 /// # Errors
 /// Those of scenes, techniques and files. A scene that a technique cannot model is no error: the variant says so in the results.
@@ -58,19 +58,21 @@ pub fn run(
     sweep: &Sweep,
     smoke: bool,
     places: &Places,
+    load: &dyn Fn(&str) -> Result<Scene>,
     watch: &dyn Watch,
 ) -> Result<Results> {
     sweep.check()?;
     let pictures = places.folder.join(PICTURES);
     std::fs::create_dir_all(&pictures).map_err(|error| Error::io(&pictures, error))?;
     let caps = gpu.caps();
-    let load = machine::load();
+    let load_average = machine::load();
     let machine = format!("{}, {} threads", machine::processor(), machine::threads());
     let all = sweep.scenes.len() * sweep.variants.len() * sweep.budgets().len() * sweep.repeats as usize;
     let mut running = Running {
         gpu,
         sweep,
         places,
+        load,
         watch,
         store: Store::open(&places.folder.join(MEASUREMENTS))?,
         place: serde_json::json!({
@@ -104,7 +106,7 @@ pub fn run(
         device: caps.device.clone(),
         driver: caps.driver.clone(),
         machine,
-        load,
+        load: load_average,
         interrupted: done + refused < all,
         measured: running.measured,
         found: running.found,
@@ -122,6 +124,7 @@ struct Running<'a> {
     gpu: &'a Gpu,
     sweep: &'a Sweep,
     places: &'a Places,
+    load: &'a dyn Fn(&str) -> Result<Scene>,
     watch: &'a dyn Watch,
     store: Store,
     /// What of the machine measurements depend on.
@@ -153,7 +156,7 @@ struct Task {
 impl Running<'_> {
     /// `None` when it was stopped before the reference was there.
     fn scene(&mut self, address: &str) -> Result<Option<SceneResults>> {
-        let mut scene = scene::load(address)?;
+        let mut scene = (self.load)(address)?;
         let print = fingerprint::scene(&mut scene);
         let triangles = SceneProfile::of(&scene).triangles;
         let tone = ToneMap {

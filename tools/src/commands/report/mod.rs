@@ -5,12 +5,13 @@
 mod files;
 mod watch;
 
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use clerestory::Result;
 use clerestory::gpu::Gpu;
+use clerestory::{Result, scene};
 use clerestory_tools::experiments::measures::{self, Context};
 use clerestory_tools::experiments::render_sweep::{self, Places};
 use clerestory_tools::experiments::sweep::Sweep;
@@ -99,9 +100,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     // Opened for the first experiment that needs it, and kept: kernels compile once.
     let mut gpu = None;
     for experiment in found? {
-        output::note(&format!("{}: {}", experiment.name, experiment.title));
+        let about = format!("{}: {}", experiment.name, experiment.title);
         let interrupted = match experiment.kind()? {
             Kind::Measure(name) => {
+                output::note(&about);
                 measure(arguments, &experiment, name)?;
                 false
             }
@@ -110,6 +112,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
                     Some(gpu) => gpu,
                     None => gpu.insert(arguments.device.open()?),
                 };
+                output::note(&about);
                 render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar, into_page)?
             }
         };
@@ -185,12 +188,16 @@ fn render(
         references: arguments.references.clone(),
         fresh: arguments.fresh,
     };
-    let results = render_sweep::run(gpu, experiment, sweep, arguments.smoke, &places, bar);
+    let unread = Cell::new(false);
+    let load = |address: &str| scene::load(address).inspect_err(|_| unread.set(true));
+    let results = render_sweep::run(gpu, experiment, sweep, arguments.smoke, &places, &load, bar);
     bar.clear();
-    let results = results.map_err(|error| match error {
-        // Files of one's own are not read here, scenes are.
-        clerestory::Error::Scene { .. } => Failure::scene(error),
-        other => other.into(),
+    let results = results.map_err(|error| {
+        if unread.get() {
+            Failure::scene(error)
+        } else {
+            error.into()
+        }
     })?;
     let text = files::sweep(&places.folder, &results)?;
     if into_page && !results.interrupted {
