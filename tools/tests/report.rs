@@ -188,7 +188,7 @@ fn an_interrupt_leaves_complete_files_and_the_next_run_goes_on() -> Tested {
     assert_eq!(child.wait()?.code(), Some(130), "{heard}");
     assert!(read(&bench.out().join("report.md"))?.contains("Interrupted"));
     assert!(read(&bench.out().join("index.html"))?.ends_with("</html>\n"));
-    bench.measured(&TEXT.replace("repeats = 2", "repeats = 1"), 0, 2)?;
+    bench.measured(&long.replace("10000000", "16"), 1, 2)?;
     Ok(())
 }
 

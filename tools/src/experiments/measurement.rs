@@ -98,13 +98,15 @@ impl Store {
             .filter(|one| fingerprint::kernels_are_current(&one.kernels))
     }
 
-    /// Keeps a measurement, in the file first.
+    /// Keeps a measurement, in the file first, and returns it as it will be read back: text may cost a number its last bit, and results
+    /// must not depend on when they were made.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn add(&mut self, measurement: Measurement) -> Result<()> {
+    pub fn add(&mut self, measurement: &Measurement) -> Result<Measurement> {
         let wrong = |error| Error::io(&self.path, error);
-        let line = serde_json::to_string(&measurement).map_err(|cause| wrong(cause.into()))?;
+        let line = serde_json::to_string(measurement).map_err(|cause| wrong(cause.into()))?;
+        let read: Measurement = serde_json::from_str(&line).map_err(|cause| wrong(cause.into()))?;
         let line = if self.cut_off { "\n" } else { "" }.to_owned() + &line + "\n";
         let mut file = std::fs::OpenOptions::new()
             .create(true)
@@ -115,8 +117,8 @@ impl Store {
             .and_then(|()| file.sync_data())
             .map_err(wrong)?;
         self.cut_off = false;
-        self.known.insert(measurement.key.clone(), measurement);
-        Ok(())
+        self.known.insert(read.key.clone(), read.clone());
+        Ok(read)
     }
 }
 
@@ -161,15 +163,15 @@ pub(super) mod tests {
         let path = folder.path().join("measurements.jsonl");
         let one = |key: &str, seconds| made_up(key, Budget::Spp(4), 0, seconds, 0.25);
         let mut store = Store::open(&path).unwrap();
-        store.add(one("a", 0.5)).unwrap();
-        store.add(one("b", 1.5)).unwrap();
+        store.add(&one("a", 0.5)).unwrap();
+        store.add(&one("b", 1.5)).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, &text[..text.len() - 20]).unwrap();
         let mut store = Store::open(&path).unwrap();
         assert_eq!(store.get("a"), Some(&one("a", 0.5)));
         assert_eq!(store.get("b"), None);
-        store.add(one("c", 2.5)).unwrap();
-        store.add(one("a", 3.5)).unwrap();
+        store.add(&one("c", 2.5)).unwrap();
+        store.add(&one("a", 3.5)).unwrap();
         let store = Store::open(&path).unwrap();
         assert_eq!(store.get("a").map(|one| one.seconds), Some(3.5));
         assert_eq!(store.get("c").map(|one| one.seconds), Some(2.5));
@@ -181,7 +183,7 @@ pub(super) mod tests {
         let mut store = Store::open(&folder.path().join("measurements.jsonl")).unwrap();
         let mut old = made_up("a", Budget::Seconds(0.5), 0, 0.5, 0.25);
         old.kernels = BTreeMap::from([("gone.comp".into(), "0".into())]);
-        store.add(old).unwrap();
+        store.add(&old).unwrap();
         assert_eq!(store.get("a"), None);
     }
 }

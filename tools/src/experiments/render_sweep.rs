@@ -318,7 +318,7 @@ impl Running<'_> {
             keep_picture(path, &rendered.picture)?;
         }
         let measurement = judge(&rendered, reference, task, budget, stage.tone)?;
-        self.store.add(measurement.clone())?;
+        let measurement = self.store.add(&measurement)?;
         self.measured += 1;
         Ok(Some(measurement))
     }
