@@ -209,7 +209,7 @@ impl Running<'_> {
         }
         Ok(Some(SceneResults {
             address: address.into(),
-            triangles: triangles as u64,
+            triangles,
             reference: reference_path.display().to_string(),
             tone,
             reference_picture: reference,
