@@ -57,9 +57,11 @@ pub fn facts(results: &Results) -> Vec<String> {
                 .to_owned(),
         );
     }
+    // Of measurements found from earlier runs, this run's load says nothing.
     let load = results
         .load
         .as_ref()
+        .filter(|_| results.measured > 0)
         .map_or(String::new(), |load| format!("; load average {load} when it began"));
     facts.extend([
         format!("Device: {}; driver: {}.", results.device, results.driver),
