@@ -456,7 +456,8 @@ fn a_benchmark_counts_its_runs() -> Tested {
 #[test]
 fn a_report_has_a_table_for_its_scene() -> Tested {
     let folder = tempfile::tempdir()?;
-    let (page, references) = (folder.path().join("page.md"), folder.path().join("references"));
+    let page = folder.path().join("page.md");
+    let (references, out) = (folder.path().join("references"), folder.path().join("out"));
     let arguments = [
         "report",
         "--smoke",
@@ -466,21 +467,26 @@ fn a_report_has_a_table_for_its_scene() -> Tested {
         "1",
         "-o",
         text(&page),
+        "--references",
+        text(&references),
+        "--folder",
+        text(&out),
     ];
-    succeed(&[&arguments[..], &["--references", text(&references)]].concat())?;
+    succeed(&arguments)?;
     let written = std::fs::read_to_string(&page)?;
     assert!(
         written.contains("### `builtin:cornell-box` (38 triangles)") && written.contains("Smoke run"),
         "{written}"
     );
-    assert_eq!(
+    // Two variants, budgets of 2, 8 and 32 samples.
+    let rows = |budget: &str| {
         written
             .lines()
-            .filter(|line| line.starts_with("| 2 |") || line.starts_with("| 32 |"))
-            .count(),
-        2,
-        "{written}"
-    );
+            .filter(|line| line.contains(&format!("| {budget} spp |")))
+            .count()
+    };
+    assert_eq!(["2", "8", "32"].map(rows), [2; 3], "{written}");
     assert_eq!(std::fs::read_dir(&references)?.count(), 1);
+    assert!(out.join("error-against-time-smoke/index.html").is_file());
     Ok(())
 }

@@ -1,11 +1,33 @@
 //! Experiments: what `clerestory report NAME` runs. Each is a file of `tools/experiments/`, named as the spec names it.
 //!
-//! An experiment *measures* numbers (a table of a [`measures::Measure`]: errors, counts and speeds of functions and kernels).
+//! An experiment does one of two things:
+//! - it *measures* numbers: `measure = "name"`, tables of a [`measures::Measure`] (errors, counts and speeds of functions and kernels);
+//! - it *sweeps*: `[sweep]`, pictures of scenes by techniques and settings with growing budgets, their errors against converged
+//!   references, plots, slopes and strips. [`sweep`] describes the format with an example.
 
+pub mod equal_error;
+pub mod fingerprint;
+pub mod measurement;
 pub mod measures;
+pub mod pareto;
+pub mod plot;
+pub mod reference;
+pub mod render_sweep;
+pub mod results;
+pub mod series;
+pub mod slope;
+pub mod strip;
+pub mod summary;
+pub mod sweep;
 pub mod table;
+pub mod unbiased;
+pub mod web_page;
+
+use std::path::Path;
 
 use clerestory::{Error, Result};
+
+use self::sweep::Sweep;
 
 /// The files of `tools/experiments/`: name and text.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/experiments.rs"));
@@ -21,8 +43,35 @@ pub struct Experiment {
     pub title: String,
     /// Ids of the catalogue's rows that it measures.
     pub systems: Vec<String>,
-    /// The measure that it runs, by its name.
-    pub measure: String,
+    measure: Option<String>,
+    sweep: Option<Sweep>,
+}
+
+/// What an experiment does.
+#[derive(Debug, Clone, Copy)]
+pub enum Kind<'a> {
+    /// Runs the measure of this name.
+    Measure(&'a str),
+    /// Renders a sweep.
+    Sweep(&'a Sweep),
+}
+
+impl Experiment {
+    /// What it does.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when the file has neither `measure` nor `[sweep]`, or both.
+    pub fn kind(&self) -> Result<Kind<'_>> {
+        match (&self.measure, &self.sweep) {
+            (Some(measure), None) => Ok(Kind::Measure(measure)),
+            (None, Some(sweep)) => Ok(Kind::Sweep(sweep)),
+            _ => Err(Error::setting(
+                "experiment",
+                &self.name,
+                "needs exactly one of measure = \"…\" and [sweep]",
+            )),
+        }
+    }
 }
 
 /// The names of all experiments, in order.
@@ -30,11 +79,17 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-/// The experiment of that name.
+/// The experiment of that name, or the one that a file `….toml` describes.
 ///
 /// # Errors
-/// [`Error::Setting`] when there is none, or when its file is not sound.
+/// [`Error::Setting`] when there is none, or when its file is not sound; [`Error::Io`] when a named file cannot be read.
 pub fn find(name: &str) -> Result<Experiment> {
+    let path = Path::new(name);
+    if path.extension().is_some_and(|ending| ending == "toml") {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        return parse(&stem, &text);
+    }
     let (name, text) = FILES
         .iter()
         .find(|(known, _)| known.eq_ignore_ascii_case(name))
@@ -52,11 +107,17 @@ pub fn find(name: &str) -> Result<Experiment> {
 fn parse(name: &str, text: &str) -> Result<Experiment> {
     let experiment: Experiment =
         toml::from_str(text).map_err(|cause| Error::setting("experiment", name, cause.to_string()))?;
-    measures::find(&experiment.measure)?;
-    Ok(Experiment {
+    let experiment = Experiment {
         name: name.to_owned(),
         ..experiment
-    })
+    };
+    match experiment.kind()? {
+        Kind::Measure(measure) => {
+            measures::find(measure)?;
+        }
+        Kind::Sweep(sweep) => sweep.check()?,
+    }
+    Ok(experiment)
 }
 
 #[cfg(test)]
@@ -81,5 +142,26 @@ mod tests {
                 .to_string()
                 .contains("is not known")
         );
+    }
+
+    #[test]
+    fn an_experiment_is_of_exactly_one_kind() {
+        let refused = |text: &str| parse("x", text).unwrap_err().to_string();
+        assert!(refused("title = \"t\"\nsystems = []\n").contains("exactly one"));
+        assert!(refused("title = \"t\"\nsystems = []\nmeasure = \"no such\"\n").contains("is not known"));
+        assert!(refused("title = \"t\"\nsystems = []\ncolour = 1\n").contains("colour"));
+    }
+
+    #[test]
+    fn a_file_is_an_experiment_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.toml");
+        let text = "title = \"t\"\nsystems = []\n[sweep]\nscenes = [\"builtin:cornell-box\"]\nsize = [8, 8]\nspp = [1, 2]\n\
+                    reference = { spp = 64 }\n[[sweep.variant]]\nname = \"path\"\n";
+        std::fs::write(&path, text).unwrap();
+        let experiment = find(path.to_str().unwrap()).unwrap();
+        assert_eq!(experiment.name, "mine");
+        assert!(matches!(experiment.kind(), Ok(Kind::Sweep(_))));
+        assert!(find(folder.path().join("none.toml").to_str().unwrap()).is_err());
     }
 }

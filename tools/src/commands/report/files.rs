@@ -1,0 +1,73 @@
+//! The files of an experiment's results, each written as a whole or not at all.
+
+use std::path::Path;
+
+use clerestory::Error;
+use clerestory::film::png;
+use clerestory_tools::experiments::reference::slug;
+use clerestory_tools::experiments::results::Results;
+use clerestory_tools::experiments::series::{self, Work};
+use clerestory_tools::experiments::strip::{self, Strip};
+use clerestory_tools::experiments::table::Table;
+use clerestory_tools::experiments::{Experiment, summary, web_page};
+
+use crate::failure::Outcome;
+use crate::output;
+
+fn write(path: &Path, text: &str) -> Outcome {
+    // Beside its target first, so that nobody reads half a file.
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(format!(".{}.tmp", std::process::id()));
+    std::fs::write(&temporary, text)
+        .and_then(|()| std::fs::rename(&temporary, path))
+        .map_err(|error| Error::io(path, error).into())
+}
+
+fn make(folder: &Path) -> Outcome {
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error).into())
+}
+
+/// Writes the tables of a measure: Markdown, JSON, and a CSV for each. Returns the Markdown.
+pub fn tables(folder: &Path, experiment: &Experiment, tables: &[Table]) -> Outcome<String> {
+    make(folder)?;
+    let mut page = format!("# {}: {}\n", experiment.name, experiment.title);
+    for (index, table) in tables.iter().enumerate() {
+        page += &format!("\n{}", table.markdown());
+        write(&folder.join(format!("{}.csv", index + 1)), &table.csv())?;
+    }
+    write(&folder.join("report.md"), &page)?;
+    write(&folder.join("report.json"), &output::json_text("report.json", &tables)?)?;
+    Ok(page)
+}
+
+/// Writes everything of a sweep: page, Markdown, JSON, CSV, plots and picture strips. Returns the Markdown of facts and tables.
+pub fn sweep(folder: &Path, results: &Results) -> Outcome<String> {
+    let (plots, strips) = (folder.join("plots"), folder.join("strips"));
+    for folder in [folder, &plots, &strips] {
+        make(folder)?;
+    }
+    let scenes = series::of(results);
+    let made: clerestory::Result<Vec<Strip>> = results.scenes.iter().map(strip::of).collect();
+    let made = made?;
+    for (scene, strip) in scenes.iter().zip(&made) {
+        let name = slug(&scene.address);
+        for work in Work::ALL {
+            if let Some(svg) = web_page::plot_of(scene, work)? {
+                write(&plots.join(format!("{name}-{}.svg", work.word())), &svg)?;
+            }
+        }
+        png::write(strips.join(format!("{name}.png")), &strip.composed())?;
+    }
+    let text = summary::markdown(results, &scenes);
+    let page = format!("# {}: {}\n\n{text}", results.experiment, results.title);
+    write(&folder.join("report.md"), &page)?;
+    write(&folder.join("measurements.csv"), &summary::measurements(results).csv())?;
+    let document = serde_json::json!({ "results": results, "statistics": scenes });
+    write(
+        &folder.join("report.json"),
+        &output::json_text("report.json", &document)?,
+    )?;
+    // Last, so that a page that is there has all that stands beside it.
+    write(&folder.join("index.html"), &web_page::html(results, &scenes, &made)?)?;
+    Ok(text)
+}

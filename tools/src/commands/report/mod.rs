@@ -1,0 +1,216 @@
+//! `clerestory report`: runs experiments by name; without names, error against time of the path tracer, into a page of results.
+//!
+//! Only the part of the page between two marks is replaced, so that other measurements can stand beside it.
+
+mod files;
+mod watch;
+
+use std::cell::Cell;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use clerestory::gpu::Gpu;
+use clerestory::{Result, scene};
+use clerestory_tools::experiments::measures::{self, Context};
+use clerestory_tools::experiments::render_sweep::{self, Places};
+use clerestory_tools::experiments::sweep::Sweep;
+use clerestory_tools::experiments::{self, Experiment, Kind};
+use clerestory_tools::page::Block;
+
+use super::check_validation;
+use crate::failure::{Code, Failure, Outcome};
+use crate::options::DeviceOptions;
+use crate::output;
+use watch::Bar;
+
+/// Runs experiments by name: error against time and work with plots, slopes and pictures, or tables of measured numbers
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  clerestory report --list                         the experiments
+  clerestory report samplers                       into out/report/samplers: index.html, report.md, report.json, CSV, plots, pictures
+  clerestory report BG-2-convergence roulette      two of them
+  clerestory report my-experiment.toml             an experiment of your own; the format is that of tools/experiments/
+  clerestory report                                error against time on six scenes, also into RESULTS.md
+  clerestory report --smoke                        its smallest form, under two minutes on two cores
+  clerestory report --scene model.glb --repeat 3 -o model.md
+
+Finished pictures are kept in the experiment's folder, references in a folder of their own: an interrupted report goes on where it \
+stopped, and a changed experiment renders only what is missing. Changes of scenes, settings, kernels and driver are noticed by \
+themselves; after a change of the engine's Rust code that changes pictures, --fresh measures anew.")]
+pub struct Arguments {
+    /// Experiments by name or .toml file, into a folder each; without any, error-against-time, also into RESULTS.md
+    #[arg(value_name = "EXPERIMENT")]
+    experiments: Vec<String>,
+    /// Lists the experiments
+    #[arg(long, conflicts_with = "experiments")]
+    list: bool,
+    /// Folder of the experiments' results
+    #[arg(long, value_name = "FOLDER", default_value = "out/report")]
+    folder: PathBuf,
+    /// The smallest form: small pictures, few samples, two repeats; into a folder NAME-smoke
+    #[arg(long)]
+    smoke: bool,
+    /// Scenes in place of the experiment's; may be given several times
+    #[arg(long = "scene", value_name = "SCENE")]
+    scenes: Vec<String>,
+    /// Pictures of each budget in place of the experiment's number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=99))]
+    repeat: Option<u32>,
+    /// Measures everything anew, references included
+    #[arg(long)]
+    fresh: bool,
+    /// File whose marked part is replaced when no experiment is named; it is made if there is none
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        default_value = "RESULTS.md",
+        conflicts_with = "experiments"
+    )]
+    output: PathBuf,
+    /// Folder that keeps the references
+    #[arg(long, value_name = "FOLDER", default_value = "out/references")]
+    references: PathBuf,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+/// What runs without names.
+const DEFAULT: &str = "error-against-time";
+const BLOCK: Block = Block {
+    name: "error against time",
+    command: "clerestory report",
+};
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    if arguments.list {
+        return list();
+    }
+    let into_page = arguments.experiments.is_empty();
+    let names = if into_page {
+        vec![DEFAULT.to_owned()]
+    } else {
+        arguments.experiments.clone()
+    };
+    let found: Result<Vec<Experiment>> = names.iter().map(|name| experiments::find(name)).collect();
+    let bar = Bar::start()?;
+    // Opened for the first experiment that needs it, and kept: kernels compile once.
+    let mut gpu = None;
+    for experiment in found? {
+        let about = format!("{}: {}", experiment.name, experiment.title);
+        let interrupted = match experiment.kind()? {
+            Kind::Measure(name) => {
+                output::note(&about);
+                measure(arguments, &experiment, name)?;
+                false
+            }
+            Kind::Sweep(sweep) => {
+                let gpu = match &mut gpu {
+                    Some(gpu) => gpu,
+                    None => gpu.insert(arguments.device.open()?),
+                };
+                output::note(&about);
+                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar, into_page)?
+            }
+        };
+        if interrupted {
+            output::note("interrupted; the same command goes on where this stopped");
+            return Ok(Code::Interrupted.into());
+        }
+    }
+    if let Some(gpu) = gpu {
+        let log = gpu.validation_log();
+        drop(gpu);
+        check_validation(&log)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list() -> Outcome<ExitCode> {
+    let mut table = output::Table::new(&["experiment", "systems", "shows"], &[1, 2]);
+    for name in experiments::names() {
+        let experiment = experiments::find(name)?;
+        table.row([experiment.name, experiment.systems.join(", "), experiment.title]);
+    }
+    output::print(&table.text())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The folder of an experiment's results.
+fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
+    let form = if arguments.smoke { "-smoke" } else { "" };
+    arguments.folder.join(format!("{}{form}", experiment.name))
+}
+
+/// The tables go to standard output and, with all digits, into the folder.
+fn measure(arguments: &Arguments, experiment: &Experiment, name: &str) -> Outcome {
+    let open = || Gpu::headless(&arguments.device.options());
+    let context = Context {
+        smoke: arguments.smoke,
+        gpu: &open,
+    };
+    let tables = (measures::find(name)?.run)(&context)?;
+    let folder = folder(arguments, experiment);
+    let page = files::tables(&folder, experiment, &tables)?;
+    output::print(&page)?;
+    output::note(&format!("wrote {}", folder.display()));
+    Ok(())
+}
+
+/// The sweep with the changes that the command line asks for.
+fn chosen(arguments: &Arguments, sweep: &Sweep) -> Sweep {
+    let mut sweep = if arguments.smoke {
+        sweep.smoke_form()
+    } else {
+        sweep.clone()
+    };
+    if !arguments.scenes.is_empty() {
+        sweep.scenes.clone_from(&arguments.scenes);
+    }
+    sweep.repeats = arguments.repeat.unwrap_or(sweep.repeats);
+    sweep
+}
+
+/// Renders and writes everything; says whether it was interrupted.
+fn render(
+    arguments: &Arguments,
+    experiment: &Experiment,
+    sweep: &Sweep,
+    gpu: &Gpu,
+    bar: &Bar,
+    into_page: bool,
+) -> Outcome<bool> {
+    let places = Places {
+        folder: folder(arguments, experiment),
+        references: arguments.references.clone(),
+        fresh: arguments.fresh,
+    };
+    let unread = Cell::new(false);
+    let load = |address: &str| scene::load(address).inspect_err(|_| unread.set(true));
+    let results = render_sweep::run(gpu, experiment, sweep, arguments.smoke, &places, &load, bar);
+    bar.clear();
+    let results = results.map_err(|error| {
+        if unread.get() {
+            Failure::scene(error)
+        } else {
+            error.into()
+        }
+    })?;
+    let text = files::sweep(&places.folder, &results)?;
+    if into_page && !results.interrupted {
+        BLOCK.write(&arguments.output, &text)?;
+        output::note(&format!("wrote {}", arguments.output.display()));
+    } else {
+        output::print(&text)?;
+    }
+    output::note(&format!(
+        "{} pictures measured, {} found from earlier runs; wrote {}",
+        results.measured,
+        results.found,
+        places.folder.join("index.html").display()
+    ));
+    Ok(results.interrupted)
+}

@@ -1,0 +1,363 @@
+//! Sweeps: which pictures an experiment renders, and against what it measures them.
+//!
+//! ```toml
+//! title = "Russian roulette: noise and time"
+//! systems = ["MET-B8"]
+//!
+//! [sweep]
+//! scenes = ["builtin:cornell-box", "builtin:passage?width=0.1"]   # any scene address or file
+//! path_set = "indirect"           # default "all"; the same for every variant and the reference
+//! camera = "main"                 # default: each scene's first
+//! size = [96, 96]                 # pixels across and down
+//! spp = [4, 16, 64]               # samples a pixel, rising; or seconds = [0.1, 0.4, 1.6], time budgets
+//! repeats = 5                     # pictures a budget, with seeds of their own; default 5
+//! seed = 0                        # of the first repeat; the others follow it; default 0
+//!
+//! [sweep.reference]
+//! spp = 4096                      # samples a pixel; 16 times the most of a variant leaves its noise below 1/16 of their MSE
+//! technique = "path"              # default
+//! settings = { roulette_cap = 0.9 }  # default: the technique's, with independent samples where it has a `sampler`
+//!
+//! [[sweep.variant]]
+//! name = "from bounce 3"
+//! technique = "path"              # default
+//! settings = { roulette_start = 3 }
+//! slope = -0.5                    # optional: what log RMSE against log samples is expected to have
+//!
+//! [sweep.smoke]                   # optional: what `--smoke` takes instead
+//! size = [32, 32]
+//! spp = [1, 4, 16]
+//! repeats = 2
+//! reference_spp = 512
+//! scenes = ["builtin:cornell-box"]
+//! ```
+//!
+//! Unknown keys are refused. Settings are the technique's (`clerestory list path`).
+
+use clerestory::transport::PathSet;
+use clerestory::{Error, Result, techniques};
+use serde_json::{Map, Value};
+
+/// Pixels of either side at most.
+const SIDE_MAX: u32 = 16_384;
+/// Repeats at most.
+const REPEATS_MAX: u32 = 99;
+/// Samples a pixel at most; also what a picture with a time budget asks for.
+pub const SPP_MAX: u32 = 1 << 24;
+/// Height and width of smoke pictures, unless the file says otherwise.
+const SMOKE_SIDE: u32 = 48;
+const SMOKE_SPP: [u32; 3] = [2, 8, 32];
+const SMOKE_SECONDS: [f64; 2] = [0.05, 0.2];
+const SMOKE_REPEATS: u32 = 2;
+const SMOKE_REFERENCE_SPP: u32 = 1024;
+const DEFAULT_REPEATS: u32 = 5;
+
+/// What a sweep renders.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// Addresses of scenes.
+    pub scenes: Vec<String>,
+    /// Which light paths all pictures contain, in the text form of [`PathSet`].
+    #[serde(default = "all_paths")]
+    pub path_set: String,
+    /// Camera by name; `None` takes the first of each scene.
+    #[serde(default)]
+    pub camera: Option<String>,
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Budgets in samples a pixel, rising.
+    #[serde(default)]
+    pub spp: Option<Vec<u32>>,
+    /// Budgets in seconds of wall clock, rising.
+    #[serde(default)]
+    pub seconds: Option<Vec<f64>>,
+    /// Pictures of each budget.
+    #[serde(default = "default_repeats")]
+    pub repeats: u32,
+    /// Seed of the first repeat.
+    #[serde(default)]
+    pub seed: u32,
+    /// The converged picture.
+    pub reference: ReferencePlan,
+    /// What is compared.
+    #[serde(rename = "variant")]
+    pub variants: Vec<Variant>,
+    /// What the smoke form changes.
+    #[serde(default)]
+    pub smoke: Smoke,
+}
+
+/// How references are made.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReferencePlan {
+    /// Samples a pixel.
+    pub spp: u32,
+    /// The technique; it must be unbiased.
+    #[serde(default = "path_technique")]
+    pub technique: String,
+    /// Its settings.
+    #[serde(default)]
+    pub settings: Map<String, Value>,
+}
+
+/// A technique with settings.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variant {
+    /// What tables and plots call it.
+    pub name: String,
+    /// The technique's id.
+    #[serde(default = "path_technique")]
+    pub technique: String,
+    /// Its settings, where they differ from the defaults.
+    #[serde(default)]
+    pub settings: Map<String, Value>,
+    /// Expected slope of log RMSE against log samples, −½ for independent samples.
+    #[serde(default)]
+    pub slope: Option<f64>,
+}
+
+/// What the smoke form takes in place of the sweep's own.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Smoke {
+    /// Pixels across and down.
+    pub size: Option<[u32; 2]>,
+    /// Budgets in samples a pixel.
+    pub spp: Option<Vec<u32>>,
+    /// Budgets in seconds.
+    pub seconds: Option<Vec<f64>>,
+    /// Pictures of each budget.
+    pub repeats: Option<u32>,
+    /// Samples a pixel of the reference.
+    pub reference_spp: Option<u32>,
+    /// Scenes.
+    pub scenes: Option<Vec<String>>,
+}
+
+/// When a rendering ends.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Budget {
+    /// After this many samples a pixel.
+    Spp(u32),
+    /// After about this many seconds of wall clock.
+    Seconds(f64),
+}
+
+impl std::fmt::Display for Budget {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Spp(spp) => write!(f, "{spp} spp"),
+            Self::Seconds(seconds) => write!(f, "{seconds} s"),
+        }
+    }
+}
+
+fn all_paths() -> String {
+    "all".into()
+}
+
+fn path_technique() -> String {
+    "path".into()
+}
+
+fn default_repeats() -> u32 {
+    DEFAULT_REPEATS
+}
+
+fn wrong(name: &str, value: impl std::fmt::Display, cause: &str) -> Error {
+    Error::setting(format!("sweep.{name}"), value, cause)
+}
+
+impl Sweep {
+    /// The budgets, rising.
+    pub fn budgets(&self) -> Vec<Budget> {
+        let spp = self.spp.iter().flatten().map(|spp| Budget::Spp(*spp));
+        let seconds = self.seconds.iter().flatten().map(|seconds| Budget::Seconds(*seconds));
+        spp.chain(seconds).collect()
+    }
+
+    /// The seeds of the repeats.
+    pub fn seeds(&self) -> impl Iterator<Item = u32> {
+        let first = self.seed;
+        (0..self.repeats).map(move |repeat| first.wrapping_add(repeat))
+    }
+
+    /// The smallest form.
+    pub fn smoke_form(&self) -> Self {
+        let smoke = &self.smoke;
+        let in_spp = smoke.spp.is_some() || (smoke.seconds.is_none() && self.spp.is_some());
+        Self {
+            scenes: smoke.scenes.clone().unwrap_or_else(|| self.scenes.clone()),
+            size: smoke.size.unwrap_or(self.size.map(|side| side.min(SMOKE_SIDE))),
+            spp: in_spp.then(|| smoke.spp.clone().unwrap_or(SMOKE_SPP.to_vec())),
+            seconds: (!in_spp).then(|| smoke.seconds.clone().unwrap_or(SMOKE_SECONDS.to_vec())),
+            repeats: smoke.repeats.unwrap_or(SMOKE_REPEATS),
+            reference: ReferencePlan {
+                spp: smoke.reference_spp.unwrap_or(SMOKE_REFERENCE_SPP),
+                ..self.reference.clone()
+            },
+            ..self.clone()
+        }
+    }
+
+    /// Refuses what cannot be rendered or compared.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] that names the key.
+    pub fn check(&self) -> Result<()> {
+        self.path_set.parse::<PathSet>()?;
+        if self.scenes.is_empty() {
+            return Err(wrong("scenes", "[]", "needs at least one"));
+        }
+        if self.size.iter().any(|side| !(1..=SIDE_MAX).contains(side)) {
+            return Err(wrong("size", format!("{:?}", self.size), "sides are 1 … 16384 pixels"));
+        }
+        let budgets = match (&self.spp, &self.seconds) {
+            (Some(spp), None) => spp.iter().map(|spp| f64::from(*spp)).collect::<Vec<_>>(),
+            (None, Some(seconds)) => seconds.clone(),
+            _ => return Err(wrong("spp", "seconds", "exactly one of spp and seconds is wanted")),
+        };
+        let shown = format!("{budgets:?}");
+        let sound = budgets
+            .iter()
+            .all(|budget| *budget > 0.0 && *budget <= f64::from(SPP_MAX));
+        if budgets.is_empty() || !sound || !budgets.is_sorted_by(|a, b| a < b) {
+            return Err(wrong("spp", shown, "needs rising budgets above 0"));
+        }
+        if !(1..=REPEATS_MAX).contains(&self.repeats) {
+            return Err(wrong("repeats", self.repeats, "is not in 1 … 99"));
+        }
+        if !(2..=SPP_MAX).contains(&self.reference.spp) {
+            return Err(wrong("reference.spp", self.reference.spp, "is not in 2 … 16777216"));
+        }
+        if self.variants.is_empty() {
+            return Err(wrong("variant", "[]", "needs at least one [[sweep.variant]]"));
+        }
+        for (index, variant) in self.variants.iter().enumerate() {
+            let earlier = &self.variants[..index];
+            if variant.name.is_empty() || earlier.iter().any(|other| other.name == variant.name) {
+                return Err(wrong("variant.name", &variant.name, "is empty or there twice"));
+            }
+            self.settings(&variant.technique, &variant.settings)?;
+        }
+        self.reference_settings()?;
+        Ok(())
+    }
+
+    /// All settings of a technique: its defaults, changed by those given and by the path set.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a technique or setting that there is not, and for a path set that the technique cannot be restricted to.
+    pub fn settings(&self, technique: &str, given: &Map<String, Value>) -> Result<Value> {
+        let info = techniques::by_id(technique)?;
+        let mut settings = match (info.default_settings)() {
+            Value::Object(settings) => settings,
+            _ => Map::new(),
+        };
+        let path_set = self.path_set.parse::<PathSet>()?;
+        for (name, value) in given {
+            if !settings.contains_key(name) || name == "path_set" {
+                let known: Vec<&str> = settings.keys().map(String::as_str).collect();
+                let cause = if name == "path_set" {
+                    "stands beside the scenes, since all pictures must contain the same paths".to_owned()
+                } else {
+                    format!("is no setting of technique {technique}; there is: {}", known.join(", "))
+                };
+                return Err(Error::setting("sweep.variant.settings", name, cause));
+            }
+            settings.insert(name.clone(), value.clone());
+        }
+        if settings.contains_key("path_set") {
+            settings.insert("path_set".into(), Value::String(path_set.to_string()));
+        } else if path_set != PathSet::ALL {
+            let cause = format!("technique {technique} cannot be restricted to paths");
+            return Err(wrong("path_set", &self.path_set, &cause));
+        }
+        Ok(Value::Object(settings))
+    }
+
+    /// All settings of the reference. Where its technique has a choice of samplers and the file makes none, samples are independent: only
+    /// then is the variance layer, which counts samples, the variance of the mean.
+    ///
+    /// # Errors
+    /// As [`Sweep::settings`].
+    pub fn reference_settings(&self) -> Result<Value> {
+        let mut given = self.reference.settings.clone();
+        let info = techniques::by_id(&self.reference.technique)?;
+        if (info.default_settings)().get("sampler").is_some() {
+            given.entry("sampler").or_insert_with(|| Value::String("pcg".into()));
+        }
+        self.settings(&self.reference.technique, &given)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "scenes = [\"builtin:ring\"]\nsize = [96, 64]\nspp = [4, 16]\nreference = { spp = 1024 }\n\
+                        [[variant]]\nname = \"a\"\nsettings = { sampler = \"pcg\" }\nslope = -0.5\n[[variant]]\nname = \"b\"\n";
+
+    fn changed(from: &str, to: &str) -> std::result::Result<Sweep, String> {
+        assert!(TEXT.contains(from), "{from}");
+        let sweep: Sweep = toml::from_str(&TEXT.replace(from, to)).map_err(|e| e.to_string())?;
+        sweep.check().map_err(|e| e.to_string())?;
+        Ok(sweep)
+    }
+
+    #[test]
+    fn defaults_and_settings_are_filled_in() {
+        let sweep = changed("4, 16", "4, 16, 64").unwrap();
+        assert_eq!((sweep.repeats, sweep.seed, sweep.path_set.as_str()), (5, 0, "all"));
+        assert_eq!(sweep.budgets(), [4, 16, 64].map(Budget::Spp));
+        assert_eq!(sweep.seeds().collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+        let settings = |index: usize| {
+            let variant = &sweep.variants[index];
+            sweep.settings(&variant.technique, &variant.settings).unwrap()
+        };
+        assert_eq!(
+            (&settings(0)["sampler"], &settings(1)["sampler"]),
+            (&"pcg".into(), &"sobol".into())
+        );
+        assert_eq!(settings(0)["path_set"], "all");
+        assert_eq!(sweep.reference_settings().unwrap()["sampler"], "pcg");
+    }
+
+    #[test]
+    fn mistakes_are_refused_by_name() {
+        for (from, to, word) in [
+            ("[\"builtin:ring\"]", "[]", "scenes"),
+            ("[96, 64]", "[0, 64]", "size"),
+            ("[4, 16]", "[16, 4]", "rising"),
+            ("[4, 16]", "[]", "rising"),
+            ("spp = [4, 16]", "spp = [4]\nseconds = [1.0]", "exactly one"),
+            ("spp = [4, 16]", "spp = [4]\nrepeats = 0", "repeats"),
+            ("spp = [4, 16]", "spp = [4]\npath_set = \"nonsense\"", "path set"),
+            ("spp = [4, 16]", "spp = [4]\nrepeat = 3", "repeat"),
+            ("sampler =", "smapler =", "roulette_start"),
+            ("sampler =", "path_set =", "the same paths"),
+            ("name = \"b\"", "name = \"a\"", "twice"),
+            ("name = \"b\"", "name = \"b\"\ntechnique = \"magic\"", "magic"),
+            ("1024", "1", "reference.spp"),
+        ] {
+            let message = changed(from, to).unwrap_err();
+            assert!(message.contains(word), "{to}: {message}");
+        }
+    }
+
+    #[test]
+    fn the_smoke_form_is_small_and_keeps_what_is_compared() {
+        let sweep = changed("[4, 16]", "[4, 16, 64, 256]").unwrap();
+        let smoke = sweep.smoke_form();
+        smoke.check().unwrap();
+        assert_eq!((smoke.size, smoke.repeats, smoke.reference.spp), ([48, 48], 2, 1024));
+        assert_eq!((&smoke.variants, &smoke.scenes), (&sweep.variants, &sweep.scenes));
+        let timed = changed("spp = [4, 16]", "seconds = [0.5, 2.0]").unwrap().smoke_form();
+        timed.check().unwrap();
+        assert_eq!((timed.spp, timed.seconds), (None, Some(vec![0.05, 0.2])));
+    }
+}
