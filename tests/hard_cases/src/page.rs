@@ -23,9 +23,11 @@ pub fn case_section(case: &HardCase, pictured: bool) -> String {
     )
 }
 
-/// The page. `cases` with their outcomes in the order of `subjects`, `None` where a case does not concern one; `device` says on what
-/// they were measured.
-pub fn markdown(device: &str, subjects: &[String], cases: &[(&HardCase, Vec<Option<Outcome>>)]) -> String {
+/// A case with its outcomes in the order of the page's subjects, `None` where it does not concern one.
+pub type Row<'a> = (&'a HardCase, Vec<Option<Outcome>>);
+
+/// The page. `device` says on what the outcomes were measured, `pictured` which cases have a picture.
+pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: impl Fn(&HardCase) -> bool) -> String {
     let mut page = format!(
         "# Stability\n\nHow every technique with each of its samplers, every ray index and the scattering functions (`lobes`, in f64) take the \
          hard cases. Written by `clerestory stability --markdown`, measured on {device}. Each cell has the figure that came nearest \
@@ -35,7 +37,7 @@ pub fn markdown(device: &str, subjects: &[String], cases: &[(&HardCase, Vec<Opti
         "---|".repeat(subjects.len()),
     );
     let mut reasons = Vec::new();
-    for (case, outcomes) in cases {
+    for (case, outcomes) in rows {
         page += &format!("| [{name}](#{name}) |", name = case.name);
         for outcome in outcomes {
             page += &match outcome {
@@ -56,9 +58,9 @@ pub fn markdown(device: &str, subjects: &[String], cases: &[(&HardCase, Vec<Opti
         page += &reasons.concat();
     }
     page += "\n## The cases\n";
-    for (case, _) in cases {
+    for (case, _) in rows {
         page += "\n";
-        page += &case_section(case);
+        page += &case_section(case, pictured(case));
     }
     page
 }

@@ -1,6 +1,6 @@
 //! NaN and infinity in what a scene holds.
 
-use clerestory::scene::{Environment, LightKind, Scene, load};
+use clerestory::scene::{Environment, LightKind, Medium, Phase, Scene, load};
 use clerestory::{Error, Result};
 use glam::{Vec2, Vec3, Vec4};
 
@@ -124,6 +124,19 @@ const FAULTS: &[Fault] = &[
     ("cameras[0]", |s| s.cameras[0].transform.translation.x = f64::NAN),
     ("cameras[0]", |s| s.cameras[0].lens_radius = f32::NAN),
     ("cameras[0]", |s| s.cameras[0].focus_distance = 0.0),
+    ("media[0]", |s| {
+        s.media.push(Medium {
+            sigma_s: Vec3::NAN,
+            ..Medium::default()
+        });
+    }),
+    ("media[0]", |s| {
+        s.media.push(Medium {
+            phase: Phase::HenyeyGreenstein { g: 1.0 },
+            ..Medium::default()
+        });
+    }),
+    ("surrounding", |s| s.surrounding = Some(0)),
     ("environment", |s| {
         s.environment = Some(Environment::uniform(Vec3::splat(f32::NAN)))
     }),
