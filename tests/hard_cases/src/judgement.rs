@@ -9,7 +9,7 @@ use crate::Painted;
 pub const FALSE_ALARM: f64 = 1e-6;
 
 /// |z| that a standard normal passes with probability [`FALSE_ALARM`].
-const Z_MAX: f64 = 4.892;
+pub(crate) const Z_MAX: f64 = 4.892;
 /// The same for a sum over pixels whose three channels may be one and the same: √3 times as much.
 const SUM_Z_MAX: f64 = 8.473;
 /// Share of a picture's values that its z-test may reject: 1 − [`ACCEPTED_FRACTION`](clerestory::film::z_test::ACCEPTED_FRACTION).
@@ -89,7 +89,7 @@ impl Judgement {
     pub fn worst(&self) -> Option<&Figure> {
         let rank = |figure: &Figure| (!figure.is_documented(), !figure.passes());
         self.figures.iter().reduce(|worst, figure| {
-            let worse = (rank(figure), figure.excess()) > (rank(worst), worst.excess());
+            let worse = (rank(figure), figure.excess()) >= (rank(worst), worst.excess());
             if worse { figure } else { worst }
         })
     }
@@ -121,6 +121,7 @@ impl Judgement {
 
     /// Every sample was finite and is there, and all radiance is finite and not negative.
     pub fn sound(&mut self, what: &str, painted: &Painted) {
+        self.holds(format!("{what}: no picture"), !painted.radiance.is_empty());
         self.none(
             format!("{what}: samples that are not finite"),
             painted.non_finite as usize,
@@ -133,7 +134,6 @@ impl Judgement {
             .filter(|v| !(v.is_finite() && **v >= 0.0))
             .count();
         self.none(format!("{what}: radiance negative or not finite"), wrong);
-        self.holds(format!("{what}: no picture"), !painted.radiance.is_empty());
     }
 
     /// Every value is exactly this.
@@ -247,12 +247,12 @@ impl Judgement {
 
     /// A call has to fail with an error that `fits`.
     pub fn refused<T>(&mut self, what: &str, result: Result<T>, fits: impl FnOnce(&Error) -> bool) {
-        match result {
-            Ok(_) => self.holds(format!("{what} is accepted"), false),
-            Err(error) => {
-                let fits = fits(&error);
-                self.holds(format!("{what} gives {error}"), fits);
-            }
-        }
+        let fault = match result {
+            Ok(_) => Some("accepted".to_owned()),
+            Err(error) if !fits(&error) => Some(error.to_string()),
+            Err(_) => None,
+        };
+        let found = fault.as_deref().unwrap_or("not refused as it has to be");
+        self.holds(format!("{what}: {found}"), fault.is_none());
     }
 }

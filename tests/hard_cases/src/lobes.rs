@@ -9,6 +9,7 @@ use clerestory::transport::random::{Sampler, SamplerKind, sample_1d, sample_2d};
 use glam::{DVec3, Vec3};
 
 use crate::Judgement;
+use crate::judgement::Z_MAX;
 
 /// A kind of scattering.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +20,13 @@ pub struct Lobe {
     pub material: fn(f32) -> Material,
     /// Nothing is lost in it at the roughness `r`, so that a white one gives back all light.
     pub lossless: fn(f32) -> bool,
+}
+
+impl Lobe {
+    /// What a white one of this roughness may lose; `None` for what is not lossless.
+    pub fn loss(&self, roughness: f32) -> Option<f64> {
+        (self.lossless)(roughness).then_some(TABLE_LOSS)
+    }
 }
 
 /// Every kind of scattering.
@@ -81,12 +89,22 @@ pub const TABLE_GAIN: f64 = 5e-3;
 /// See [`TABLE_GAIN`].
 pub const TABLE_LOSS: f64 = 9e-3;
 
-/// Judges a material seen at a cosine: all values finite and not negative, density and value of samples equal to those evaluated, at most
-/// as much light as came, and no less where `lossless`.
-pub fn judge(what: &str, material: &Material, cosine: f64, lossless: bool, judgement: &mut Judgement) {
+/// Samples of a direction.
+struct Sampled {
+    /// Mean weight.
+    mean: DVec3,
+    /// Its standard error, as if samples were independent: Sobol' points err less, so this is to the safe side.
+    deviation: f64,
+    /// Samples that are not finite, negative or of a direction that is none.
+    broken: usize,
+    /// Samples whose density or value is not the one that is evaluated for their direction.
+    unequal: usize,
+}
+
+fn sample(material: &Material, cosine: f64, features: BsdfFeatures) -> Sampled {
     const SAMPLES: u32 = 1 << 10;
     let context = BsdfContext {
-        features: BsdfFeatures::ALL,
+        features,
         table: AlbedoTable::shared(),
     };
     let bsdf = Bsdf::from_material(material);
@@ -107,13 +125,8 @@ pub fn judge(what: &str, material: &Material, cosine: f64, lossless: bool, judge
             seed: 11,
         };
         let pair = sample_2d(&mut sampler, SamplerKind::Sobol);
-        let sample = bsdf_sample(
-            &context,
-            &bsdf,
-            wo,
-            pair.extend(sample_1d(&mut sampler, SamplerKind::Sobol)),
-            LOBE_ALL,
-        );
+        let u = pair.extend(sample_1d(&mut sampler, SamplerKind::Sobol));
+        let sample = bsdf_sample(&context, &bsdf, wo, u, LOBE_ALL);
         if sample.flags == 0 {
             continue;
         }
@@ -134,14 +147,36 @@ pub fn judge(what: &str, material: &Material, cosine: f64, lossless: bool, judge
     }
     let n = f64::from(SAMPLES);
     let mean = sum / n;
-    // Sobol' points err less than independent samples, so this is to the safe side.
-    let deviation = ((squares / n - mean.length_squared() / 3.0).max(0.0) / n).sqrt();
-    let noise = 4.892 * deviation;
+    let variance = (squares / n - mean.length_squared() / 3.0).max(0.0);
+    Sampled {
+        mean,
+        deviation: (variance / n).sqrt(),
+        broken,
+        unequal,
+    }
+}
+
+/// What a white material loses at a cosine without compensation for scattering among microfacets.
+pub fn single_scattering_loss(material: &Material, cosine: f64) -> f64 {
+    let features = BsdfFeatures {
+        multiple_scattering: false,
+        ..BsdfFeatures::ALL
+    };
+    1.0 - sample(material, cosine, features).mean.min_element()
+}
+
+/// Judges a material seen at a cosine: all values finite and not negative, density and value of samples equal to those evaluated, at most
+/// as much light as came; and where nothing should be lost, no less than the table's error, or than the given documented loss.
+pub fn judge(what: &str, material: &Material, cosine: f64, loss: Option<f64>, judgement: &mut Judgement) {
+    let sampled = sample(material, cosine, BsdfFeatures::ALL);
+    let noise = Z_MAX * sampled.deviation;
     let what = format!("{what}, cos {cosine}");
-    judgement.none(format!("{what}: samples not finite or negative"), broken);
-    judgement.none(format!("{what}: samples whose density is another one"), unequal);
-    judgement.at_most(format!("{what}: gain"), mean.max_element() - 1.0, TABLE_GAIN + noise);
-    if lossless {
-        judgement.at_most(format!("{what}: loss"), 1.0 - mean.min_element(), TABLE_LOSS + noise);
+    judgement.none(format!("{what}: samples not finite or negative"), sampled.broken);
+    judgement.none(format!("{what}: samples whose density is another one"), sampled.unequal);
+    let gain = sampled.mean.max_element() - 1.0;
+    judgement.at_most(format!("{what}: gain"), gain, TABLE_GAIN + noise);
+    if let Some(documented) = loss {
+        let loss = 1.0 - sampled.mean.min_element();
+        judgement.at_most_documented(format!("{what}: loss"), loss, TABLE_LOSS + noise, documented + noise);
     }
 }

@@ -96,7 +96,9 @@ pub fn misses(triangles: &[[Vec3; 3]], ray: &Ray, hit: &Hit) -> bool {
         let cosine = normal.normalize().dot(direction.as_dvec3().normalize()).abs();
         // Clear of the edges by the slack, and not so thin or grazing that the plane itself is uncertain.
         let margin = found.u.min(found.v).min(1.0 - found.u - found.v) * normal.length() / longest * cosine;
-        (margin > 4.0 * slack && cosine > 0.01).then_some(found.t)
+        // Neither so near to an end of the ray that it may lie beyond.
+        let inside = found.t > f64::from(ray.t_min) + 100.0 * slack && found.t < f64::from(ray.t_max) - 100.0 * slack;
+        (margin > 4.0 * slack && cosine > 0.01 && inside).then_some(found.t)
     });
     let nearest = nearest.fold(f64::INFINITY, f64::min);
     nearest.is_finite() && !(hit.is_hit() && f64::from(hit.t) <= nearest + 100.0 * slack)
@@ -117,11 +119,15 @@ pub(crate) fn judge(kind: &IndexKind, sets: &[RaySet]) -> Result<Judgement> {
     for RaySet { what, triangles, rays } in sets {
         let index = (kind.build)(triangles)?;
         let (mut differ, mut disagree, mut missed) = (0, 0, 0);
+        let mut first = String::new();
         for ray in rays {
             let hit = index.closest_hit(ray);
             differ += usize::from(bits(&hit) != bits(&closest_of_all(triangles, ray)));
             disagree += usize::from(index.any_hit(ray) != hit.is_hit());
-            missed += usize::from(misses(triangles, ray, &hit));
+            if misses(triangles, ray, &hit) {
+                missed += 1;
+                first = format!(", the last of them {ray:?} with {hit:?}");
+            }
         }
         let count = rays.len();
         judgement.none(
@@ -129,7 +135,10 @@ pub(crate) fn judge(kind: &IndexKind, sets: &[RaySet]) -> Result<Judgement> {
             differ,
         );
         judgement.none(format!("{what}: of {count} rays with other shadows"), disagree);
-        judgement.none(format!("{what}: of {count} rays that miss what f64 meets"), missed);
+        judgement.none(
+            format!("{what}: of {count} rays that miss what f64 meets{first}"),
+            missed,
+        );
         let excluded = index.statistics().excluded_degenerate + index.statistics().excluded_range;
         let unfit = triangles.iter().filter(|triangle| !can_be_met(triangle)).count();
         judgement.holds(

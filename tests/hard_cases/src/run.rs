@@ -4,7 +4,7 @@ use clerestory::gpu::Gpu;
 use clerestory::techniques::{self, TechniqueInfo};
 use clerestory::{Error, Result};
 
-use crate::{Easel, HardCase, INDEXES, IndexKind, Judgement, LOBES};
+use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
 
 /// What a case is run against.
 #[derive(Debug, Clone, Copy)]
@@ -100,8 +100,8 @@ pub struct Outcome {
     pub reason: Option<String>,
     /// True when the subject has refused the case beforehand, with its reasons.
     pub refused: bool,
-    /// Number of figures that were measured.
-    pub figures: usize,
+    /// Everything that was measured.
+    pub figures: Vec<Figure>,
 }
 
 /// Runs a case on a subject; `None` when it does not concern it.
@@ -130,11 +130,11 @@ fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Out
         measured: String::new(),
         reason: None,
         refused: false,
-        figures: 0,
+        figures: Vec::new(),
     };
     match judged {
         Ok(judgement) => {
-            outcome.figures = judgement.figures().len();
+            outcome.figures = judgement.figures().to_vec();
             let Some(worst) = judgement.worst() else {
                 outcome.reason = Some("nothing was measured".into());
                 return outcome;

@@ -31,14 +31,8 @@ pub(super) const CASE: HardCase = HardCase {
                 base_color: color.extend(1.0),
                 ..(lobe.material)(0.5)
             };
-            let white = color == Vec3::ONE;
-            lobes::judge(
-                &format!("{what} {}", lobe.name),
-                &material,
-                0.7,
-                white && (lobe.lossless)(0.5),
-                judgement,
-            );
+            let loss = if color == Vec3::ONE { lobe.loss(0.5) } else { None };
+            lobes::judge(&format!("{what} {}", lobe.name), &material, 0.7, loss, judgement);
         }
     }),
     ..HardCase::BASE

@@ -33,7 +33,7 @@ pub(super) const CASE: HardCase = HardCase {
                 .into_iter()
                 .filter(|cosine| *cosine > 0.0 || lobe.name == "glass")
             {
-                lobes::judge(&what, &material, cosine, false, judgement);
+                lobes::judge(&what, &material, cosine, None, judgement);
             }
         }
     }),
