@@ -86,8 +86,10 @@ fn bits(hit: &Hit) -> [u32; 4] {
 pub fn misses(triangles: &[[Vec3; 3]], ray: &Ray, hit: &Hit) -> bool {
     let direction = Vec3::from(ray.direction);
     let reach = reach(triangles, ray);
-    // 44u of the reach is what boxes are grown for (accel/bvh2.rs); edges that a ray passes within that may go either way.
-    let slack = reach * 64.0 / 16_777_216.0 / f64::from(direction.abs().max_element());
+    // 44u of the reach is what boxes are grown for (accel/bvh2.rs), in metres; edges that a ray passes within that may go either way.
+    let rounding = reach * 64.0 / 16_777_216.0;
+    // The same as a ray parameter.
+    let slack = rounding / f64::from(direction.abs().max_element());
     let nearest = triangles.iter().filter_map(|triangle| {
         let found = moller_trumbore(ray, triangle)?;
         let [a, b, c] = triangle.map(|v| v.as_dvec3());
@@ -98,7 +100,7 @@ pub fn misses(triangles: &[[Vec3; 3]], ray: &Ray, hit: &Hit) -> bool {
         let margin = found.u.min(found.v).min(1.0 - found.u - found.v) * normal.length() / longest * cosine;
         // Neither so near to an end of the ray that it may lie beyond.
         let inside = found.t > f64::from(ray.t_min) + 100.0 * slack && found.t < f64::from(ray.t_max) - 100.0 * slack;
-        (margin > 4.0 * slack && cosine > 0.01 && inside).then_some(found.t)
+        (margin > 4.0 * rounding && cosine > 0.01 && inside).then_some(found.t)
     });
     let nearest = nearest.fold(f64::INFINITY, f64::min);
     nearest.is_finite() && !(hit.is_hit() && f64::from(hit.t) <= nearest + 100.0 * slack)
@@ -118,6 +120,12 @@ pub(crate) fn judge(kind: &IndexKind, sets: &[RaySet]) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     for RaySet { what, triangles, rays } in sets {
         let index = (kind.build)(triangles)?;
+        let excluded = index.statistics().excluded_degenerate + index.statistics().excluded_range;
+        let unfit = triangles.iter().filter(|triangle| !can_be_met(triangle)).count();
+        judgement.holds(
+            format!("{what}: {excluded} instead of {unfit} triangles left out"),
+            excluded == unfit as u64,
+        );
         let (mut differ, mut disagree, mut missed) = (0, 0, 0);
         let mut first = String::new();
         for ray in rays {
@@ -138,12 +146,6 @@ pub(crate) fn judge(kind: &IndexKind, sets: &[RaySet]) -> Result<Judgement> {
         judgement.none(
             format!("{what}: of {count} rays that miss what f64 meets{first}"),
             missed,
-        );
-        let excluded = index.statistics().excluded_degenerate + index.statistics().excluded_range;
-        let unfit = triangles.iter().filter(|triangle| !can_be_met(triangle)).count();
-        judgement.holds(
-            format!("{what}: {excluded} instead of {unfit} triangles left out"),
-            excluded == unfit as u64,
         );
     }
     Ok(judgement)

@@ -86,12 +86,12 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         },
     );
     let alone = easel.paint(&lit, SMALL, 16)?;
+    judgement.holds("beside a light: black", alone.mean()[0].0 > 0.1);
     lit.add_light("off", off);
     emitting_triangle(&mut lit, &emitter, Vec3::splat(-3e38), 3e38);
     point_triangle(&mut lit, emitter, Vec3::Y);
     let painted = easel.paint(&lit, SMALL, 16)?;
     judgement.sound("beside a light", &painted);
     judgement.same_bits("beside a light", &painted, &alone);
-    judgement.holds("beside a light: black", alone.mean()[0].0 > 0.1);
     Ok(judgement)
 }
