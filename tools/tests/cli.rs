@@ -515,7 +515,7 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
     let pictures = folder.path().join("pictures");
     succeed(&["stability", "empty-scene", "--pictures", text(&pictures)])?;
     let picture = image::open(pictures.join("empty-scene.png"))?;
-    assert_eq!((picture.width(), picture.height()), (96, 96));
+    assert_eq!((picture.width(), picture.height()), (64, 64));
     refuse(&["stability", "nothing"], 2, &["nothing", "--list"])?;
     refuse(&["stability", "--technique", "nothing"], 2, &["nothing"])
 }

@@ -196,7 +196,7 @@ fn table(outcomes: &[&Judged]) -> String {
 }
 
 /// Pixels along a side of the cases' pictures, and their samples.
-const PICTURE: (u32, u32) = (96, 256);
+const PICTURE: (u32, u32) = (64, 512);
 
 fn paint(gpu: &Gpu, cases: &[&HardCase], folder: &Path) -> Outcome {
     std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?;

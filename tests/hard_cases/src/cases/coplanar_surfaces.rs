@@ -16,7 +16,7 @@ fn tilt() -> Quat {
 pub(super) const CASE: HardCase = HardCase {
     name: "coplanar-surfaces",
     breaks: "Which of two surfaces in one place is met changes from ray to ray (z-fighting), and each shades the other.",
-    expects: "No self-shadowing: two overlapping squares of one plane, cut into triangles differently, have the radiance ρE·cos θ/π of one. Of two equal squares the first is met, bit for bit as if it were alone.",
+    expects: "No self-shadowing: two overlapping squares of one plane, cut into triangles differently, have the radiance ρE·cos θ/π of one. Of two equal squares the first is met, bit for bit as if it were alone. Where squares of other shapes overlap, rounding decides which of them a ray meets.",
     picture: || {
         let mut scene = overlapping();
         let red = scene.add_material(Material::lambert("red", Vec3::new(0.7, 0.1, 0.1)));

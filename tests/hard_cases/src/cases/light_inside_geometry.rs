@@ -16,7 +16,7 @@ pub(super) const CASE: HardCase = HardCase {
             // Into the tall block.
             for light in &mut scene.lights {
                 if let LightKind::Point { position, .. } = &mut light.kind {
-                    *position = Vec3::new(0.368, 0.335, 0.351);
+                    *position = Vec3::new(0.368, 0.2, 0.351);
                 }
             }
             scene.environment = Some(clerestory::scene::Environment::uniform(Vec3::splat(0.2)));
