@@ -4,12 +4,12 @@
 //! `CLERESTORY_VALIDATION` (`off`, `core`, `gpu`). Unlike for programs, unset means `core` here, so that a bare `cargo test` checks every
 //! call; an unknown value fails the tests.
 
-#[path = "../../engine/src/test_random.rs"]
-pub mod random;
 pub mod render;
 pub mod shaders;
 pub mod statistics;
 pub mod twin;
+
+pub use clerestory_hard_cases::random;
 
 use clerestory::gpu::{Gpu, GpuOptions, Validation};
 

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
-use clerestory::scene::{Camera, Material, Mesh, Projection, Scene};
+use clerestory::scene::Scene;
 use clerestory::transport::path_tracer::PathCounters;
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathSet, PathTracer, PathTracerSettings};
-use glam::{DVec3, Vec3};
+pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, point_triangle};
 
 use crate::statistics::expect_mean;
 
@@ -169,56 +169,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, size: [u32; 2], samples: u32, settings: 
     picture
 }
 
-/// A camera that looks straight down (−Y) at a square of the plane y = 0, from `height`.
-pub fn camera_down(half_height: f32, height: f64) -> Camera {
-    let eye = DVec3::Y * height;
-    let mut camera = Camera::look_at("down", eye, DVec3::ZERO, -DVec3::Z, 1.0);
-    camera.projection = Projection::Orthographic { half_height };
-    camera
-}
-
-/// Averages of a function of (x, z) over each pixel of a square picture of [−half, half]² seen by [`camera_down`], by a 16 × 16 midpoint
-/// rule a pixel.
+/// As [`scenes::pixel_averages`](clerestory_hard_cases::scenes::pixel_averages), with 16 × 16 points a pixel.
 pub fn pixel_averages(size: u32, half: f64, function: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-    const STEPS: u32 = 16;
-    let at = |i: u32, sub: u32| {
-        half * (2.0 * (f64::from(i) + (f64::from(sub) + 0.5) / f64::from(STEPS)) / f64::from(size) - 1.0)
-    };
-    (0..size * size)
-        .map(|pixel| {
-            let sum: f64 = (0..STEPS * STEPS)
-                .map(|s| function(at(pixel % size, s % STEPS), at(pixel / size, s / STEPS)))
-                .sum();
-            sum / f64::from(STEPS * STEPS)
-        })
-        .collect()
-}
-
-/// The square [−half, half]² of the plane at `y`, facing up.
-pub fn floor(name: &str, material: u32, half: f32, y: f32) -> Mesh {
-    let corner = |x: f32, z: f32| Vec3::new(x * half, y, z * half);
-    Mesh {
-        name: name.into(),
-        positions: vec![
-            corner(-1.0, 1.0),
-            corner(1.0, 1.0),
-            corner(1.0, -1.0),
-            corner(-1.0, -1.0),
-        ],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(material),
-        ..Mesh::default()
-    }
-}
-
-/// A triangle without area at `place`, of a material: it is never met, but the scene's profile has to count its material in.
-pub fn point_triangle(scene: &mut Scene, material: Material, place: Vec3) {
-    let material = scene.add_material(material);
-    scene.place(Mesh {
-        name: "no area".into(),
-        positions: vec![place; 3],
-        triangles: vec![[0, 1, 2]],
-        material: Some(material),
-        ..Mesh::default()
-    });
+    clerestory_hard_cases::scenes::pixel_averages(size, half, 16, function)
 }

@@ -138,7 +138,7 @@ fn crates_used_directly_and_pages_of_notes_are_listed() {
         .collect();
     let missing: Vec<_> = crates
         .iter()
-        .filter(|name| **name != "clerestory" && !listed.contains(name))
+        .filter(|name| !name.starts_with("clerestory") && !listed.contains(name))
         .collect();
     assert!(
         missing.is_empty(),

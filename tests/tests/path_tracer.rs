@@ -11,7 +11,7 @@ use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, LOBE_ALL, bsdf_sample};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{
-    builtin, camera_down, finish, floor, independent, paths, pixel_averages, point_triangle, render, tracer,
+    builtin, camera_down, cuboid, finish, floor, independent, paths, pixel_averages, point_triangle, render, tracer,
 };
 use clerestory_tests::statistics::expect_mean;
 use clerestory_tests::with_gpu;
@@ -454,27 +454,6 @@ fn unlit_surfaces_show_their_colour_exactly() {
     });
 }
 
-/// A closed box, seen from outside counter-clockwise.
-fn solid_box(scene: &mut Scene, material: Material, lower: Vec3, upper: Vec3) {
-    let corner = |i: u32| Vec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), upper, lower);
-    let faces = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let material = scene.add_material(material);
-    scene.place(clerestory::scene::Mesh {
-        name: "box".into(),
-        positions: (0..8).map(corner).collect(),
-        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-        material: Some(material),
-        ..Default::default()
-    });
-}
-
 /// A floor and a point light inside an absorbing body that does not refract: exp(−σ (h + r)) of what they are in the clear, with r from
 /// the light to the floor and h from there to the body's top, under the camera.
 #[test]
@@ -493,12 +472,9 @@ fn light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way() {
             attenuation_distance: 1.0,
             ..Material::glass("body", 1.0)
         };
-        solid_box(
-            &mut scene,
-            body,
-            Vec3::new(-6.0, -0.5, -6.0),
-            Vec3::new(6.0, top as f32, 6.0),
-        );
+        let body = scene.add_material(body);
+        let corners = [Vec3::new(-6.0, -0.5, -6.0), Vec3::new(6.0, top as f32, 6.0)];
+        scene.place(cuboid("body", body, corners[0], corners[1]));
         let irradiance = |x: f64, z: f64| {
             let to = place - DVec3::new(x, 0.0, z);
             let r = to.length();

@@ -16,7 +16,7 @@ pub enum Code {
     Usage = 2,
     /// The scene cannot be read, or the technique cannot render it.
     Scene = 3,
-    /// Pictures differ beyond a threshold.
+    /// Pictures differ beyond a threshold, or a hard case fails.
     Differ = 4,
     /// No Vulkan device, or none that can do it.
     NoDevice = 5,

@@ -490,3 +490,38 @@ fn a_report_has_a_table_for_its_scene() -> Tested {
     assert!(out.join("error-against-time-smoke/index.html").is_file());
     Ok(())
 }
+
+#[test]
+fn hard_cases_are_listed_judged_and_shown() -> Tested {
+    let list = String::from_utf8(succeed(&["stability", "--list"])?.stdout)?;
+    for word in [
+        "scales",
+        "breaks",
+        "expects",
+        "path (sobol), path (pcg), bvh2",
+        "degrades",
+    ] {
+        assert!(list.contains(word), "{word}: {list}");
+    }
+    let judged = json(&succeed(&["stability", "empty-scene", "--json"])?.stdout)?;
+    let outcomes = judged["outcomes"].as_array().ok_or("no outcomes")?;
+    assert_eq!(outcomes.len(), 3, "{judged}");
+    for outcome in outcomes {
+        assert_eq!(outcome["verdict"], "pass", "{outcome}");
+        assert!(outcome["figures"].as_array().is_some_and(|figures| !figures.is_empty()));
+    }
+    let table = String::from_utf8(succeed(&["stability", "empty-scene", "--technique", "path"])?.stdout)?;
+    assert!(table.contains("path (pcg)") && !table.contains("bvh2"), "{table}");
+    let page = String::from_utf8(succeed(&["stability", "empty-scene", "--markdown"])?.stdout)?;
+    assert!(
+        page.starts_with("# Stability") && page.contains("### empty-scene"),
+        "{page}"
+    );
+    let folder = tempfile::tempdir()?;
+    let pictures = folder.path().join("pictures");
+    succeed(&["stability", "empty-scene", "--pictures", text(&pictures)])?;
+    let picture = image::open(pictures.join("empty-scene.png"))?;
+    assert_eq!((picture.width(), picture.height()), (64, 64));
+    refuse(&["stability", "nothing"], 2, &["nothing", "--list"])?;
+    refuse(&["stability", "--technique", "nothing"], 2, &["nothing"])
+}

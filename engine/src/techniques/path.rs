@@ -21,7 +21,13 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     bias: Bias::Unbiased,
     needs: &[],
     path_set: PathSet::ALL,
-    refusals: |_| Vec::new(),
+    refusals: |profile| {
+        let media = profile
+            .media
+            .any()
+            .then(|| "it does not model participating media".to_owned());
+        media.into_iter().collect()
+    },
     settings: &SETTINGS,
     default_settings: || serde_json::to_value(PathTracerSettings::default()).unwrap_or_default(),
     variants: &[

@@ -8,6 +8,7 @@ mod list;
 mod render;
 mod report;
 mod scenes;
+mod stability;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -45,7 +46,7 @@ Exit codes:
   1    the run failed: device lost, out of memory, a picture that cannot be read, a file that cannot be written
   2    the command line or a setting asks for what cannot be; pictures to compare have different sizes
   3    the scene is missing or cannot be read, or the technique cannot render it
-  4    pictures differ beyond a --threshold, or renderers beyond their noise
+  4    pictures differ beyond a --threshold, or renderers beyond their noise; a hard case fails
   5    no Vulkan device, or none that can do it
   130  stopped by Ctrl-C or a request to end, after writing what was there";
 
@@ -59,6 +60,7 @@ enum Command {
     Bench(bench::Arguments),
     Report(report::Arguments),
     Agreement(agreement::Arguments),
+    Stability(stability::Arguments),
 }
 
 /// Reads the command line, runs the command, reports its failure.
@@ -108,6 +110,7 @@ fn run(program: &Program) -> Outcome<ExitCode> {
         Command::Bench(arguments) => bench::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Agreement(arguments) => agreement::run(arguments),
+        Command::Stability(arguments) => stability::run(arguments),
     }
 }
 

@@ -1,0 +1,75 @@
+//! Lights inside of bodies and in the plane of walls.
+
+use clerestory::Result;
+use clerestory::scene::{LightKind, Material, Scene, load};
+use glam::Vec3;
+
+use crate::scenes::{SMALL, cuboid, floor, floor_from_above, lamp};
+use crate::{Easel, HardCase, Judgement};
+
+pub(super) const CASE: HardCase = HardCase {
+    name: "light-inside-geometry",
+    breaks: "Shadow rays that begin or end on a surface meet it by rounding or miss the wall around a light: light leaks out, and 1/r² at r = 0 is infinite.",
+    expects: "A light in a closed box is not seen outside, exactly; a point light in the plane of a floor and a lamp in that plane give the floor beside them exactly nothing.",
+    picture: || {
+        load("builtin:cornell-box?sphere=diffuse&source=point").map(|mut scene| {
+            // Into the tall block.
+            for light in &mut scene.lights {
+                if let LightKind::Point { position, .. } = &mut light.kind {
+                    *position = Vec3::new(0.368, 0.2, 0.351);
+                }
+            }
+            scene.environment = Some(clerestory::scene::Environment::uniform(Vec3::splat(0.2)));
+            scene
+        })
+    },
+    techniques: Some(judge),
+    ..HardCase::BASE
+};
+
+fn grey_floor() -> Scene {
+    floor_from_above(Material::lambert("floor", Vec3::splat(0.5)))
+}
+
+fn judge(easel: &Easel<'_>) -> Result<Judgement> {
+    let mut judgement = Judgement::default();
+    let point = |position: Vec3| LightKind::Point {
+        position,
+        intensity: Vec3::splat(1e3),
+    };
+    let mut boxed = grey_floor();
+    let wall = boxed.add_material(Material::lambert("wall", Vec3::splat(0.9)));
+    // One face of the box is level with the floor's plane, so that a corner of it lies in the floor.
+    boxed.place(cuboid(
+        "box",
+        wall,
+        Vec3::new(-0.4, 0.0, -0.3),
+        Vec3::new(0.3, 0.7, 0.5),
+    ));
+    boxed.add_light("inside", point(Vec3::new(0.1, 0.2, 0.1)));
+    boxed.add_light(
+        "in a corner",
+        point(Vec3::new(-0.4, 0.7, -0.3) + Vec3::new(1.0, -1.0, 1.0) * 1e-4),
+    );
+    judgement.exactly("light in a box", &easel.paint(&boxed, SMALL, 64)?, [0.0; 3]);
+
+    let mut in_plane = grey_floor();
+    in_plane.add_light("in the plane", point(Vec3::ZERO));
+    judgement.exactly(
+        "point light in the floor",
+        &easel.paint(&in_plane, SMALL, 64)?,
+        [0.0; 3],
+    );
+
+    let mut lamp_beside = grey_floor();
+    let shine = lamp_beside.add_material(lamp(Vec3::splat(1e3)));
+    let mut square = floor("lamp", shine, 0.5, 0.0);
+    square.positions.iter_mut().for_each(|p| p.x += 2.0);
+    lamp_beside.place(square);
+    judgement.exactly(
+        "lamp in the floor's plane",
+        &easel.paint(&lamp_beside, SMALL, 64)?,
+        [0.0; 3],
+    );
+    Ok(judgement)
+}

@@ -1,0 +1,59 @@
+//! Media that scatter and absorb nothing.
+
+use clerestory::Result;
+use clerestory::scene::{Environment, Material, Medium, Phase, Scene, load};
+use glam::Vec3;
+
+use crate::scenes::SMALL;
+use crate::{Easel, HardCase, Judgement};
+
+pub(super) const CASE: HardCase = HardCase {
+    name: "media-albedo-one",
+    breaks: "Paths in a dense medium that absorbs nothing scatter ten thousand times; roulette by throughput never ends them, and a cut at a depth loses light.",
+    expects: "A ball of it in a uniform environment of radiance 1 has radiance 1 at any optical thickness: it cannot be seen.",
+    picture: || {
+        ball(4.0, Phase::Isotropic).map(|mut scene| {
+            scene.environment = Some(Environment {
+                name: "sky and ground".into(),
+                width: 1,
+                height: 2,
+                radiance: vec![Vec3::new(0.5, 0.7, 1.0), Vec3::splat(0.1)],
+                ..Environment::uniform(Vec3::ONE)
+            });
+            scene
+        })
+    },
+    techniques: Some(judge),
+    ..HardCase::BASE
+};
+
+/// A ball of radius 1 of a medium that scatters, in a uniform environment.
+pub(super) fn ball(sigma: f32, phase: Phase) -> Result<Scene> {
+    let mut scene = load("builtin:white-furnace?frequency=4")?;
+    scene.media.push(Medium {
+        name: "milk".into(),
+        sigma_s: Vec3::splat(sigma),
+        phase,
+        ..Medium::default()
+    });
+    scene.materials[0] = Material {
+        interior: Some(0),
+        boundary: true,
+        ..Material::default()
+    };
+    Ok(scene)
+}
+
+fn judge(easel: &Easel<'_>) -> Result<Judgement> {
+    let mut judgement = Judgement::default();
+    for sigma in [1e-4, 1.0, 30.0] {
+        let painted = easel.paint(&ball(sigma, Phase::Isotropic)?, SMALL, 64)?;
+        judgement.mean(&format!("optical radius {sigma:e}"), &painted, [1.0; 3], 0.0)?;
+    }
+    // So dense that few paths come back before roulette ends them; those that do carry much: the mean is not near to normal.
+    judgement.sound(
+        "optical radius 1e4",
+        &easel.paint(&ball(1e4, Phase::Isotropic)?, SMALL, 16)?,
+    );
+    Ok(judgement)
+}

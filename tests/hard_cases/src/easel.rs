@@ -1,0 +1,177 @@
+//! A technique at work on small pictures.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use clerestory::film::picture::{RADIANCE, SAMPLES, VARIANCE};
+use clerestory::gpu::Gpu;
+use clerestory::scene::Scene;
+use clerestory::techniques::{Technique, TechniqueInfo, View};
+use clerestory::transport::GpuScene;
+use clerestory::{Error, Result};
+use serde_json::Value;
+
+/// Seed of all pictures.
+const SEED: u32 = 7;
+
+/// A technique with settings on a device.
+#[derive(Debug, Clone)]
+pub struct Easel<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    /// The technique.
+    pub info: &'static TechniqueInfo,
+    settings: serde_json::Map<String, Value>,
+    seed: u32,
+}
+
+/// A finished picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Painted {
+    /// RGB a pixel.
+    pub radiance: Vec<f32>,
+    /// Variance of the means.
+    pub variance: Vec<f32>,
+    /// Finite samples a pixel.
+    pub samples: Vec<f32>,
+    /// Samples left out.
+    pub non_finite: u64,
+    /// Samples a pixel that were asked for.
+    pub spp: u32,
+    /// Exact counts of work.
+    pub counters: BTreeMap<&'static str, u64>,
+}
+
+impl Painted {
+    /// Bits of radiance and variance: equal for equal pictures only.
+    pub fn bits(&self) -> Vec<u32> {
+        let values = self.radiance.iter().chain(&self.variance);
+        values.map(|v| v.to_bits()).collect()
+    }
+
+    /// Mean over the picture and the variance of that mean, per channel.
+    pub fn mean(&self) -> [(f64, f64); 3] {
+        let pixels = (self.radiance.len() / 3) as f64;
+        let sum = |values: &[f32], c: usize| values.iter().skip(c).step_by(3).map(|v| f64::from(*v)).sum::<f64>();
+        [0, 1, 2].map(|c| {
+            (
+                sum(&self.radiance, c) / pixels,
+                sum(&self.variance, c) / (pixels * pixels),
+            )
+        })
+    }
+}
+
+impl<'a> Easel<'a> {
+    /// A technique with settings that differ from its defaults.
+    pub fn new(gpu: &'a Gpu, info: &'static TechniqueInfo, settings: serde_json::Map<String, Value>) -> Self {
+        Self {
+            gpu,
+            info,
+            settings,
+            seed: SEED,
+        }
+    }
+
+    /// Whether the technique knows a setting.
+    pub fn has(&self, setting: &str) -> bool {
+        self.info.settings.iter().any(|known| known.name == setting)
+    }
+
+    /// The same with another setting, where the technique knows it.
+    #[must_use]
+    pub fn with(&self, setting: &str, value: impl Into<Value>) -> Self {
+        let mut other = self.clone();
+        if self.has(setting) {
+            other.settings.insert(setting.into(), value.into());
+        }
+        other
+    }
+
+    /// For scenes whose paths lose half of their light at each bounce: without the rare bright samples of early Russian roulette the
+    /// means of few samples are near enough to normal for tests of single pixels.
+    #[must_use]
+    pub fn calm(&self) -> Self {
+        self.with("roulette_start", 12)
+    }
+
+    /// The same with other random numbers.
+    #[must_use]
+    pub fn other_seed(&self) -> Self {
+        Self {
+            seed: self.seed + 92,
+            ..self.clone()
+        }
+    }
+
+    /// Checks and uploads a scene.
+    ///
+    /// # Errors
+    /// As [`GpuScene::new`].
+    pub fn upload(&self, scene: &Scene) -> Result<Arc<GpuScene>> {
+        GpuScene::new(self.gpu, scene).map(Arc::new)
+    }
+
+    /// Prepares the technique for the scene's first camera.
+    ///
+    /// # Errors
+    /// As [`Easel::upload`] and [`TechniqueInfo::prepare`].
+    pub fn prepare(&self, scene: &Scene, size: [u32; 2]) -> Result<Box<dyn Technique>> {
+        self.prepare_uploaded(self.upload(scene)?, scene, size)
+    }
+
+    /// As [`Easel::prepare`], with the scene on the device.
+    ///
+    /// # Errors
+    /// As [`TechniqueInfo::prepare`].
+    pub fn prepare_uploaded(
+        &self,
+        uploaded: Arc<GpuScene>,
+        scene: &Scene,
+        size: [u32; 2],
+    ) -> Result<Box<dyn Technique>> {
+        let view = View {
+            camera: scene.require_camera(None)?,
+            size,
+            seed: self.seed,
+            aovs: false,
+        };
+        let settings = Value::Object(self.settings.clone());
+        self.info.prepare(self.gpu, uploaded, &view, &settings)
+    }
+
+    /// Renders a picture through the scene's first camera.
+    ///
+    /// # Errors
+    /// As [`Easel::prepare`] and [`Technique::step`].
+    pub fn paint(&self, scene: &Scene, size: [u32; 2], spp: u32) -> Result<Painted> {
+        finish(self.prepare(scene, size)?.as_mut(), spp)
+    }
+}
+
+/// Renders to the end and reads the picture.
+///
+/// # Errors
+/// As [`Technique::step`] and [`Technique::picture`].
+pub fn finish(technique: &mut dyn Technique, spp: u32) -> Result<Painted> {
+    while technique.step(spp)?.is_some_and(|step| step.done < step.wanted) {}
+    let (picture, non_finite) = technique.picture()?;
+    let layer = |name: &str| {
+        let missing = || Error::Picture {
+            path: "picture".into(),
+            cause: format!("has no layer {name:?}"),
+        };
+        picture
+            .layer(name)
+            .map(|layer| layer.values().to_vec())
+            .ok_or_else(missing)
+    };
+    Ok(Painted {
+        radiance: layer(RADIANCE)?,
+        variance: layer(VARIANCE)?,
+        samples: layer(SAMPLES)?,
+        non_finite: non_finite.total(),
+        spp,
+        counters: technique.counters(),
+    })
+}

@@ -1,0 +1,79 @@
+//! The registry of hard cases: scenes, rays and directions that break naive renderers, each with what is known to be right about it.
+//!
+//! A case is judged on every subject that it concerns: each technique with each of its samplers ([`Easel`]), each ray index
+//! ([`INDEXES`]) and the scattering functions ([`LOBES`]). What is known is a closed form, a well-conditioned twin of the scene, a search
+//! through all triangles, or that an error names its place; never a picture of an earlier run. Verdicts: a case passes, degrades as
+//! [`HardCase::documented`] says and no further, or fails. Both the test suite and `clerestory stability` run this table.
+//!
+//! # How to add a case
+//!
+//! A file in `cases/` with a constant `CASE`, and its line in [`all`]. Statistical checks reject a right picture with a probability of
+//! [`FALSE_ALARM`] each, for a driver never seen before; seeds are fixed.
+
+mod cases;
+mod easel;
+mod judgement;
+mod lobes;
+mod page;
+#[path = "../../../engine/src/test_random.rs"]
+pub mod random;
+mod rays;
+mod run;
+pub mod scenes;
+#[cfg(test)]
+mod tests;
+
+pub use easel::{Easel, Painted};
+pub use judgement::{FALSE_ALARM, Figure, Judgement};
+pub use lobes::{LOBES, Lobe};
+pub use page::{PAGE, PICTURES, Row, case_section, markdown};
+pub use rays::{INDEXES, IndexKind, RaySet, misses};
+pub use run::{Outcome, Subject, Verdict, judge, subjects};
+
+use clerestory::Result;
+use clerestory::scene::Scene;
+
+/// A hard case.
+#[derive(Debug, Clone, Copy)]
+pub struct HardCase {
+    /// Unique name in lower case with hyphens.
+    pub name: &'static str,
+    /// What breaks in naive code.
+    pub breaks: &'static str,
+    /// What has to come out instead.
+    pub expects: &'static str,
+    /// What its picture shows.
+    pub picture: fn() -> Result<Scene>,
+    /// How techniques degrade and what a user can do about it, for cases where that is so.
+    pub documented: Option<&'static str>,
+    /// Judges a technique; `None` for what concerns none.
+    pub techniques: Option<fn(&Easel<'_>) -> Result<Judgement>>,
+    /// What every ray index has to answer as a search through all triangles does.
+    pub rays: Option<fn() -> Vec<RaySet>>,
+    /// Judges a scattering function in f64.
+    pub lobes: Option<fn(&Lobe, &mut Judgement)>,
+}
+
+impl HardCase {
+    /// What cases take for the parts that they leave out.
+    const BASE: Self = Self {
+        name: "",
+        breaks: "",
+        expects: "",
+        picture: || Ok(Scene::default()),
+        documented: None,
+        techniques: None,
+        rays: None,
+        lobes: None,
+    };
+}
+
+/// All cases, in the order of the page.
+pub fn all() -> &'static [HardCase] {
+    cases::ALL
+}
+
+/// The case of that name.
+pub fn by_name(name: &str) -> Option<&'static HardCase> {
+    all().iter().find(|case| case.name == name)
+}

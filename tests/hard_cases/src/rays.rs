@@ -1,0 +1,192 @@
+//! Ray indexes against a search through all triangles, bit for bit, and against Möller and Trumbore's test in f64.
+
+use clerestory::Result;
+use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::triangle::{intersect_triangle, moller_trumbore, ray_shear};
+use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
+use glam::{DVec3, Vec3};
+
+use crate::Judgement;
+
+/// Builds a ray index with default settings.
+type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
+
+/// A kind of ray index.
+#[derive(Debug, Clone, Copy)]
+pub struct IndexKind {
+    /// Its name, as [`RayIndex::name`] has it.
+    pub name: &'static str,
+    /// Builds one with default settings.
+    pub build: Build,
+}
+
+/// Every ray index of the engine.
+pub const INDEXES: &[IndexKind] = &[IndexKind {
+    name: "bvh2",
+    build: |triangles| Ok(Box::new(Bvh2::build(triangles, &Bvh2Settings::default())?)),
+}];
+
+/// Rays to trace among triangles.
+#[derive(Debug, Clone)]
+pub struct RaySet {
+    /// What it is, in few words.
+    pub what: String,
+    /// The triangles.
+    pub triangles: Vec<[Vec3; 3]>,
+    /// The rays.
+    pub rays: Vec<Ray>,
+}
+
+/// A ray without bounds.
+pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray {
+        origin: origin.into(),
+        t_min: 0.0,
+        direction: direction.into(),
+        t_max: f32::INFINITY,
+    }
+}
+
+/// Whether rays can meet a triangle: in range, and of an area in f64.
+fn can_be_met(triangle: &[Vec3; 3]) -> bool {
+    let in_range = triangle
+        .iter()
+        .all(|v| v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all());
+    let [a, b, c] = triangle.map(|v| v.as_dvec3());
+    in_range && (b - a).cross(c - a) != DVec3::ZERO
+}
+
+/// Tries all triangles in order with the kernels' test; of equal distances the first triangle counts.
+fn closest_of_all(triangles: &[[Vec3; 3]], ray: &Ray) -> Hit {
+    let mut hit = Hit::none(ray.t_max);
+    if !ray.is_traceable() {
+        return hit;
+    }
+    let shear = ray_shear(ray.origin.into(), ray.direction.into());
+    for (i, triangle) in triangles.iter().enumerate().filter(|(_, t)| can_be_met(t)) {
+        if let Some(found) = intersect_triangle(&shear, triangle, ray.t_min, hit.t)
+            && (found.t < hit.t || !hit.is_hit())
+        {
+            hit = Hit {
+                t: found.t,
+                barycentrics: [found.u, found.v],
+                triangle: i as u32,
+            };
+        }
+    }
+    hit
+}
+
+fn bits(hit: &Hit) -> [u32; 4] {
+    let [u, v] = hit.barycentrics;
+    [hit.t.to_bits(), u.to_bits(), v.to_bits(), hit.triangle]
+}
+
+/// Whether a hit misses something that is clearly nearer in f64, by more than the rounding of the triangle test.
+pub fn misses(triangles: &[[Vec3; 3]], ray: &Ray, hit: &Hit) -> bool {
+    let direction = Vec3::from(ray.direction);
+    let reach = reach(triangles, ray);
+    // 44u of the reach is what boxes are grown for (accel/bvh2.rs), in metres; edges that a ray passes within that may go either way.
+    let rounding = reach * 64.0 / 16_777_216.0;
+    // The same as a ray parameter.
+    let slack = rounding / f64::from(direction.abs().max_element());
+    let nearest = triangles.iter().filter_map(|triangle| {
+        let found = moller_trumbore(ray, triangle)?;
+        let [a, b, c] = triangle.map(|v| v.as_dvec3());
+        let normal = (b - a).cross(c - a);
+        let longest = [b - a, c - b, a - c].map(DVec3::length).into_iter().fold(0.0, f64::max);
+        let cosine = normal.normalize().dot(direction.as_dvec3().normalize()).abs();
+        // Clear of the edges by the slack, and not so thin or grazing that the plane itself is uncertain.
+        let margin = found.u.min(found.v).min(1.0 - found.u - found.v) * normal.length() / longest * cosine;
+        // Neither so near to an end of the ray that it may lie beyond.
+        let inside = found.t > f64::from(ray.t_min) + 100.0 * slack && found.t < f64::from(ray.t_max) - 100.0 * slack;
+        (margin > 4.0 * rounding && cosine > 0.01 && inside).then_some(found.t)
+    });
+    let nearest = nearest.fold(f64::INFINITY, f64::min);
+    nearest.is_finite() && !(hit.is_hit() && f64::from(hit.t) <= nearest + 100.0 * slack)
+}
+
+/// Largest component distance from a ray's origin to a vertex.
+fn reach(triangles: &[[Vec3; 3]], ray: &Ray) -> f64 {
+    let distances = triangles
+        .iter()
+        .flatten()
+        .map(|v| (*v - Vec3::from(ray.origin)).abs().max_element());
+    f64::from(distances.filter(|d| d.is_finite()).fold(0.0f32, f32::max))
+}
+
+/// Judges an index on sets of rays.
+pub(crate) fn judge(kind: &IndexKind, sets: &[RaySet]) -> Result<Judgement> {
+    let mut judgement = Judgement::default();
+    for RaySet { what, triangles, rays } in sets {
+        let index = (kind.build)(triangles)?;
+        let excluded = index.statistics().excluded_degenerate + index.statistics().excluded_range;
+        let unfit = triangles.iter().filter(|triangle| !can_be_met(triangle)).count();
+        judgement.holds(
+            format!("{what}: {excluded} instead of {unfit} triangles left out"),
+            excluded == unfit as u64,
+        );
+        let (mut differ, mut disagree, mut missed) = (0, 0, 0);
+        let mut first = String::new();
+        for ray in rays {
+            let hit = index.closest_hit(ray);
+            differ += usize::from(bits(&hit) != bits(&closest_of_all(triangles, ray)));
+            disagree += usize::from(index.any_hit(ray) != hit.is_hit());
+            if misses(triangles, ray, &hit) {
+                missed += 1;
+                first = format!(", the last of them {ray:?} with {hit:?}");
+            }
+        }
+        let count = rays.len();
+        judgement.none(
+            format!("{what}: of {count} rays other hits than a search finds"),
+            differ,
+        );
+        judgement.none(format!("{what}: of {count} rays with other shadows"), disagree);
+        judgement.none(
+            format!("{what}: of {count} rays that miss what f64 meets{first}"),
+            missed,
+        );
+    }
+    Ok(judgement)
+}
+
+/// Rays of every awkward kind about triangles: along axes with signed zeros, through vertices and edges, starting on them, bounded.
+pub fn awkward_rays(seed: u64, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray> {
+    let mut random = crate::random::Random(seed);
+    let sound: Vec<_> = triangles
+        .iter()
+        .filter(|triangle| can_be_met(triangle))
+        .copied()
+        .collect();
+    let sound = if sound.is_empty() {
+        vec![[Vec3::ZERO, Vec3::X, Vec3::Y]]
+    } else {
+        sound
+    };
+    let negative_zero = Vec3::splat(-0.0);
+    (0..count)
+        .map(|i| {
+            let (a, b) = (random.choose(&sound), random.choose(&sound));
+            let size = (a[0] - b[0]).length().max((a[1] - a[0]).length());
+            let outside = b[1] + random.vector() * size;
+            let axis = random.choose(&Vec3::AXES) * random.choose(&[1.0, -1.0]);
+            match i % 10 {
+                0 => ray(outside, random.vector()),
+                1 => ray(outside, a[0] - outside),
+                2 => ray(outside, (a[0] + a[1]) * 0.5 - outside),
+                3 => ray(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
+                4 => ray(a[0] - axis * size, axis),
+                5 => ray((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
+                6 => ray(a[0].with_x(b[0].x), axis),
+                7 => ray(a[0], random.vector()),
+                8 => ray(a[0], a[1] - a[0]),
+                _ => Ray {
+                    t_min: 0.25,
+                    t_max: 1.0,
+                    ..ray(outside, a[0] - outside)
+                },
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,171 @@
+//! Runs cases on subjects and gives verdicts.
+
+use clerestory::gpu::Gpu;
+use clerestory::techniques::{self, TechniqueInfo};
+use clerestory::{Error, Result};
+
+use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
+
+/// What a case is run against.
+#[derive(Debug, Clone, Copy)]
+pub enum Subject {
+    /// A technique with one of its samplers, where it has a choice.
+    Technique {
+        /// The technique.
+        info: &'static TechniqueInfo,
+        /// Value of its setting `sampler`.
+        sampler: Option<&'static str>,
+    },
+    /// A ray index, by the twin of its kernels; the tests of the kernels hold them to it bit for bit.
+    Index(&'static IndexKind),
+    /// All of [`LOBES`].
+    Lobes,
+}
+
+impl Subject {
+    /// Its name: `path (sobol)`, `bvh2`, `lobes`.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Technique { info, sampler } => match sampler {
+                Some(sampler) => format!("{} ({sampler})", info.id),
+                None => info.id.to_owned(),
+            },
+            Self::Index(kind) => kind.name.to_owned(),
+            Self::Lobes => "lobes".to_owned(),
+        }
+    }
+
+    /// Whether a case concerns it.
+    pub fn concerns(&self, case: &HardCase) -> bool {
+        match self {
+            Self::Technique { .. } => case.techniques.is_some(),
+            Self::Index(_) => case.rays.is_some(),
+            Self::Lobes => case.lobes.is_some(),
+        }
+    }
+}
+
+/// All subjects: techniques with each sampler that their setting `sampler` offers, ray indexes, scattering functions.
+pub fn subjects() -> Vec<Subject> {
+    let mut all = Vec::new();
+    for info in techniques::all() {
+        match info.settings.iter().find(|setting| setting.name == "sampler") {
+            Some(setting) => all.extend(setting.range.split(" | ").map(|sampler| Subject::Technique {
+                info,
+                sampler: Some(sampler),
+            })),
+            None => all.push(Subject::Technique { info, sampler: None }),
+        }
+    }
+    all.extend(INDEXES.iter().map(Subject::Index));
+    all.push(Subject::Lobes);
+    all
+}
+
+/// How a case came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// As it has to.
+    Pass,
+    /// As documented, or refused with the reason.
+    Degrades,
+    /// Worse.
+    Fails,
+}
+
+impl Verdict {
+    /// The verdict as a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Degrades => "degrades",
+            Self::Fails => "FAILS",
+        }
+    }
+}
+
+/// The outcome of a case on a subject.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Outcome {
+    /// The case's name.
+    pub case: &'static str,
+    /// The subject's name.
+    pub subject: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The figure that is worst for its bound.
+    pub measured: String,
+    /// Why it does not pass and what can be done; `None` for what passes.
+    pub reason: Option<String>,
+    /// True when the subject has refused the case beforehand, with its reasons.
+    pub refused: bool,
+    /// Everything that was measured.
+    pub figures: Vec<Figure>,
+}
+
+/// Runs a case on a subject; `None` when it does not concern it.
+pub fn judge(gpu: &Gpu, case: &HardCase, subject: &Subject) -> Option<Outcome> {
+    let judged = match subject {
+        Subject::Technique { info, sampler } => {
+            let settings = sampler.map(|sampler| ("sampler".to_owned(), sampler.into()));
+            (case.techniques?)(&Easel::new(gpu, info, settings.into_iter().collect()))
+        }
+        Subject::Index(kind) => crate::rays::judge(kind, &(case.rays?)()),
+        Subject::Lobes => {
+            let judge_lobe = case.lobes?;
+            let mut judgement = Judgement::default();
+            LOBES.iter().for_each(|lobe| judge_lobe(lobe, &mut judgement));
+            Ok(judgement)
+        }
+    };
+    Some(outcome(case, subject, judged))
+}
+
+fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Outcome {
+    let mut outcome = Outcome {
+        case: case.name,
+        subject: subject.name(),
+        verdict: Verdict::Fails,
+        measured: String::new(),
+        reason: None,
+        refused: false,
+        figures: Vec::new(),
+    };
+    match judged {
+        Ok(judgement) => {
+            outcome.figures = judgement.figures().to_vec();
+            let Some(worst) = judgement.worst() else {
+                outcome.reason = Some("nothing was measured".into());
+                return outcome;
+            };
+            outcome.measured = worst.to_string();
+            if worst.passes() {
+                outcome.verdict = Verdict::Pass;
+            } else if let (true, Some(documented)) = (worst.is_documented(), case.documented) {
+                outcome.verdict = Verdict::Degrades;
+                outcome.reason = Some(documented.to_owned());
+            } else {
+                outcome.reason = Some(format!(
+                    "{worst}: worse than is documented; avoid such scenes on this device and report the output of \
+                     `clerestory stability {} --json`",
+                    case.name
+                ));
+            }
+        }
+        Err(Error::Unsupported { reasons, .. }) => {
+            outcome.verdict = Verdict::Degrades;
+            outcome.refused = true;
+            outcome.measured = "refused".into();
+            outcome.reason = Some(format!(
+                "{}; choose another technique or change the scene",
+                reasons.join("; ")
+            ));
+        }
+        Err(error) => {
+            outcome.measured = "error".into();
+            outcome.reason = Some(error.to_string());
+        }
+    }
+    outcome
+}

@@ -1,0 +1,173 @@
+//! The table itself: names, words, the page; and that judgements find what is wrong.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::*;
+
+fn repository() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+#[test]
+fn every_case_says_what_it_is_and_has_a_judge() {
+    let mut names = BTreeSet::new();
+    for case in all() {
+        let plain = case
+            .name
+            .chars()
+            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-');
+        assert!(plain && names.insert(case.name), "{}", case.name);
+        for text in [case.breaks, case.expects] {
+            assert!(text.len() > 20 && text.ends_with('.'), "{}: {text}", case.name);
+        }
+        assert!(
+            case.techniques.is_some() || case.rays.is_some() || case.lobes.is_some(),
+            "{}",
+            case.name
+        );
+        let file = format!("tests/hard_cases/src/cases/{}.rs", case.name.replace('-', "_"));
+        assert!(repository().join(&file).is_file(), "{file}");
+        assert!(by_name(case.name).is_some_and(|found| found.name == case.name));
+    }
+    let files = std::fs::read_dir(repository().join("tests/hard_cases/src/cases"))
+        .expect("folder")
+        .count();
+    assert_eq!(files, all().len() + 1, "one file each, and the list");
+    let names: Vec<String> = subjects().iter().map(Subject::name).collect();
+    assert!(
+        names.contains(&"path (sobol)".to_owned()) && names.contains(&"path (pcg)".to_owned()),
+        "{names:?}"
+    );
+}
+
+#[test]
+fn every_case_has_a_scene_to_show() {
+    for case in all() {
+        let scene = (case.picture)().unwrap_or_else(|error| panic!("{}: {error}", case.name));
+        scene.check().unwrap_or_else(|error| panic!("{}: {error}", case.name));
+        assert!(scene.camera(None).is_some(), "{}: no camera", case.name);
+    }
+}
+
+#[test]
+fn the_page_describes_every_case_and_names_every_subject() {
+    let page = std::fs::read_to_string(repository().join(PAGE)).unwrap_or_default();
+    let again = "write it anew: cargo run --release -p clerestory-tools --bin clerestory -- stability --markdown > docs/stability.md";
+    let picture = |case: &HardCase| repository().join(PICTURES).join(format!("{}.png", case.name));
+    let sections: Vec<String> = (all().iter())
+        .map(|case| case_section(case, picture(case).is_file()))
+        .collect();
+    assert!(page.ends_with(&sections.join("\n")), "{again}");
+    for subject in subjects() {
+        assert!(
+            page.contains(&format!("| {} |", subject.name())),
+            "{}: {again}",
+            subject.name()
+        );
+    }
+    for case in all() {
+        let row = page
+            .lines()
+            .find(|line| line.starts_with(&format!("| [{name}](#{name}) |", name = case.name)));
+        let row = row.unwrap_or_else(|| panic!("{}: {again}", case.name));
+        let cells: Vec<&str> = row
+            .split(" | ")
+            .skip(1)
+            .map(|cell| cell.trim_end_matches(" |"))
+            .collect();
+        for (subject, cell) in subjects().iter().zip(cells) {
+            assert_eq!(
+                subject.concerns(case),
+                cell != "–",
+                "{}, {}: {again}",
+                case.name,
+                subject.name()
+            );
+        }
+        let bytes = std::fs::metadata(picture(case)).map_or(0, |data| data.len());
+        assert!(bytes < 30_000, "{}: {bytes} bytes", case.name);
+    }
+}
+
+/// A picture of one pixel.
+fn painted(value: f32) -> Painted {
+    Painted {
+        radiance: vec![value; 3],
+        variance: vec![1e-4; 3],
+        samples: vec![4.0],
+        non_finite: 0,
+        spp: 4,
+        counters: std::collections::BTreeMap::new(),
+    }
+}
+
+fn passes(check: impl FnOnce(&mut Judgement)) -> bool {
+    let mut judgement = Judgement::default();
+    check(&mut judgement);
+    judgement.figures().iter().all(Figure::passes)
+}
+
+#[test]
+fn judgements_find_what_is_wrong() {
+    assert!(passes(|j| j.sound("", &painted(1.0))));
+    assert!(!passes(|j| j.sound("", &painted(f32::NAN))));
+    assert!(!passes(|j| j.sound("", &painted(-1.0))));
+    assert!(!passes(|j| j.sound(
+        "",
+        &Painted {
+            non_finite: 1,
+            ..painted(1.0)
+        }
+    )));
+    assert!(!passes(|j| j.sound("", &Painted { spp: 5, ..painted(1.0) })));
+    assert!(!passes(|j| j.exactly("", &painted(1.0 + f32::EPSILON), [1.0; 3])));
+    assert!(!passes(|j| j.at_most("", f64::NAN, 1.0)));
+    // A deviation of 0.01 a channel and pixel.
+    assert!(passes(|j| j.uniform("", &painted(1.02), [1.0; 3]).expect("picture")));
+    assert!(!passes(|j| j.uniform("", &painted(1.06), [1.0; 3]).expect("picture")));
+    assert!(passes(|j| j.mean_at_most("", &painted(1.03), 1.0)));
+    assert!(!passes(|j| j.mean_at_most("", &painted(1.06), 1.0)));
+    assert!(!passes(|j| j.same_bits("", &painted(1.0), &painted(0.5))));
+    assert!(!passes(|j| j.refused("", Ok(()), |_| true)));
+    assert!(!passes(|j| j.refused(
+        "",
+        Err::<(), _>(clerestory::Error::setting("a", 1, "b")),
+        |_| false
+    )));
+}
+
+#[test]
+fn the_worst_figure_decides() {
+    let mut judgement = Judgement::default();
+    judgement.at_most("fine", 1.0, 2.0);
+    assert!(judgement.worst().is_some_and(Figure::passes));
+    judgement.at_most_documented("so so", 3.0, 2.0, 4.0);
+    judgement.at_most("fine too", 1.9, 2.0);
+    let worst = judgement.worst().expect("figure");
+    assert!(!worst.passes() && worst.is_documented());
+    judgement.at_most("wrong", 2.1, 2.0);
+    assert!(
+        judgement
+            .worst()
+            .is_some_and(|worst| !worst.is_documented() && worst.what == "wrong")
+    );
+}
+
+#[test]
+fn an_index_that_loses_triangles_is_found_out() {
+    use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+    let lossy = IndexKind {
+        name: "lossy",
+        build: |triangles| {
+            let half = &triangles[..triangles.len() / 2];
+            Ok(Box::new(Bvh2::build(half, &Bvh2Settings::default())?))
+        },
+    };
+    let sets = (cases::ALL[0].rays.expect("rays"))();
+    let judgement = rays::judge(&lossy, &sets).expect("judgement");
+    let worst = judgement.worst().expect("figure");
+    assert!(!worst.is_documented(), "{worst}");
+    let judgement = rays::judge(&INDEXES[0], &sets).expect("judgement");
+    assert!(judgement.figures().iter().all(Figure::passes));
+}
