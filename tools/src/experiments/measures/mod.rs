@@ -125,7 +125,9 @@ mod tests {
     #[test]
     fn every_measure_has_an_experiment() {
         for measure in MEASURES {
-            let of = |name: &str| crate::experiments::find(name).is_ok_and(|found| found.measure == measure.name);
+            let of = |name: &str| {
+                crate::experiments::find(name).is_ok_and(|found| found.measure.as_deref() == Some(measure.name))
+            };
             assert!(crate::experiments::names().any(of), "{}", measure.name);
         }
     }
