@@ -21,6 +21,8 @@ layout(constant_id = 15) const uint SAMPLER_KIND = 0;                  // SAMPLE
 layout(constant_id = 16) const bool WRITE_AOVS = true;
 layout(constant_id = 17) const bool HAS_ALPHA = true;                  // surfaces that are there in part
 
+layout(constant_id = 19) const bool HAS_MEDIA = true;                  // paths know which medium they are in
+
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 
 #endif
