@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clerestory::Error;
-use clerestory::scene::{self, EnvironmentUse, Projection, Scene, SceneProfile};
+use clerestory::scene::{self, EnvironmentUse, MediaUse, Phase, PhaseUse, Projection, Scene, SceneProfile};
 use glam::{DVec3, Vec3};
 
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl ring\nf 1 2 3\n";
@@ -71,8 +71,13 @@ fn a_sidecar_adds_what_the_model_cannot_say() {
     let camera = &scene.cameras[0];
     assert_eq!((camera.lens_radius, camera.focus_distance), (0.25, 5.0));
     assert_eq!(camera.transform.translation, DVec3::new(0.0, 0.0, 5.0));
-    assert_eq!(scene.notes.len(), 1);
-    assert_eq!(scene.notes[0].feature, "participating media");
+    assert!(scene.notes.is_empty(), "{:?}", scene.notes);
+    let medium = &scene.media[0];
+    assert_eq!((scene.media.len(), scene.surrounding), (1, Some(0)));
+    assert_eq!(
+        (medium.sigma_a, medium.sigma_s, medium.phase),
+        (Vec3::splat(0.1), Vec3::ONE, Phase::HenyeyGreenstein { g: 0.5 })
+    );
     assert!(SceneProfile::of(&scene).has_lens);
 }
 
@@ -91,8 +96,56 @@ fn the_sidecar_of_the_readme_is_understood() {
     let scene = load(folder.path(), "m.obj").expect("scene");
     assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
     assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
-    assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
-    assert_eq!(scene.notes[0].feature, "participating media");
+    assert!(scene.notes.is_empty(), "{:?}", scene.notes);
+    assert!(SceneProfile::of(&scene).media.surrounding);
+}
+
+#[test]
+fn several_media_find_their_places() {
+    let folder = folder(
+        "[[medium]]\nsigma_a = 0.5\nphase = \"rayleigh\"\n\
+         [[medium]]\nname = \"smoke\"\nmaterial = \"ring\"\nboundary = true\nsigma_t = [4, 8, 16.0]\nalbedo = 0.75\n\
+         emission = [0.0, 0.0, 2.0]\nphase = \"schlick\"\nk = -0.5\n",
+    );
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    assert_eq!((scene.surrounding, scene.materials[0].interior), (Some(0), Some(1)));
+    assert!(scene.materials[0].boundary);
+    let names: Vec<&str> = scene.media.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(names, ["surrounding", "smoke"]);
+    let [air, smoke] = &scene.media[..] else {
+        panic!("two media")
+    };
+    assert_eq!(
+        (air.sigma_a, air.sigma_s, air.phase),
+        (Vec3::splat(0.5), Vec3::ZERO, Phase::Rayleigh)
+    );
+    assert_eq!(smoke.sigma_s, Vec3::new(3.0, 6.0, 12.0));
+    assert_eq!(smoke.sigma_a, Vec3::new(1.0, 2.0, 4.0));
+    assert_eq!((smoke.emission.z, smoke.phase), (2.0, Phase::Schlick { k: -0.5 }));
+    let profile = SceneProfile::of(&scene);
+    let expected = MediaUse {
+        count: 2,
+        homogeneous: true,
+        heterogeneous: false,
+        absorbs: true,
+        scatters: true,
+        emits: true,
+        chromatic: true,
+        // What does not scatter has no use for its phase function.
+        phases: PhaseUse {
+            schlick: true,
+            ..PhaseUse::default()
+        },
+        surrounding: true,
+        boundaries: true,
+        in_solids: false,
+    };
+    assert_eq!(profile.media, expected);
+    assert!(profile.media.any() && !MediaUse::default().any());
+    assert!(
+        profile.to_string().contains("media         2, homogeneous"),
+        "{profile}"
+    );
 }
 
 #[test]
@@ -159,6 +212,24 @@ fn sidecar_faults_have_their_line_or_key() {
         (
             "[medium]\nsigma_a = [-1.0, 0.0, 0.0]\nsigma_s = [0.0, 0.0, 0.0]\n",
             "at least 0",
+        ),
+        ("[[medium]]\nsigma_a = 1.0\n[[medium]]\nsigma_a = 1.0\n", "medium[1]"),
+        ("[medium]\nsigma_a = 1.0\nphase = \"mie\"\n", "known: isotropic, hg"),
+        ("[medium]\nsigma_a = 1.0\nphase = \"rayleigh\"\ng = 0.1\n", "medium.g"),
+        ("[medium]\nsigma_a = 1.0\nphase = \"hg\"\nk = 0.1\n", "medium.k"),
+        ("[medium]\nsigma_t = 1.0\n", "sigma_t with albedo"),
+        ("[medium]\nsigma_t = 1.0\nalbedo = 1.5\n", "medium.albedo"),
+        ("[medium]\nsigma_t = 1.0\nalbedo = 0.5\nsigma_a = 1.0\n", "mixture"),
+        ("[medium]\nboundary = true\n", "medium.boundary"),
+        (
+            "[[medium]]\nname = \"a\"\nmaterial = \"ring\"\nsigma_a = 1.0\n",
+            "no light reaches",
+        ),
+        ("[[medium]]\nsigma_a = \"thick\"\n", "a number or three"),
+        ("[[medium]]\n[[medium]]\nsigma_b = 1.0\n", "line 3"),
+        (
+            "[[medium]]\nmaterial = \"ring\"\nboundary = true\n[[medium]]\nmaterial = \"ring\"\n",
+            "another medium",
         ),
         ("exposure = nan\n", "exposure"),
         ("aspect = 0.0\n", "aspect"),

@@ -3,7 +3,7 @@
 //! Readers and generators end with it, and a host that builds a [`Scene`] itself should too: what passes cannot make an upload or a
 //! traversal read outside its buffers.
 
-use super::{Camera, Light, LightKind, Material, Mesh, Projection, Scene, Texture};
+use super::{Camera, Light, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
 use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place.
@@ -77,6 +77,9 @@ impl Scene {
             if let Err((field, cause)) = check_material(material, self.images.len()) {
                 return fail(format!("materials[{i}] {:?}.{field}", material.name), cause);
             }
+        }
+        if let Err((at, cause)) = medium::check(self) {
+            return fail(at, cause);
         }
         for (i, light) in self.lights.iter().enumerate() {
             if !light_is_sound(light) {

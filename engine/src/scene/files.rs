@@ -106,7 +106,8 @@ fn complete(scene: &mut Scene) {
         });
     }
     let lights = profile.lights.point + profile.lights.spot + profile.lights.directional;
-    let dark = profile.environment == EnvironmentUse::Absent && !profile.has_area_lights() && !profile.has_unlit;
+    let shines = profile.has_area_lights() || profile.has_unlit || profile.media.emits;
+    let dark = profile.environment == EnvironmentUse::Absent && !shines;
     if lights == 0 && dark && scene.environment.is_none() {
         scene.environment = Some(Environment::uniform(Vec3::ONE));
         scene.notes.push(Note {

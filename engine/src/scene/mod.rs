@@ -18,8 +18,8 @@ pub mod tangents;
 pub mod texture;
 
 pub use files::load;
-pub use medium::{DensityGrid, Medium, Phase};
-pub use profile::{AlphaUse, EnvironmentUse, LightCounts, SceneProfile, TransmissionUse};
+pub use medium::{DensityGrid, MajorantGrid, Medium, Phase};
+pub use profile::{AlphaUse, EnvironmentUse, LightCounts, MediaUse, PhaseUse, SceneProfile, TransmissionUse};
 
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 
@@ -231,9 +231,11 @@ pub struct Material {
     pub attenuation_color: Vec3,
     /// Metres; infinite means clear.
     pub attenuation_distance: f32,
-    /// Index into [`Scene::media`] of the medium inside of a closed mesh.
+    /// Index into [`Scene::media`] of the medium inside of a closed mesh, behind its faces. Only for a [`Material::boundary`] or a solid that
+    /// transmits, and instead of its attenuation: both are an error.
     pub interior: Option<u32>,
-    /// Bounds [`Material::interior`] and is otherwise not there: light goes through unchanged, and no bounce is counted.
+    /// Bounds [`Material::interior`], which it must have, and is otherwise not there: light goes through unchanged, and no bounce is counted.
+    /// All else that the material says is ignored; it must not emit or have alpha.
     pub boundary: bool,
     /// Exact conductor that replaces the metallic lobe's Schlick Fresnel (sidecar only).
     pub conductor: Option<ConductorIor>,

@@ -7,7 +7,7 @@ use std::fmt;
 
 use glam::{DVec3, Vec3};
 
-use super::{AlphaMode, Image, LightKind, Material, Scene, Texture};
+use super::{AlphaMode, Image, LightKind, Material, Medium, Phase, Scene, Texture};
 
 /// How alpha is used by the materials that are placed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -50,6 +50,76 @@ pub struct LightCounts {
     pub directional: usize,
 }
 
+/// Which phase functions the media that scatter have. An eccentricity of 0 is isotropic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct PhaseUse {
+    /// Even scattering.
+    pub isotropic: bool,
+    /// Henyey and Greenstein's.
+    pub henyey_greenstein: bool,
+    /// Schlick's.
+    pub schlick: bool,
+    /// Rayleigh's.
+    pub rayleigh: bool,
+}
+
+/// What the participating media need: of the surrounding one and those inside of placed materials. A medium that does nothing
+/// ([`Medium::is_empty`]) is counted by `boundaries` and `in_solids` alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct MediaUse {
+    /// Media that do something.
+    pub count: usize,
+    /// Some medium has the same density everywhere.
+    pub homogeneous: bool,
+    /// Some medium's density comes from a grid.
+    pub heterogeneous: bool,
+    /// Some medium absorbs.
+    pub absorbs: bool,
+    /// Some medium scatters.
+    pub scatters: bool,
+    /// Some medium emits.
+    pub emits: bool,
+    /// Some medium's extinction coefficient differs between the RGB bands, so that one free flight cannot serve all of them exactly.
+    pub chromatic: bool,
+    /// Phase functions of those that scatter.
+    pub phases: PhaseUse,
+    /// The space outside of all bodies holds a medium.
+    pub surrounding: bool,
+    /// Some placed material is an invisible boundary.
+    pub boundaries: bool,
+    /// Some placed solid that refracts has a medium inside.
+    pub in_solids: bool,
+}
+
+impl MediaUse {
+    /// Whether paths must know which medium they are in.
+    pub fn any(&self) -> bool {
+        self.count > 0 || self.boundaries || self.in_solids
+    }
+
+    fn add(&mut self, medium: &Medium) {
+        self.count += 1;
+        self.heterogeneous |= medium.density.is_some();
+        self.homogeneous |= medium.density.is_none();
+        self.absorbs |= medium.sigma_a != Vec3::ZERO;
+        self.scatters |= medium.sigma_s != Vec3::ZERO;
+        self.emits |= medium.emission != Vec3::ZERO;
+        let extinction = medium.sigma_t();
+        self.chromatic |= extinction != Vec3::splat(extinction.x);
+        if medium.sigma_s != Vec3::ZERO {
+            match medium.phase {
+                Phase::Isotropic => self.phases.isotropic = true,
+                Phase::HenyeyGreenstein { g: value } | Phase::Schlick { k: value } if value == 0.0 => {
+                    self.phases.isotropic = true;
+                }
+                Phase::HenyeyGreenstein { .. } => self.phases.henyey_greenstein = true,
+                Phase::Schlick { .. } => self.phases.schlick = true,
+                Phase::Rayleigh => self.phases.rayleigh = true,
+            }
+        }
+    }
+}
+
 /// What a scene needs of a renderer.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct SceneProfile {
@@ -75,8 +145,10 @@ pub struct SceneProfile {
     pub has_rough_dielectric_spec: bool,
     /// Specular transmission.
     pub transmission: TransmissionUse,
-    /// Some solid body absorbs.
+    /// Some solid body absorbs by its attenuation colour.
     pub has_absorption: bool,
+    /// Participating media.
+    pub media: MediaUse,
     /// Alpha.
     pub alpha: AlphaUse,
     /// Triangles over all instances whose material emits.
@@ -135,6 +207,7 @@ impl SceneProfile {
                 thin: false,
             },
             has_absorption: false,
+            media: MediaUse::default(),
             alpha: AlphaUse {
                 mask: false,
                 blend: false,
@@ -169,8 +242,22 @@ impl SceneProfile {
             .collect();
         used.sort_unstable();
         used.dedup();
+        let mut media: Vec<u32> = scene.surrounding.into_iter().collect();
         for index in used {
-            profile.add_material(material_of(index), &scene.images);
+            let material = material_of(index);
+            media.extend(material.interior);
+            profile.media.boundaries |= material.boundary;
+            profile.media.in_solids |= material.interior.is_some() && !material.boundary;
+            if !material.boundary {
+                profile.add_material(material, &scene.images);
+            }
+        }
+        let medium_of = |index: u32| scene.media.get(index as usize).filter(|medium| !medium.is_empty());
+        profile.media.surrounding = scene.surrounding.is_some_and(|index| medium_of(index).is_some());
+        media.sort_unstable();
+        media.dedup();
+        for medium in media.into_iter().filter_map(medium_of) {
+            profile.media.add(medium);
         }
         for light in &scene.lights {
             match light.kind {
@@ -245,7 +332,7 @@ impl SceneProfile {
 }
 
 fn emits(material: &Material) -> bool {
-    !material.unlit && material.emission.max_element() > 0.0
+    !material.unlit && !material.boundary && material.emission.max_element() > 0.0
 }
 
 fn environment_use(scene: &Scene) -> EnvironmentUse {
@@ -333,6 +420,34 @@ impl fmt::Display for SceneProfile {
         if let Some([low, high]) = self.roughness {
             write!(f, "\nroughness     {low:.3} … {high:.3}")?;
         }
+        if self.media.any() {
+            write!(f, "\nmedia         {}", self.media)?;
+        }
         Ok(())
+    }
+}
+
+impl fmt::Display for MediaUse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let facts = [
+            ("homogeneous", self.homogeneous),
+            ("heterogeneous", self.heterogeneous),
+            ("absorbing", self.absorbs),
+            ("scattering", self.scatters),
+            ("emitting", self.emits),
+            ("chromatic", self.chromatic),
+            ("isotropic", self.phases.isotropic),
+            ("Henyey-Greenstein", self.phases.henyey_greenstein),
+            ("Schlick", self.phases.schlick),
+            ("Rayleigh", self.phases.rayleigh),
+            ("around everything", self.surrounding),
+            ("inside of boundaries", self.boundaries),
+            ("inside of solids", self.in_solids),
+        ];
+        write!(f, "{}", self.count)?;
+        facts
+            .iter()
+            .filter(|(_, there)| *there)
+            .try_for_each(|(name, _)| write!(f, ", {name}"))
     }
 }

@@ -2,8 +2,21 @@
 //!
 //! Source: Chandrasekhar, "Radiative Transfer" (1960), chapter 1. Coefficients are those at density 1; a grid of densities scales all
 //! of them alike.
+//!
+//! Where media are: [`Scene::surrounding`](super::Scene::surrounding) fills the space outside of all bodies. A placed mesh whose material has
+//! an [`interior`](super::Material::interior) holds that medium on the side its faces (counter-clockwise) turn their back to, in place of
+//! whatever is around it; so does a solid of glass without one hold nothing. Such meshes are closed, and nested or apart, never crossing.
 
-use glam::{DAffine3, Vec3};
+mod check;
+mod grid;
+mod majorant;
+
+pub(super) use check::check;
+pub use check::{MAX_DENSITY_CELLS, MAX_MEDIA};
+pub use grid::DensityGrid;
+pub use majorant::MajorantGrid;
+
+use glam::Vec3;
 
 /// How a medium scatters about the direction of propagation. All are normalised to one over the sphere.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -43,14 +56,15 @@ pub struct Medium {
     pub density: Option<DensityGrid>,
 }
 
-/// Densities at the centres of a grid's cells, interpolated linearly between them, constant from the outermost centres to the faces
-/// of the grid, and zero outside of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DensityGrid {
-    /// Cells along x, y and z; each at least 1.
-    pub size: [u32; 3],
-    /// Densities, finite and not negative, x fastest and z slowest.
-    pub values: Vec<f32>,
-    /// The unit cube, which the grid fills, to world space.
-    pub to_world: DAffine3,
+impl Medium {
+    /// Extinction coefficient at density 1 per RGB band, m⁻¹.
+    pub fn sigma_t(&self) -> Vec3 {
+        self.sigma_a + self.sigma_s
+    }
+
+    /// Whether light passes unchanged and none is added, so that it may be left out: all coefficients are 0, or the density is 0 everywhere.
+    pub fn is_empty(&self) -> bool {
+        let nothing = self.sigma_t() == Vec3::ZERO && self.emission == Vec3::ZERO;
+        nothing || self.density.as_ref().is_some_and(|grid| grid.max() == 0.0)
+    }
 }

@@ -25,14 +25,17 @@
 //! focus = 4.0                   # distance of the plane in focus, metres
 //! ```
 //!
-//! A `[medium]` table (`sigma_a`, `sigma_s` in 1/m for three channels, `g`, and `material` for a medium inside of one) is checked and
-//! reported as not modelled. Unknown keys are errors with their line.
+//! Participating media are described in [`medium`]. Unknown keys are errors with their line.
+
+pub mod medium;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Quat, Vec3};
 use serde::Deserialize;
+
+use medium::MediumTable;
 
 use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, builtin, metals};
 use crate::{Error, Result};
@@ -59,7 +62,8 @@ struct Content {
     metals: BTreeMap<String, Metal>,
     #[serde(default)]
     cameras: Vec<CameraTable>,
-    medium: Option<MediumTable>,
+    #[serde(default, deserialize_with = "medium::one_or_many")]
+    medium: Vec<MediumTable>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -95,17 +99,6 @@ struct CameraTable {
     fov: Option<f32>,
     aperture: Option<f32>,
     focus: Option<f32>,
-}
-
-/// A homogeneous medium that fills the scene or a material's inside.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MediumTable {
-    material: Option<String>,
-    sigma_a: [f32; 3],
-    sigma_s: [f32; 3],
-    #[serde(default)]
-    g: f32,
 }
 
 impl Sidecar {
@@ -197,31 +190,8 @@ impl Sidecar {
         for table in &content.cameras {
             self.camera(scene, table)?;
         }
-        if let Some(medium) = &content.medium {
-            let sound = medium
-                .sigma_a
-                .iter()
-                .chain(&medium.sigma_s)
-                .all(|s| s.is_finite() && *s >= 0.0);
-            self.require(
-                sound,
-                "medium",
-                "sigma_a and sigma_s must be finite and at least 0, in 1/m",
-            )?;
-            self.require(medium.g.abs() < 1.0, "medium.g", "must lie between -1 and 1")?;
-            if let Some(name) = &medium.material
-                && !scene.materials.iter().any(|material| material.name == *name)
-            {
-                return Err(self.unknown_material(scene, "medium.material"));
-            }
-            scene.notes.push(Note {
-                feature: "participating media".into(),
-                at: match &medium.material {
-                    Some(material) => format!("medium of material {material:?}"),
-                    None => "medium".into(),
-                },
-                instead: "not modelled yet; the space is empty".into(),
-            });
+        for (index, table) in content.medium.iter().enumerate() {
+            self.medium(scene, index, table)?;
         }
         Ok(())
     }
