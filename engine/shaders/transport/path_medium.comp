@@ -180,7 +180,6 @@ void main() {
                 Sampler s = path_sampler(slot, dimension + DIMENSION_AIRLIGHT);
                 if (sample_airlight(slot, place, path, bands, m, way, sample_2d(s))) {
                     flags |= FLAG_AIRLIGHT | FLAG_SHADOW;
-                    COUNT_MEDIUM(airlight_rays, 1u)
                 }
             }
             Sampler s = path_sampler(slot, dimension);

@@ -32,7 +32,7 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     },
 };
 
-const SETTINGS: [SettingInfo; 8] = [
+const SETTINGS: [SettingInfo; 9] = [
     SettingInfo {
         name: "path_set",
         range: "all | emitted | direct | indirect | bounces=A..B, each with lobes=diffuse+glossy+…",
@@ -70,6 +70,12 @@ const SETTINGS: [SettingInfo; 8] = [
         meaning: "uncorrelated instead of height-correlated masking of microfacets; changes the picture",
     },
     SettingInfo {
+        name: "equiangular",
+        range: "true | false",
+        unit: "",
+        meaning: "samples light of points and spots in homogeneous media also by the angle under which they see the ray; changes the noise only",
+    },
+    SettingInfo {
         name: "paths_in_flight",
         range: "0 … 4194304",
         unit: "paths",
@@ -84,7 +90,7 @@ const SETTINGS: [SettingInfo; 8] = [
 ];
 
 /// What each specialization constant of the shading stage stands for, and why it is off where nothing else is known.
-const FEATURES: [(&str, &str, &str); 16] = [
+const FEATURES: [(&str, &str, &str); 17] = [
     (HAS_METAL, "metal lobes", "no material is metal"),
     (
         "has_conductor",
@@ -117,6 +123,7 @@ const FEATURES: [(&str, &str, &str); 16] = [
         "point, spot and directional lights",
         "the scene has none",
     ),
+    ("has_media", "participating media", "the scene has none"),
 ];
 const HAS_METAL: &str = "has_metal";
 const HAS_MULTIPLE_SCATTERING: &str = "has_multiple_scattering";
@@ -155,6 +162,9 @@ impl Technique for PathTracer {
             ("rays", c.extend_rays + c.shadow_rays),
             ("waves", c.waves),
             ("stalls", c.stalls),
+            ("medium_collisions", c.medium_collisions),
+            ("null_collisions", c.null_collisions),
+            ("density_lookups", c.density_lookups),
         ])
     }
 

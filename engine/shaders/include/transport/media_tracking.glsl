@@ -12,7 +12,7 @@
 #include "transport/medium.glsl"
 #include "transport/random.glsl"
 
-// Iterations of a walk in one dispatch: blocks left and tentative collisions.
+// Iterations of a walk in one dispatch: blocks left and tentative collisions. Software drivers end loops in silence after 65,535 of all lanes.
 const uint GRID_WALK_QUOTA = 2048u;
 // Transmittances below this are decided by roulette, with this chance to go on.
 const float RATIO_ROULETTE_BELOW = 0.1;
@@ -110,9 +110,8 @@ uint delta_tracking(SceneMedium m, uvec4 key, vec3 throughput, inout GridWalk w,
     return WALK_LEFT;
 }
 
-// Multiplies `weight` by an estimate of the transmittance to the end; WALK_STOPPED by the quota.
-uint ratio_tracking(SceneMedium m, uvec4 key, float scale, inout GridWalk w, inout vec3 weight) {
-    uint iterations = GRID_WALK_QUOTA;
+// Multiplies `weight` by an estimate of the transmittance to the end; WALK_STOPPED when `iterations` have been used up.
+uint ratio_tracking(SceneMedium m, uvec4 key, float scale, inout GridWalk w, inout uint iterations, inout vec3 weight) {
     while (true) {
         uvec4 bits = walk_draw(key, w.draw++);
         float majorant;

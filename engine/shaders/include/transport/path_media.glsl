@@ -44,7 +44,7 @@ layout(set = 4, binding = 5, scalar) restrict buffer PathMediumCounters {
     uint collisions[2];
     uint null_collisions[2];
     uint density_lookups[2];
-    uint airlight_rays[2];
+    uint second_rays[2];  // of places that have one already
 } medium_counters;
 
 #define COUNT_MEDIUM(COUNTER, AMOUNT) { \

@@ -13,8 +13,14 @@
 layout(constant_id = 20) const bool HAS_GRIDS = true;
 layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
 
-// Surfaces met in one dispatch.
+// Surfaces met in one dispatch. With alpha, a traversal's iterations add up over the lanes.
 const uint SHADOW_SURFACES = 8u;
+const uint SHADOW_SURFACES_ALPHA = 2u;
+#ifdef PATH_ALPHA
+#define SHADOW_SURFACES_MAX SHADOW_SURFACES_ALPHA
+#else
+#define SHADOW_SURFACES_MAX SHADOW_SURFACES
+#endif
 // Random numbers of a walk; those of the next begin behind them.
 const uint WALK_SHIFT = 16u;
 // Stands for the round in the key of shadow rays' random numbers, so that those of ways do not return.
@@ -35,7 +41,7 @@ ShadowState begin_ray(uint place, uint rays, float t_max, uint walks) {
 
 // The next surface of a ray to which the way has been searched: passes a boundary, ends elsewhere. True when the ray has ended, its transmittance
 // known; WALK_STOPPED in `outcome` where a walk has to go on.
-bool pass_surface(ShadowRay s, inout ShadowState state, out uint outcome) {
+bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, out uint outcome) {
     bool met = state.hit.triangle != NO_HIT;
     Crossing crossing = Crossing(s.t_max < FAR_AWAY ? state.interior : OUTSIDE, OUTSIDE, false);
     if (met) {
@@ -57,7 +63,7 @@ bool pass_surface(ShadowRay s, inout ShadowState state, out uint outcome) {
             ++state.walks;
             uvec4 key = uvec4(push.first_pixel + s.slot / push.sample_count, push.first_sample + s.slot % push.sample_count,
                               SHADOW_KEY + status.rounds, push.seed);
-            outcome = ratio_tracking(m, key, scale, walk, state.transmittance);
+            outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
             COUNT_MEDIUM(density_lookups, walk.nulls)
             state.start = outcome == WALK_STOPPED ? walk.t : state.start;
         }
@@ -97,18 +103,20 @@ void main() {
     }
     BEGIN_CANDIDATES(s.slot, s.bounce, CANDIDATES_SHADOW)
     bool stopped = false;
-    for (uint surface = 0u; surface < SHADOW_SURFACES && state.rays != 0u && !stopped; ++surface) {
+    uint iterations = GRID_WALK_QUOTA;
+    for (uint surface = 0u; surface < SHADOW_SURFACES_MAX && state.rays != 0u && !stopped; ++surface) {
         resume = closest_hit(Ray(s.origin, state.start, s.direction, s.t_max), resume, state.hit);
         stopped = resume != BVH2_FINISHED;
         if (!stopped) {
             resume = BVH2_START;
             uint outcome;
-            if (pass_surface(s, state, outcome)) {
+            if (pass_surface(s, state, iterations, outcome)) {
                 if (state.transmittance != vec3(0.0)) {
                     path_gathered[s.slot].radiance += s.contribution * state.transmittance;
                 }
                 rays = state.rays & (state.rays - 1u);
                 if (rays != 0u) {
+                    COUNT_MEDIUM(second_rays, 1u)
                     s = first_ray(place, rays);
                     state = begin_ray(place, rays, s.t_max, state.walks);
                 }
