@@ -170,6 +170,8 @@ void main() {
     uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_A_WAY * status.rounds;
     if (medium != NO_MEDIUM && way.end > way.start) {
         m = load_medium(medium);
+        // Where collisions would only end the path, it goes on in proportion to the transmittance instead.
+        bool passes = !scattering || m.sigma_s == vec3(0.0);
         if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
             float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
             if (m.emission != vec3(0.0)) {
@@ -182,17 +184,21 @@ void main() {
                     flags |= FLAG_AIRLIGHT | FLAG_SHADOW;
                 }
             }
-            Sampler s = path_sampler(slot, dimension);
-            FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, bands, t_max, sample_2d(s));
-            t = flight.t;
-            weight = flight.weight;
-            state.bands = flight.bands;
-            outcome = flight.collides ? WALK_COLLIDED : WALK_LEFT;
+            if (passes) {
+                weight = transmittance(m.sigma_t, t_max);
+            } else {
+                Sampler s = path_sampler(slot, dimension);
+                FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, bands, t_max, sample_2d(s));
+                t = flight.t;
+                weight = flight.weight;
+                state.bands = flight.bands;
+                outcome = flight.collides ? WALK_COLLIDED : WALK_LEFT;
+            }
         } else if (HAS_GRIDS) {
             uint pixel = push.first_pixel + slot / push.sample_count;
             uvec4 key = uvec4(pixel, push.first_sample + slot % push.sample_count, dimension, push.seed);
             GridWalk walk = begin_grid_walk(m, path.origin, path.direction, way.start, way.end);
-            outcome = delta_tracking(m, key, path.throughput, walk, state.bands, weight, emitted);
+            outcome = delta_tracking(m, key, path.throughput, passes, walk, state.bands, weight, emitted);
             t = walk.t - way.start;
             COUNT_MEDIUM(null_collisions, walk.nulls)
             COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == WALK_COLLIDED ? 1u : 0u))
@@ -210,7 +216,7 @@ void main() {
     uint interior = way.interior;
     if (outcome == WALK_COLLIDED) {
         path.throughput *= weight;
-        if (scattering && path.throughput != vec3(0.0)) {
+        if (path.throughput != vec3(0.0)) {
             vec3 at = path.origin + (way.start + t) * path.direction;
             if (lighting && sample_collision_light(slot, place, path, bands, m, way, at, t)) {
                 flags |= FLAG_SAMPLED | FLAG_SHADOW;

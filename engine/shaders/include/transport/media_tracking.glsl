@@ -90,8 +90,9 @@ uint next_tentative_collision(SceneMedium m, float scale, float depth, inout Gri
 // Density at the walk's place as a share of its block's majorant at density 1.
 float walk_density(SceneMedium m, GridWalk w) { return density_in_cells(m, w.origin + w.t * w.direction); }
 
-// Flies on until a real collision, the end or the quota. Adds what the medium emits on the way, seen through `throughput`.
-uint delta_tracking(SceneMedium m, uvec4 key, vec3 throughput, inout GridWalk w, inout vec3 bands, inout vec3 weight, inout vec3 emitted) {
+// Flies on until a real collision, the end or the quota; a flight that `passes` has no real ones, but is weighted by the transmittance
+// (ratio tracking). Adds what the medium emits on the way, seen through `throughput`.
+uint delta_tracking(SceneMedium m, uvec4 key, vec3 throughput, bool passes, inout GridWalk w, inout vec3 bands, inout vec3 weight, inout vec3 emitted) {
     uint iterations = GRID_WALK_QUOTA;
     while (true) {
         uvec4 bits = walk_draw(key, w.draw++);
@@ -102,7 +103,10 @@ uint delta_tracking(SceneMedium m, uvec4 key, vec3 throughput, inout GridWalk w,
         }
         float share = walk_density(m, w) / majorant;
         emitted += throughput * weight * m.emission * share;
-        if (sample_null_collision(min(m.sigma_t * share, vec3(1.0)), m.sigma_s * share, unit_float(bits.y), bands, weight)) {
+        vec3 real = min(m.sigma_t * share, vec3(1.0));
+        if (passes) {
+            weight *= 1.0 - real;
+        } else if (sample_null_collision(real, m.sigma_s * share, unit_float(bits.y), bands, weight)) {
             return WALK_COLLIDED;
         }
         ++w.nulls;

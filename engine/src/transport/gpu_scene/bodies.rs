@@ -37,7 +37,9 @@ impl Bodies {
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];
             let end = first_triangle + mesh.triangles.len();
-            let material = mesh.material.filter(|&index| bounds_body(&scene.materials[index as usize]));
+            let material = mesh
+                .material
+                .filter(|&index| bounds_body(&scene.materials[index as usize]));
             if let Some(material) = material.filter(|_| end > first_triangle) {
                 let triangles = geometry.triangles[first_triangle..end].iter().map(corners_of);
                 bodies.0.push(Body::new(material, first_triangle, triangles.collect()));
@@ -46,7 +48,9 @@ impl Bodies {
         }
         for body in &bodies.0 {
             let [a, b, c] = body.triangles[0].map(|p| p.as_dvec3());
-            let around = bodies.innermost((a + b + c) / 3.0, body.volume).map_or(0, |material| material + 1);
+            let around = bodies
+                .innermost((a + b + c) / 3.0, body.volume)
+                .map_or(0, |material| material + 1);
             for triangle in &mut geometry.triangles[body.first_triangle..][..body.triangles.len()] {
                 triangle.around = around;
             }
@@ -62,7 +66,9 @@ impl Bodies {
     /// As [`Bodies::around`], among those with more than a volume.
     fn innermost(&self, point: DVec3, least: f64) -> Option<u32> {
         let around = self.0.iter().filter(|body| body.volume > least && body.contains(point));
-        around.min_by(|a, b| a.volume.total_cmp(&b.volume)).map(|body| body.material)
+        around
+            .min_by(|a, b| a.volume.total_cmp(&b.volume))
+            .map(|body| body.material)
     }
 }
 

@@ -32,10 +32,11 @@ impl GpuMedia {
     pub(super) fn new(gpu: &Gpu, scene: &Scene, bodies: Bodies) -> Result<Self> {
         let (mut densities, mut majorants) = (Vec::new(), Vec::new());
         let media = scene.media.iter();
-        let records: Vec<_> = media.map(|medium| record(medium, &mut densities, &mut majorants)).collect();
-        let texels = |name: &str, values: &[f32]| {
-            gpu.texels_with(name, Category::Material, vk::Format::R32_SFLOAT, values)
-        };
+        let records: Vec<_> = media
+            .map(|medium| record(medium, &mut densities, &mut majorants))
+            .collect();
+        let texels =
+            |name: &str, values: &[f32]| gpu.texels_with(name, Category::Material, vk::Format::R32_SFLOAT, values);
         let format = vk::Format::R32G32B32A32_UINT;
         let bytes: &[u8] = bytemuck::cast_slice(&records);
         Ok(Self {
@@ -43,7 +44,9 @@ impl GpuMedia {
             densities: texels("densities", &densities)?,
             majorants: texels("majorants", &majorants)?,
             bodies,
-            surrounding: scene.surrounding.filter(|&index| !scene.media[index as usize].is_empty()),
+            surrounding: scene
+                .surrounding
+                .filter(|&index| !scene.media[index as usize].is_empty()),
         })
     }
 

@@ -83,7 +83,9 @@ impl GpuScene {
         let index = gpu.texels_with(bvh.name(), Category::Index, vk::Format::R32G32B32A32_UINT, bvh.texels())?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
-        let placed = materials.iter().filter(|(material, placed)| *placed && !material.boundary);
+        let placed = materials
+            .iter()
+            .filter(|(material, placed)| *placed && !material.boundary);
         let bsdf = BsdfFeatures::of_materials(placed.map(|(material, _)| *material));
         let mut textures = Textures::default();
         let records: Vec<_> = materials

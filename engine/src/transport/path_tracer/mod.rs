@@ -20,7 +20,6 @@ pub use self::settings::PathTracerSettings;
 use self::wave::{
     Cursor, MediumCounters, Status, Wave, WaveBuffers, WaveNeeds, group_counts, slots_of_device, slots_of_picture,
 };
-use glam::DVec3;
 use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -29,6 +28,7 @@ use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_EXTEND, STALLED_NOT, ST
 use crate::gpu::{Access, Buffer, DeviceKind, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
+use glam::DVec3;
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
 const BOUNCES_A_SUBMISSION: usize = 12;
