@@ -149,6 +149,73 @@ fn several_media_find_their_places() {
 }
 
 #[test]
+fn densities_are_generated_or_read_and_placed() {
+    let with = |density: &str| folder(&format!("[[medium]]\nsigma_a = 1.0\ndensity = {{ {density} }}\n"));
+    let grid = |folder: &tempfile::TempDir| {
+        let mut scene = load(folder.path(), "m.obj").expect("scene");
+        assert!(SceneProfile::of(&scene).media.heterogeneous);
+        scene.media.remove(0).density.expect("grid")
+    };
+    let made = grid(&with(
+        "generate = \"gradient\", size = [4, 2, 1], factor = 8, low = [0, 0, 0], high = [2, 2, 2]",
+    ));
+    assert_eq!((made.size, &made.values[..4]), ([4, 2, 1], &[1.0, 3.0, 5.0, 7.0][..]));
+    assert_eq!(made.density(DVec3::new(1.0, 1.0, 1.0)), 4.0);
+    // A quarter turn about +Y takes +X to −Z.
+    let turned = grid(&with(
+        "generate = \"gradient\", size = 4, scale = 2, rotate = [0, 90, 0], translate = [0, 0, 10]",
+    ));
+    assert!((turned.density(DVec3::new(1.0, 1.0, 9.0)) - 0.5).abs() < 1e-12);
+    assert!((turned.density(DVec3::new(1.0, 1.0, 8.1)) - 0.875).abs() < 1e-7);
+
+    let file = with("file = \"d.vol\"");
+    let (low, high) = (DVec3::ZERO, DVec3::new(4.0, 1.0, 1.0));
+    std::fs::write(
+        file.path().join("d.vol"),
+        scene::medium::vol::to_bytes(&made, &[1.0], low, high),
+    )
+    .expect("file");
+    let read = grid(&file);
+    assert_eq!(
+        (&read.values, read.density(DVec3::new(2.0, 0.5, 0.5))),
+        (&made.values, 4.0)
+    );
+
+    let raw = with("file = \"d.raw\", size = [2, 1, 1], type = \"uint8\", offset = 1");
+    std::fs::write(raw.path().join("d.raw"), [9, 0, 255]).expect("file");
+    assert_eq!(grid(&raw).values, [0.0, 1.0]);
+    std::fs::write(raw.path().join("d.raw"), [9, 0]).expect("file");
+    let error = load(raw.path(), "m.obj").expect_err("short").to_string();
+    assert!(
+        error.contains("d.raw") && error.contains("3 bytes are wanted"),
+        "{error}"
+    );
+    for (density, expected) in [
+        ("file = \"a.vol\", generate = \"smoke\"", "either file or generate"),
+        ("file = \"none.vol\"", "none.vol"),
+        ("file = \"a.nvdb\"", "mitsuba2-vdb-converter"),
+        ("file = \"a.raw\"", "wants size"),
+        ("file = \"a.raw\", size = 2, type = \"int8\"", "known: uint8"),
+        (
+            "file = \"a.raw\", size = 2, endian = \"middle\"",
+            "neither little nor big",
+        ),
+        ("file = \"a.vol\", size = 2", "says itself"),
+        ("generate = \"fog\"", "known: constant, gradient"),
+        ("generate = \"ball\", size = 513", "between 1 and 512"),
+        ("generate = \"ball\", size = [1, 2]", "a number or three"),
+        ("generate = \"ball\", factor = -1", "factor"),
+        ("generate = \"ball\", low = [0, 0, 0]", "both low and high"),
+        ("generate = \"ball\", low = [0, 0, 0], high = [1, 0, 1]", "below high"),
+        ("generate = \"ball\", scale = 0", "must not be 0"),
+        ("generate = \"ball\", colour = 0", "line 3"),
+    ] {
+        let error = load(with(density).path(), "m.obj").expect_err(density).to_string();
+        assert!(error.contains(expected), "{expected}: {error}");
+    }
+}
+
+#[test]
 fn a_sidecar_can_be_the_scene() {
     let folder = folder("");
     std::fs::write(folder.path().join("dusk.toml"), "file = \"m.obj\"\nexposure = -1.0\n").expect("file");

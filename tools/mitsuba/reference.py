@@ -12,6 +12,7 @@ import json
 import os
 import sys
 import time
+import xml.etree.ElementTree
 
 
 def find_llvm():
@@ -60,7 +61,9 @@ def main():
 
     variant = set_variant(mitsuba, arguments.variant)
     scene = mitsuba.load_file(arguments.scene, sampler=arguments.sampler, spp=arguments.spp)
-    integrator = mitsuba.load_dict({"type": "path", "max_depth": arguments.max_depth, "rr_depth": arguments.rr_depth})
+    # The exporter's file names the integrator that its media want.
+    kind = xml.etree.ElementTree.parse(arguments.scene).getroot().find("integrator").get("type")
+    integrator = mitsuba.load_dict({"type": kind, "max_depth": arguments.max_depth, "rr_depth": arguments.rr_depth})
 
     def render(seed):
         # The conversion waits for the result, so that the clock sees the work.
@@ -98,6 +101,7 @@ def main():
         "scene": os.path.basename(arguments.scene),
         "width": width,
         "height": height,
+        "integrator": kind,
         "sampler": arguments.sampler,
         "passes": arguments.passes,
         "spp_per_pass": arguments.spp,

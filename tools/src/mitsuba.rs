@@ -6,6 +6,7 @@
 //! elevation and cells in azimuth, with the seam half a turn away from ours.
 //! Guarantees: deterministic files; no file is written for a scene that is refused.
 
+mod medium;
 mod mesh;
 pub mod scenes;
 mod surface;
@@ -31,7 +32,7 @@ pub struct ExportOptions {
 pub struct Exported {
     /// The scene file.
     pub scene: PathBuf,
-    /// The meshes and the environment map.
+    /// The meshes, the environment map and the grids of media.
     pub files: Vec<PathBuf>,
     /// Triangles in all meshes; those without area are left out.
     pub triangles: usize,
@@ -77,7 +78,19 @@ pub fn export_with(
         }
     }
     shapes.retain(|shape| !shape.triangles.is_empty());
+    let surroundings = medium::Surroundings::new(scene, &shapes);
+    reasons.extend(surroundings.refusals());
     let mut body = String::new();
+    let mut grids = Vec::new();
+    for (index, medium) in (0..).zip(&scene.media) {
+        match medium::describe(index, medium) {
+            Ok(described) => {
+                body.push_str(&described.xml);
+                grids.extend(described.file);
+            }
+            Err(cause) => reasons.push(format!("medium {:?}: {cause}", medium.name)),
+        }
+    }
     for (index, shape) in shapes.iter().enumerate() {
         match surface::describe(&shape.material, &mut notes) {
             Ok(surface) => {
@@ -91,13 +104,13 @@ pub fn export_with(
                     "    <boolean name=\"face_normals\" value=\"{}\"/>",
                     shape.normals.is_empty()
                 );
-                let _ = writeln!(body, "{surface}  </shape>");
+                let _ = writeln!(body, "{surface}{}  </shape>", surroundings.of(shape));
             }
             Err(cause) => reasons.push(format!("material {:?}: {cause}", shape.material.name)),
         }
     }
     for light in &scene.lights {
-        match light_xml(&light.kind) {
+        match light_xml(&light.kind, &surroundings) {
             Ok(xml) => body.push_str(&xml),
             Err(cause) => reasons.push(format!("light {:?}: {cause}", light.name)),
         }
@@ -136,8 +149,16 @@ pub fn export_with(
         exr::write(&path, &map)?;
         files.push(path);
     }
+    for (name, bytes) in grids {
+        files.push(write(dir.join(name), &bytes)?);
+    }
     let reach = farthest(camera.transform.translation, &shapes);
-    let text = format!("{HEADER}{}{body}</scene>\n", camera_xml(camera, size, reach));
+    let around = medium_at(&surroundings, camera.transform.translation);
+    let integrator = if scene.media.is_empty() { "path" } else { "volpathmis" };
+    let text = format!(
+        "{HEADER}  <integrator type=\"{integrator}\">{INTEGRATOR}{body}{}</scene>\n",
+        camera_xml(camera, size, reach, &around)
+    );
     notes.sort();
     notes.dedup();
     Ok(Exported {
@@ -152,7 +173,8 @@ const HEADER: &str = r#"<?xml version="1.0" encoding="utf-8"?>
 <scene version="3.0.0">
   <default name="spp" value="16"/>
   <default name="sampler" value="independent"/>
-  <integrator type="path">
+"#;
+const INTEGRATOR: &str = r#"
     <integer name="max_depth" value="-1"/>
     <integer name="rr_depth" value="5"/>
   </integrator>
@@ -208,8 +230,8 @@ fn transform_xml(indent: &str, transform: DAffine3) -> String {
     format!("{indent}<transform name=\"to_world\"><matrix value=\"{rows}\"/></transform>\n")
 }
 
-/// The sensor: Mitsuba's camera space is ours turned half a turn about +Y.
-fn camera_xml(camera: &Camera, size: [u32; 2], reach: f64) -> String {
+/// The sensor, in a medium if there is a `<ref>` to one: Mitsuba's camera space is ours turned half a turn about +Y.
+fn camera_xml(camera: &Camera, size: [u32; 2], reach: f64, medium: &str) -> String {
     const NEAR_OVER_FAR: f64 = 1e-5;
     let half_turn = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0));
     let mut to_world = camera.transform * DAffine3::from_mat3(half_turn);
@@ -243,7 +265,7 @@ fn camera_xml(camera: &Camera, size: [u32; 2], reach: f64) -> String {
     };
     let far = 2.0 * reach + 1.0;
     format!(
-        "  <sensor type=\"{kind}\">\n{lines}    <float name=\"near_clip\" value=\"{}\"/>\n    <float name=\"far_clip\" value=\"{far}\"/>\n{}\
+        "  <sensor type=\"{kind}\">{medium}\n{lines}    <float name=\"near_clip\" value=\"{}\"/>\n    <float name=\"far_clip\" value=\"{far}\"/>\n{}\
          \x20   <sampler type=\"$sampler\"><integer name=\"sample_count\" value=\"$spp\"/></sampler>\n\
          \x20   <film type=\"hdrfilm\">\n\
          \x20     <integer name=\"width\" value=\"{}\"/>\n      <integer name=\"height\" value=\"{}\"/>\n\
@@ -256,15 +278,22 @@ fn camera_xml(camera: &Camera, size: [u32; 2], reach: f64) -> String {
     )
 }
 
-fn light_xml(light: &LightKind) -> Result<String, String> {
+/// The `<ref>` to the medium around a camera or a light.
+fn medium_at(surroundings: &medium::Surroundings, point: DVec3) -> String {
+    let found = surroundings.at(point);
+    found.map_or_else(String::new, |index| medium::reference("medium", index))
+}
+
+fn light_xml(light: &LightKind, surroundings: &medium::Surroundings) -> Result<String, String> {
     let vector = |kind: &str, name: &str, v: Vec3| {
         format!("<{kind} name=\"{name}\" x=\"{}\" y=\"{}\" z=\"{}\"/>", v.x, v.y, v.z)
     };
     match *light {
         LightKind::Point { position, intensity } => Ok(format!(
-            "  <emitter type=\"point\">{}{}</emitter>\n",
+            "  <emitter type=\"point\">{}{}{}</emitter>\n",
             vector("point", "position", position),
-            rgb("intensity", intensity)
+            rgb("intensity", intensity),
+            medium_at(surroundings, position.as_dvec3())
         )),
         LightKind::Directional { direction, irradiance } => Ok(format!(
             "  <emitter type=\"directional\">{}{}</emitter>\n",

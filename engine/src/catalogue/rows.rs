@@ -487,7 +487,7 @@ pub(super) const ROWS: &[Row] = &[
         "tools/models",
         part(
             "CL-SIDECAR",
-            "sidecar of a model: environment, metals, cameras, exposure, technique (media are read and reported only)",
+            "sidecar of a model: environment, metals, cameras, exposure, technique, participating media with grids of densities",
             "the engine's own",
             "engine/src/scene/sidecar.rs",
             &[

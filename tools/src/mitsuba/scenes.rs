@@ -1,7 +1,7 @@
 //! The scenes on which the engine and Mitsuba 3 are compared.
 //!
 //! They are the engine's generated scenes, with flat shading and, where a material has no exact counterpart, another one: between them they hold every
-//! material, light, camera and environment that the exporter knows. Guarantees: a pure function; the exporter accepts every one (a test checks it).
+//! material, light, camera, environment and medium that the exporter knows. Guarantees: a pure function; the exporter accepts every one (a test checks it).
 
 use clerestory::Result;
 use clerestory::scene::{Camera, Environment, Material, Projection, Scene, builtin, metals};
@@ -97,6 +97,39 @@ pub fn scenes() -> Result<Vec<ComparedScene>> {
     repaint(&mut room, "mirror", |m| m.conductor = metals::by_name("silver"));
     add("box-room", "furnished room, silver mirror wall", room);
     add("passage", "indirect light only", flat("passage?width=0.4")?);
+
+    add("fog-box", "thin fog in an invisible boundary", flat("fog-box?g=0.5")?);
+    add(
+        "fog-box-glass",
+        "clear glass in chromatic fog",
+        flat("fog-box?sphere=glass&sigma_s=1,2,3&phase=rayleigh")?,
+    );
+    add(
+        "point-in-fog",
+        "point light in endless fog",
+        flat("point-in-fog?wall=white")?,
+    );
+    add(
+        "medium-slab",
+        "beam through an optically thick slab",
+        flat("medium-slab?source=back&sigma_s=4&sigma_a=0.04&g=0.6&width=40")?,
+    );
+    add(
+        "furnace-medium",
+        "medium without absorption inside of glass",
+        flat("furnace-medium?ior=1.3&shape=box")?,
+    );
+    add(
+        "smoke",
+        "grid of densities in an invisible boundary",
+        flat("smoke?size=32")?,
+    );
+    add(
+        "cloud",
+        "dense grid, forward scattering, sun and sky",
+        flat("cloud?size=32&albedo=0.98")?,
+    );
+    add("wax", "scattering inside of a rough solid", flat("wax?smooth=no")?);
     Ok(all)
 }
 

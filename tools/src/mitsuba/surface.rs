@@ -14,6 +14,9 @@ const SINGLE_SCATTERING: &str =
 
 /// The `<bsdf>` and `<emitter>` elements of a shape, or why there are none.
 pub(super) fn describe(material: &Material, notes: &mut Vec<String>) -> Result<String, String> {
+    if material.boundary {
+        return Ok("    <bsdf type=\"null\"/>\n".into());
+    }
     refuse_common(material)?;
     let alpha = material.roughness * material.roughness;
     let bsdf = if material.metallic == 1.0 {

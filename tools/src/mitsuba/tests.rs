@@ -100,7 +100,7 @@ fn writes_the_plugins_of_each_material() -> Result<()> {
 #[test]
 fn camera_space_is_turned_about_the_vertical() {
     let camera = &room().cameras[0];
-    let xml = camera_xml(camera, [64, 32], 4.0);
+    let xml = camera_xml(camera, [64, 32], 4.0, "");
     let rows = "<matrix value=\"-1 0 0 0.5 0 1 0 0.5 0 0 -1 3 0 0 0 1\"/>";
     assert!(xml.contains(rows), "{xml}");
     let flat = Camera {
@@ -108,7 +108,7 @@ fn camera_space_is_turned_about_the_vertical() {
         ..camera.clone()
     };
     assert!(
-        camera_xml(&flat, [64, 32], 4.0).contains("<matrix value=\"-4 "),
+        camera_xml(&flat, [64, 32], 4.0, "").contains("<matrix value=\"-4 "),
         "half the width is 4"
     );
 }

@@ -13,36 +13,36 @@ use super::shapes::{MeshBuilder, geodesic_sphere};
 use crate::Result;
 use crate::scene::{Camera, LightKind, Material, Scene, metals};
 
+pub(super) const LIGHT_RADIANCE: Parameter = Parameter::color(
+    "light",
+    "17,12,4",
+    0.0,
+    1e6,
+    "radiance of the ceiling light, W·m⁻²·sr⁻¹",
+);
+pub(super) const SOURCE: Parameter = Parameter::choice(
+    "source",
+    "area",
+    &["area", "point", "spot"],
+    "the ceiling light as measured, or a point or downward spot light of the same intensity straight down",
+);
+pub(super) const BOXES: Parameter = Parameter::choice(
+    "boxes",
+    "both",
+    &["both", "short", "tall", "none"],
+    "which blocks stand in the box",
+);
+pub(super) const SPHERE: Parameter = Parameter::choice(
+    "sphere",
+    "none",
+    &["none", "glass", "mirror", "gold", "diffuse"],
+    "a sphere of radius 0.08 m above the place of the short block",
+);
+
 pub const CORNELL_BOX: Entry = Entry {
     name: "cornell-box",
     summary: "The measured Cornell box: two blocks in a box with one red and one green wall, lit from the ceiling.",
-    parameters: &[
-        Parameter::color(
-            "light",
-            "17,12,4",
-            0.0,
-            1e6,
-            "radiance of the ceiling light, W·m⁻²·sr⁻¹",
-        ),
-        Parameter::choice(
-            "source",
-            "area",
-            &["area", "point", "spot"],
-            "the ceiling light as measured, or a point or downward spot light of the same intensity straight down",
-        ),
-        Parameter::choice(
-            "boxes",
-            "both",
-            &["both", "short", "tall", "none"],
-            "which blocks stand in the box",
-        ),
-        Parameter::choice(
-            "sphere",
-            "none",
-            &["none", "glass", "mirror", "gold", "diffuse"],
-            "a sphere of radius 0.08 m above the place of the short block",
-        ),
-    ],
+    parameters: &[LIGHT_RADIANCE, SOURCE, BOXES, SPHERE],
     build,
 };
 
@@ -118,7 +118,8 @@ fn metres(corners: [[f32; 3]; 4]) -> [Vec3; 4] {
     corners.map(|c| Vec3::from_array(c) * MILLIMETRE)
 }
 
-fn build(values: &Values) -> Result<Scene> {
+/// The box of [`CORNELL_BOX`]'s parameters.
+pub(super) fn build(values: &Values) -> Result<Scene> {
     let mut scene = Scene::default();
     let white = scene.add_material(Material::lambert("white", WHITE));
     let red = scene.add_material(Material::lambert("red", RED));

@@ -5,8 +5,10 @@
 
 mod city;
 mod cornell;
+mod fog;
 mod furnace;
 mod materials;
+mod media;
 pub mod noise;
 mod parameters;
 mod ring;
@@ -16,6 +18,7 @@ mod slab;
 mod soup;
 mod sphere_flake;
 mod textures;
+mod volumes;
 
 pub use parameters::{Parameter, ParameterKind};
 
@@ -44,17 +47,24 @@ pub fn catalogue() -> &'static [Entry] {
     &[
         city::BOX_CITY,
         rooms::BOX_ROOM,
+        volumes::CLOUD,
         cornell::CORNELL_BOX,
         rooms::DIVIDER_ROOM,
+        fog::FOG_BOX,
         furnace::FURNACE_BOX,
+        media::FURNACE_MEDIUM,
         furnace::FURNACE_SPHERE,
         materials::MATERIALS,
+        media::MEDIUM_SLAB,
         rooms::PASSAGE,
+        fog::POINT_IN_FOG,
         ring::RING,
         slab::SLAB,
+        volumes::SMOKE,
         sphere_flake::SPHERE_FLAKE,
         furnace::SPHERE_LIGHT,
         soup::TRIANGLE_SOUP,
+        media::WAX,
         furnace::WHITE_FURNACE,
     ]
 }

@@ -55,7 +55,7 @@ fn check_medium(medium: &Medium) -> Result<(), Fault> {
         }
     }
     if let Phase::HenyeyGreenstein { g: value } | Phase::Schlick { k: value } = medium.phase
-        && !(value.abs() < 1.0)
+        && (value.is_nan() || value.abs() >= 1.0)
     {
         return fault("phase", format!("{value} does not lie between -1 and 1"));
     }

@@ -30,15 +30,12 @@ impl MajorantGrid {
     /// Bounds of a grid over blocks of `block` cells a side (at least 1). Looks at each value once an axis.
     pub fn new(grid: &DensityGrid, block: u32) -> Self {
         let block = block.max(1);
-        let mut extent = grid.size.map(|s| s as usize);
         let (mut minima, mut maxima) = (grid.values.clone(), grid.values.clone());
         let mut stride = 1;
-        for axis in 0..3 {
-            let fold = |values: &[f32], pick: fn(f32, f32) -> f32| fold_axis(values, extent[axis], stride, block, pick);
-            minima = fold(&minima, f32::min);
-            maxima = fold(&maxima, f32::max);
-            extent[axis] = extent[axis].div_ceil(block as usize);
-            stride *= extent[axis];
+        for length in grid.size.map(|s| s as usize) {
+            minima = fold_axis(&minima, length, stride, block, f32::min);
+            maxima = fold_axis(&maxima, length, stride, block, f32::max);
+            stride *= length.div_ceil(block as usize);
         }
         Self {
             cells: grid.size,

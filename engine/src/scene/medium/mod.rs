@@ -8,8 +8,11 @@
 //! whatever is around it; so does a solid of glass without one hold nothing. Such meshes are closed, and nested or apart, never crossing.
 
 mod check;
+pub mod generate;
 mod grid;
 mod majorant;
+pub mod raw;
+pub mod vol;
 
 pub(super) use check::check;
 pub use check::{MAX_DENSITY_CELLS, MAX_MEDIA};

@@ -15,9 +15,10 @@
 //! emission = [0.0, 0.0, 0.0]    # W·m⁻³·sr⁻¹
 //! phase = "hg"
 //! g = 0.5                       # mean cosine; with phase = "schlick", k = 0.5
+//! density = { generate = "smoke", size = 96, low = [-1.0, 0.0, -1.0], high = [1.0, 2.0, 1.0] }
 //! ```
 //!
-//! `g` without `phase` means Henyey and Greenstein's. All coefficients are those at density 1. A single table may be written `[medium]`.
+//! `g` without `phase` means Henyey and Greenstein's. All coefficients are those at density 1; what `density` may be says [`density`](super::density). A single table may be written `[medium]`.
 //! The extension `KHR_materials_volume` of glTF makes no medium: its absorption stays that of the solid, and a solid with both is an error.
 
 use std::fmt;
@@ -28,6 +29,7 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 
 use super::Sidecar;
+use super::density::DensityTable;
 use crate::Result;
 use crate::scene::{Medium, Phase, Scene};
 
@@ -44,6 +46,7 @@ pub(super) struct MediumTable {
     sigma_t: Option<Bands>,
     albedo: Option<Bands>,
     emission: Option<Bands>,
+    density: Option<DensityTable>,
     phase: Option<String>,
     g: Option<f32>,
     k: Option<f32>,
@@ -110,6 +113,10 @@ impl Sidecar {
         };
         let (sigma_a, sigma_s) = self.coefficients(&key, table)?;
         let emission = self.bands(&key, "emission", table.emission)?;
+        let density = match &table.density {
+            Some(density) => Some(self.density(&format!("{key}.density"), density)?),
+            None => None,
+        };
         let medium = Medium {
             name: table
                 .name
@@ -120,7 +127,7 @@ impl Sidecar {
             sigma_s,
             emission: emission.unwrap_or_default(),
             phase: self.phase(&key, table)?,
-            density: None,
+            density,
         };
         let number = scene.media.len() as u32;
         let Some(name) = &table.material else {

@@ -25,8 +25,9 @@
 //! focus = 4.0                   # distance of the plane in focus, metres
 //! ```
 //!
-//! Participating media are described in [`medium`]. Unknown keys are errors with their line.
+//! Participating media are described in [`medium`], grids of their densities in [`density`]. Unknown keys are errors with their line.
 
+pub mod density;
 pub mod medium;
 
 use std::collections::BTreeMap;
