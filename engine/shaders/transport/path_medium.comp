@@ -30,6 +30,8 @@ layout(push_constant, scalar) uniform Push {
     uint roulette_start;    // first bounce at which Russian roulette may end a path
     float roulette_cap;     // largest probability to go on
     uint surrounding;       // index of the medium outside of all bodies, or NO_MEDIUM
+    uint accepting;         // states of the automaton in which light counts, a bit each
+    uint successors[15];    // of each state
 } push;
 
 #include "transport/path_draws.glsl"
@@ -144,6 +146,11 @@ void main() {
     }
     uint slot = load_slot(place);
     PathState path = load_path(slot);
+    uint automaton = 0u;
+    if (HAS_PATH_AUTOMATON) {
+        automaton = path_set_state(path.bounce);
+        path.bounce = path_set_bounce(path.bounce);
+    }
     MediumState state = MediumState(vec3(1.0 / 3.0), 0.0);
     if (status.rounds > 0u) {
         state = path_medium_states[slot];
@@ -164,8 +171,15 @@ void main() {
     vec3 bands = state.bands;
     bool counted = path_set_contains(push.path_set, path.bounce);
     bool scattering = path_set_continues(push.path_set, path.bounce) && (path_set_lobes(push.path_set) & LOBE_VOLUME) != 0u;
+    uint after = 0u;  // state of the automaton after scattering in a medium
+    if (HAS_PATH_AUTOMATON) {
+        after = path_set_successor(push.successors[automaton], LOBE_VOLUME);
+        counted = counted && (push.accepting >> automaton & 1u) != 0u;
+        scattering = path_set_continues(push.path_set, path.bounce) && after != PATH_SET_DEAD;
+    }
     bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
     bool lighting = lit && scattering && path_set_contains(push.path_set, path.bounce + 1u);
+    lighting = lighting && (!HAS_PATH_AUTOMATON || (push.accepting >> after & 1u) != 0u);
     // Draws of the medium are numbered by the round, which is the number of the path's ways so far.
     uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_A_WAY * status.rounds;
     if (medium != NO_MEDIUM && way.end > way.start) {
@@ -222,6 +236,7 @@ void main() {
                 flags |= FLAG_SAMPLED | FLAG_SHADOW;
             }
             alive = scatter(slot, m, at, path);
+            automaton = after;
             state.start = 0.0;
         }
     } else if (outcome == WALK_STOPPED) {
@@ -241,6 +256,9 @@ void main() {
     path_medium_events[place] = MediumEvent(weight, (flags & FLAG_AIRLIGHT) | (handled ? EVENT_HANDLED : 0u));
     path_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);
     if (alive) {
+        if (HAS_PATH_AUTOMATON) {
+            path.bounce = path_set_joined(path.bounce, automaton);
+        }
         path_states_out[slot] = path;
     }
 }

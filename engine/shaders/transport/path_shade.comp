@@ -11,6 +11,7 @@ layout(local_size_x = 64) in;
 #include "transport/path_features.glsl"
 #include "transport/path_buffers.glsl"
 #include "transport/path_set.glsl"
+#include "transport/bsdf_label.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/path_media.glsl"
 #include "transport/surface.glsl"
@@ -25,6 +26,8 @@ layout(push_constant, scalar) uniform Push {
     uint path_set;          // PathSet, packed
     uint roulette_start;    // first bounce at which Russian roulette may end a path
     float roulette_cap;     // largest probability to go on
+    uint accepting;         // states of the automaton in which light counts, a bit each
+    uint successors[15];    // of each state
 } push;
 
 #include "transport/path_draws.glsl"
@@ -38,7 +41,13 @@ float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heu
 // Shades the hit of the path in a slot; true when the path goes on. What it meets is added to `radiance`.
 bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uint flags) {
     Hit hit = load_hit(place);
+    uint state = 0u;
+    if (HAS_PATH_AUTOMATON) {
+        state = path_set_state(path.bounce);
+        path.bounce = path_set_bounce(path.bounce);
+    }
     bool counted = path_set_contains(push.path_set, path.bounce);
+    counted = counted && (!HAS_PATH_AUTOMATON || (push.accepting >> state & 1u) != 0u);
 
     if (hit.triangle == NO_HIT) {
         if (HAS_ENVIRONMENT && counted) {
@@ -84,7 +93,17 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         vec3 albedo = HAS_CONDUCTOR && (bsdf.flags & BSDF_CONDUCTOR) != 0u ? bsdf.conductor_average : bsdf.base_color;
         path_aovs[slot] = PathAov(albedo, hit.t, normal, 1u);
     }
+    // Lobes after which the path may go on, and those after which light counts.
+    uint mask = path_set_lobes(push.path_set);
+    uint lit_mask = mask;
+    uint successors = 0u;
+    if (HAS_PATH_AUTOMATON) {
+        successors = push.successors[state];
+        mask = path_set_lobes_to(successors, PATH_SET_LIVE);
+        lit_mask = path_set_lobes_to(successors, push.accepting);
+    }
     bool ends = (HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u) || !path_set_continues(push.path_set, path.bounce);
+    ends = ends || (HAS_PATH_AUTOMATON && mask == 0u);
     if (ends) {
         return false;
     }
@@ -94,10 +113,10 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     vec3 y;
     orthonormal_basis(z, x, y);
     vec3 wo_local = vec3(dot(wo, x), dot(wo, y), dot(wo, z));
-    uint mask = path_set_lobes(push.path_set);
     uint bounce = path.bounce;
 
     bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
+    lit = lit && (!HAS_PATH_AUTOMATON || lit_mask != 0u);
     if (lit && path_set_contains(push.path_set, bounce + 1u)) {
         vec2 choice = bounce_sample(slot, bounce, DIMENSION_LIGHT);
         vec2 u = bounce_sample(slot, bounce, DIMENSION_LIGHT_POINT);
@@ -105,7 +124,8 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         LightSample light = sample_light(s.point.position, choice.x, u, within, push.scene_lower, push.scene_upper);
         vec3 wi = light.direction;
         if (light.radiance != vec3(0.0) && sides_agree(z, outward, wi)) {
-            vec4 f = bsdf_eval_pdf(bsdf, wo_local, vec3(dot(wi, x), dot(wi, y), dot(wi, z)), mask);
+            // The density is that of the directions sampled below, whatever part of them finds light that counts.
+            vec4 f = bsdf_eval_part(bsdf, wo_local, vec3(dot(wi, x), dot(wi, y), dot(wi, z)), mask, lit_mask);
             if (f.rgb != vec3(0.0)) {
                 float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, f.a) : 1.0;
                 ShadowRay ray_to_light;
@@ -136,6 +156,13 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
 
     vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
     BsdfSample scattered = bsdf_sample(bsdf, wo_local, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), mask);
+    if (HAS_PATH_AUTOMATON) {
+        uint after_base = path_set_successor(successors, LOBE_DIFFUSE & LOBE_REFLECTION);
+        uint after_microfacets = path_set_successor(successors, LOBE_GLOSSY & LOBE_REFLECTION);
+        bool alike = !HAS_LOBE_LABELS || after_base == after_microfacets;
+        scattered = bsdf_label(bsdf, wo_local, scattered, mask, alike, lobe.y);
+        state = scattered.flags != 0u ? path_set_successor(successors, scattered.flags) : 0u;
+    }
     vec3 wi = scattered.wi.x * x + scattered.wi.y * y + scattered.wi.z * z;
     path.throughput *= scattered.weight;
     if (scattered.flags == 0u || !sides_agree(z, outward, wi) || path.throughput == vec3(0.0)) {
@@ -167,6 +194,9 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         path_medium_states[slot].start = -distance(path.origin, s.point.position) / max(cos_i, LEAD_COS_MIN);
     }
     path.pdf = scattered.pdf;
+    if (HAS_PATH_AUTOMATON) {
+        path.bounce = path_set_joined(path.bounce, state);
+    }
     path_states_out[slot] = path;
     return true;
 }

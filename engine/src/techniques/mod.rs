@@ -53,7 +53,7 @@ pub struct TechniqueInfo {
     pub bias: Bias,
     /// Device features beyond the baseline, by the Vulkan names that [`offers`] knows.
     pub needs: &'static [&'static str],
-    /// The light paths of its picture with default settings.
+    /// The light paths of its picture with default settings; a setting `path_set` may restrict them to a part.
     pub path_set: PathSet,
     /// Why it cannot model a scene; empty when it can.
     pub refusals: fn(&SceneProfile) -> Vec<String>,
@@ -184,7 +184,8 @@ impl TechniqueInfo {
         settings: &serde_json::Value,
     ) -> Result<Box<dyn Technique>> {
         features::check(gpu.caps(), self)?;
-        let reasons = (self.refusals)(scene.profile());
+        let mut reasons = (self.refusals)(scene.profile());
+        reasons.extend(self.path_set_refusal(settings));
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
                 technique: self.id.into(),
@@ -192,5 +193,17 @@ impl TechniqueInfo {
             });
         }
         (self.create)(gpu, scene, view, settings)
+    }
+
+    /// Why the path set in settings cannot be rendered, if it can be read and is no part of the technique's own.
+    fn path_set_refusal(&self, settings: &serde_json::Value) -> Option<String> {
+        let wanted: PathSet = settings.get("path_set")?.as_str()?.parse().ok()?;
+        let missing = !wanted.is_subset_of(&self.path_set);
+        missing.then(|| {
+            format!(
+                "its pictures contain the paths {}, but {wanted} has others",
+                self.path_set
+            )
+        })
     }
 }

@@ -35,7 +35,7 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
 const SETTINGS: [SettingInfo; 9] = [
     SettingInfo {
         name: "path_set",
-        range: "all | emitted | direct | indirect | bounces=A..B, each with lobes=diffuse+glossy+…",
+        range: "all | emitted | direct | indirect | bounces=A..B, with lobes=diffuse+glossy+…; or path expressions: LDE, LS+DE, L[DG]{1,3}E, !L.*S.*E …",
         unit: "",
         meaning: "which light paths the picture contains",
     },
@@ -90,7 +90,7 @@ const SETTINGS: [SettingInfo; 9] = [
 ];
 
 /// What each specialization constant of the shading stage stands for, and why it is off where nothing else is known.
-const FEATURES: [(&str, &str, &str); 17] = [
+const FEATURES: [(&str, &str, &str); 19] = [
     (HAS_METAL, "metal lobes", "no material is metal"),
     (
         "has_conductor",
@@ -124,6 +124,16 @@ const FEATURES: [(&str, &str, &str); 17] = [
         "the scene has none",
     ),
     ("has_media", "participating media", "the scene has none"),
+    (
+        "has_path_automaton",
+        "path expressions",
+        "the path set is a range of bounces and lobes",
+    ),
+    (
+        "has_lobe_labels",
+        "telling overlapping lobes apart",
+        "the path set goes on alike after each, or the scene has but one",
+    ),
 ];
 const HAS_METAL: &str = "has_metal";
 const HAS_MULTIPLE_SCATTERING: &str = "has_multiple_scattering";

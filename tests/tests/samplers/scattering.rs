@@ -237,13 +237,13 @@ fn surface_lobes_follow_their_densities() {
         for (what, surface, wo, mask) in [
             ("diffuse", matt, flat, LOBE_ALL),
             ("layer over diffuse", ROUGH, flat, LOBE_ALL),
-            ("glossy layer alone", ROUGH, steep, LOBE_GLOSSY | LOBE_REFLECTION),
-            ("diffuse alone", ROUGH, steep, LOBE_DIFFUSE | LOBE_REFLECTION),
+            ("glossy layer alone", ROUGH, steep, LOBE_GLOSSY & LOBE_REFLECTION),
+            ("diffuse alone", ROUGH, steep, LOBE_DIFFUSE & LOBE_REFLECTION),
             ("metal", metal, steep, LOBE_ALL),
             ("exact conductor", conductor, flat, LOBE_ALL),
             ("solid from outside", GLASS, steep, LOBE_ALL),
             ("solid from inside", GLASS, below, LOBE_ALL),
-            ("transmission alone", GLASS, steep, LOBE_GLOSSY | LOBE_TRANSMISSION),
+            ("transmission alone", GLASS, steep, LOBE_GLOSSY & LOBE_TRANSMISSION),
             ("thin wall", thin, steep, LOBE_ALL),
             ("everything", mixed, flat, LOBE_ALL),
         ] {

@@ -65,7 +65,12 @@ pub struct Arguments {
     /// Camera by name; by default the scene's first
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
-    /// Which light paths: all, emitted, direct, indirect, bounces=1..3, with lobes=diffuse+glossy+… after a comma
+    /// Which light paths: words or an expression from light to eye, e.g. direct, LS+DE; --help says more
+    ///
+    /// Words: all, none, emitted, direct, indirect, bounces=1..3, lobes=diffuse+glossy+…. Expressions: L events E, with the events D
+    /// diffuse, G glossy, S specular (r or t after them for one side: Gt), V volume, . any, [DG] one of these, [^S] one of the others; (D|S) a
+    /// choice; * + ? {2} {1,3} {2,} repeat what is before them; | joins paths, ! in front means all but these. Parts with commas between
+    /// them are intersected. Put expressions in quotes: 'L(D|S)E', 'LD{1,3}E', '!L.*S.*E'. docs/path-sets.md shows pictures.
     #[arg(long, value_name = "SET", value_parser = parse_path_set)]
     path_set: Option<PathSet>,
     /// Sequence of random numbers; by default as the settings say, else sobol
@@ -345,9 +350,14 @@ fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
     })
 }
 
+/// Whether two texts stand for the same light paths.
+fn same_path_set(a: &str, b: &str) -> bool {
+    a == b || matches!((a.parse::<PathSet>(), b.parse::<PathSet>()), (Ok(a), Ok(b)) if a == b)
+}
+
 fn measure(arguments: &Arguments, rendered: &Rendered, reference: &Picture, tone: ToneMap) -> Outcome<ErrorAgainst> {
     if let Some(of_reference) = &reference.metadata.path_set
-        && *of_reference != rendered.report.path_set
+        && !same_path_set(of_reference, &rendered.report.path_set)
     {
         output::warn(&format!(
             "the reference holds the light paths {of_reference:?}, the picture {:?}: the error counts the difference",

@@ -21,13 +21,14 @@
 #include "transport/ggx.glsl"
 #include "transport/warp.glsl"
 
-// Lobes are a class and a side; a mask allows a lobe when it has both bits. BsdfSample.flags holds the one that was sampled.
-const uint LOBE_DIFFUSE = 1u;
-const uint LOBE_GLOSSY = 2u;
-const uint LOBE_SPECULAR = 4u;
-const uint LOBE_REFLECTION = 8u;
-const uint LOBE_TRANSMISSION = 16u;
-const uint LOBE_ALL = 31u;
+// Sets of lobes, a bit each. A lobe is what a class and a side have in common: LOBE_GLOSSY & LOBE_REFLECTION. BsdfSample.flags holds
+// the one that was sampled.
+const uint LOBE_DIFFUSE = 3u;
+const uint LOBE_GLOSSY = 12u;
+const uint LOBE_SPECULAR = 48u;
+const uint LOBE_REFLECTION = 21u;
+const uint LOBE_TRANSMISSION = 42u;
+const uint LOBE_ALL = 63u;
 
 const uint BSDF_THIN = 1u;        // transmission goes straight through a thin wall
 const uint BSDF_CONDUCTOR = 2u;   // the metal is conductor_eta + i conductor_k, not base_color
@@ -60,7 +61,7 @@ struct BsdfSample {
 };
 
 float mean3(vec3 v) { return (v.x + v.y + v.z) * (1.0 / 3.0); }
-bool lobe_allowed(uint mask, uint lobe) { return (mask & lobe) == lobe; }
+bool lobe_allowed(uint mask, uint lobe) { return (mask & lobe) != 0u; }
 bool bsdf_is_delta(Bsdf b) { return b.alpha < ALPHA_MIN; }
 float bsdf_metallic(Bsdf b) { return HAS_METAL ? b.metallic : 0.0; }
 float bsdf_transmission(Bsdf b) { return HAS_TRANSMISSION ? b.transmission : 0.0; }
@@ -121,10 +122,10 @@ void microfacet_split(Bsdf b, float cos_h, float eta, uint mask, out vec3 r, out
         r += m * metal_fresnel(b, cos_h);
     }
     t = ((1.0 - m) * bsdf_transmission(b)) * b.base_color * (1.0 - f);
-    if (!lobe_allowed(mask, shape | LOBE_REFLECTION)) {
+    if (!lobe_allowed(mask, shape & LOBE_REFLECTION)) {
         r = vec3(0.0);
     }
-    if (!HAS_TRANSMISSION || !lobe_allowed(mask, shape | LOBE_TRANSMISSION)) {
+    if (!HAS_TRANSMISSION || !lobe_allowed(mask, shape & LOBE_TRANSMISSION)) {
         t = vec3(0.0);
     }
 }
@@ -163,11 +164,11 @@ CosineLobes cosine_lobes(Bsdf b, float cos_o, bool inside, uint mask) {
     lobes.metal = vec3(0.0);
     float m = bsdf_metallic(b);
     float opaque = (1.0 - m) * (1.0 - bsdf_transmission(b));
-    if (opaque > 0.0 && !inside && lobe_allowed(mask, LOBE_DIFFUSE | LOBE_REFLECTION)) {
+    if (opaque > 0.0 && !inside && lobe_allowed(mask, LOBE_DIFFUSE & LOBE_REFLECTION)) {
         lobes.diffuse = opaque * b.base_color * layer_loss(b, cos_o);
     }
     lobes.seen = lobes.diffuse;
-    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && !bsdf_is_delta(b) && lobe_allowed(mask, LOBE_GLOSSY | LOBE_REFLECTION)) {
+    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && !bsdf_is_delta(b) && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION)) {
         float e_average = albedo_average(0u, b.alpha);
         float loss = 1.0 - e_average;
         if (loss > LOSS_MIN) {
@@ -206,8 +207,8 @@ float cosine_probability(Bsdf b, CosineLobes lobes, float cos_o, float eta, uint
 // Radiance scaling of a refraction.
 float refraction_scale(Bsdf b, float eta) { return (b.flags & BSDF_IMPORTANCE) != 0u ? 1.0 : 1.0 / (eta * eta); }
 
-// Non-delta lobes for wo.z > 0: f |cos| in rgb, density in a.
-vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi, float eta, uint mask) {
+// Non-delta lobes for wo.z > 0: f |cos| of those in `part` in rgb, density in a. `lobes` holds what `part` has of them.
+vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi, float eta, uint mask, uint part) {
     vec4 result = vec4(0.0);
     bool reflected = wi.z > 0.0;
     float cos_i = abs(wi.z);
@@ -233,6 +234,10 @@ vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi
     vec3 t;
     microfacet_split(b, cos_h, eta, mask, r, t);
     float p_reflection = reflection_probability(r, t);
+    if (!lobe_allowed(part, LOBE_GLOSSY & (reflected ? LOBE_REFLECTION : LOBE_TRANSMISSION))) {
+        r = vec3(0.0);
+        t = vec3(0.0);
+    }
     float density = (1.0 - p_cosine) * ggx_visible_pdf(wo, h, b.alpha) * (reflected ? p_reflection : 1.0 - p_reflection);
     float d = ggx_d(h, b.alpha);
     if (refracted) {
@@ -245,8 +250,8 @@ vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi
     return result + vec4((reflected ? r : t) * shape, density / (4.0 * cos_h));
 }
 
-// f |cos| (rgb) and the density of bsdf_sample (a) of all allowed lobes that are not deltas.
-vec4 bsdf_eval_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) {
+// f |cos| (rgb) of the lobes in `part`, a subset of `mask`, and the density of bsdf_sample (a) under `mask`; without deltas.
+vec4 bsdf_eval_part(Bsdf b, vec3 wo, vec3 wi, uint mask, uint part) {
     bool below = wo.z < 0.0;
     bool inside = HAS_TRANSMISSION && below && b.transmission > 0.0 && (b.flags & BSDF_THIN) == 0u;
     if (below) {
@@ -256,8 +261,17 @@ vec4 bsdf_eval_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) {
     float eta = inside ? 1.0 / b.eta : b.eta;
     CosineLobes lobes = cosine_lobes(b, wo.z, inside, mask);
     float p_cosine = cosine_probability(b, lobes, wo.z, eta, mask);
-    return bsdf_eval_upper(b, lobes, p_cosine, wo, wi, eta, mask);
+    if (!lobe_allowed(part, LOBE_DIFFUSE & LOBE_REFLECTION)) {
+        lobes.diffuse = vec3(0.0);
+    }
+    if (!lobe_allowed(part, LOBE_GLOSSY & LOBE_REFLECTION)) {
+        lobes.metal = vec3(0.0);
+    }
+    return bsdf_eval_upper(b, lobes, p_cosine, wo, wi, eta, mask, part);
 }
+
+// f |cos| (rgb) and the density of bsdf_sample (a) of all allowed lobes that are not deltas.
+vec4 bsdf_eval_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_part(b, wo, wi, mask, mask); }
 
 vec3 bsdf_eval(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).rgb; }
 float bsdf_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).a; }
@@ -275,7 +289,7 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
     uint flags;
     if (u.z < p_cosine) {
         wi = square_to_cosine_hemisphere(u.xy);
-        flags = LOBE_DIFFUSE | LOBE_REFLECTION;
+        flags = LOBE_DIFFUSE & LOBE_REFLECTION;
     } else {
         bool delta = bsdf_is_delta(b);
         vec3 h = delta ? vec3(0.0, 0.0, 1.0) : ggx_sample_visible(wo, b.alpha, u.xy);
@@ -286,13 +300,14 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
         float p_reflection = reflection_probability(r, t);
         bool reflected = u.z - p_cosine < p_reflection * (1.0 - p_cosine);
         wi = 2.0 * cos_h * h - wo;
-        flags = (delta ? LOBE_SPECULAR : LOBE_GLOSSY) | LOBE_REFLECTION;
+        uint shape = delta ? LOBE_SPECULAR : LOBE_GLOSSY;
+        flags = shape & LOBE_REFLECTION;
         float scale = 1.0 / (p_reflection * (1.0 - p_cosine));
         if (wi.z <= 0.0 && (reflected || (b.flags & BSDF_THIN) != 0u)) {
             return s;
         }
         if (HAS_TRANSMISSION && !reflected) {
-            flags ^= LOBE_REFLECTION | LOBE_TRANSMISSION;
+            flags = shape & LOBE_TRANSMISSION;
             scale = 1.0 / ((1.0 - p_reflection) * (1.0 - p_cosine));
             if ((b.flags & BSDF_THIN) != 0u) {
                 wi.z = -wi.z;
@@ -313,7 +328,7 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
             return s;
         }
     }
-    vec4 f = bsdf_eval_upper(b, lobes, p_cosine, wo, wi, eta, mask);
+    vec4 f = bsdf_eval_upper(b, lobes, p_cosine, wo, wi, eta, mask, mask);
     if (f.a <= 0.0) {
         return s;
     }

@@ -20,6 +20,8 @@ layout(constant_id = 14) const bool HAS_PUNCTUAL_LIGHTS = true;
 layout(constant_id = 15) const uint SAMPLER_KIND = 0;                  // SAMPLER_SOBOL or SAMPLER_PCG
 layout(constant_id = 16) const bool WRITE_AOVS = true;
 layout(constant_id = 17) const bool HAS_ALPHA = true;                  // surfaces that are there in part
+layout(constant_id = 24) const bool HAS_PATH_AUTOMATON = false;        // the path set is more than a range of bounces and lobes
+layout(constant_id = 25) const bool HAS_LOBE_LABELS = false;           // and tells lobes apart that share directions
 
 layout(constant_id = 19) const bool HAS_MEDIA = true;                  // paths know which medium they are in
 

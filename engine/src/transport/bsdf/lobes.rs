@@ -71,10 +71,10 @@ impl BsdfContext<'_> {
             r += m * self.metal_fresnel(b, cos_h);
         }
         let mut t = ((1.0 - m) * self.transmission(b)) * b.base_color * (DVec3::ONE - f);
-        if !lobe_allowed(mask, shape | LOBE_REFLECTION) {
+        if !lobe_allowed(mask, shape & LOBE_REFLECTION) {
             r = DVec3::ZERO;
         }
-        if !lobe_allowed(mask, shape | LOBE_TRANSMISSION) {
+        if !lobe_allowed(mask, shape & LOBE_TRANSMISSION) {
             t = DVec3::ZERO;
         }
         (r, t)
@@ -105,12 +105,12 @@ impl BsdfContext<'_> {
         let m = self.metallic(b);
         let opaque = (1.0 - m) * (1.0 - self.transmission(b));
         let mut diffuse = DVec3::ZERO;
-        if opaque > 0.0 && !inside && lobe_allowed(mask, LOBE_DIFFUSE | LOBE_REFLECTION) {
+        if opaque > 0.0 && !inside && lobe_allowed(mask, LOBE_DIFFUSE & LOBE_REFLECTION) {
             diffuse = opaque * b.base_color * self.layer_loss(b, cos_o);
         }
         let mut metal = DVec3::ZERO;
         let compensated = self.features.metal && self.features.multiple_scattering && !b.is_delta();
-        if compensated && lobe_allowed(mask, LOBE_GLOSSY | LOBE_REFLECTION) {
+        if compensated && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION) {
             let e_average = albedo_average(self.table, 0, b.alpha);
             let loss = 1.0 - e_average;
             if loss > LOSS_MIN {

@@ -15,12 +15,14 @@
 //! both sides. Twin of `transport/bsdf.glsl`.
 
 mod features;
+mod label;
 mod lobes;
 mod parameters;
 
 use glam::{DVec2, DVec3};
 
 pub use self::features::{BsdfContext, BsdfFeatures};
+pub use self::label::bsdf_label;
 use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
@@ -37,7 +39,7 @@ pub const LOBE_SPECULAR: u32 = constants::LOBE_SPECULAR;
 pub const LOBE_REFLECTION: u32 = constants::LOBE_REFLECTION;
 /// Scattering to the other side.
 pub const LOBE_TRANSMISSION: u32 = constants::LOBE_TRANSMISSION;
-/// Every class on both sides. A mask allows a lobe when it has the bits of both its class and its side.
+/// Every class on both sides. These are sets of lobes, a bit each: a lobe is what a class and a side have in common.
 pub const LOBE_ALL: u32 = constants::LOBE_ALL;
 
 /// Transmission goes straight through a thin wall.
@@ -61,7 +63,7 @@ pub struct BsdfSample {
     pub pdf: f64,
     /// f |cos| / pdf with all probabilities included.
     pub weight: DVec3,
-    /// `LOBE_…` bits of the strategy that was used, 0 when no direction was found. A path is restricted to lobes by the mask, not
+    /// The lobe of the strategy that was used, one bit; 0 when no direction was found. A path is restricted to lobes by the mask, not
     /// by looking at these: strategies overlap.
     pub flags: u32,
 }
@@ -80,9 +82,9 @@ pub fn mean3(v: DVec3) -> f64 {
     v.element_sum() / 3.0
 }
 
-/// Whether a mask allows a lobe (class and side bits).
+/// Whether a mask allows a lobe.
 pub fn lobe_allowed(mask: u32, lobe: u32) -> bool {
-    mask & lobe == lobe
+    mask & lobe != 0
 }
 
 /// What does not change between the directions of one look: the side-adjusted ωo and what follows from it.
@@ -113,7 +115,8 @@ impl BsdfContext<'_> {
         }
     }
 
-    fn eval_upper(&self, b: &Bsdf, upper: &Upper, wi: DVec3, mask: u32) -> (DVec3, f64) {
+    /// The value of the lobes in `part`, of which `upper` holds the cosine's, and the density under `mask`.
+    fn eval_upper(&self, b: &Bsdf, upper: &Upper, wi: DVec3, mask: u32, part: u32) -> (DVec3, f64) {
         let &Upper { wo, eta, p_cosine, .. } = upper;
         let (reflected, cos_i) = (wi.z > 0.0, wi.z.abs());
         if cos_i <= 0.0 || wo.z <= 0.0 {
@@ -140,8 +143,12 @@ impl BsdfContext<'_> {
         if cos_h <= 0.0 || (refracted && cos_ih >= 0.0) {
             return (value, pdf);
         }
-        let (r, t) = self.microfacet_split(b, cos_h, eta, mask);
+        let (mut r, mut t) = self.microfacet_split(b, cos_h, eta, mask);
         let p_reflection = reflection_probability(r, t);
+        let side = if reflected { LOBE_REFLECTION } else { LOBE_TRANSMISSION };
+        if !lobe_allowed(part, LOBE_GLOSSY & side) {
+            (r, t) = (DVec3::ZERO, DVec3::ZERO);
+        }
         let p_side = if reflected { p_reflection } else { 1.0 - p_reflection };
         let density = (1.0 - p_cosine) * ggx_visible_pdf(wo, h, b.alpha) * p_side;
         let d = ggx_d(h, b.alpha);
@@ -158,11 +165,22 @@ impl BsdfContext<'_> {
     }
 }
 
+/// f |cos θi| of the lobes in `part`, a subset of `mask`, and the density of [`bsdf_sample`] under `mask`; without deltas.
+pub fn bsdf_eval_part(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32, part: u32) -> (DVec3, f64) {
+    let mut upper = context.upper(b, wo, mask);
+    if !lobe_allowed(part, LOBE_DIFFUSE & LOBE_REFLECTION) {
+        upper.lobes.diffuse = DVec3::ZERO;
+    }
+    if !lobe_allowed(part, LOBE_GLOSSY & LOBE_REFLECTION) {
+        upper.lobes.metal = DVec3::ZERO;
+    }
+    let wi = DVec3::new(wi.x, wi.y, wi.z * upper.side);
+    context.eval_upper(b, &upper, wi, mask, part)
+}
+
 /// f |cos θi| and the density of [`bsdf_sample`] of all allowed lobes that are not deltas.
 pub fn bsdf_eval_pdf(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32) -> (DVec3, f64) {
-    let upper = context.upper(b, wo, mask);
-    let wi = DVec3::new(wi.x, wi.y, wi.z * upper.side);
-    context.eval_upper(b, &upper, wi, mask)
+    bsdf_eval_part(context, b, wo, wi, mask, mask)
 }
 
 /// f |cos θi| of all allowed lobes that are not deltas, sr⁻¹.
@@ -192,7 +210,7 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
     let (mut wi, mut flags);
     if u.z < p_cosine {
         wi = square_to_cosine_hemisphere(uv);
-        flags = LOBE_DIFFUSE | LOBE_REFLECTION;
+        flags = LOBE_DIFFUSE & LOBE_REFLECTION;
     } else {
         let delta = b.is_delta();
         let h = if delta {
@@ -205,13 +223,14 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
         let p_reflection = reflection_probability(r, t);
         let reflected = u.z - p_cosine < p_reflection * (1.0 - p_cosine);
         wi = 2.0 * cos_h * h - wo;
-        flags = if delta { LOBE_SPECULAR } else { LOBE_GLOSSY } | LOBE_REFLECTION;
+        let shape = if delta { LOBE_SPECULAR } else { LOBE_GLOSSY };
+        flags = shape & LOBE_REFLECTION;
         let mut scale = 1.0 / (p_reflection * (1.0 - p_cosine));
         if wi.z <= 0.0 && (reflected || b.is_thin()) {
             return BsdfSample::NONE;
         }
         if !reflected {
-            flags ^= LOBE_REFLECTION | LOBE_TRANSMISSION;
+            flags = shape & LOBE_TRANSMISSION;
             scale = 1.0 / ((1.0 - p_reflection) * (1.0 - p_cosine));
             if b.is_thin() {
                 wi.z = -wi.z;
@@ -235,7 +254,7 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
             };
         }
     }
-    let (value, pdf) = context.eval_upper(b, &upper, wi, mask);
+    let (value, pdf) = context.eval_upper(b, &upper, wi, mask, mask);
     if pdf <= 0.0 {
         return BsdfSample::NONE;
     }

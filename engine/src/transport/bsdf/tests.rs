@@ -156,7 +156,7 @@ fn specular_zero_is_exactly_lambert() {
             assert_eq!(pdf, wi.z.abs() * FRAC_1_PI);
             let s = bsdf_sample(&c, &b, wo, u, LOBE_ALL);
             assert!((s.weight - b.base_color).abs().max_element() < 1e-15);
-            assert_eq!(s.flags, LOBE_DIFFUSE | LOBE_REFLECTION);
+            assert_eq!(s.flags, LOBE_DIFFUSE & LOBE_REFLECTION);
         }
     }
 }
@@ -293,12 +293,12 @@ fn clear_solid_is_the_smooth_dielectric() {
                 DVec3::new(0.5, 0.5, (f64::from(i) + 0.5) / 2000.0),
                 LOBE_ALL,
             );
-            if s.flags == LOBE_SPECULAR | LOBE_REFLECTION {
+            if s.flags == LOBE_SPECULAR & LOBE_REFLECTION {
                 reflections += 1.0;
                 assert!((s.weight - 1.0).abs().max_element() < 1e-12);
                 assert!((s.wi - DVec3::new(-wo.x, -wo.y, wo.z)).length() < 1e-15);
             } else {
-                assert_eq!(s.flags, LOBE_SPECULAR | LOBE_TRANSMISSION);
+                assert_eq!(s.flags, LOBE_SPECULAR & LOBE_TRANSMISSION);
                 assert!((s.weight * eta * eta - 1.0).abs().max_element() < 1e-12);
                 assert!((s.wi.truncate() * eta + wo.truncate()).length() < 1e-15, "Snell's law");
                 assert!(s.wi.z * wo.z < 0.0);
@@ -312,10 +312,10 @@ fn clear_solid_is_the_smooth_dielectric() {
     let inside = direction(-0.5, 0.0);
     for i in 0..100 {
         let s = bsdf_sample(&c, &b, inside, random3(i, 9), LOBE_ALL);
-        assert_eq!(s.flags, LOBE_SPECULAR | LOBE_REFLECTION, "total internal reflection");
+        assert_eq!(s.flags, LOBE_SPECULAR & LOBE_REFLECTION, "total internal reflection");
         assert!((s.weight - 1.0).abs().max_element() < 1e-12);
         assert_eq!(
-            bsdf_sample(&c, &b, inside, random3(i, 9), LOBE_SPECULAR | LOBE_TRANSMISSION).flags,
+            bsdf_sample(&c, &b, inside, random3(i, 9), LOBE_SPECULAR & LOBE_TRANSMISSION).flags,
             0
         );
     }
@@ -328,7 +328,7 @@ fn clear_solid_is_the_smooth_dielectric() {
         ..WHITE
     });
     let wo = direction(-0.4, 0.7);
-    let s = bsdf_sample(&c, &thin, wo, DVec3::splat(0.999), LOBE_SPECULAR | LOBE_TRANSMISSION);
+    let s = bsdf_sample(&c, &thin, wo, DVec3::splat(0.999), LOBE_SPECULAR & LOBE_TRANSMISSION);
     assert_eq!(s.wi, -wo);
     let expected = tint * (1.0 - fresnel_dielectric(0.4, 1.5));
     assert!((s.weight - expected).abs().max_element() < 1e-15);
@@ -354,8 +354,8 @@ fn narrow_lobes_tend_to_deltas() {
     for side in [LOBE_REFLECTION, LOBE_TRANSMISSION] {
         for cos_o in [1.0, 0.8, 0.5, -0.95, -0.8] {
             let wo = direction(cos_o, 0.2);
-            let (a, _) = albedo(&c, &smooth, wo, side | LOBE_SPECULAR, 64);
-            let (b, _) = albedo(&c, &narrow, wo, side | LOBE_GLOSSY, 1024);
+            let (a, _) = albedo(&c, &smooth, wo, side & LOBE_SPECULAR, 64);
+            let (b, _) = albedo(&c, &narrow, wo, side & LOBE_GLOSSY, 1024);
             // Slopes spread by alpha, shifts of second order and the noise of the mean: a hundredth of the value at most.
             assert!(
                 (a - b).abs().max_element() < 0.01 * a.max_element() + 1e-4,
@@ -369,9 +369,9 @@ fn narrow_lobes_tend_to_deltas() {
 fn masks_divide_the_whole() {
     let c = context(BsdfFeatures::ALL);
     let lobes = [
-        LOBE_DIFFUSE | LOBE_REFLECTION,
-        LOBE_GLOSSY | LOBE_REFLECTION,
-        LOBE_GLOSSY | LOBE_TRANSMISSION,
+        LOBE_DIFFUSE & LOBE_REFLECTION,
+        LOBE_GLOSSY & LOBE_REFLECTION,
+        LOBE_GLOSSY & LOBE_TRANSMISSION,
     ];
     for (name, b) in zoo() {
         for i in 0..200 {
@@ -390,7 +390,7 @@ fn masks_divide_the_whole() {
         let mut error = e * e;
         for class in [LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_SPECULAR] {
             for side in [LOBE_REFLECTION, LOBE_TRANSMISSION] {
-                let (part, e) = albedo(&c, &b, wo, class | side, 4096);
+                let (part, e) = albedo(&c, &b, wo, class & side, 4096);
                 sum += part;
                 error += e * e;
             }
@@ -401,6 +401,43 @@ fn masks_divide_the_whole() {
             "{name}, alpha {}: {whole} {sum}",
             b.alpha
         );
+    }
+}
+
+/// What labels gather is what masks let through; the sum does not change, and the draw can be used again.
+#[test]
+fn labels_divide_samples_without_bias() {
+    let c = context(BsdfFeatures::ALL);
+    let n = 4096u32;
+    let wo = direction(0.6, 0.1);
+    for (name, b) in zoo() {
+        for lobe in [LOBE_DIFFUSE & LOBE_REFLECTION, LOBE_GLOSSY & LOBE_REFLECTION] {
+            let (expected, e) = albedo(&c, &b, wo, lobe, n);
+            let (mut sum, mut squares, mut draws) = (0.0, 0.0, 0.0);
+            for i in 0..n {
+                let s = bsdf_sample(&c, &b, wo, random3(i, 31), LOBE_ALL);
+                let mut u = random3(i, 32).x;
+                let labelled = bsdf_label(&c, &b, wo, s, LOBE_ALL, false, &mut u);
+                assert!(
+                    (0.0..1.0).contains(&u) && (s.wi, s.pdf) == (labelled.wi, labelled.pdf),
+                    "{name}"
+                );
+                draws += u;
+                if labelled.flags == lobe {
+                    sum += labelled.weight.x;
+                    squares += labelled.weight.x.powi(2);
+                }
+            }
+            let n = f64::from(n);
+            let mean = sum / n;
+            let variance = (squares / n - mean * mean).max(0.0) / n;
+            let bound = 5.0 * (variance + e * e).sqrt() + 1e-4;
+            assert!((mean - expected.x).abs() < bound, "{name}: {mean} {expected}");
+            assert!(
+                (draws / n - 0.5).abs() < 5.0 * (1.0 / (12.0 * n)).sqrt(),
+                "{name}: draws"
+            );
+        }
     }
 }
 

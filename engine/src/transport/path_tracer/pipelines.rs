@@ -90,6 +90,7 @@ impl Pipelines {
         camera: &Camera,
     ) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
+        let overlapping = bsdf.metal || bsdf.specular_layer;
         let shade = path_shade::Spec {
             has_metal: bsdf.metal,
             has_conductor: bsdf.conductor,
@@ -110,6 +111,8 @@ impl Pipelines {
             write_aovs: settings.aovs,
             has_alpha: profile.has_alpha(),
             has_media: profile.media.any(),
+            has_path_automaton: settings.path_set.has_automaton(),
+            has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
         };
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.
@@ -124,6 +127,7 @@ impl Pipelines {
             has_punctual_lights: shade.has_punctual_lights,
             has_alpha: shade.has_alpha,
             sampler_kind: shade.sampler_kind,
+            has_path_automaton: shade.has_path_automaton,
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             has_airlight: settings.equiangular

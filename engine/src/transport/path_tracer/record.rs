@@ -106,6 +106,8 @@ impl PathTracer {
                 roulette_start: self.settings.roulette_start,
                 roulette_cap: self.settings.roulette_cap,
                 surrounding,
+                accepting: self.settings.path_set.accepting(),
+                successors: self.settings.path_set.successors(),
             };
             recorder.pass("path: medium", |pass| {
                 pass.dispatch_indirect(medium, &[&paths, &scene, &media, &path_media], &push, items)?;
@@ -123,6 +125,8 @@ impl PathTracer {
             path_set: self.settings.path_set.packed(),
             roulette_start: self.settings.roulette_start,
             roulette_cap: self.settings.roulette_cap,
+            accepting: self.settings.path_set.accepting(),
+            successors: self.settings.path_set.successors(),
         };
         recorder.pass("path: shade", |pass| {
             pass.dispatch_indirect(&p.shade, &[&paths, &scene, &path_media], &push, items)?;
