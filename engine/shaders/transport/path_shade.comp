@@ -11,8 +11,8 @@ layout(local_size_x = 64) in;
 #include "transport/path_features.glsl"
 #include "transport/path_buffers.glsl"
 #include "transport/path_set.glsl"
-#include "transport/bsdf_label.glsl"
 #include "transport/light_choice.glsl"
+#include "transport/bsdf_label.glsl"
 #include "transport/path_media.glsl"
 #include "transport/surface.glsl"
 

@@ -21,6 +21,7 @@ fn airlight(sigma_t: f32, albedo: f32, phase: Phase, light: Vec3, eye: DVec3) ->
 fn picture(gpu: &Gpu, scene: &Scene, set: &str, samples: u32, equiangular: bool) -> Rendered {
     let settings = PathTracerSettings {
         equiangular,
+        seed: seed_of(scene) ^ (samples + u32::from(equiangular)),
         ..paths(set)
     };
     render(gpu, scene, [16, 16], samples, &settings)

@@ -72,6 +72,23 @@ fn layers(cells: u32, low: Vec3, high: Vec3, density: impl Fn(f64) -> f64) -> De
     DensityGrid::from_fn([3, cells, 2], |p| density(p.y) as f32).in_box(low.as_dvec3(), high.as_dvec3())
 }
 
+/// A seed of its own for each scene, so that no two results share their random numbers: 32-bit FNV-1a of what the scene holds.
+fn seed_of(scene: &Scene) -> u32 {
+    let media: Vec<_> = scene
+        .media
+        .iter()
+        .map(|m| (m.sigma_a, m.sigma_s, m.phase, m.density.is_some()))
+        .collect();
+    let text = format!(
+        "{media:?} {:?} {:?}",
+        scene.lights,
+        scene.cameras.first().map(|c| c.transform)
+    );
+    text.bytes().fold(0x811c_9dc5, |hash, byte| {
+        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+    })
+}
+
 /// A camera of parallel rays from `eye` along `forward`, so close together that they are one ray.
 fn ray_camera(eye: DVec3, forward: DVec3) -> Camera {
     let mut camera = Camera::look_at("ray", eye, eye + forward, forward.any_orthonormal_vector(), 1.0);
@@ -133,7 +150,7 @@ fn over_sphere(
         let mut scene = scene.clone();
         scene.cameras = vec![Camera::look_at("face", eye, eye + forward, up, 0.5 * PI as f32)];
         let settings = PathTracerSettings {
-            seed: 100 + face as u32,
+            seed: seed_of(&scene).wrapping_add(face as u32),
             ..settings.clone()
         };
         let picture = render(gpu, &scene, [SIZE; 2], samples, &settings);

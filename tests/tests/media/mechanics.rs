@@ -8,39 +8,32 @@ use clerestory_tests::with_gpu;
 
 use super::*;
 
-/// A room with a lamp, a box of smoke, one of fog and glass with a medium inside, in a thin surrounding medium.
+/// The Cornell box with a cloud of smoke, a box of fog and glass with a medium inside, in a thin surrounding medium, and a point light.
 fn everything() -> Scene {
     let mut scene = builtin("builtin:cornell-box");
-    scene.media.push(medium(0.05, 0.8, Phase::HenyeyGreenstein { g: 0.6 }));
+    scene.media.push(medium(0.2, 0.8, Phase::HenyeyGreenstein { g: 0.6 }));
     scene.surrounding = Some(0);
-    let [low, high] = [Vec3::splat(-0.8), Vec3::splat(-0.1)];
+    let [low, high] = [Vec3::new(0.05, 0.2, 0.1), Vec3::new(0.27, 0.5, 0.4)];
     let smoke =
         DensityGrid::from_fn([12, 12, 12], |p| (3.0 * p.x * p.y) as f32).in_box(low.as_dvec3(), high.as_dvec3());
     let colored = Medium {
-        sigma_a: Vec3::new(0.2, 0.5, 1.0),
-        sigma_s: Vec3::new(3.0, 2.0, 1.0),
-        emission: Vec3::new(0.1, 0.05, 0.0),
+        sigma_a: Vec3::new(0.5, 1.0, 2.0),
+        sigma_s: Vec3::new(12.0, 8.0, 4.0),
+        emission: Vec3::new(1.0, 0.5, 0.0),
         density: Some(smoke),
         ..Medium::default()
     };
     add_box(&mut scene, colored, low, high);
-    add_box(
-        &mut scene,
-        medium(2.0, 0.9, Phase::Isotropic),
-        Vec3::new(0.1, -0.8, -0.2),
-        Vec3::new(0.6, -0.3, 0.3),
-    );
-    scene.media.push(medium(5.0, 0.95, Phase::Rayleigh));
+    let [low, high] = [Vec3::new(0.3, 0.35, 0.1), Vec3::new(0.5, 0.5, 0.4)];
+    add_box(&mut scene, medium(8.0, 0.9, Phase::Isotropic), low, high);
+    scene.media.push(medium(20.0, 0.95, Phase::Rayleigh));
     let mut glass = Material::glass("glass", 1.4);
     glass.interior = Some(scene.media.len() as u32 - 1);
     let glass = scene.add_material(glass);
-    scene.place(cuboid(
-        "glass",
-        glass,
-        Vec3::new(0.2, 0.2, -0.3),
-        Vec3::new(0.6, 0.6, 0.1),
-    ));
-    add_point(&mut scene, Vec3::new(0.0, 0.1, 0.0));
+    // In the box of fog.
+    let [low, high] = [Vec3::new(0.35, 0.4, 0.15), Vec3::new(0.45, 0.47, 0.3)];
+    scene.place(cuboid("glass", glass, low, high));
+    add_point(&mut scene, Vec3::new(0.29, 0.3, 0.2));
     scene
 }
 

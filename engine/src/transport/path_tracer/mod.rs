@@ -3,6 +3,11 @@
 //! Sources: BG-2 and BG-3; Kajiya, "The Rendering Equation" (SIGGRAPH 1986); Veach, "Robust Monte Carlo Methods for Light Transport
 //! Simulation" (1997), chapters 9 and 10; wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013).
 //!
+//! Participating media (BG-4, PM-F-3), only where a scene has some: analytic free flight in homogeneous media, delta and ratio tracking through
+//! density grids, one walk for all bands; the shaders `transport/path_medium.comp` and `transport/media_tracking.glsl` name the sources. Bodies
+//! may lie in bodies as long as their surfaces neither cross nor coincide; the camera may be in any of them, where its position counts for
+//! the whole lens and for all of an orthographic picture. Nothing from infinity is seen through an endless medium that extinguishes it.
+//!
 //! Unbiased: paths end by Russian roulette or by the [`PathSet`](super::PathSet) alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
 //! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
