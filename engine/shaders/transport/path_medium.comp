@@ -47,6 +47,9 @@ struct Way {
     uint interior;
 };
 
+// What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
+vec3 place_on_way(PathState path, Way way, float t) { return path.origin + max(way.start + t, 0.0) * path.direction; }
+
 ShadowRay shadow_ray(uint slot, PathState path, vec3 from, vec3 to, vec3 contribution) {
     ShadowRay ray;
     ray.origin = from;
@@ -70,7 +73,7 @@ bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMed
     EquiAngular e = equi_angular(start, path.direction, t_max, light.position);
     float t = equi_angular_sample(e, t_max, u.y);
     float pdf = equi_angular_pdf(e, t);
-    vec3 from = start + t * path.direction;
+    vec3 from = place_on_way(path, way, t);
     vec3 to = light.position - from;
     float squared = dot(to, to);
     if (!(pdf > 0.0) || squared <= 0.0) {
@@ -231,7 +234,7 @@ void main() {
     if (outcome == WALK_COLLIDED) {
         path.throughput *= weight;
         if (path.throughput != vec3(0.0)) {
-            vec3 at = path.origin + (way.start + t) * path.direction;
+            vec3 at = place_on_way(path, way, t);
             if (lighting && sample_collision_light(slot, place, path, bands, m, way, at, t)) {
                 flags |= FLAG_SAMPLED | FLAG_SHADOW;
             }

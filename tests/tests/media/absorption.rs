@@ -193,3 +193,29 @@ fn a_medium_that_does_nothing_changes_no_expectation() {
         picture.expect_same_as("cornell box", &truth.radiance, &truth.variance);
     });
 }
+
+#[test]
+fn alpha_and_media_act_together() {
+    with_gpu(|gpu| {
+        // A black surface that is half there, inside of an absorbing box: seen against the sky, and in the way of the sun.
+        let sigma = [0.0f32, 0.7, 1.5];
+        let mut scene = bright(DVec3::new(0.21, 5.0, 0.13));
+        let mut half = Material::lambert("half", Vec3::ZERO);
+        half.alpha_mode = clerestory::scene::AlphaMode::Blend;
+        half.base_color.w = 0.5;
+        let half = scene.add_material(half);
+        scene.place(clerestory_tests::render::floor("half", half, 0.5, 0.2));
+        add_box(&mut scene, absorber(sigma), Vec3::splat(-1.0), Vec3::ONE);
+        let expected = sigma.map(|s| 0.5 * (-2.0 * f64::from(s)).exp());
+        let picture = render(gpu, &scene, [16, 16], 256, &independent());
+        picture.expect_uniform("sky through alpha", expected, MEAN_ONLY);
+        scene.environment = None;
+        let (direction, irradiance) = (Vec3::NEG_Y, Vec3::splat(PI as f32));
+        scene.add_light("sun", LightKind::Directional { direction, irradiance });
+        let white = scene.add_material(Material::lambert("white", Vec3::ONE));
+        scene.place(clerestory_tests::render::floor("floor", white, 3.0, -1.5));
+        scene.cameras[0] = ray_camera(DVec3::new(0.21, -1.2, 0.13), DVec3::NEG_Y);
+        let picture = render(gpu, &scene, [16, 16], 256, &independent());
+        picture.expect_uniform("sun through alpha", expected, MEAN_ONLY);
+    });
+}
