@@ -283,7 +283,7 @@ fn wax(values: &Values) -> Result<Scene> {
     lamp.double_sided = false;
     let lamp = scene.add_material(lamp);
     // Behind to the left, turned towards the body.
-    let middle = Vec3::new(-0.25, 0.35, -0.35);
+    let middle = Vec3::new(-0.3, 0.6, -0.3);
     let towards = (Vec3::Y * RADIUS - middle).normalize();
     let (across, up) = towards.any_orthonormal_pair();
     let at = |x: f32, y: f32| middle + 0.08 * (across * x + up * y);

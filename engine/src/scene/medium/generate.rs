@@ -117,8 +117,8 @@ fn smoke(p: DVec3, seed: u32) -> f64 {
     // The plume sways with height, more the higher it is.
     let sway = |salt: u32| fbm(seed ^ salt, DVec3::new(p.y * 2.5, 0.7, 0.3), 2) * 0.22 * p.y;
     let radius = 0.06 + 0.2 * p.y;
-    // Nothing reaches farther out than the plume with all its sway and swirl.
-    const GREATEST_SHIFT: f64 = 0.3;
+    // Sway reaches 0.75 · 0.22 and warp 0.875 · 0.15 along each of two axes: nothing lies farther out than the plume with both.
+    const GREATEST_SHIFT: f64 = 0.42;
     let across = DVec2::new(p.x - 0.5, p.z - 0.5);
     let fade = fade_at_faces(p);
     if fade == 0.0 || across.length_squared() > (radius + GREATEST_SHIFT) * (radius + GREATEST_SHIFT) {
@@ -136,8 +136,8 @@ fn smoke(p: DVec3, seed: u32) -> f64 {
         return 0.0;
     }
     let stretched = (p + warp) * DVec3::new(9.0, 6.0, 9.0);
-    let texture = 0.5 + 0.9 * fbm(seed ^ 6, stretched, 4);
-    let thinning = 1.0 - 0.6 * p.y;
+    let texture = 0.45 + 1.4 * fbm(seed ^ 6, stretched, 4);
+    let thinning = 1.0 - smooth_step(0.4, 0.95, p.y);
     (body * texture.max(0.0) * thinning * fade).clamp(0.0, 1.0)
 }
 
