@@ -248,7 +248,7 @@ void main() {
         alive = true;
     } else if (crossing.boundary) {
         path.throughput *= weight;
-        state.start = behind_surface(hit.t);
+        state.start = past_surface(hit.t);
         interior = crossing.beyond;
         alive = path.throughput != vec3(0.0);
     } else {

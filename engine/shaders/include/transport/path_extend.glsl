@@ -28,7 +28,7 @@ void main() {
     float t_min = 0.0;
 #ifdef PATH_MEDIA
     // Behind the boundaries that the path has passed.
-    t_min = status.rounds > 0u ? max(path_medium_states[slot].start, 0.0) : 0.0;
+    t_min = status.rounds > 0u ? search_start(path_medium_states[slot].start) : 0.0;
 #endif
     resume = closest_hit(Ray(path.origin, t_min, path.direction, FAR_AWAY), resume, hit);
     path_hits_out[place] = hit;

@@ -54,9 +54,13 @@ layout(set = 4, binding = 5, scalar) restrict buffer PathMediumCounters {
     } \
 }
 
-// Where the search for the next surface begins behind one at a distance of t: at the next float that no device flushes to zero.
+// The least distance that no device flushes to zero.
 const float NORMAL_MIN = 1.17549435e-38;
 
-float behind_surface(float t) { return uintBitsToFloat(floatBitsToUint(max(t, NORMAL_MIN)) + 1u); }
+// How far a ray has come that passes a surface at a distance of t.
+float past_surface(float t) { return max(t, NORMAL_MIN); }
+
+// Where the search for the next surface begins: at the next float behind the last one, if there was one.
+float search_start(float start) { return start > 0.0 ? uintBitsToFloat(floatBitsToUint(start) + 1u) : 0.0; }
 
 #endif

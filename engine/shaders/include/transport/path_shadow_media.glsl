@@ -71,7 +71,7 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
     bool ended = outcome == WALK_LEFT && (!met || state.transmittance == vec3(0.0));
     if (!ended) {
         if (outcome == WALK_LEFT) {
-            state.start = behind_surface(state.hit.t);
+            state.start = past_surface(state.hit.t);
             state.interior = crossing.beyond;
         }
         state.hit = no_hit(s.t_max);
@@ -105,7 +105,7 @@ void main() {
     bool stopped = false;
     uint iterations = GRID_WALK_QUOTA;
     for (uint surface = 0u; surface < SHADOW_SURFACES_MAX && state.rays != 0u && !stopped; ++surface) {
-        resume = closest_hit(Ray(s.origin, state.start, s.direction, s.t_max), resume, state.hit);
+        resume = closest_hit(Ray(s.origin, search_start(state.start), s.direction, s.t_max), resume, state.hit);
         stopped = resume != BVH2_FINISHED;
         if (!stopped) {
             resume = BVH2_START;
