@@ -527,7 +527,7 @@ pub(super) const ROWS: &[Row] = &[
             "CL-SIDECAR",
             "sidecar of a model: environment, metals, cameras, exposure, technique, participating media with grids of densities",
             "the engine's own",
-            "engine/src/scene/sidecar.rs",
+            "engine/src/scene/sidecar/mod.rs",
             &[
                 "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
                 "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
