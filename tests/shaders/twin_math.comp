@@ -14,6 +14,7 @@ const bool SEPARABLE_MASKING = false;
 #include "transport/fresnel.glsl"
 #include "transport/ggx.glsl"
 #include "transport/lights.glsl"
+#include "transport/medium.glsl"
 #include "transport/phase.glsl"
 #include "transport/phong.glsl"
 #include "transport/shading_normal.glsl"
@@ -76,6 +77,8 @@ void main() {
         out1(2u, schlick_phase(in1(0u), in1(2u)));
         out1(3u, schlick_phase_sample(in1(2u), in1(3u)));
         out3(4u, phase_direction(in3(5u), in1(0u), in1(4u)));
+        out1(7u, phase_function(in_bits(8u), in1(1u), in1(0u)));
+        out1(8u, phase_function_sample(in_bits(8u), in1(1u), in1(3u)));
         break;
     }
     case 6u: {  // Phong
@@ -125,6 +128,30 @@ void main() {
         out_pair(6u, two_float_add(a, in1(2u)));
         out_pair(8u, two_float_add_two_float(a, TwoFloat(in1(4u), in1(5u))));
         out_pair(10u, two_float_add_square(a, in1(2u)));
+        break;
+    }
+    case 12u: {  // media
+        FreeFlight f = sample_free_flight(in3(0u), in3(3u), in3(6u), in1(9u), in2(10u));
+        out1(0u, f.t);
+        out_bits(1u, f.collides ? 1u : 0u);
+        out3(2u, f.weight);
+        out3(5u, f.bands);
+        out1(8u, collision_density(in3(3u), in3(6u), f.t));
+        out1(9u, attenuated_length(in1(3u), in1(9u)));
+        break;
+    }
+    case 13u: {  // lights by segments, null collisions
+        EquiAngular e = equi_angular(in3(0u), in3(3u), in1(9u), in3(6u));
+        float t = equi_angular_sample(e, in1(9u), in1(10u));
+        out3(0u, vec3(e.along, e.off, e.range));
+        out1(3u, t);
+        // Without the angle, which stands for itself.
+        out1(4u, equi_angular_pdf(e, in1(11u)) * e.range);
+        vec3 bands = in3(12u);
+        vec3 weight = vec3(1.0);
+        out_bits(5u, sample_null_collision(in3(15u), in3(18u), in1(10u), bands, weight) ? 1u : 0u);
+        out3(6u, bands);
+        out3(9u, weight);
         break;
     }
     }

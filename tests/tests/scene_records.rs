@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::scene::records;
-use clerestory::gpu::shaders::sets::SceneSet;
+use clerestory::gpu::shaders::sets::{MediaSet, SceneSet};
 use clerestory::gpu::{Access, BufferDesc, Category, Gpu, TexelView};
 use clerestory_tests::with_gpu;
 
@@ -31,11 +31,13 @@ fn kernels_load_every_word_of_a_record() {
         wanted.texture_record = numbered(201);
         wanted.light = numbered(301);
         wanted.environment = numbered(401);
+        wanted.medium = numbered(501);
         let triangles = texels(gpu, wanted.triangle);
         let materials = texels(gpu, wanted.material);
         let textures = texels(gpu, wanted.texture_record);
         let lights = texels(gpu, wanted.light);
         let environment = texels(gpu, wanted.environment);
+        let medium = texels(gpu, wanted.medium);
         let no_words = texels(gpu, [0u32; 4]);
         let no_floats = gpu
             .texels_with("none", Category::Staging, vk::Format::R32_SFLOAT, &[0.0f32])
@@ -55,6 +57,11 @@ fn kernels_load_every_word_of_a_record() {
             scene_environment: &environment,
             scene_albedo_table: &no_floats,
         };
+        let media = MediaSet {
+            media_records: &medium,
+            media_densities: &no_floats,
+            media_majorants: &no_floats,
+        };
         let bytes = size_of::<records::SceneRecords>() as u64;
         let output = gpu
             .buffer(&BufferDesc::storage("records", bytes, Category::Staging))
@@ -64,7 +71,7 @@ fn kernels_load_every_word_of_a_record() {
         recorder
             .pass("load", |pass| {
                 let set = records::Set0 { records: output.view() };
-                pass.dispatch(&kernel, &[&set, &scene], &(), [1, 1, 1])?;
+                pass.dispatch(&kernel, &[&set, &scene, &media], &(), [1, 1, 1])?;
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
                 Ok(())
             })

@@ -32,6 +32,11 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("transport/path_extend_alpha.comp", "SampledBuffer"),
     ("transport/path_shadow.comp", "SampledBuffer"),
     ("transport/path_shadow_alpha.comp", "SampledBuffer"),
+    ("transport/path_medium.comp", "SampledBuffer"),
+    ("transport/path_extend_media.comp", "SampledBuffer"),
+    ("transport/path_extend_media_alpha.comp", "SampledBuffer"),
+    ("transport/path_shadow_media.comp", "SampledBuffer"),
+    ("transport/path_shadow_media_alpha.comp", "SampledBuffer"),
     // Comparisons of specialization constants.
     ("twin_random.comp", "SpecConstantOp"),
 ];

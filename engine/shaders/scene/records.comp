@@ -7,6 +7,7 @@
 layout(local_size_x = 1) in;
 
 #include "scene/bindings.glsl"
+#include "scene/media.glsl"
 
 layout(set = 0, binding = 0, scalar) restrict writeonly buffer SceneRecords {
     SceneTriangle triangle;
@@ -14,6 +15,7 @@ layout(set = 0, binding = 0, scalar) restrict writeonly buffer SceneRecords {
     SceneTexture texture_record;
     SceneLight light;
     SceneEnvironment environment;
+    SceneMedium medium;
 } records;
 
 void main() {
@@ -22,4 +24,5 @@ void main() {
     records.texture_record = load_texture(0u);
     records.light = load_light(0u);
     records.environment = load_environment();
+    records.medium = load_medium(0u);
 }

@@ -34,6 +34,7 @@ layout(push_constant, scalar) uniform Push {
     uint first_sample;
     uint sample_count;
     uint seed;
+    uint interior;      // material of the body that the camera is inside of, or OUTSIDE
 } push;
 
 void main() {
@@ -57,7 +58,7 @@ void main() {
         direction = direction * push.focus_distance - offset;
     }
     path_states_out[slot] = PathState(origin, 0.0, normalize(direction), 0u, vec3(1.0), 1.0);
-    path_gathered[slot] = GatheredLight(vec3(0.0), OUTSIDE);
+    path_gathered[slot] = GatheredLight(vec3(0.0), push.interior);
     if (WRITE_AOVS) {
         path_aovs[slot].filled = 0u;
     }

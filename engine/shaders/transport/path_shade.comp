@@ -10,12 +10,11 @@ layout(local_size_x = 64) in;
 
 #include "transport/path_features.glsl"
 #include "transport/path_buffers.glsl"
-#include "transport/path_dimensions.glsl"
 #include "transport/path_set.glsl"
-#include "transport/random.glsl"
-#include "transport/surface.glsl"
-#include "transport/bsdf_label.glsl"
 #include "transport/light_choice.glsl"
+#include "transport/bsdf_label.glsl"
+#include "transport/path_media.glsl"
+#include "transport/surface.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -31,17 +30,10 @@ layout(push_constant, scalar) uniform Push {
     uint successors[15];    // of each state
 } push;
 
-// Draws of the current bounce.
-Sampler bounce_sampler(uint slot, uint bounce, uint dimension) {
-    uint first = DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_A_BOUNCE;
-    uint pixel = push.first_pixel + slot / push.sample_count;
-    return Sampler(pixel, push.first_sample + slot % push.sample_count, first + dimension, push.seed);
-}
+#include "transport/path_draws.glsl"
 
-vec2 bounce_sample(uint slot, uint bounce, uint dimension) {
-    Sampler s = bounce_sampler(slot, bounce, dimension);
-    return sample_2d(s);
-}
+// Least cosine by which the offset of a ray's origin counts as a way through a medium.
+const float LEAD_COS_MIN = 1.0 / 16.0;
 
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
@@ -73,9 +65,10 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     bool front = dot(wo, s.geometric_normal) > 0.0;
     bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
     // A camera inside a solid does not know it until it looks out.
-    uint interior = HAS_TRANSMISSION ? path_gathered[slot].interior : OUTSIDE;
+    uint interior = HAS_TRANSMISSION || HAS_MEDIA ? path_gathered[slot].interior : OUTSIDE;
+    uint around = HAS_MEDIA ? s.around : OUTSIDE;
     interior = interior == OUTSIDE && solid && !front ? s.material : interior;
-    if (HAS_ABSORPTION) {
+    if (HAS_ABSORPTION && !HAS_MEDIA) {
         if (interior != OUTSIDE) {
             path.throughput *= exp(-load_material(interior).absorption * hit.t);
         }
@@ -147,13 +140,16 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
                 }
                 ray_to_light.origin = start;
                 ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
-                uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : OUTSIDE) : interior;
+                uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : around) : interior;
                 if (HAS_ABSORPTION && passed != OUTSIDE && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
                     ray_to_light.contribution *= exp(-load_material(passed).absorption * way);
                 }
                 path_shadow_rays_out[place] = ray_to_light;
-                flags |= FLAG_SHADOW;
+                if (HAS_MEDIA) {
+                    path_shadow_interiors[place].x = passed;
+                }
+                flags |= HAS_MEDIA ? FLAG_SHADOW | FLAG_SAMPLED : FLAG_SHADOW;
             }
         }
     }
@@ -175,7 +171,7 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
         float eta = wo_local.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
         path.eta_scale *= eta * eta;
-        path_gathered[slot].interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
+        path_gathered[slot].interior = wo_local.z > 0.0 ? s.material : around;
     }
     path.bounce = bounce + 1u;
     if (path.bounce >= push.roulette_start) {
@@ -193,6 +189,10 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         path.throughput *= exp(m.absorption * (distance(path.origin, s.point.position) / dot(wi, s.geometric_normal)));
     }
     path.direction = normalize(wi);
+    if (HAS_MEDIA) {
+        float cos_i = abs(dot(path.direction, s.geometric_normal));
+        path_medium_states[slot].start = -distance(path.origin, s.point.position) / max(cos_i, LEAD_COS_MIN);
+    }
     path.pdf = scattered.pdf;
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);
@@ -209,7 +209,16 @@ void main() {
     uint slot = load_slot(place);
     vec3 radiance = vec3(0.0);
     uint flags = 0u;
-    if (shade(slot, place, load_path(slot), radiance, flags)) {
+    PathState path = load_path(slot);
+    if (HAS_MEDIA) {
+        MediumEvent event = path_medium_events[place];
+        if ((event.flags & EVENT_HANDLED) != 0u) {
+            return;
+        }
+        flags = (event.flags & FLAG_AIRLIGHT) != 0u ? FLAG_AIRLIGHT | FLAG_SHADOW : 0u;
+        path.throughput *= event.weight;
+    }
+    if (shade(slot, place, path, radiance, flags)) {
         flags |= FLAG_ALIVE;
     }
     if (radiance != vec3(0.0)) {

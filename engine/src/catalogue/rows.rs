@@ -25,8 +25,32 @@ const PATH_TRACER: &[&str] = &[
     "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
     "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
     "tests/tests/path_tracer.rs::rough_glass_loses_what_the_f64_twin_says",
+    "tests/tests/media/homogeneous.rs::fluence_about_a_source_is_the_exact_one",
+    "tests/tests/media/homogeneous.rs::rays_past_a_source_have_the_exact_multiple_scattering",
+    "tests/tests/media/slab.rs::reflectance_and_transmittance_are_those_of_the_tables",
+    "tests/tests/media/mechanics.rs::parts_of_everything_sum_to_the_whole",
     "tests/tests/hard_cases.rs::techniques_take_every_case_as_documented",
     "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
+];
+const TRANSPORT_EQUATION: &[&str] = &[
+    "engine/src/transport/lights.rs::a_triangle_seen_by_its_density_has_its_solid_angle",
+    "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
+    "engine/src/transport/phase.rs::samples_follow_their_density",
+    "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+    "tests/tests/media/absorption.rs::beers_law_is_exact",
+    "tests/tests/media/absorption.rs::emission_is_integrated_exactly",
+    "tests/tests/media/furnace.rs::lossless_media_vanish",
+];
+const FREE_FLIGHT: &[&str] = &[
+    "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
+    "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
+    "engine/src/transport/medium.rs::equi_angular_samples_follow_their_density",
+    "tests/tests/twins/media.rs::free_flight",
+    "tests/tests/media/homogeneous.rs::single_scattering_is_the_airlight_integral",
+    "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
+    "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
+    "tests/tests/media/heterogeneous.rs::layered_slabs_depend_on_their_optical_depth_alone",
+    "tests/tests/media/slab.rs::bands_of_a_chromatic_medium_are_those_of_grey_ones",
 ];
 const ESTIMATION: &[&str] = &[
     "engine/src/transport/lights.rs::heuristics_sum_to_one",
@@ -41,10 +65,10 @@ pub(super) const ROWS: &[Row] = &[
         "tools/report",
         part(
             "BG-1",
-            "radiometry and surface transport (the volumetric equation is not carried yet)",
-            "Veach 1997, chapter 3",
-            "engine/src/transport/lights.rs",
-            RADIOMETRY,
+            "radiometry, transport between surfaces and in media",
+            "Chandrasekhar 1960; Veach 1997, chapter 3",
+            "engine/src/transport/medium.rs",
+            TRANSPORT_EQUATION,
         ),
     ),
     measured(
@@ -62,12 +86,22 @@ pub(super) const ROWS: &[Row] = &[
         experiment: "tools/report",
         ..unbiased(part(
             "BG-3",
-            "path tracer, surfaces (no media yet): technique `path`",
+            "path tracer, surfaces and media: technique `path`",
             "Kajiya 1986; Veach 1997, chapters 9 and 10; Laine, Karras and Aila 2013",
             "engine/src/transport/path_tracer/mod.rs",
             PATH_TRACER,
         ))
     },
+    measured(
+        "clerestory agreement --scene fog-box,smoke",
+        unbiased(part(
+            "BG-4",
+            "free flight and transmittance: analytic, delta and ratio tracking, equi-angular",
+            "Woodcock et al. 1965; Kulla and Fajardo 2012; Novák et al. 2014; Miller et al. 2019",
+            "engine/src/transport/path_tracer/mod.rs",
+            FREE_FLIGHT,
+        )),
+    ),
     measured(
         "clerestory bench",
         part(

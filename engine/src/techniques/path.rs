@@ -21,13 +21,7 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     bias: Bias::Unbiased,
     needs: &[],
     path_set: PathSet::ALL,
-    refusals: |profile| {
-        let media = profile
-            .media
-            .any()
-            .then(|| "it does not model participating media".to_owned());
-        media.into_iter().collect()
-    },
+    refusals: |_| Vec::new(),
     settings: &SETTINGS,
     default_settings: || serde_json::to_value(PathTracerSettings::default()).unwrap_or_default(),
     variants: &[
@@ -56,7 +50,7 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
     },
 };
 
-const SETTINGS: [SettingInfo; 8] = [
+const SETTINGS: [SettingInfo; 9] = [
     SettingInfo {
         name: "path_set",
         range: "all | emitted | direct | indirect | bounces=A..B, with lobes=diffuse+glossy+…; or path expressions: LDE, LS+DE, L[DG]{1,3}E, !L.*S.*E …",
@@ -94,6 +88,12 @@ const SETTINGS: [SettingInfo; 8] = [
         meaning: "uncorrelated instead of height-correlated masking of microfacets; changes the picture",
     },
     SettingInfo {
+        name: "equiangular",
+        range: "true | false",
+        unit: "",
+        meaning: "samples light of points and spots in homogeneous media also by the angle under which they see the ray; changes the noise only",
+    },
+    SettingInfo {
         name: "paths_in_flight",
         range: "0 … 4194304",
         unit: "paths",
@@ -108,7 +108,7 @@ const SETTINGS: [SettingInfo; 8] = [
 ];
 
 /// What each specialization constant of the shading stage stands for, and why it is off where nothing else is known.
-const FEATURES: [(&str, &str, &str); 18] = [
+const FEATURES: [(&str, &str, &str); 19] = [
     (HAS_METAL, "metal lobes", "no material is metal"),
     (
         "has_conductor",
@@ -141,6 +141,7 @@ const FEATURES: [(&str, &str, &str); 18] = [
         "point, spot and directional lights",
         "the scene has none",
     ),
+    ("has_media", "participating media", "the scene has none"),
     (
         "has_path_automaton",
         "path expressions",
@@ -189,6 +190,9 @@ impl Technique for PathTracer {
             ("rays", c.extend_rays + c.shadow_rays),
             ("waves", c.waves),
             ("stalls", c.stalls),
+            ("medium_collisions", c.medium_collisions),
+            ("null_collisions", c.null_collisions),
+            ("density_lookups", c.density_lookups),
         ])
     }
 

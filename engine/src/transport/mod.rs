@@ -8,6 +8,7 @@ pub mod fresnel;
 pub mod ggx;
 pub mod gpu_scene;
 pub mod lights;
+pub mod medium;
 pub mod path_set;
 pub mod path_tracer;
 pub mod phase;

@@ -1,10 +1,13 @@
 //! Light without area, measures and weights of light sampling, phase functions.
 
+use clerestory::gpu::shaders::constants::{PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH, PHASE_SCHLICK};
+use clerestory::scene::Phase;
 use clerestory::transport::lights::{
     area_to_solid_angle, balance_heuristic, power_heuristic, spot_falloff, triangle_point,
 };
 use clerestory::transport::phase::{
-    henyey_greenstein, henyey_greenstein_sample, phase_direction, schlick_phase, schlick_phase_sample,
+    henyey_greenstein, henyey_greenstein_sample, phase_direction, phase_function, phase_function_sample, schlick_phase,
+    schlick_phase_sample,
 };
 use clerestory_tests::twin::{Tolerance, U, trigonometric_error};
 use clerestory_tests::with_gpu;
@@ -43,6 +46,17 @@ fn lights() {
     });
 }
 
+/// The phase function that the numbers of a case choose.
+fn phase(x: &[f64]) -> Phase {
+    let parameter = x[1] as f32;
+    match (x[8] as f32).to_bits() {
+        PHASE_HENYEY_GREENSTEIN => Phase::HenyeyGreenstein { g: parameter },
+        PHASE_SCHLICK => Phase::Schlick { k: parameter },
+        PHASE_RAYLEIGH => Phase::Rayleigh,
+        _ => Phase::Isotropic,
+    }
+}
+
 #[test]
 fn phase_functions() {
     with_gpu(|gpu| {
@@ -55,7 +69,8 @@ fn phase_functions() {
                 unit(r),
                 unit(r),
             ];
-            join(&[&head, &direction(r).to_array()])
+            let kind = r.choose(&[0, 1, 2, 3].map(f32::from_bits));
+            join(&[&head, &direction(r).to_array(), &[kind]])
         });
         // Henyey and Greenstein's inversion divides a difference of terms near 1 by 2g; |g| is 0.05 or more, or 0, here.
         let tolerance = Tolerance {
@@ -71,6 +86,7 @@ fn phase_functions() {
                     schlick_phase_sample(x[2], x[3]),
                 ],
                 phase_direction(v3(x, 5), x[0], x[4]).to_array(),
+                [phase_function(phase(x), x[0]), phase_function_sample(phase(x), x[3])],
             ]
         });
     });

@@ -6,6 +6,7 @@
 mod directions;
 mod geometry;
 mod lights;
+mod media;
 mod random;
 mod reflection;
 mod scattering;

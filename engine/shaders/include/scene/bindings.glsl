@@ -58,7 +58,7 @@ SceneMaterial load_material(uint index) {
     uvec4 q8 = material_quarter(index, 8u);
     uvec4 q9 = material_quarter(index, 9u);
     return SceneMaterial(f0.xyz, f0.w, f1.xyz, f1.w, f2.xyz, f2.w, f3.xyz, f3.w, f4.xyz, f4.w, f5.xyz, f5.w, f6.xyz, f6.w,
-                         uintBitsToFloat(q7.x), uintBitsToFloat(q7.y), q7.z, q7.w, q8.x, q8.y, q8.z, q8.w, q9.x, q9.y, q9.zw);
+                         uintBitsToFloat(q7.x), uintBitsToFloat(q7.y), q7.z, q7.w, q8.x, q8.y, q8.z, q8.w, q9.x, q9.y, q9.z, q9.w);
 }
 
 SceneTexture load_texture(uint index) {

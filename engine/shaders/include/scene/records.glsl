@@ -10,6 +10,7 @@ const uint MATERIAL_UNLIT = 2u;
 const uint MATERIAL_CONDUCTOR = 4u;
 const uint MATERIAL_MASK = 8u;
 const uint MATERIAL_BLEND = 16u;
+const uint MATERIAL_BOUNDARY = 32u;  // not there but for the medium that it bounds
 
 const uint LIGHT_TRIANGLE = 0u;
 const uint LIGHT_POINT = 1u;
@@ -23,6 +24,12 @@ const uint MATERIAL_QUARTERS = 10u;
 const uint TEXTURE_QUARTERS = 3u;
 const uint LIGHT_QUARTERS = 4u;
 const uint ENVIRONMENT_HEADER_QUARTERS = 3u;
+const uint MEDIUM_QUARTERS = 9u;
+
+const uint PHASE_ISOTROPIC = 0u;
+const uint PHASE_HENYEY_GREENSTEIN = 1u;
+const uint PHASE_SCHLICK = 2u;
+const uint PHASE_RAYLEIGH = 3u;
 
 struct SceneTriangle {
     vec3 a;
@@ -30,7 +37,7 @@ struct SceneTriangle {
     vec3 b;
     uint light;  // index of its light, or NO_LIGHT
     vec3 c;
-    uint spare;
+    uint around;  // of a body: material of the body that it is inside of, plus one; 0 without
 };
 
 struct SceneMaterial {
@@ -58,7 +65,8 @@ struct SceneMaterial {
     uint specular_texture;
     uint specular_color_texture;
     uint transmission_texture;
-    uvec2 spare;
+    uint interior;  // index of the medium inside, plus one; 0 without
+    uint spare;
 };
 
 struct SceneTexture {
@@ -80,6 +88,28 @@ struct SceneLight {
     float cos_outer;
     vec3 strength;      // W/sr, W/m2; unused for triangles and the environment
     float spare_strength;
+};
+
+// A medium: coefficients at density 1, and where the grid of its density is.
+struct SceneMedium {
+    vec3 sigma_s;          // 1/m
+    uint phase;            // PHASE_*
+    vec3 sigma_t;          // 1/m
+    float phase_parameter;
+    vec3 emission;         // W/(m3 sr)
+    float majorant;        // at least every band of sigma_t and positive where there is emission, 1/m
+    vec3 row_x;            // from world space to cells of the grid, with the components of `offset`
+    uint has_grid;
+    vec3 row_y;
+    uint first_density;
+    vec3 row_z;
+    uint first_majorant;
+    vec3 offset;
+    float block;           // cells along the side of a block with one majorant
+    uvec3 cells;
+    uint spare;
+    uvec3 blocks;
+    uint spare_blocks;
 };
 
 // What stands before an environment's texels: its axes in world space, its size, where its probabilities begin.

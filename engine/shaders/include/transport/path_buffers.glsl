@@ -20,6 +20,9 @@ const uint STALLED_SHADOW = 2u;
 
 const uint FLAG_ALIVE = 1u;
 const uint FLAG_SHADOW = 2u;
+// In scenes with media, which shadow rays a place has: to light scattered once on the way there, and to light sampled at its end.
+const uint FLAG_AIRLIGHT = 4u;
+const uint FLAG_SAMPLED = 8u;
 
 const uint OUTSIDE = 0xFFFFFFFFu;
 

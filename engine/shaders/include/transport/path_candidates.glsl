@@ -14,20 +14,27 @@ layout(constant_id = 18) const bool RESUMES = false;
 const uint CANDIDATES_EXTEND = 0u;
 const uint CANDIDATES_SHADOW = 1u;
 
-#ifdef PATH_ALPHA
+#if defined(PATH_ALPHA) || defined(PATH_MEDIA)
 
 #define CLERESTORY_SAMPLER SAMPLER_PCG
 #include "transport/random.glsl"
-
-#include "transport/attribute_features.glsl"
-#include "scene/material.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first_pixel;
     uint first_sample;
     uint sample_count;
     uint seed;
+#ifdef PATH_MEDIA
+    uint surrounding;  // index of the medium outside of all bodies, or NO_MEDIUM
+#endif
 } push;
+
+#endif
+
+#ifdef PATH_ALPHA
+
+#include "transport/attribute_features.glsl"
+#include "scene/material.glsl"
 
 // (pixel, sample, bounce and kind, seed) of the ray under way.
 uvec4 candidate_key;

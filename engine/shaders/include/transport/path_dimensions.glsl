@@ -13,6 +13,11 @@ const uint DIMENSION_LIGHT = 2u;        // which light; which side of an alpha-b
 const uint DIMENSION_LIGHT_POINT = 3u;  // point of a triangle, or texel of the environment
 const uint DIMENSION_LIGHT_WITHIN = 4u; // direction within the texel
 
+// Ways through media have slots of their own, far behind those of all bounces.
+const uint DIMENSION_FIRST_MEDIUM = 1u << 24;
+const uint DIMENSIONS_A_WAY = 2u;
+const uint DIMENSION_AIRLIGHT = 1u;  // which light, and where on the way; the first is for the free flight
+
 // A distance beyond every scene: coordinates are below 2^30 m.
 const float FAR_AWAY = 3.0e38;
 

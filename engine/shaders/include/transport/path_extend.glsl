@@ -7,6 +7,10 @@
 
 #include "transport/path_candidates.glsl"
 
+#ifdef PATH_MEDIA
+#include "transport/path_media.glsl"
+#endif
+
 void main() {
     uint place = gl_GlobalInvocationID.x;
     if (status.stalled == STALLED_SHADOW || place >= status.active_count) {
@@ -21,7 +25,12 @@ void main() {
         hit = path_hits_out[place];
         resume = path_resume[place];
     }
-    resume = closest_hit(Ray(path.origin, 0.0, path.direction, FAR_AWAY), resume, hit);
+    float t_min = 0.0;
+#ifdef PATH_MEDIA
+    // Behind the boundaries that the path has passed.
+    t_min = status.rounds > 0u ? search_start(path_medium_states[slot].start) : 0.0;
+#endif
+    resume = closest_hit(Ray(path.origin, t_min, path.direction, FAR_AWAY), resume, hit);
     path_hits_out[place] = hit;
     path_resume[place] = resume;
     if (resume != BVH2_FINISHED) {

@@ -1,11 +1,12 @@
 // Phase functions: how a medium scatters about the direction of propagation.
 //
 // |g| and |k| are below 1; c is the cosine between the directions of propagation before and after (forward scattering: g, k > 0). Sources: Henyey and
-// Greenstein (1941); Blasi, Le Saec and Schlick, "A Rendering Algorithm for Discrete Volume Density Objects" (1993).
+// Greenstein (1941); Rayleigh (1871); Blasi, Le Saec and Schlick, "A Rendering Algorithm for Discrete Volume Density Objects" (1993).
 // Guarantees: densities per solid angle that integrate to one and are sampled exactly, so that weights are one.
 #ifndef CLERESTORY_TRANSPORT_PHASE_GLSL
 #define CLERESTORY_TRANSPORT_PHASE_GLSL
 
+#include "scene/records.glsl"
 #include "transport/warp.glsl"
 
 // Below this |g| the inversion loses its digits and the lobe is taken as isotropic.
@@ -34,6 +35,29 @@ float schlick_phase(float c, float k) {
 float schlick_phase_sample(float k, float u) {
     float x = 2.0 * u - 1.0;
     return clamp((x + k) / (1.0 + k * x), -1.0, 1.0);
+}
+
+// Scattering by particles far smaller than the wavelength.
+float rayleigh_phase(float c) { return 0.75 * UNIFORM_SPHERE_PDF * (1.0 + c * c); }
+
+float rayleigh_phase_sample(float u) {
+    // The real root of c^3 + 3 c = 2 q.
+    float q = 4.0 * u - 2.0;
+    float z = pow(abs(q) + sqrt(q * q + 1.0), 1.0 / 3.0);
+    return clamp(q < 0.0 ? 1.0 / z - z : z - 1.0 / z, -1.0, 1.0);
+}
+
+// The phase function of a medium: `kind` is one of PHASE_..., `parameter` g or k.
+float phase_function(uint kind, float parameter, float c) {
+    return kind == PHASE_HENYEY_GREENSTEIN ? henyey_greenstein(c, parameter)
+        : kind == PHASE_SCHLICK ? schlick_phase(c, parameter)
+        : kind == PHASE_RAYLEIGH ? rayleigh_phase(c) : UNIFORM_SPHERE_PDF;
+}
+
+float phase_function_sample(uint kind, float parameter, float u) {
+    return kind == PHASE_HENYEY_GREENSTEIN ? henyey_greenstein_sample(parameter, u)
+        : kind == PHASE_SCHLICK ? schlick_phase_sample(parameter, u)
+        : kind == PHASE_RAYLEIGH ? rayleigh_phase_sample(u) : 1.0 - 2.0 * u;
 }
 
 // The direction after scattering of propagation direction w, at cosine c and azimuth 2 pi u.

@@ -25,6 +25,7 @@ struct Surface {
     float double_area;
     uint material;
     uint light;
+    uint around;            // material of the body that a body is inside of, or all bits set
 };
 
 vec3 interpolate(vec3 a, vec3 b, vec3 c, vec3 w) { return w.x * a + w.y * b + w.z * c; }
@@ -74,6 +75,7 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     }
     s.material = triangle.material;
     s.light = triangle.light;
+    s.around = triangle.around - 1u;
     return s;
 }
 

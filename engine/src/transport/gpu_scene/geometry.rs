@@ -89,7 +89,7 @@ impl Geometry {
                     b: positions[b as usize].to_array(),
                     light: NO_LIGHT,
                     c: positions[c as usize].to_array(),
-                    spare: 0,
+                    around: 0,
                 });
                 if has_attributes {
                     all.vertices.push([base + a, base + b, base + c, 0]);

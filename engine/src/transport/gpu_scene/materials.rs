@@ -2,7 +2,7 @@
 
 use super::textures::Textures;
 use crate::gpu::shaders::constants::{
-    MATERIAL_BLEND, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
+    MATERIAL_BLEND, MATERIAL_BOUNDARY, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
 };
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::scene::{AlphaMode, Material, Scene};
@@ -32,6 +32,8 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         .as_dvec3()
         .map(|c| -c.clamp(f64::from(f32::MIN_POSITIVE), 1.0).ln());
     let absorption = absorption / f64::from(m.attenuation_distance);
+    // A medium that does nothing is none.
+    let interior = m.interior.filter(|&index| !scene.media[index as usize].is_empty());
     SceneMaterial {
         base_color: m.base_color.truncate().to_array(),
         base_alpha: m.base_color.w,
@@ -56,6 +58,7 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         flags: flag(m.double_sided, MATERIAL_DOUBLE_SIDED)
             | flag(m.unlit, MATERIAL_UNLIT)
             | flag(conductor.is_some(), MATERIAL_CONDUCTOR)
+            | flag(m.boundary, MATERIAL_BOUNDARY)
             | alpha_flag,
         base_color_texture: textures.record(scene, m.base_color_texture, true),
         metallic_roughness_texture: textures.record(scene, m.metallic_roughness_texture, false),
@@ -64,6 +67,7 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         specular_texture: textures.record(scene, m.specular_texture, false),
         specular_color_texture: textures.record(scene, m.specular_color_texture, true),
         transmission_texture: textures.record(scene, m.transmission_texture, false),
-        spare: [0; 2],
+        interior: interior.map_or(0, |index| index + 1),
+        spare: 0,
     }
 }

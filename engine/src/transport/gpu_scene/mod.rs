@@ -3,16 +3,20 @@
 //! What a scene lacks is not allocated: its binding holds one texel that no specialized kernel reads. Deterministic:
 //! equal scenes give equal bytes.
 
+mod bodies;
 mod geometry;
 mod lights;
 mod materials;
+mod media;
 mod textures;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
+use self::bodies::Bodies;
 use self::geometry::Geometry;
 use self::lights::Lights;
 use self::materials::{material_record, materials_by_use};
+use self::media::GpuMedia;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
@@ -20,7 +24,7 @@ use crate::Result;
 use crate::accel::bvh2::{Bvh2, Bvh2Settings};
 use crate::accel::{IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::sets::{Bvh2Set, SceneSet};
+use crate::gpu::shaders::sets::{Bvh2Set, MediaSet, SceneSet};
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::gpu::{Category, Gpu, TexelView};
 use crate::scene::{Material, Scene, SceneProfile};
@@ -35,6 +39,7 @@ pub struct GpuScene {
     light_kinds: LightKinds,
     index: TexelView,
     buffers: SceneBuffers,
+    media: Option<GpuMedia>,
 }
 
 /// Which kinds of lights there are to choose: emitters without area and lights without power are none.
@@ -72,12 +77,15 @@ impl GpuScene {
         scene.check()?;
         let profile = SceneProfile::of(scene);
         let mut geometry = Geometry::flatten(scene, &profile)?;
+        let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
         let bvh = Bvh2::build(&geometry.corners(), &Bvh2Settings::default())?;
         let index = gpu.texels_with(bvh.name(), Category::Index, vk::Format::R32G32B32A32_UINT, bvh.texels())?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
-        let placed = materials.iter().filter(|(_, placed)| *placed);
+        let placed = materials
+            .iter()
+            .filter(|(material, placed)| *placed && !material.boundary);
         let bsdf = BsdfFeatures::of_materials(placed.map(|(material, _)| *material));
         let mut textures = Textures::default();
         let records: Vec<_> = materials
@@ -91,6 +99,7 @@ impl GpuScene {
             &[]
         };
         let buffers = SceneBuffers::upload(gpu, &geometry, &records, &textures, &lights, albedo)?;
+        let media = bodies.map(|bodies| GpuMedia::new(gpu, scene, bodies)).transpose()?;
         Ok(Self {
             profile,
             bsdf,
@@ -99,6 +108,7 @@ impl GpuScene {
             light_kinds: lights.kinds(),
             index,
             buffers,
+            media,
         })
     }
 
@@ -136,6 +146,22 @@ impl GpuScene {
     /// True when some point, spot or directional light has power.
     pub fn has_punctual_lights(&self) -> bool {
         self.light_kinds.punctual
+    }
+
+    /// Set 3, of scenes with participating media.
+    pub fn media_set(&self) -> Option<MediaSet<'_>> {
+        self.media.as_ref().map(GpuMedia::set)
+    }
+
+    /// Index of the medium outside of all bodies, if there is one that does something.
+    pub fn surrounding(&self) -> Option<u32> {
+        self.media.as_ref()?.surrounding
+    }
+
+    /// Index of the material of the innermost body around a point, in scenes with participating media: of the solids that refract and the
+    /// boundaries of media.
+    pub fn body_around(&self, point: DVec3) -> Option<u32> {
+        self.media.as_ref()?.bodies.around(point)
     }
 
     /// Set 1.

@@ -3,6 +3,11 @@
 //! Sources: BG-2 and BG-3; Kajiya, "The Rendering Equation" (SIGGRAPH 1986); Veach, "Robust Monte Carlo Methods for Light Transport
 //! Simulation" (1997), chapters 9 and 10; wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013).
 //!
+//! Participating media (BG-4, PM-F-3), only where a scene has some: analytic free flight in homogeneous media, delta and ratio tracking through
+//! density grids, one walk for all bands; the shaders `transport/path_medium.comp` and `transport/media_tracking.glsl` name the sources. Bodies
+//! may lie in bodies as long as their surfaces neither cross nor coincide; the camera may be in any of them, where its position counts for
+//! the whole lens and for all of an orthographic picture. Nothing from infinity is seen through an endless medium that extinguishes it.
+//!
 //! Unbiased: paths end by Russian roulette or by the [`PathSet`](super::PathSet) alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
 //! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
@@ -17,7 +22,9 @@ use std::time::Instant;
 
 use self::pipelines::{Pipelines, TracePipelines, camera_pipeline, ray_quota};
 pub use self::settings::PathTracerSettings;
-use self::wave::{Cursor, Status, Wave, WaveBuffers, group_counts, slots_of_device, slots_of_picture};
+use self::wave::{
+    Cursor, MediumCounters, Status, Wave, WaveBuffers, WaveNeeds, group_counts, slots_of_device, slots_of_picture,
+};
 use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -26,6 +33,7 @@ use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_EXTEND, STALLED_NOT, ST
 use crate::gpu::{Access, Buffer, DeviceKind, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
+use glam::DVec3;
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
 const BOUNCES_A_SUBMISSION: usize = 12;
@@ -46,6 +54,12 @@ pub struct PathCounters {
     pub shadow_rays: u64,
     /// Waves rendered.
     pub waves: u64,
+    /// Collisions with media that scattered or absorbed.
+    pub medium_collisions: u64,
+    /// Tentative collisions of free flights through density grids that were none.
+    pub null_collisions: u64,
+    /// Densities looked up in grids, by free flights and by shadow rays.
+    pub density_lookups: u64,
     /// Submissions that ended with rays stopped by the quota, which then went on.
     pub stalls: u64,
 }
@@ -56,6 +70,8 @@ pub struct PathTracer {
     scene: Arc<GpuScene>,
     settings: PathTracerSettings,
     frame: CameraFrame,
+    /// Where the camera is, for the medium around it.
+    eye: DVec3,
     pipelines: Pipelines,
     buffers: WaveBuffers,
     film: GpuFilm,
@@ -92,12 +108,18 @@ impl PathTracer {
         let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
         let frame = CameraFrame::new(camera, size)?;
         let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
-        let (buffers, slots) = WaveBuffers::within_memory(gpu, slots, scene.has_lights(), &film)?;
+        let needs = WaveNeeds {
+            lights: scene.has_lights(),
+            media: scene.profile().media.any(),
+            airlight: settings.equiangular && scene.has_punctual_lights(),
+        };
+        let (buffers, slots) = WaveBuffers::within_memory(gpu, slots, needs, &film)?;
         Ok(Self {
             gpu: gpu.clone(),
             scene,
             settings,
             frame,
+            eye: camera.transform.translation,
             pipelines,
             buffers,
             film,
@@ -121,6 +143,7 @@ impl PathTracer {
         self.film.clear()?;
         self.pipelines.camera = pipeline;
         self.frame = frame;
+        self.eye = camera.transform.translation;
         self.pending = None;
         self.cursor = Cursor::default();
         Ok(())
@@ -224,6 +247,14 @@ impl PathTracer {
         self.counters.paths += u64::from(paths);
         self.counters.extend_rays += wide(status.extend_rays);
         self.counters.shadow_rays += wide(status.shadow_rays);
+        if let Some(media) = &self.buffers.media {
+            let counts = media.readback.read::<MediumCounters>(0, 1)?[0];
+            self.counters.medium_collisions += wide(counts.collisions);
+            self.counters.null_collisions += wide(counts.null_collisions);
+            self.counters.density_lookups += wide(counts.density_lookups);
+            // A place's two rays are counted as one before.
+            self.counters.shadow_rays += wide(counts.second_rays);
+        }
         self.counters.waves += 1;
         self.pending = Some(*wave);
         Ok(timings)
@@ -250,6 +281,9 @@ impl PathTracer {
         (status.stalled, status.unfinished) = (STALLED_NOT, 0);
         recorder.pass("path: begin", |pass| {
             pass.update(self.buffers.status.view(), &[*status])?;
+            if let Some(media) = self.buffers.media.as_ref().filter(|_| first) {
+                pass.update(media.counters.view(), &[MediumCounters::default()])?;
+            }
             pass.memory_barrier(
                 Access::TRANSFER_WRITE | Access::COMPUTE,
                 Access::COMPUTE | Access::INDIRECT_READ,
@@ -272,7 +306,11 @@ impl PathTracer {
             pass.copy(
                 self.buffers.status.slice(0, size_of::<Status>() as u64),
                 self.buffers.readback.view(),
-            )
+            )?;
+            match &self.buffers.media {
+                Some(media) => pass.copy(media.counters.view(), media.readback.view()),
+                None => Ok(()),
+            }
         })?;
         let clock = Instant::now();
         let submission = recorder.submit()?;

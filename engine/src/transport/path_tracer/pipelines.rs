@@ -4,7 +4,8 @@ use super::settings::PathTracerSettings;
 use crate::Result;
 use crate::gpu::shaders::transport::{
     path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_extend_alpha,
-    path_resolve, path_shade, path_shadow, path_shadow_alpha,
+    path_extend_media, path_extend_media_alpha, path_medium, path_resolve, path_shade, path_shadow, path_shadow_alpha,
+    path_shadow_media, path_shadow_media_alpha,
 };
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
 use crate::scene::Camera;
@@ -15,12 +16,17 @@ use crate::transport::camera_frame::CameraFrame;
 /// stays below the 65,535 iterations after which it silently ends loops, even if its lanes take turns.
 const ALPHA_QUOTA_MAX: u32 = 2048;
 
+/// The same where shadow rays pass boundaries of media, up to eight in a dispatch, and with alpha besides, up to two.
+const MEDIA_QUOTA_MAX: u32 = 2048;
+const MEDIA_ALPHA_QUOTA_MAX: u32 = 512;
+
 /// Loop iterations after which a ray goes on in a later dispatch.
 pub(super) fn ray_quota(scene: &GpuScene, settings: &PathTracerSettings) -> u32 {
-    let most = if scene.profile().has_alpha() {
-        ALPHA_QUOTA_MAX
-    } else {
-        u32::MAX
+    let most = match (scene.profile().has_alpha(), scene.profile().media.any()) {
+        (false, false) => u32::MAX,
+        (true, false) => ALPHA_QUOTA_MAX,
+        (false, true) => MEDIA_QUOTA_MAX,
+        (true, true) => MEDIA_ALPHA_QUOTA_MAX,
     };
     settings.ray_quota.min(most)
 }
@@ -31,6 +37,8 @@ pub(super) struct Pipelines {
     pub trace: TracePipelines,
     /// The same for rays that a quota stopped; made when the first one is.
     pub resume: Option<TracePipelines>,
+    /// Only where there are media.
+    pub medium: Option<ComputePipeline<path_medium::Kernel>>,
     pub shade: ComputePipeline<path_shade::Kernel>,
     pub count: ComputePipeline<path_compact_count::Kernel>,
     pub scan: ComputePipeline<path_compact_scan::Kernel>,
@@ -47,6 +55,14 @@ pub(super) enum TracePipelines {
     Alpha {
         extend: ComputePipeline<path_extend_alpha::Kernel>,
         shadow: ComputePipeline<path_shadow_alpha::Kernel>,
+    },
+    Media {
+        extend: ComputePipeline<path_extend_media::Kernel>,
+        shadow: ComputePipeline<path_shadow_media::Kernel>,
+    },
+    MediaAlpha {
+        extend: ComputePipeline<path_extend_media_alpha::Kernel>,
+        shadow: ComputePipeline<path_shadow_media_alpha::Kernel>,
     },
 }
 
@@ -94,13 +110,39 @@ impl Pipelines {
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
             has_alpha: profile.has_alpha(),
+            has_media: profile.media.any(),
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
         };
+        let medium = path_medium::Spec {
+            // What surfaces scatter by is not compiled into this stage.
+            has_textures: shade.has_textures,
+            has_vertex_colors: shade.has_vertex_colors,
+            has_shading_normals: false,
+            has_normal_maps: false,
+            has_absorption: shade.has_absorption,
+            has_unlit: shade.has_unlit,
+            has_environment: shade.has_environment,
+            has_area_lights: shade.has_area_lights,
+            has_punctual_lights: shade.has_punctual_lights,
+            has_alpha: shade.has_alpha,
+            sampler_kind: shade.sampler_kind,
+            has_path_automaton: shade.has_path_automaton,
+            has_grids: profile.media.heterogeneous,
+            has_homogeneous: profile.media.homogeneous,
+            has_airlight: settings.equiangular
+                && profile.media.homogeneous
+                && profile.media.scatters
+                && profile.lights.point + profile.lights.spot > 0
+                && shade.has_punctual_lights,
+            ..Default::default()
+        };
+        let medium = shade.has_media.then(|| gpu.compute_pipeline(&medium)).transpose()?;
         Ok(Self {
             camera: camera_pipeline(gpu, settings, frame, camera)?,
             trace: TracePipelines::new(gpu, scene, settings, false)?,
             resume: None,
+            medium,
             shade: gpu.compute_pipeline(&shade)?,
             count: gpu.compute_pipeline(&())?,
             scan: gpu.compute_pipeline(&())?,
@@ -115,7 +157,7 @@ impl Pipelines {
     pub fn info(&self) -> Vec<PipelineInfo> {
         let p = self;
         let [extend, shadow] = p.trace.info();
-        vec![
+        let mut all = vec![
             p.camera.info(),
             extend,
             shadow,
@@ -124,7 +166,9 @@ impl Pipelines {
             p.scan.info(),
             p.scatter.info(),
             p.resolve.info(),
-        ]
+        ];
+        all.extend(p.medium.as_ref().map(ComputePipeline::info));
+        all
     }
 }
 
@@ -132,6 +176,44 @@ impl TracePipelines {
     pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettings, resumes: bool) -> Result<Self> {
         let profile = scene.profile();
         let bvh2_quota = ray_quota(scene, settings);
+        let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
+        let (has_grids, has_homogeneous) = (profile.media.heterogeneous, profile.media.homogeneous);
+        if profile.media.any() && !profile.has_alpha() {
+            return Ok(Self::Media {
+                extend: gpu.compute_pipeline(&path_extend_media::Spec {
+                    bvh2_quota,
+                    resumes,
+                    ..Default::default()
+                })?,
+                shadow: gpu.compute_pipeline(&path_shadow_media::Spec {
+                    bvh2_quota,
+                    resumes,
+                    has_grids,
+                    has_homogeneous,
+                    ..Default::default()
+                })?,
+            });
+        }
+        if profile.media.any() {
+            return Ok(Self::MediaAlpha {
+                extend: gpu.compute_pipeline(&path_extend_media_alpha::Spec {
+                    has_textures,
+                    has_vertex_colors,
+                    bvh2_quota,
+                    resumes,
+                    ..Default::default()
+                })?,
+                shadow: gpu.compute_pipeline(&path_shadow_media_alpha::Spec {
+                    has_textures,
+                    has_vertex_colors,
+                    bvh2_quota,
+                    resumes,
+                    has_grids,
+                    has_homogeneous,
+                    ..Default::default()
+                })?,
+            });
+        }
         if !profile.has_alpha() {
             return Ok(Self::Opaque {
                 extend: gpu.compute_pipeline(&path_extend::Spec {
@@ -146,7 +228,6 @@ impl TracePipelines {
                 })?,
             });
         }
-        let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
         let extend = path_extend_alpha::Spec {
             has_textures,
             has_vertex_colors,
@@ -171,6 +252,8 @@ impl TracePipelines {
         match self {
             Self::Opaque { extend, shadow } => [extend.info(), shadow.info()],
             Self::Alpha { extend, shadow } => [extend.info(), shadow.info()],
+            Self::Media { extend, shadow } => [extend.info(), shadow.info()],
+            Self::MediaAlpha { extend, shadow } => [extend.info(), shadow.info()],
         }
     }
 }

@@ -4,7 +4,11 @@ use super::PathTracer;
 use super::pipelines::TracePipelines;
 use super::wave::{Status, Wave};
 use crate::Result;
-use crate::gpu::shaders::transport::{path_camera, path_extend_alpha, path_resolve, path_shade, path_shadow_alpha};
+use crate::gpu::shaders::constants::{NO_MEDIUM, OUTSIDE};
+use crate::gpu::shaders::transport::{
+    path_camera, path_extend_alpha, path_extend_media, path_extend_media_alpha, path_medium, path_resolve, path_shade,
+    path_shadow_alpha, path_shadow_media, path_shadow_media_alpha,
+};
 use crate::gpu::{Access, BufferView, Pass, Recorder};
 
 impl PathTracer {
@@ -26,6 +30,7 @@ impl PathTracer {
             first_sample: wave.first_sample,
             sample_count: wave.samples,
             seed: self.settings.seed,
+            interior: self.scene.body_around(self.eye).unwrap_or(OUTSIDE),
         };
         recorder.pass("path: camera", |pass| {
             let groups = self.pipelines.camera.groups_for(wave.pixels * wave.samples);
@@ -48,6 +53,8 @@ impl PathTracer {
         let paths = self.buffers.set(parity);
         let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
         let items = self.groups(std::mem::offset_of!(Status, item_groups));
+        let path_media = self.buffers.media_set();
+        let surrounding = self.scene.surrounding().unwrap_or(NO_MEDIUM);
         recorder.pass("path: extend", |pass| {
             match trace {
                 TracePipelines::Opaque { extend, .. } => {
@@ -62,11 +69,52 @@ impl PathTracer {
                     };
                     pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
                 }
+                TracePipelines::Media { extend, .. } => {
+                    let push = path_extend_media::Push {
+                        first_pixel: wave.first_pixel,
+                        first_sample: wave.first_sample,
+                        sample_count: wave.samples,
+                        seed: self.settings.seed,
+                        surrounding,
+                    };
+                    pass.dispatch_indirect(extend, &[&paths, &index, &path_media], &push, items)?;
+                }
+                TracePipelines::MediaAlpha { extend, .. } => {
+                    let push = path_extend_media_alpha::Push {
+                        first_pixel: wave.first_pixel,
+                        first_sample: wave.first_sample,
+                        sample_count: wave.samples,
+                        seed: self.settings.seed,
+                        surrounding,
+                    };
+                    pass.dispatch_indirect(extend, &[&paths, &index, &scene, &path_media], &push, items)?;
+                }
             }
             stage_barrier(pass);
             Ok(())
         })?;
         let [lower, upper] = self.scene.bounds();
+        if let (Some(medium), Some(media)) = (&p.medium, self.scene.media_set()) {
+            let push = path_medium::Push {
+                scene_lower: lower.to_array(),
+                first_pixel: wave.first_pixel,
+                scene_upper: upper.to_array(),
+                first_sample: wave.first_sample,
+                sample_count: wave.samples,
+                seed: self.settings.seed,
+                path_set: self.settings.path_set.packed(),
+                roulette_start: self.settings.roulette_start,
+                roulette_cap: self.settings.roulette_cap,
+                surrounding,
+                accepting: self.settings.path_set.accepting(),
+                successors: self.settings.path_set.successors(),
+            };
+            recorder.pass("path: medium", |pass| {
+                pass.dispatch_indirect(medium, &[&paths, &scene, &media, &path_media], &push, items)?;
+                stage_barrier(pass);
+                Ok(())
+            })?;
+        }
         let push = path_shade::Push {
             scene_lower: lower.to_array(),
             first_pixel: wave.first_pixel,
@@ -81,7 +129,7 @@ impl PathTracer {
             successors: self.settings.path_set.successors(),
         };
         recorder.pass("path: shade", |pass| {
-            pass.dispatch_indirect(&p.shade, &[&paths, &scene], &push, items)?;
+            pass.dispatch_indirect(&p.shade, &[&paths, &scene, &path_media], &push, items)?;
             stage_barrier(pass);
             Ok(())
         })?;
@@ -113,6 +161,8 @@ impl PathTracer {
         let paths = self.buffers.set(parity);
         let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
         let rays = self.groups(std::mem::offset_of!(Status, shadow_groups));
+        let path_media = self.buffers.media_set();
+        let surrounding = self.scene.surrounding().unwrap_or(NO_MEDIUM);
         recorder.pass("path: shadow", |pass| {
             match trace {
                 TracePipelines::Opaque { shadow, .. } => {
@@ -126,6 +176,30 @@ impl PathTracer {
                         seed: self.settings.seed,
                     };
                     pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, rays)?;
+                }
+                TracePipelines::Media { shadow, .. } => {
+                    let push = path_shadow_media::Push {
+                        first_pixel: wave.first_pixel,
+                        first_sample: wave.first_sample,
+                        sample_count: wave.samples,
+                        seed: self.settings.seed,
+                        surrounding,
+                    };
+                    if let Some(media) = self.scene.media_set() {
+                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene, &media, &path_media], &push, rays)?;
+                    }
+                }
+                TracePipelines::MediaAlpha { shadow, .. } => {
+                    let push = path_shadow_media_alpha::Push {
+                        first_pixel: wave.first_pixel,
+                        first_sample: wave.first_sample,
+                        sample_count: wave.samples,
+                        seed: self.settings.seed,
+                        surrounding,
+                    };
+                    if let Some(media) = self.scene.media_set() {
+                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene, &media, &path_media], &push, rays)?;
+                    }
                 }
             }
             stage_barrier(pass);

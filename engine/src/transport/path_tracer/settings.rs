@@ -35,6 +35,8 @@ pub struct PathTracerSettings {
     pub multiple_scattering: bool,
     /// Uncorrelated instead of height-correlated Smith masking, for the same comparison.
     pub separable_masking: bool,
+    /// Samples light of points and spots in homogeneous media also equi-angularly. Changes the noise only.
+    pub equiangular: bool,
     /// Paths in flight; 0 chooses by the kind of device. Never changes the picture.
     pub paths_in_flight: u32,
     /// Loop iterations after which a ray goes on in a later dispatch. Never changes the picture.
@@ -54,6 +56,7 @@ impl Default for PathTracerSettings {
             roulette_cap: 0.95,
             multiple_scattering: true,
             separable_masking: false,
+            equiangular: true,
             paths_in_flight: 0,
             ray_quota: 32_768,
             aovs: false,

@@ -7,9 +7,11 @@ use super::settings::SLOTS_MAX;
 use crate::film::GpuFilm;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP};
-use crate::gpu::shaders::sets::PathBuffers;
-use crate::gpu::shaders::transport::path_camera;
-use crate::gpu::shaders::types::{FilmAov, FilmPixel, GatheredLight, Hit, PathAov, PathState, ShadowRay};
+use crate::gpu::shaders::sets::{PathBuffers, PathMedia};
+use crate::gpu::shaders::transport::{path_camera, path_medium};
+use crate::gpu::shaders::types::{
+    FilmAov, FilmPixel, GatheredLight, Hit, MediumEvent, MediumState, PathAov, PathState, ShadowRay, ShadowState,
+};
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 use crate::{Error, Result};
 
@@ -47,6 +49,29 @@ pub(super) struct Cursor {
 /// The head of the working memory: indirect arguments and counters.
 pub(super) type Status = path_camera::PathStatusBlock;
 
+/// Counts of what happened in media.
+pub(super) type MediumCounters = path_medium::PathMediumCounters;
+
+/// Working memory for participating media.
+pub(super) struct MediaBuffers {
+    states: Buffer,
+    events: Buffer,
+    interiors: Buffer,
+    airlight_rays: Buffer,
+    shadow_states: Buffer,
+    pub counters: Buffer,
+    pub readback: Buffer,
+}
+
+/// Which buffers a wave needs beside those of all scenes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WaveNeeds {
+    pub lights: bool,
+    pub media: bool,
+    /// Equi-angular samples.
+    pub airlight: bool,
+}
+
 /// Working memory of a wave.
 pub(super) struct WaveBuffers {
     pub status: Buffer,
@@ -61,6 +86,7 @@ pub(super) struct WaveBuffers {
     pub chunks: Buffer,
     pub aovs: Buffer,
     pub readback: Buffer,
+    pub media: Option<MediaBuffers>,
 }
 
 impl Cursor {
@@ -126,12 +152,12 @@ pub(super) fn group_counts(places: u32) -> [[u32; 3]; 2] {
 impl WaveBuffers {
     /// For as many slots, up to `slots`, as there is memory for beside what reading the film takes; a wave's size never changes the
     /// picture.
-    pub fn within_memory(gpu: &Gpu, mut slots: u32, lights: bool, film: &GpuFilm) -> Result<(Self, u32)> {
+    pub fn within_memory(gpu: &Gpu, mut slots: u32, needs: WaveNeeds, film: &GpuFilm) -> Result<(Self, u32)> {
         let band = film.bands().iter().map(|band| u64::from(band.pixels())).max();
         let pixel_bytes = size_of::<FilmPixel>().max(size_of::<FilmAov>()) as u64;
         let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
         loop {
-            let made = Self::new(gpu, slots, lights, film.has_aovs());
+            let made = Self::new(gpu, slots, needs, film.has_aovs());
             match made.and_then(|buffers| gpu.buffer(&reading).map(|_| buffers)) {
                 Err(Error::OutOfMemory { .. }) if slots > SLOTS_MIN => slots = (slots / 2).next_multiple_of(PATH_GROUP),
                 made => return made.map(|buffers| (buffers, slots)),
@@ -139,7 +165,7 @@ impl WaveBuffers {
         }
     }
 
-    pub fn new(gpu: &Gpu, slots: u32, lights: bool, aovs: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, slots: u32, needs: WaveNeeds, aovs: bool) -> Result<Self> {
         let work = |name: &str, bytes: usize, count: u32| {
             gpu.buffer(&BufferDesc::storage(
                 name,
@@ -154,7 +180,7 @@ impl WaveBuffers {
             gpu.storage_texels(name, Category::Work, vk::Format::R32G32B32A32_UINT, texels)
         };
         let states = |name: &str| quarters(name, size_of::<PathState>(), slots);
-        let lit_slots = if lights { slots } else { 0 };
+        let lit_slots = if needs.lights { slots } else { 0 };
         let chunks = slots.div_ceil(COMPACT_CHUNK);
         Ok(Self {
             status: work("path status", size_of::<Status>(), 1)?,
@@ -173,7 +199,31 @@ impl WaveBuffers {
                 "path status readback",
                 size_of::<Status>() as u64,
             ))?,
+            media: needs.media.then(|| MediaBuffers::new(gpu, slots, needs)).transpose()?,
         })
+    }
+
+    /// Set 4. Without media nothing is read or written through it, and some other buffer stands there.
+    pub fn media_set(&self) -> PathMedia<'_> {
+        let Some(media) = &self.media else {
+            let none = self.chunks.view();
+            return PathMedia {
+                path_medium_states: none,
+                path_medium_events: none,
+                path_shadow_interiors: none,
+                path_airlight_rays: none,
+                path_shadow_states: none,
+                medium_counters: none,
+            };
+        };
+        PathMedia {
+            path_medium_states: media.states.view(),
+            path_medium_events: media.events.view(),
+            path_shadow_interiors: media.interiors.view(),
+            path_airlight_rays: media.airlight_rays.view(),
+            path_shadow_states: media.shadow_states.view(),
+            medium_counters: media.counters.view(),
+        }
     }
 
     /// Set 0 with the queues in the roles of a bounce of this parity.
@@ -197,5 +247,28 @@ impl WaveBuffers {
             path_chunks: self.chunks.view(),
             path_aovs: self.aovs.view(),
         }
+    }
+}
+
+impl MediaBuffers {
+    fn new(gpu: &Gpu, slots: u32, needs: WaveNeeds) -> Result<Self> {
+        let work = |name: &str, bytes: usize, count: u32| {
+            let bytes = bytes as u64 * u64::from(count);
+            gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work))
+        };
+        let lit_slots = if needs.lights { slots } else { 0 };
+        let airlight_slots = if needs.airlight { slots } else { 0 };
+        Ok(Self {
+            states: work("path medium states", size_of::<MediumState>(), slots)?,
+            events: work("path medium events", size_of::<MediumEvent>(), slots)?,
+            interiors: work("path shadow interiors", size_of::<[u32; 2]>(), lit_slots)?,
+            airlight_rays: work("path airlight rays", size_of::<ShadowRay>(), airlight_slots)?,
+            shadow_states: work("path shadow states", size_of::<ShadowState>(), lit_slots)?,
+            counters: work("path medium counters", size_of::<MediumCounters>(), 1)?,
+            readback: gpu.buffer(&BufferDesc::readback(
+                "path medium counters readback",
+                size_of::<MediumCounters>() as u64,
+            ))?,
+        })
     }
 }

@@ -1,0 +1,61 @@
+// Participating media of the scene: set 3, filled by clerestory::transport::GpuScene; twin of clerestory::scene::DensityGrid.
+//
+// Only kernels that are dispatched for scenes with media use it. Everything is read by texel fetches, as in scene/bindings.glsl.
+#ifndef CLERESTORY_SCENE_MEDIA_GLSL
+#define CLERESTORY_SCENE_MEDIA_GLSL
+
+#extension GL_EXT_samplerless_texture_functions : require
+
+#include "scene/records.glsl"
+
+// descriptor set 3: MediaSet
+
+layout(set = 3, binding = 0) uniform utextureBuffer media_records;
+layout(set = 3, binding = 1) uniform textureBuffer media_densities;  // of all grids, x fastest
+layout(set = 3, binding = 2) uniform textureBuffer media_majorants;  // greatest densities of blocks of cells
+
+uvec4 medium_quarter(uint medium, uint quarter) { return texelFetch(media_records, int(MEDIUM_QUARTERS * medium + quarter)); }
+
+SceneMedium load_medium(uint index) {
+    uvec4 q0 = medium_quarter(index, 0u);
+    uvec4 q1 = medium_quarter(index, 1u);
+    uvec4 q2 = medium_quarter(index, 2u);
+    uvec4 q3 = medium_quarter(index, 3u);
+    uvec4 q4 = medium_quarter(index, 4u);
+    uvec4 q5 = medium_quarter(index, 5u);
+    uvec4 q6 = medium_quarter(index, 6u);
+    uvec4 q7 = medium_quarter(index, 7u);
+    uvec4 q8 = medium_quarter(index, 8u);
+    return SceneMedium(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), uintBitsToFloat(q1.w), uintBitsToFloat(q2.xyz),
+                       uintBitsToFloat(q2.w), uintBitsToFloat(q3.xyz), q3.w, uintBitsToFloat(q4.xyz), q4.w,
+                       uintBitsToFloat(q5.xyz), q5.w, uintBitsToFloat(q6.xyz), uintBitsToFloat(q6.w), q7.xyz, q7.w, q8.xyz, q8.w);
+}
+
+// A direction of world space in cells of the grid.
+vec3 direction_to_cells(SceneMedium m, vec3 d) { return vec3(dot(m.row_x, d), dot(m.row_y, d), dot(m.row_z, d)); }
+
+float fetch_density(SceneMedium m, uvec3 cell) {
+    return texelFetch(media_densities, int(m.first_density + (cell.z * m.cells.y + cell.y) * m.cells.x + cell.x)).x;
+}
+
+// Density at a point in cells that lies in the grid: between centres by trilinear interpolation, constant outside of them.
+float density_in_cells(SceneMedium m, vec3 point) {
+    vec3 last = vec3(m.cells - 1u);
+    vec3 at = clamp(point - 0.5, vec3(0.0), last);
+    vec3 below = floor(at);
+    vec3 w = at - below;
+    uvec3 a = uvec3(below);
+    uvec3 b = uvec3(min(below + 1.0, last));
+    vec4 x0 = vec4(fetch_density(m, a), fetch_density(m, uvec3(a.x, b.y, a.z)), fetch_density(m, uvec3(a.xy, b.z)),
+                   fetch_density(m, uvec3(a.x, b.yz)));
+    vec4 x1 = vec4(fetch_density(m, uvec3(b.x, a.yz)), fetch_density(m, uvec3(b.xy, a.z)), fetch_density(m, uvec3(b.x, a.y, b.z)),
+                   fetch_density(m, b));
+    vec4 x = mix(x0, x1, w.x);
+    return mix(mix(x.x, x.y, w.y), mix(x.z, x.w, w.y), w.z);
+}
+
+float fetch_majorant(SceneMedium m, ivec3 block) {
+    return texelFetch(media_majorants, int(m.first_majorant) + (block.z * int(m.blocks.y) + block.y) * int(m.blocks.x) + block.x).x;
+}
+
+#endif

@@ -1,0 +1,34 @@
+// Which medium a way was in, and which one is beyond the surface that ends it; see path_media.glsl.
+#ifndef CLERESTORY_TRANSPORT_PATH_BODIES_GLSL
+#define CLERESTORY_TRANSPORT_PATH_BODIES_GLSL
+
+#include "scene/bindings.glsl"
+#include "transport/path_media.glsl"
+
+struct Crossing {
+    uint interior;  // body that the way was in, or OUTSIDE
+    uint beyond;    // body on the other side
+    bool boundary;  // the surface is there for media alone
+};
+
+// The way in `direction` to a triangle, believed to be inside of `interior`.
+Crossing cross_surface(uint triangle_index, vec3 direction, uint interior) {
+    SceneTriangle triangle = load_triangle(triangle_index);
+    uvec4 q7 = material_quarter(triangle.material, 7u);
+    float transmission = uintBitsToFloat(material_quarter(triangle.material, 3u).w);
+    float thickness = uintBitsToFloat(material_quarter(triangle.material, 6u).w);
+    bool boundary = (q7.z & MATERIAL_BOUNDARY) != 0u;
+    if (!boundary && !(transmission > 0.0 && thickness > 0.0)) {
+        return Crossing(interior, interior, false);
+    }
+    bool entering = dot(cross(triangle.b - triangle.a, triangle.c - triangle.a), direction) < 0.0;
+    uint around = triangle.around - 1u;
+    return entering ? Crossing(around, triangle.material, boundary) : Crossing(triangle.material, around, boundary);
+}
+
+// Index of the medium inside of a body, or NO_MEDIUM; `surrounding` is the one outside of all.
+uint medium_inside(uint interior, uint surrounding) {
+    return interior == OUTSIDE ? surrounding : material_quarter(interior, 9u).z - 1u;
+}
+
+#endif

@@ -1,0 +1,66 @@
+// What paths know of media: set 4 of the path tracer's stages, and the surfaces that bound media.
+//
+// A body is a solid that refracts or an invisible boundary. Paths carry the material of the innermost body they are in; what is outside of a
+// body is known for each of its triangles, so bodies may lie in bodies, as long as their surfaces do not cross. A surface of a body tells
+// by its side which body the way to it was in, whatever the path believed: rounding cannot leave a path in the wrong medium for good.
+// Boundaries leave the ray as it is: the search for the next surface begins one rounding unit behind them, so nothing is skipped.
+#ifndef CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
+#define CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
+
+#include "transport/path_buffers.glsl"
+
+// descriptor set 4: PathMedia
+
+// There is nothing left for the shading stage.
+const uint EVENT_HANDLED = 1u;
+const uint NO_MEDIUM = 0xFFFFFFFFu;
+
+struct MediumState {
+    vec3 bands;   // as in transport/medium.glsl
+    float start;  // distance along the ray up to which the path has come; negative by what the offset of its origin left out
+};
+
+struct MediumEvent {
+    vec3 weight;  // of the throughput on the way to the surface
+    uint flags;   // EVENT_HANDLED, FLAG_AIRLIGHT
+};
+
+struct ShadowState {
+    vec3 transmittance;
+    float start;
+    Hit hit;
+    uint interior;
+    uint walks;  // through grids, so far
+    uint rays;   // those still to follow: FLAG_AIRLIGHT, FLAG_SAMPLED; the first one is under way
+};
+
+layout(set = 4, binding = 0, scalar) restrict buffer PathMediumStates { MediumState path_medium_states[]; };     // by slot
+layout(set = 4, binding = 1, scalar) restrict buffer PathMediumEvents { MediumEvent path_medium_events[]; };     // by place
+layout(set = 4, binding = 2, scalar) restrict buffer PathShadowInteriors { uvec2 path_shadow_interiors[]; };     // by place: of the sampled ray, and of airlight
+layout(set = 4, binding = 3, scalar) restrict buffer PathAirlightRays { ShadowRay path_airlight_rays[]; };       // by place
+layout(set = 4, binding = 4, scalar) restrict buffer PathShadowStates { ShadowState path_shadow_states[]; };     // by place in the shadow queue
+// 64-bit counters, low word first.
+layout(set = 4, binding = 5, scalar) restrict buffer PathMediumCounters {
+    uint collisions[2];
+    uint null_collisions[2];
+    uint density_lookups[2];
+    uint second_rays[2];  // of places that have one already
+} medium_counters;
+
+#define COUNT_MEDIUM(COUNTER, AMOUNT) { \
+    uint counted_amount = AMOUNT; \
+    if (counted_amount > 0u && atomicAdd(medium_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
+        atomicAdd(medium_counters.COUNTER[1], 1u); \
+    } \
+}
+
+// The least distance that no device flushes to zero.
+const float NORMAL_MIN = 1.17549435e-38;
+
+// How far a ray has come that passes a surface at a distance of t.
+float past_surface(float t) { return max(t, NORMAL_MIN); }
+
+// Where the search for the next surface begins: at the next float behind the last one, if there was one.
+float search_start(float start) { return start > 0.0 ? uintBitsToFloat(floatBitsToUint(start) + 1u) : 0.0; }
+
+#endif

@@ -1,0 +1,138 @@
+// The shadow stage for scenes with media: adds what light sampling found, as much of it as the media let through. Boundaries are passed,
+// every other surface blocks.
+//
+// Homogeneous media in closed form, grids by ratio tracking: unbiased. A ray that has met too many surfaces, or whose traversal or walk a quota
+// stops, stalls the wave and goes on from where it is.
+#ifndef CLERESTORY_TRANSPORT_PATH_SHADOW_MEDIA_GLSL
+#define CLERESTORY_TRANSPORT_PATH_SHADOW_MEDIA_GLSL
+
+#include "transport/path_candidates.glsl"
+#include "transport/media_tracking.glsl"
+#include "transport/path_bodies.glsl"
+
+layout(constant_id = 20) const bool HAS_GRIDS = true;
+layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
+
+// Surfaces met in one dispatch. With alpha, a traversal's iterations add up over the lanes.
+const uint SHADOW_SURFACES = 8u;
+const uint SHADOW_SURFACES_ALPHA = 2u;
+#ifdef PATH_ALPHA
+#define SHADOW_SURFACES_MAX SHADOW_SURFACES_ALPHA
+#else
+#define SHADOW_SURFACES_MAX SHADOW_SURFACES
+#endif
+// Random numbers of a walk; those of the next begin behind them.
+const uint WALK_SHIFT = 16u;
+// Stands for the round in the key of shadow rays' random numbers, so that those of ways do not return.
+const uint SHADOW_KEY = 0x40000000u;
+
+// Of a place's rays, the one that is first in `rays`.
+ShadowRay first_ray(uint place, uint rays) {
+    if ((rays & FLAG_AIRLIGHT) != 0u) {
+        return path_airlight_rays[place];
+    }
+    return load_shadow_ray(place);
+}
+
+ShadowState begin_ray(uint place, uint rays, float t_max, uint walks) {
+    uvec2 interiors = path_shadow_interiors[place];
+    return ShadowState(vec3(1.0), 0.0, no_hit(t_max), (rays & FLAG_AIRLIGHT) != 0u ? interiors.y : interiors.x, walks, rays);
+}
+
+// The next surface of a ray to which the way has been searched: passes a boundary, ends elsewhere. True when the ray has ended, its transmittance
+// known; WALK_STOPPED in `outcome` where a walk has to go on.
+bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, out uint outcome) {
+    bool met = state.hit.triangle != NO_HIT;
+    Crossing crossing = Crossing(s.t_max < FAR_AWAY ? state.interior : OUTSIDE, OUTSIDE, false);
+    if (met) {
+        crossing = cross_surface(state.hit.triangle, s.direction, state.interior);
+    }
+    if (met && !crossing.boundary) {
+        state.transmittance = vec3(0.0);
+    }
+    outcome = WALK_LEFT;
+    float scale = length(s.direction);
+    uint medium = medium_inside(crossing.interior, push.surrounding);
+    if (medium != NO_MEDIUM && state.transmittance != vec3(0.0)) {
+        SceneMedium m = load_medium(medium);
+        if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
+            state.transmittance *= transmittance(m.sigma_t, max(state.hit.t - state.start, 0.0) * scale);
+        } else if (HAS_GRIDS) {
+            GridWalk walk = begin_grid_walk(m, s.origin, s.direction, state.start, state.hit.t);
+            walk.draw = state.walks << WALK_SHIFT;
+            ++state.walks;
+            uvec4 key = uvec4(push.first_pixel + s.slot / push.sample_count, push.first_sample + s.slot % push.sample_count,
+                              SHADOW_KEY + status.rounds, push.seed);
+            outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
+            COUNT_MEDIUM(density_lookups, walk.nulls)
+            state.start = outcome == WALK_STOPPED ? walk.t : state.start;
+        }
+    }
+    bool ended = outcome == WALK_LEFT && (!met || state.transmittance == vec3(0.0));
+    if (!ended) {
+        if (outcome == WALK_LEFT) {
+            state.start = past_surface(state.hit.t);
+            state.interior = crossing.beyond;
+        }
+        state.hit = no_hit(s.t_max);
+    }
+    return ended;
+}
+
+void main() {
+    uint queue_place = gl_GlobalInvocationID.x;
+    if (status.stalled == STALLED_EXTEND || queue_place >= status.shadow_count) {
+        return;
+    }
+    uint resume = BVH2_START;
+    if (RESUMES) {
+        resume = path_resume[queue_place];
+        if (resume == BVH2_FINISHED) {
+            return;
+        }
+    }
+    uint place = texelFetch(path_shadow_queue_in, int(queue_place)).x;
+    uint rays = texelFetch(path_flags_in, int(place / FLAGS_A_TEXEL))[place % FLAGS_A_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
+    if (RESUMES) {
+        rays = path_shadow_states[queue_place].rays;
+    }
+    ShadowRay s = first_ray(place, rays);
+    ShadowState state = begin_ray(place, rays, s.t_max, 0u);
+    if (RESUMES) {
+        state = path_shadow_states[queue_place];
+    }
+    BEGIN_CANDIDATES(s.slot, s.bounce, CANDIDATES_SHADOW)
+    bool stopped = false;
+    uint iterations = GRID_WALK_QUOTA;
+    for (uint surface = 0u; surface < SHADOW_SURFACES_MAX && state.rays != 0u && !stopped; ++surface) {
+        resume = closest_hit(Ray(s.origin, search_start(state.start), s.direction, s.t_max), resume, state.hit);
+        stopped = resume != BVH2_FINISHED;
+        if (!stopped) {
+            resume = BVH2_START;
+            uint outcome;
+            if (pass_surface(s, state, iterations, outcome)) {
+                if (state.transmittance != vec3(0.0)) {
+                    path_gathered[s.slot].radiance += s.contribution * state.transmittance;
+                }
+                rays = state.rays & (state.rays - 1u);
+                if (rays != 0u) {
+                    COUNT_MEDIUM(second_rays, 1u)
+                    s = first_ray(place, rays);
+                    state = begin_ray(place, rays, s.t_max, state.walks);
+                }
+                state.rays = rays;
+            }
+            stopped = outcome == WALK_STOPPED;
+        }
+    }
+    if (state.rays == 0u) {
+        path_resume[queue_place] = BVH2_FINISHED;
+        return;
+    }
+    path_resume[queue_place] = resume;
+    path_shadow_states[queue_place] = state;
+    atomicAdd(status.unfinished, 1u);
+    atomicMax(status.stalled, STALLED_SHADOW);
+}
+
+#endif

@@ -1,0 +1,267 @@
+#version 460
+// Wavefront path tracer: what happens in the medium on the way to the surface that a ray has met. Free flight to a collision, light sampled
+// and a direction chosen there; or on through a boundary; or the weight with which the path arrives at the surface, for path_shade.comp.
+//
+// BG-1, BG-3, BG-4, PM-F-3: volumetric path tracing by analytic free flight (homogeneous media) and delta tracking (grids); methods and
+// sources in transport/medium.glsl and transport/media_tracking.glsl. Emission of homogeneous media is integrated along the way in closed
+// form, that of grids is collected at tentative collisions. Light from points and spots is in homogeneous media also sampled
+// equi-angularly, combined by the power heuristic. Unbiased. Light from infinity does not pass an endless medium that extinguishes.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+layout(constant_id = 20) const bool HAS_GRIDS = true;        // media with a density grid
+layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
+layout(constant_id = 22) const bool HAS_AIRLIGHT = true;     // equi-angular samples
+
+#include "transport/path_features.glsl"
+#include "transport/path_buffers.glsl"
+#include "transport/path_set.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint first_pixel;
+    vec3 scene_upper;
+    uint first_sample;
+    uint sample_count;
+    uint seed;
+    uint path_set;          // PathSet, packed
+    uint roulette_start;    // first bounce at which Russian roulette may end a path
+    float roulette_cap;     // largest probability to go on
+    uint surrounding;       // index of the medium outside of all bodies, or NO_MEDIUM
+    uint accepting;         // states of the automaton in which light counts, a bit each
+    uint successors[15];    // of each state
+} push;
+
+#include "transport/path_draws.glsl"
+#include "transport/light_choice.glsl"
+#include "transport/media_tracking.glsl"
+#include "transport/path_bodies.glsl"
+#include "transport/phase.glsl"
+
+// The way from the path's start to the surface.
+struct Way {
+    float start;
+    float end;
+    uint interior;
+};
+
+// What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
+vec3 place_on_way(PathState path, Way way, float t) { return path.origin + max(way.start + t, 0.0) * path.direction; }
+
+ShadowRay shadow_ray(uint slot, PathState path, vec3 from, vec3 to, vec3 contribution) {
+    ShadowRay ray;
+    ray.origin = from;
+    ray.t_max = 1.0;
+    ray.direction = to - from;
+    ray.slot = slot;
+    ray.contribution = contribution;
+    ray.bounce = path.bounce + 1u;
+    return ray;
+}
+
+// Light of a point or spot scattered once on the way, at a place chosen by the angle under which the light sees it. True where there is some.
+bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMedium m, Way way, vec2 u) {
+    float probability;
+    SceneLight light = load_light(distribution_sample(0u, light_count(), u.x, probability));
+    if (light.kind != LIGHT_POINT && light.kind != LIGHT_SPOT) {
+        return false;
+    }
+    float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
+    vec3 start = path.origin + way.start * path.direction;
+    EquiAngular e = equi_angular(start, path.direction, t_max, light.position);
+    float t = equi_angular_sample(e, t_max, u.y);
+    float pdf = equi_angular_pdf(e, t);
+    vec3 from = place_on_way(path, way, t);
+    vec3 to = light.position - from;
+    float squared = dot(to, to);
+    if (!(pdf > 0.0) || squared <= 0.0) {
+        return false;
+    }
+    vec3 wi = to * inversesqrt(squared);
+    float falloff = light.kind == LIGHT_SPOT ? spot_falloff(-dot(light.direction, wi), light.cos_inner, light.cos_outer) : 1.0;
+    float phase = phase_function(m.phase, m.phase_parameter, dot(wi, path.direction));
+    float weight = power_heuristic(pdf, collision_density(m.sigma_t, bands, t));
+    vec3 contribution = path.throughput * m.sigma_s * transmittance(m.sigma_t, t) * light.strength
+        * (falloff * phase * weight / (squared * probability * pdf));
+    if (contribution == vec3(0.0)) {
+        return false;
+    }
+    path_airlight_rays[place] = shadow_ray(slot, path, from, light.position, contribution);
+    path_shadow_interiors[place].y = way.interior;
+    return true;
+}
+
+// Light that a collision at `from`, t from the start of the way, scatters into the path. True where there is some.
+bool sample_collision_light(uint slot, uint place, PathState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
+    vec2 choice = bounce_sample(slot, path.bounce, DIMENSION_LIGHT);
+    vec2 u = bounce_sample(slot, path.bounce, DIMENSION_LIGHT_POINT);
+    vec2 within = HAS_ENVIRONMENT ? bounce_sample(slot, path.bounce, DIMENSION_LIGHT_WITHIN) : vec2(0.0);
+    LightSample light = sample_light(from, choice.x, u, within, push.scene_lower, push.scene_upper);
+    if (light.radiance == vec3(0.0)) {
+        return false;
+    }
+    float phase = phase_function(m.phase, m.phase_parameter, dot(light.direction, path.direction));
+    float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, phase) : 1.0;
+    if (HAS_AIRLIGHT && light.pdf == 0.0 && !light.infinite && m.has_grid == 0u) {
+        float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
+        EquiAngular e = equi_angular(path.origin + way.start * path.direction, path.direction, t_max, light.point.position);
+        weight = power_heuristic(collision_density(m.sigma_t, bands, t), equi_angular_pdf(e, t));
+    }
+    ShadowRay ray = shadow_ray(slot, path, from, light.point.position, path.throughput * light.radiance * (phase * weight));
+    if (light.infinite) {
+        ray.t_max = FAR_AWAY;
+        ray.direction = light.direction;
+    } else {
+        shadow_segment(SurfacePoint(from, vec3(0.0)), vec3(0.0), light.point, light.normal, ray.origin, ray.direction);
+    }
+    path_shadow_rays_out[place] = ray;
+    path_shadow_interiors[place].x = way.interior;
+    return true;
+}
+
+// The path's new direction at a collision; false when it ends.
+bool scatter(uint slot, SceneMedium m, vec3 at, inout PathState path) {
+    vec2 lobe = bounce_sample(slot, path.bounce, DIMENSION_LOBE);
+    vec2 u = bounce_sample(slot, path.bounce, DIMENSION_DIRECTION);
+    float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
+    path.pdf = phase_function(m.phase, m.phase_parameter, c);
+    path.origin = at;
+    path.direction = normalize(phase_direction(path.direction, c, u.y));
+    path.bounce += 1u;
+    if (path.bounce >= push.roulette_start) {
+        vec3 t = path.throughput * path.eta_scale;
+        float survival = min(max(t.x, max(t.y, t.z)), push.roulette_cap);
+        // Also ends a path whose throughput is not a number.
+        if (!(lobe.y < survival)) {
+            return false;
+        }
+        path.throughput /= survival;
+    }
+    return path.throughput != vec3(0.0);
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled != STALLED_NOT || place >= status.active_count) {
+        return;
+    }
+    uint slot = load_slot(place);
+    PathState path = load_path(slot);
+    uint automaton = 0u;
+    if (HAS_PATH_AUTOMATON) {
+        automaton = path_set_state(path.bounce);
+        path.bounce = path_set_bounce(path.bounce);
+    }
+    MediumState state = MediumState(vec3(1.0 / 3.0), 0.0);
+    if (status.rounds > 0u) {
+        state = path_medium_states[slot];
+    }
+    Hit hit = load_hit(place);
+    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (hit.triangle != NO_HIT) {
+        crossing = cross_surface(hit.triangle, path.direction, path_gathered[slot].interior);
+    }
+    Way way = Way(state.start, hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start), crossing.interior);
+    uint medium = medium_inside(way.interior, push.surrounding);
+    vec3 weight = vec3(1.0);
+    vec3 emitted = vec3(0.0);
+    uint flags = 0u;
+    uint outcome = WALK_LEFT;
+    SceneMedium m;
+    float t = 0.0;  // of a collision, from the start of the way
+    vec3 bands = state.bands;
+    bool counted = path_set_contains(push.path_set, path.bounce);
+    bool scattering = path_set_continues(push.path_set, path.bounce) && (path_set_lobes(push.path_set) & LOBE_VOLUME) != 0u;
+    uint after = 0u;  // state of the automaton after scattering in a medium
+    if (HAS_PATH_AUTOMATON) {
+        after = path_set_successor(push.successors[automaton], LOBE_VOLUME);
+        counted = counted && (push.accepting >> automaton & 1u) != 0u;
+        scattering = path_set_continues(push.path_set, path.bounce) && after != PATH_SET_DEAD;
+    }
+    bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
+    bool lighting = lit && scattering && path_set_contains(push.path_set, path.bounce + 1u);
+    lighting = lighting && (!HAS_PATH_AUTOMATON || (push.accepting >> after & 1u) != 0u);
+    // Draws of the medium are numbered by the round, which is the number of the path's ways so far.
+    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_A_WAY * status.rounds;
+    if (medium != NO_MEDIUM && way.end > way.start) {
+        m = load_medium(medium);
+        // Where collisions would only end the path, it goes on in proportion to the transmittance instead.
+        bool passes = !scattering || m.sigma_s == vec3(0.0);
+        if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
+            float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
+            if (m.emission != vec3(0.0)) {
+                emitted = path.throughput * m.emission * vec3(attenuated_length(m.sigma_t.x, t_max), attenuated_length(m.sigma_t.y, t_max),
+                                                              attenuated_length(m.sigma_t.z, t_max));
+            }
+            if (HAS_AIRLIGHT && lighting && m.sigma_s != vec3(0.0)) {
+                Sampler s = path_sampler(slot, dimension + DIMENSION_AIRLIGHT);
+                if (sample_airlight(slot, place, path, bands, m, way, sample_2d(s))) {
+                    flags |= FLAG_AIRLIGHT | FLAG_SHADOW;
+                }
+            }
+            if (passes) {
+                weight = transmittance(m.sigma_t, t_max);
+            } else {
+                Sampler s = path_sampler(slot, dimension);
+                FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, bands, t_max, sample_2d(s));
+                t = flight.t;
+                weight = flight.weight;
+                state.bands = flight.bands;
+                outcome = flight.collides ? WALK_COLLIDED : WALK_LEFT;
+            }
+        } else if (HAS_GRIDS) {
+            uint pixel = push.first_pixel + slot / push.sample_count;
+            uvec4 key = uvec4(pixel, push.first_sample + slot % push.sample_count, dimension, push.seed);
+            GridWalk walk = begin_grid_walk(m, path.origin, path.direction, way.start, way.end);
+            outcome = delta_tracking(m, key, path.throughput, passes, walk, state.bands, weight, emitted);
+            t = walk.t - way.start;
+            COUNT_MEDIUM(null_collisions, walk.nulls)
+            COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == WALK_COLLIDED ? 1u : 0u))
+        }
+        COUNT_MEDIUM(collisions, outcome == WALK_COLLIDED ? 1u : 0u)
+        if (counted && emitted != vec3(0.0)) {
+            path_gathered[slot].radiance += emitted;
+        }
+    }
+    if (HAS_ABSORPTION && way.interior != OUTSIDE && outcome == WALK_LEFT) {
+        weight *= exp(-load_material(way.interior).absorption * (way.end - max(way.start, 0.0)));
+    }
+    bool handled = true;
+    bool alive = false;
+    uint interior = way.interior;
+    if (outcome == WALK_COLLIDED) {
+        path.throughput *= weight;
+        if (path.throughput != vec3(0.0)) {
+            vec3 at = place_on_way(path, way, t);
+            if (lighting && sample_collision_light(slot, place, path, bands, m, way, at, t)) {
+                flags |= FLAG_SAMPLED | FLAG_SHADOW;
+            }
+            alive = scatter(slot, m, at, path);
+            automaton = after;
+            state.start = 0.0;
+        }
+    } else if (outcome == WALK_STOPPED) {
+        path.throughput *= weight;
+        state.start = way.start + t;
+        alive = true;
+    } else if (crossing.boundary) {
+        path.throughput *= weight;
+        state.start = past_surface(hit.t);
+        interior = crossing.beyond;
+        alive = path.throughput != vec3(0.0);
+    } else {
+        handled = false;
+    }
+    path_gathered[slot].interior = interior;
+    path_medium_states[slot] = state;
+    path_medium_events[place] = MediumEvent(weight, (flags & FLAG_AIRLIGHT) | (handled ? EVENT_HANDLED : 0u));
+    path_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);
+    if (alive) {
+        if (HAS_PATH_AUTOMATON) {
+            path.bounce = path_set_joined(path.bounce, automaton);
+        }
+        path_states_out[slot] = path;
+    }
+}

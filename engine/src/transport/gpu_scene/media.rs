@@ -1,0 +1,105 @@
+//! Media records, densities and their majorants, as scene/media.glsl reads them.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::bodies::Bodies;
+use crate::Result;
+use crate::gpu::ash::vk;
+use crate::gpu::shaders::constants::{PHASE_HENYEY_GREENSTEIN, PHASE_ISOTROPIC, PHASE_RAYLEIGH, PHASE_SCHLICK};
+use crate::gpu::shaders::sets::MediaSet;
+use crate::gpu::shaders::types::SceneMedium;
+use crate::gpu::{Category, Gpu, TexelView};
+use crate::scene::{MajorantGrid, Medium, Phase, Scene};
+
+/// Blocks along the longest side of a grid, about, and the least number of cells along a side of one.
+const BLOCKS_A_SIDE: u32 = 32;
+const BLOCK_MIN: u32 = 4;
+/// Tentative collisions on the way through a grid that emits, at least.
+const EMISSION_DEPTH: f64 = 4.0;
+
+/// The media of a scene in device memory.
+#[derive(Debug)]
+pub(super) struct GpuMedia {
+    records: TexelView,
+    densities: TexelView,
+    majorants: TexelView,
+    pub(super) bodies: Bodies,
+    /// The medium outside of all bodies.
+    pub(super) surrounding: Option<u32>,
+}
+
+impl GpuMedia {
+    pub(super) fn new(gpu: &Gpu, scene: &Scene, bodies: Bodies) -> Result<Self> {
+        let (mut densities, mut majorants) = (Vec::new(), Vec::new());
+        let media = scene.media.iter();
+        let records: Vec<_> = media
+            .map(|medium| record(medium, &mut densities, &mut majorants))
+            .collect();
+        let texels =
+            |name: &str, values: &[f32]| gpu.texels_with(name, Category::Material, vk::Format::R32_SFLOAT, values);
+        let format = vk::Format::R32G32B32A32_UINT;
+        let bytes: &[u8] = bytemuck::cast_slice(&records);
+        Ok(Self {
+            records: gpu.texels_with("media", Category::Material, format, bytes)?,
+            densities: texels("densities", &densities)?,
+            majorants: texels("majorants", &majorants)?,
+            bodies,
+            surrounding: scene
+                .surrounding
+                .filter(|&index| !scene.media[index as usize].is_empty()),
+        })
+    }
+
+    pub(super) fn set(&self) -> MediaSet<'_> {
+        MediaSet {
+            media_records: &self.records,
+            media_densities: &self.densities,
+            media_majorants: &self.majorants,
+        }
+    }
+}
+
+fn record(medium: &Medium, densities: &mut Vec<f32>, majorants: &mut Vec<f32>) -> SceneMedium {
+    let (phase, phase_parameter) = match medium.phase {
+        Phase::Isotropic => (PHASE_ISOTROPIC, 0.0),
+        Phase::HenyeyGreenstein { g } => (PHASE_HENYEY_GREENSTEIN, g),
+        Phase::Schlick { k } => (PHASE_SCHLICK, k),
+        Phase::Rayleigh => (PHASE_RAYLEIGH, 0.0),
+    };
+    let mut record = SceneMedium {
+        sigma_s: medium.sigma_s.to_array(),
+        phase,
+        sigma_t: medium.sigma_t().to_array(),
+        phase_parameter,
+        emission: medium.emission.to_array(),
+        majorant: medium.sigma_t().max_element(),
+        ..SceneMedium::default()
+    };
+    let Some(grid) = medium.density.as_ref().filter(|_| !medium.is_empty()) else {
+        return record;
+    };
+    let cells = DVec3::from_array(grid.size.map(f64::from));
+    let to_cube = grid.to_world.inverse();
+    let rows = DMat3::from_diagonal(cells) * to_cube.matrix3;
+    let row = |i| rows.row(i).as_vec3().to_array();
+    let block = (grid.size.into_iter().max().unwrap_or(1) / BLOCKS_A_SIDE).max(BLOCK_MIN);
+    let bounds = MajorantGrid::new(grid, block);
+    if medium.emission != Vec3::ZERO {
+        let diagonal = grid.to_world.transform_vector3(DVec3::ONE).length();
+        let least = EMISSION_DEPTH / (diagonal * f64::from(grid.max()));
+        record.majorant = record.majorant.max(least as f32);
+    }
+    record.row_x = row(0);
+    record.row_y = row(1);
+    record.row_z = row(2);
+    record.offset = (cells * to_cube.translation).as_vec3().to_array();
+    record.has_grid = 1;
+    record.first_density = densities.len() as u32;
+    record.first_majorant = majorants.len() as u32;
+    record.block = block as f32;
+    record.cells = grid.size;
+    record.blocks = bounds.size;
+    densities.extend_from_slice(&grid.values);
+    majorants.extend_from_slice(&bounds.maxima);
+    record
+}
