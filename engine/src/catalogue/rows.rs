@@ -166,7 +166,7 @@ pub(super) const ROWS: &[Row] = &[
         "clerestory report phase-functions",
         unbiased(part(
             "PM-F-3",
-            "phase functions of Henyey and Greenstein and of Schlick (functions; no medium yet)",
+            "phase functions of Henyey and Greenstein, Schlick and Rayleigh",
             "Henyey and Greenstein 1941; Blasi, Le Saëc and Schlick 1993",
             "engine/src/transport/phase.rs",
             &[
