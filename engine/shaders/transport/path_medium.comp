@@ -245,7 +245,7 @@ void main() {
     } else if (outcome == WALK_STOPPED) {
         path.throughput *= weight;
         state.start = way.start + t;
-        alive = true;
+        alive = path.throughput != vec3(0.0);
     } else if (crossing.boundary) {
         path.throughput *= weight;
         state.start = past_surface(hit.t);

@@ -144,9 +144,11 @@ pub fn sample_null_collision(
     weight: DVec3,
 ) -> (bool, DVec3, DVec3) {
     let probability = bands.dot(real);
-    let collides = u < probability;
+    let null_probability = bands.dot(DVec3::ONE - real);
+    // Rounded, the two may sum to less than the greatest u.
+    let collides = u < probability || null_probability <= 0.0;
     let share = if collides { real } else { DVec3::ONE - real };
-    let inverse = 1.0 / if collides { probability } else { bands.dot(share) };
+    let inverse = 1.0 / if collides { probability } else { null_probability };
     let weight = weight * if collides { scattered } else { share } * inverse;
     (collides, bands * share * inverse, weight)
 }

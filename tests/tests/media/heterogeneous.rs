@@ -62,6 +62,45 @@ fn gradients_attenuate_by_their_integral() {
     });
 }
 
+#[test]
+fn walks_longer_than_a_dispatch_go_on() {
+    with_gpu(|gpu| {
+        // The blue band makes six thousand tentative collisions of the way, three times as many as a dispatch has.
+        let sigma = [0.1f32, 1.0, 3000.0];
+        let medium = Medium {
+            sigma_a: Vec3::from(sigma),
+            density: Some(layers(20, LOW, HIGH, |_| 1.0)),
+            ..Medium::default()
+        };
+        let expected = sigma.map(|s| (-2.0 * f64::from(s)).exp());
+        let mut scene = Scene {
+            environment: Some(Environment::uniform(Vec3::ONE)),
+            ..Scene::default()
+        };
+        add_box(&mut scene, medium, LOW, HIGH);
+        scene
+            .cameras
+            .push(ray_camera(DVec3::new(0.21, 5.0, 0.13), DVec3::NEG_Y));
+        let seen = render(gpu, &scene, [8, 8], 8, &independent());
+        scene.environment = None;
+        let white = scene.add_material(Material::lambert("white", Vec3::ONE));
+        scene.place(clerestory_tests::render::floor("floor", white, 3.0, -1.5));
+        let (direction, irradiance) = (Vec3::NEG_Y, Vec3::splat(PI as f32));
+        scene.add_light("sun", LightKind::Directional { direction, irradiance });
+        scene.cameras[0] = ray_camera(DVec3::new(0.21, -1.2, 0.13), DVec3::NEG_Y);
+        let lit = render(gpu, &scene, [8, 8], 8, &independent());
+        for (what, picture) in [("seen", &seen), ("lit", &lit)] {
+            for (c, (mean, variance)) in picture.mean().into_iter().enumerate().take(2) {
+                report(&format!("long walks, {what}, band {c}"), mean, variance, expected[c]);
+                // Six thousand products of f32.
+                expect_mean(what, mean, variance, expected[c], 6000.0 * 6e-8 * expected[c]);
+            }
+            assert_eq!(picture.mean()[2].0, 0.0);
+        }
+        assert!(seen.counters.density_lookups > 64 * 8 * 5000 && lit.counters.stalls > 0);
+    });
+}
+
 /// A box of a medium in the light of a point, a spot and the sky.
 fn lit_box(medium: Medium) -> Scene {
     let mut scene = Scene {

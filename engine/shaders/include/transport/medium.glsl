@@ -93,9 +93,11 @@ float equi_angular_pdf(EquiAngular e, float t) {
 // the throughput's weight, by `scattered` (the scattering coefficient in the same unit) where it does.
 bool sample_null_collision(vec3 real, vec3 scattered, float u, inout vec3 bands, inout vec3 weight) {
     float probability = dot(bands, real);
-    bool collides = u < probability;
+    float null_probability = dot(bands, 1.0 - real);
+    // Rounded, the two may sum to less than the greatest u.
+    bool collides = u < probability || null_probability <= 0.0;
     vec3 share = collides ? real : 1.0 - real;
-    float inverse = 1.0 / (collides ? probability : dot(bands, share));
+    float inverse = 1.0 / (collides ? probability : null_probability);
     weight *= (collides ? scattered : share) * inverse;
     bands *= share * inverse;
     return collides;
