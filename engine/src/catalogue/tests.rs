@@ -75,10 +75,12 @@ fn fault_of_experiment(id: &str, command: &str) -> Option<String> {
     let words: Vec<&str> = command.split_whitespace().collect();
     let program = match words[..] {
         [] => return Some("no experiment".into()),
-        ["clerestory", command, ..] => format!("tools/src/commands/{command}.rs"),
+        // A command is a file or a folder.
+        ["clerestory", command, ..] => format!("tools/src/commands/{command}"),
         [program, ..] => program.into(),
     };
-    if !repository().join(&program).is_file() {
+    let file = format!("{program}.rs");
+    if !repository().join(&program).exists() && !repository().join(file).is_file() {
         return Some(format!("no program {program}"));
     }
     let ["clerestory", "report", ref names @ ..] = words[..] else {

@@ -8,10 +8,10 @@
 use crate::film::picture::{Picture, VARIANCE};
 use crate::{Error, Result};
 
-/// Pixels to each side of the neighbourhood.
-const REACH: usize = 2;
-/// Inverse of the relative variance at which a pixel and its neighbourhood are believed alike.
-const MISTRUST: f64 = 20.0;
+/// Pixels to each side of the neighbourhoods, the widest first; the last is the pixel alone.
+const REACHES: [usize; 3] = [8, 2, 0];
+/// Standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half.
+const TRUST: f64 = 0.05;
 
 /// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + `offset`) over pixels and channels, as
 /// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it.
@@ -36,16 +36,24 @@ pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64
             .map(pair)
             .map(|(a, b)| (a - b) * (a - b) / 2.0)
             .collect();
-        let (near_squares, near_variances) = (blurred(&squares, width), blurred(&variances, width));
-        for i in 0..width * height {
-            // The pixel's own estimate only where there is little noise: a large difference makes the product small, and the two
-            // must not meet in one quotient.
-            let (signal, noise) = (near_squares[i].max(0.0), MISTRUST * near_variances[i]);
-            let all = signal * signal + noise * noise;
-            let own = if all > 0.0 { signal * signal / all } else { 1.0 };
-            let square = (own * squares[i] + (1.0 - own) * signal).max(0.0);
-            sum += variances[i] / (square + offset);
+        let mut truth = vec![0.0; width * height];
+        for reach in REACHES {
+            let (near_squares, near_variances) = (blurred(&squares, width, reach), blurred(&variances, width, reach));
+            let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
+            for (truth, (square, variance)) in truth.iter_mut().zip(near_squares.iter().zip(&near_variances)) {
+                // A narrower neighbourhood only where there is little noise: a large difference makes the product small, and the two
+                // must not meet in one quotient.
+                let (signal, noise) = (square.max(0.0) * TRUST, variance / count.sqrt());
+                let all = signal * signal + noise * noise;
+                let trust = if all > 0.0 && reach != REACHES[0] {
+                    signal * signal / all
+                } else {
+                    1.0
+                };
+                *truth += trust * (square.max(0.0) - *truth);
+            }
         }
+        sum += variances.iter().zip(&truth).map(|(v, t)| v / (t + offset)).sum::<f64>();
     }
     Ok(sum / (3 * width * height).max(1) as f64)
 }
@@ -67,9 +75,9 @@ pub fn relative_mse_by_variance(picture: &Picture, offset: f64) -> Result<f64> {
 }
 
 /// Means over the square neighbourhood of each pixel, as far as it lies in the picture.
-fn blurred(values: &[f64], width: usize) -> Vec<f64> {
+fn blurred(values: &[f64], width: usize, reach: usize) -> Vec<f64> {
     let height = values.len() / width.max(1);
-    let along = |count: usize, at: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(count);
+    let along = |count: usize, at: usize| at.saturating_sub(reach)..(at + reach + 1).min(count);
     let rows: Vec<f64> = (0..values.len())
         .map(|i| {
             let (x, y) = (i % width, i / width);
