@@ -516,12 +516,28 @@ pub(super) const ROWS: &[Row] = &[
         "clerestory agreement",
         part(
             "CL-CORNELL",
-            "Cornell box and thirteen more generated scenes",
+            "Cornell box and the other generated scenes",
             "Goral, Torrance, Greenberg and Battaile 1984; Cornell University, Cornell Box Data; Haines 1987",
             "engine/src/scene/builtin/mod.rs",
             &[
                 "engine/src/scene/builtin/cornell.rs::the_areas_are_those_of_the_published_data",
                 "engine/src/scene/builtin/mod.rs::every_entry_builds_with_its_defaults_and_has_what_it_promises",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report automatic-choice",
+        part(
+            "CL-PLAN",
+            "automatic choice of technique, settings and samples by pilot pictures",
+            "the engine's own",
+            "engine/src/plan/mod.rs",
+            &[
+                "engine/src/plan/noise.rs::pairs_know_their_error",
+                "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",
+                "engine/src/plan/mod.rs::what_cannot_be_had_is_said",
+                "tests/tests/automatic_choice.rs::predictions_come_true",
+                "tests/tests/automatic_choice.rs::what_cannot_be_chosen_says_why",
             ],
         ),
     ),

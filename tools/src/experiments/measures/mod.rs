@@ -2,6 +2,7 @@
 
 mod absorption;
 mod alpha;
+mod automatic_choice;
 mod barriers;
 mod clock;
 mod coupled;
@@ -65,6 +66,7 @@ const fn on_device(name: &'static str, run: fn(&Context<'_>) -> Result<Vec<Table
 pub const MEASURES: &[Measure] = &[
     on_device("absorption", absorption::measure),
     on_device("alpha", alpha::measure),
+    on_device("automatic-choice", automatic_choice::measure),
     on_device("barriers", barriers::measure),
     on_host("coupled reflection", coupled::measure),
     on_host("multiple scattering", multiscatter::measure),

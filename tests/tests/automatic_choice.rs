@@ -1,0 +1,103 @@
+//! Automatic choice on a device: predictions against what comes out, and reasons where nothing can be chosen.
+
+use std::time::Duration;
+
+use clerestory::film::{CompareOptions, compare};
+use clerestory::plan::{Goal, plan};
+use clerestory::render::{RenderOptions, Rendered, Renderer};
+use clerestory::{Error, scene};
+use clerestory_tests::with_gpu;
+
+/// Predicted and true error may differ by this factor: pilots of 4 samples of 16² pixels know an error within some 30 %, and samples are
+/// whole numbers.
+const FACTOR: f64 = 1.6;
+
+fn render(renderer: &Renderer, options: &RenderOptions) -> Rendered {
+    let mut rendering = renderer.start(options).unwrap();
+    while rendering.step().unwrap().is_some() {}
+    rendering.finish().unwrap()
+}
+
+fn options() -> RenderOptions {
+    RenderOptions {
+        technique: Some("path".into()),
+        size: [16, 16],
+        ..RenderOptions::default()
+    }
+}
+
+#[test]
+fn predictions_come_true() {
+    with_gpu(|gpu| {
+        for address in ["builtin:box-room", "builtin:furnace-medium"] {
+            let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
+            let reference = render(
+                &renderer,
+                &RenderOptions {
+                    spp: 4096,
+                    seed: 1234,
+                    ..options()
+                },
+            );
+            let asked = 0.1;
+            let goal = Goal {
+                error: Some(asked),
+                time: None,
+            };
+            let plan = plan(&renderer, &options(), goal, &mut || true).unwrap();
+            assert!(plan.shortfall.is_empty(), "{}", plan.shortfall);
+            let choice = plan.choice();
+            assert!(choice.error <= asked * 1.001 && choice.spp >= 1, "{choice:?}");
+            let rendered = render(&renderer, &plan.options(&options()));
+            assert_eq!(rendered.report.spp, choice.spp);
+            let error = compare(&rendered.picture, &reference.picture, &CompareOptions::default()).unwrap();
+            let error = error.relative_mse.sqrt();
+            assert!(
+                error < FACTOR * choice.error && choice.error < FACTOR * error,
+                "{address}: {error}, predicted {choice:?}"
+            );
+        }
+    });
+}
+
+#[test]
+fn what_cannot_be_chosen_says_why() {
+    with_gpu(|gpu| {
+        let renderer = Renderer::new(gpu, &scene::load("builtin:cornell-box").unwrap()).unwrap();
+        // No picture in no time: one sample is rendered, and the plan says that it is late.
+        let hasty = Goal {
+            error: None,
+            time: Some(Duration::from_micros(1)),
+        };
+        let late = plan(&renderer, &options(), hasty, &mut || true).unwrap();
+        assert_eq!(late.choice().spp, 1);
+        assert!(late.shortfall.contains("too short"), "{}", late.shortfall);
+        assert!(
+            late.candidates.iter().skip(1).all(|c| c.reason.contains("no time")),
+            "{late:?}"
+        );
+        // An error beyond the time: the time is kept, and the plan says what can be had.
+        let demanding = Goal {
+            error: Some(1e-4),
+            time: Some(Duration::from_secs(20)),
+        };
+        let plan_of = |options: &RenderOptions, goal| plan(&renderer, options, goal, &mut || true);
+        let short = plan_of(&options(), demanding).unwrap();
+        assert!(short.shortfall.contains("takes longer"), "{}", short.shortfall);
+        assert!(short.choice().seconds + short.pilot_seconds <= 20.1, "{short:?}");
+        // What is fixed stays fixed.
+        let fixed = RenderOptions {
+            settings: serde_json::json!({ "sampler": "pcg", "path_set": "direct" }),
+            ..options()
+        };
+        let goal = Goal {
+            error: Some(0.5),
+            time: None,
+        };
+        let chosen = plan_of(&fixed, goal).unwrap();
+        assert_eq!(chosen.choice().settings["sampler"], "pcg");
+        assert_eq!(chosen.choice().settings["path_set"], "direct");
+        let none = Goal::default();
+        assert!(matches!(plan_of(&options(), none), Err(Error::Setting { .. })));
+    });
+}
