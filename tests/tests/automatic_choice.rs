@@ -8,8 +8,8 @@ use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::{Error, scene};
 use clerestory_tests::with_gpu;
 
-/// Predicted and true error may differ by this factor: pilots of 4 samples of 16² pixels know an error within some 30 %, and samples are
-/// whole numbers.
+/// Predicted and true error may differ by this factor: both are means over 16² pixels whose errors differ much, and samples are whole
+/// numbers.
 const FACTOR: f64 = 1.6;
 
 fn render(renderer: &Renderer, options: &RenderOptions) -> Rendered {
@@ -29,7 +29,7 @@ fn options() -> RenderOptions {
 #[test]
 fn predictions_come_true() {
     with_gpu(|gpu| {
-        for address in ["builtin:box-room", "builtin:furnace-medium"] {
+        for address in ["builtin:cornell-box", "builtin:furnace-medium"] {
             let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
             let reference = render(
                 &renderer,
@@ -85,6 +85,15 @@ fn what_cannot_be_chosen_says_why() {
         let short = plan_of(&options(), demanding).unwrap();
         assert!(short.shortfall.contains("takes longer"), "{}", short.shortfall);
         assert!(short.choice().seconds + short.pilot_seconds <= 20.1, "{short:?}");
+        // Without light nothing is known, and that is said.
+        let dark = Renderer::new(gpu, &scene::load("builtin:cornell-box?light=0").unwrap()).unwrap();
+        let goal = Goal {
+            error: Some(0.1),
+            time: None,
+        };
+        let dark = plan(&dark, &options(), goal, &mut || true).unwrap();
+        assert!(dark.shortfall.contains("any light"), "{dark:?}");
+        assert!(dark.choice().spp > 1, "{dark:?}");
         // What is fixed stays fixed.
         let fixed = RenderOptions {
             settings: serde_json::json!({ "sampler": "pcg", "path_set": "direct" }),

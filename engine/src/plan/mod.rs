@@ -54,6 +54,8 @@ pub struct Candidate {
     pub pilot_spp: u32,
     /// Root of the relative MSE of those.
     pub pilot_error: f64,
+    /// Whether its pilots have met any light. Without it `error` is that of a black picture: nothing is known.
+    pub lit: bool,
     /// The error falls as samples^(−slope/2).
     pub slope: f64,
     /// Predicted seconds for each sample a pixel of the whole picture.
@@ -205,6 +207,7 @@ fn candidates(options: &RenderOptions) -> Result<Vec<Candidate>> {
                 pilot_spp: 0,
                 pilot_error: 0.0,
                 slope: 0.0,
+                lit: false,
                 seconds_a_sample: 0.0,
                 spp: 0,
                 error: 0.0,
@@ -229,6 +232,7 @@ fn merge(settings: &mut Value, fixed: &Value, info: &TechniqueInfo) {
 fn score(candidate: &Candidate, goal: Goal) -> f64 {
     let late = |time: Duration| candidate.seconds > time.as_secs_f64();
     match goal.error {
+        _ if !candidate.lit => 2.0 * MISSED,
         // What misses the error because of the time is judged by how far.
         Some(wanted) if goal.time.is_some_and(late) || candidate.error > wanted * (1.0 + TOLERANCE) => {
             MISSED * candidate.error
@@ -240,6 +244,9 @@ fn score(candidate: &Candidate, goal: Goal) -> f64 {
 
 /// Why the choice does not meet the goal.
 fn shortfall(choice: &Candidate, goal: Goal, pilot_seconds: f64) -> String {
+    if !choice.lit {
+        return "no pilot has met any light: nothing is known of the error".into();
+    }
     let all = choice.seconds + pilot_seconds;
     if let Some(time) = goal.time.map(|time| time.as_secs_f64())
         && all > time * (1.0 + TOLERANCE)
@@ -298,6 +305,7 @@ mod tests {
             pilot_spp: 4,
             pilot_error: 0.5,
             slope: 1.0,
+            lit: true,
             seconds_a_sample: 0.1,
             spp: 10,
             error: 0.3,

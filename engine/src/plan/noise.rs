@@ -30,7 +30,15 @@ pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64
     let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
     let mut sum = 0.0;
     for channel in 0..3 {
-        let pair = |i: usize| (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
+        let pair = |i: usize| {
+            let (a, b) = (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
+            // A pixel without a finite sample says nothing.
+            if a.is_finite() && b.is_finite() {
+                (a, b)
+            } else {
+                (0.0, 0.0)
+            }
+        };
         let squares: Vec<f64> = (0..width * height).map(pair).map(|(a, b)| a * b).collect();
         let variances: Vec<f64> = (0..width * height)
             .map(pair)

@@ -19,6 +19,10 @@ const PILOT_SIDE: u32 = 8;
 const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 /// Share of the predicted time that pilots may take.
 pub const PILOT_SHARE: f64 = 0.15;
+/// The error of a black picture, which is all that pilots without light know.
+const UNKNOWN_ERROR: f64 = 1.0;
+/// Seconds of rounds that pilots may take whatever the picture costs, where no time is to be kept.
+const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
 const HOPELESS: f64 = 2.0;
 /// Distance of the pilots' seeds from the picture's and from each other.
@@ -30,8 +34,11 @@ pub struct Trial {
     error: ErrorModel,
     cost: CostModel,
     spp: u32,
-    /// Seconds of its last round.
+    /// Seconds of its last round, and of all.
     round_seconds: f64,
+    all_seconds: f64,
+    /// Whether its pilots have met any light; without it nothing is known of the error.
+    lit: bool,
 }
 
 /// The pilots' size: as the picture's, with fewer pixels.
@@ -94,6 +101,8 @@ impl Trial {
             cost: CostModel { start, sample: 0.0 },
             spp: 1,
             round_seconds: 0.0,
+            all_seconds: 0.0,
+            lit: false,
         };
         trial.round(ROUNDS[0], pixels)?;
         Ok(Some(trial))
@@ -107,19 +116,30 @@ impl Trial {
             run(pilot)?;
         }
         self.round_seconds = from.elapsed().as_secs_f64();
+        self.all_seconds += self.round_seconds;
         let [width, height] = self.pilots[0].size();
         let samples = f64::from(width) * f64::from(height) * f64::from(spp - self.spp) * 2.0;
         self.cost.sample = self.round_seconds / samples * pixels;
         let [a, b] = &mut self.pilots;
-        let error = relative_mse_of_pair(&a.picture()?, &b.picture()?, RELATIVE_MSE_OFFSET)?;
-        self.error.add(spp, error);
+        let pictures = [a.picture()?, b.picture()?];
+        for picture in &pictures {
+            self.lit |= picture.main_layer()?.values().iter().any(|value| *value != 0.0);
+        }
+        self.error.add(
+            spp,
+            relative_mse_of_pair(&pictures[0], &pictures[1], RELATIVE_MSE_OFFSET)?,
+        );
         self.spp = spp;
         Ok(())
     }
 
     /// Samples a pixel for the goal, when the pilots have taken `spent` seconds.
     fn samples(&self, goal: Goal, spent: f64) -> u32 {
-        let for_error = goal.error.map(|error| self.error.samples(error * error));
+        let for_error = goal.error.map(|error| match self.lit {
+            true => self.error.samples(error * error),
+            // Nothing is known: as many as the longest pilots, at the least.
+            false => ROUNDS[ROUNDS.len() - 1],
+        });
         let left = |time: Duration| self.cost.samples(time.as_secs_f64() - spent).max(1);
         match (for_error, goal.time.map(left)) {
             (Some(by_error), Some(by_time)) => by_error.min(by_time),
@@ -127,13 +147,18 @@ impl Trial {
         }
     }
 
+    /// Writes what the pilots have found to the candidate.
     pub fn predict(&self, candidate: &mut Candidate, goal: Goal, spent: f64) {
         candidate.pilot_spp = self.spp;
         candidate.pilot_error = self.error.relative_mse(f64::from(self.spp)).sqrt();
         candidate.slope = self.error.slope();
         candidate.seconds_a_sample = self.cost.sample;
         candidate.spp = self.samples(goal, spent);
-        candidate.error = self.error.relative_mse(f64::from(candidate.spp)).sqrt();
+        candidate.lit = self.lit;
+        candidate.error = match self.lit {
+            true => self.error.relative_mse(f64::from(candidate.spp)).sqrt(),
+            false => UNKNOWN_ERROR,
+        };
         candidate.seconds = self.cost.seconds(f64::from(candidate.spp));
     }
 }
@@ -162,23 +187,31 @@ pub fn rounds(
         };
         let best = trials.iter().flatten().map(&cost).fold(f64::INFINITY, f64::min);
         let picture = trials.iter().flatten().map(predicted).fold(f64::INFINITY, f64::min);
-        let going_on: Vec<bool> = trials
-            .iter()
-            .map(|trial| {
+        let rounds: f64 = trials.iter().flatten().map(|trial| trial.all_seconds).sum();
+        let share = PILOT_SHARE * (picture + spent);
+        let allowed = match goal.time {
+            Some(_) => share - spent,
+            None => share.max(FREE_SECONDS) - rounds,
+        };
+        let blind = goal.time.is_none() && trials.iter().flatten().all(|trial| !trial.lit);
+        // All that can still be chosen, or else the best alone.
+        let affordable = [HOPELESS, 1.0].into_iter().find_map(|factor| {
+            let on = |trial: &Option<Trial>| {
                 trial
                     .as_ref()
-                    .is_some_and(|t| t.spp == last && cost(t) <= HOPELESS * best)
-            })
-            .collect();
-        // A round has four times the samples of all before it.
-        let next: f64 = trials
-            .iter()
-            .zip(&going_on)
-            .filter_map(|(trial, on)| trial.as_ref().filter(|_| *on).map(|t| t.round_seconds * 4.0))
-            .sum();
-        if spent + next > PILOT_SHARE * (picture + spent) {
-            return Ok(());
-        }
+                    .is_some_and(|t| t.spp == last && cost(t) <= factor * best)
+            };
+            let going_on: Vec<bool> = trials.iter().map(on).collect();
+            // A round has four times the samples of all before it.
+            let next: f64 = trials
+                .iter()
+                .filter(|t| on(t))
+                .flatten()
+                .map(|t| t.round_seconds * 4.0)
+                .sum();
+            (next <= allowed || blind).then_some(going_on)
+        });
+        let Some(going_on) = affordable else { return Ok(()) };
         for (trial, on) in trials.iter_mut().zip(going_on) {
             if let Some(trial) = trial.as_mut().filter(|_| on) {
                 if !proceed() {

@@ -50,7 +50,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let (side, reference_spp, pairs) = if context.smoke {
         (8, 512, &PAIRS[..1])
     } else {
-        (64, 8192, &PAIRS[..])
+        (64, 4096, &PAIRS[..])
     };
     let gpu = (context.gpu)()?;
     let mut table = Table::new(
