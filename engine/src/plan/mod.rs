@@ -109,7 +109,7 @@ impl Plan {
 ///
 /// # Errors
 /// [`Error::Setting`] for a goal that is none; [`Error::Unsupported`] when no technique can render the scene as asked, with every
-/// reason; otherwise as [`Renderer::start`] and [`Rendering::step`].
+/// reason; otherwise as [`Renderer::start`] and [`Rendering::step`](crate::render::Rendering::step).
 pub fn plan(
     renderer: &Renderer,
     options: &RenderOptions,

@@ -1,7 +1,7 @@
 //! Which light paths a picture contains: how often light is scattered, by what, and in which order.
 //!
 //! Errors are measured between pictures of equal path sets only. Notation: Heckbert, "Adaptive Radiosity Textures for Bidirectional Ray
-//! Tracing" (SIGGRAPH 1990), section 2, with classes and sides of lobes; the grammar is that of [`PathSet::from_str`], explained in
+//! Tracing" (SIGGRAPH 1990), section 2, with classes and sides of lobes; the grammar is that of `PathSet`'s `FromStr`, explained in
 //! `docs/path-sets.md`. A set is a range of lengths and a finite automaton; sets of the same paths are equal, however they are written. The form that kernels
 //! read is that of `transport/path_set.glsl`.
 
