@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 
 use clerestory::Result;
 use clerestory::transport::phase::{
-    henyey_greenstein, henyey_greenstein_sample, schlick_phase, schlick_phase_mean_cosine, schlick_phase_sample,
+    henyey_greenstein, henyey_greenstein_sample, rayleigh_phase, rayleigh_phase_sample, schlick_phase,
+    schlick_phase_mean_cosine, schlick_phase_sample,
 };
 
 use super::Context;
@@ -26,9 +27,13 @@ const PANELS: u32 = 512;
 /// e^−36 is below what f64 holds beside one.
 const DEPTH: f64 = 36.0;
 const CELLS: usize = 64;
+/// What functions with a parameter are measured at.
+const PARAMETERS: &[f64] = &[-0.99, -0.5, 0.0, 0.01, 0.5, 0.9, 0.99, 0.999];
 
 struct Phase {
     name: &'static str,
+    /// A single one stands for a function that has none.
+    parameters: &'static [f64],
     density: fn(f64, f64) -> f64,
     sample: fn(f64, f64) -> f64,
     mean_cosine: fn(f64) -> f64,
@@ -36,9 +41,10 @@ struct Phase {
     cumulative: fn(f64, f64) -> f64,
 }
 
-const PHASES: [Phase; 2] = [
+const PHASES: [Phase; 3] = [
     Phase {
         name: "Henyey–Greenstein",
+        parameters: PARAMETERS,
         density: henyey_greenstein,
         sample: henyey_greenstein_sample,
         mean_cosine: |g| g,
@@ -52,10 +58,19 @@ const PHASES: [Phase; 2] = [
     },
     Phase {
         name: "Schlick",
+        parameters: PARAMETERS,
         density: schlick_phase,
         sample: schlick_phase_sample,
         mean_cosine: schlick_phase_mean_cosine,
         cumulative: |c, k| (1.0 + c) * (1.0 - k) / (2.0 * (1.0 - k * c)),
+    },
+    Phase {
+        name: "Rayleigh",
+        parameters: &[0.0],
+        density: |c, _| rayleigh_phase(c),
+        sample: |_, u| rayleigh_phase_sample(u),
+        mean_cosine: |_| 0.0,
+        cumulative: |c, _| 0.125 * (4.0 + c * (3.0 + c * c)),
     },
 ];
 
@@ -99,7 +114,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         ],
     );
     for phase in &PHASES {
-        for parameter in [-0.99, -0.5, 0.0, 0.01, 0.5, 0.9, 0.99, 0.999] {
+        for &parameter in phase.parameters {
             let density = |c| (phase.density)(c, parameter);
             let mean = over_sphere(|c| c * density(c));
             let sample = |u| (phase.sample)(parameter, u);
@@ -134,7 +149,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     }
     table.note(format!(
         "Integrals and means by graded quadrature ({PANELS} panels of five points towards each pole). Samples: {samples} stratified ones for the \
-         mean and the inversion, as many independent ones for χ², whose deviation is standard normal when they follow their density."
+         mean and the inversion, as many independent ones for χ², whose deviation is standard normal when they follow their density. Rayleigh's \
+         function has no parameter."
     ));
     Ok(vec![table])
 }
