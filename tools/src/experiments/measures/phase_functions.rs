@@ -9,6 +9,7 @@ use clerestory::transport::phase::{
     henyey_greenstein, henyey_greenstein_sample, rayleigh_phase, rayleigh_phase_sample, schlick_phase,
     schlick_phase_mean_cosine, schlick_phase_sample,
 };
+use clerestory_hard_cases::chi_square::{chi_square, chi_square_z};
 
 use super::Context;
 use super::clock::nanoseconds;
@@ -87,15 +88,6 @@ fn over_sphere(f: impl Fn(f64) -> f64) -> f64 {
     TAU * sum
 }
 
-/// How many standard deviations χ² of the cells lies above its mean (Wilson and Hilferty's approximation).
-fn chi_square_z(counts: &[u64; CELLS], samples: u64) -> f64 {
-    let expected = samples as f64 / CELLS as f64;
-    let chi: f64 = counts.iter().map(|n| (*n as f64 - expected).powi(2) / expected).sum();
-    let freedom = (CELLS - 1) as f64;
-    let step = 2.0 / (9.0 * freedom);
-    ((chi / freedom).cbrt() - (1.0 - step)) / step.sqrt()
-}
-
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let samples: u64 = if context.smoke { 4096 } else { 1 << 20 };
@@ -127,12 +119,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 worst = worst.max((p - u).abs().min((1.0 - p - u).abs()));
             }
             let mut random = Random::new(table.rows.len() as u32);
-            let mut counts = [0; CELLS];
+            let mut counts = [0.0; CELLS];
             let inputs: Vec<f64> = (0..samples).map(|_| random.unit()).collect();
             for u in &inputs {
                 let cell = ((phase.cumulative)(sample(*u), parameter) * CELLS as f64) as usize;
-                counts[cell.min(CELLS - 1)] += 1;
+                counts[cell.min(CELLS - 1)] += 1.0;
             }
+            let chi_square = chi_square(&counts, &[samples as f64 / CELLS as f64; CELLS]);
             let timed = &inputs[..inputs.len().min(1 << 16)];
             table.row([
                 phase.name.into(),
@@ -141,7 +134,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 ((phase.mean_cosine)(parameter) - mean).into(),
                 (cosines / samples as f64 - mean).into(),
                 worst.into(),
-                chi_square_z(&counts, samples).into(),
+                chi_square
+                    .map_or(f64::NAN, |(statistic, degrees)| chi_square_z(statistic, degrees))
+                    .into(),
                 nanoseconds(context.smoke, timed, |u| density(2.0 * u - 1.0)).into(),
                 nanoseconds(context.smoke, timed, |u| sample(*u)).into(),
             ]);
