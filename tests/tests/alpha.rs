@@ -8,8 +8,7 @@ use clerestory::scene::{AlphaMode, Environment, Filter, Image, LightKind, Materi
 use clerestory::transport::PathTracerSettings;
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{
-    Rendered, builtin, camera_down, floor, floor_from_above, independent, lamp, paths, pixel_averages, point_triangle,
-    render,
+    Rendered, builtin, camera_down, floor, floor_from_above, independent, paths, pixel_averages, point_triangle, render,
 };
 use clerestory_tests::statistics::{FALSE_ALARM, chi_square_p, expect_mean};
 use clerestory_tests::with_gpu;
@@ -32,7 +31,7 @@ fn black(alpha: f32, alpha_mode: AlphaMode) -> Material {
 
 /// A black emitter of [`EMISSION`] that fills the picture, seen from above.
 fn emitter() -> Scene {
-    floor_from_above(lamp(EMISSION))
+    floor_from_above(clerestory_tests::render::lamp(EMISSION))
 }
 
 /// Adds a square facing up.
