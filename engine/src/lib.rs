@@ -32,6 +32,8 @@ pub mod techniques;
 pub mod transport;
 
 #[cfg(test)]
+mod test_chi_square;
+#[cfg(test)]
 pub mod test_random;
 
 pub use error::{Error, Result};

@@ -8,7 +8,7 @@ use clerestory::scene::Scene;
 use clerestory::transport::path_tracer::PathCounters;
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathSet, PathTracer, PathTracerSettings};
-pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, point_triangle};
+pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, floor_from_above, lamp, point_triangle};
 
 use crate::statistics::expect_mean;
 

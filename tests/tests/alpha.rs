@@ -8,7 +8,7 @@ use clerestory::scene::{AlphaMode, Environment, Filter, Image, LightKind, Materi
 use clerestory::transport::PathTracerSettings;
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{
-    Rendered, builtin, camera_down, floor, independent, paths, pixel_averages, point_triangle, render,
+    Rendered, builtin, camera_down, floor, floor_from_above, independent, paths, pixel_averages, point_triangle, render,
 };
 use clerestory_tests::statistics::{FALSE_ALARM, chi_square_p, expect_mean};
 use clerestory_tests::with_gpu;
@@ -31,15 +31,7 @@ fn black(alpha: f32, alpha_mode: AlphaMode) -> Material {
 
 /// A black emitter of [`EMISSION`] that fills the picture, seen from above.
 fn emitter() -> Scene {
-    let mut scene = Scene {
-        name: "emitter".into(),
-        ..Scene::default()
-    };
-    let mut material = Material::lambert("emitter", Vec3::ZERO);
-    material.emission = EMISSION;
-    add(&mut scene, material, 4.0, 0.0);
-    scene.cameras.push(camera_down(1.0, 10.0));
-    scene
+    floor_from_above(clerestory_tests::render::lamp(EMISSION))
 }
 
 /// Adds a square facing up.

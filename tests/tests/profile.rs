@@ -9,7 +9,7 @@ use clerestory::scene::{
 };
 use clerestory::transport::{PathTracer, PathTracerSettings};
 use clerestory_tests::render::{
-    Rendered, builtin, camera_down, finish, floor, independent, point_triangle, render, tracer,
+    Rendered, builtin, camera_down, cuboid, finish, floor, independent, point_triangle, render, tracer,
 };
 use clerestory_tests::with_gpu;
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -331,22 +331,7 @@ const HIDDEN_AREA: f32 = 1.0 / 32.0;
 
 /// A closed cube of the first material.
 fn cube(name: &str, centre: Vec3, half: f32) -> Mesh {
-    let corner = |i: u32| centre + half * Vec3::from_array([0, 1, 2].map(|a| if i >> a & 1 == 1 { 1.0 } else { -1.0 }));
-    let sides = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    Mesh {
-        name: name.into(),
-        positions: (0..8).map(corner).collect(),
-        triangles: sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-        material: Some(0),
-        ..Mesh::default()
-    }
+    cuboid(name, 0, centre - half, centre + half)
 }
 
 /// A triangle that faces down, of two legs of a right angle at `place`.

@@ -6,6 +6,7 @@ mod options;
 mod output;
 mod pictures;
 mod statistics;
+mod stop;
 
 use std::process::ExitCode;
 

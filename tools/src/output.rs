@@ -4,8 +4,10 @@
 
 use std::fmt::Write as _;
 use std::io::{IsTerminal, Write};
+use std::time::Duration;
 
 use clerestory::Error;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::failure::Outcome;
 
@@ -89,6 +91,18 @@ fn style(code: &str, text: &str, stream: Stream) -> String {
         format!("\x1b[{code}m{text}\x1b[0m")
     } else {
         text.to_owned()
+    }
+}
+
+/// Between two pictures of a bar.
+pub const TICK: Duration = Duration::from_millis(120);
+
+/// A progress bar, which shows itself only where the error output is a terminal.
+pub fn bar(length: u64) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    match ProgressStyle::with_template("{spinner} {wide_bar} {percent:>3} %  {msg}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use clerestory::film::atomic;
 use clerestory::{Error, Result};
 
 /// A measured part of a page, between two marks.
@@ -40,7 +41,7 @@ impl Block {
                 format!("{}\n\n## {heading}\n\n{marked}\n", old.trim_end())
             }
         };
-        std::fs::write(path, new).map_err(|error| Error::io(path, error))
+        atomic::write(path, new.as_bytes())
     }
 }
 

@@ -14,7 +14,7 @@ struct Bench {
     folder: tempfile::TempDir,
 }
 
-const TEXT: &str = "title = \"tiny\"\nsystems = [\"BG-2\"]\n[sweep]\nscenes = [\"builtin:cornell-box\"]\nsize = [16, 16]\n\
+const TEXT: &str = "title = \"tiny\"\nabout = \"What a test looks at.\"\nsystems = [\"BG-2\"]\n[sweep]\nscenes = [\"builtin:cornell-box\"]\nsize = [16, 16]\n\
     spp = [1, 4]\nrepeats = 2\n[sweep.reference]\nspp = 64\n[[sweep.variant]]\nname = \"independent\"\n\
     settings = { sampler = \"pcg\" }\nslope = -0.5\n";
 
@@ -126,6 +126,9 @@ fn the_files_are_complete_and_the_page_loads_nothing() -> Tested {
     let strip = image::open(out.join("strips/cornell-box.png"))?;
     assert_eq!((strip.width(), strip.height()), (16 * 2 + 4, 16 * 3 + 8));
     assert!(read(&out.join("report.md"))?.contains("Slopes and time to equal error"));
+    for head in ["report.md", "index.html"] {
+        assert!(read(&out.join(head))?.contains("What a test looks at."), "{head}");
+    }
     assert_eq!(read(&out.join("measurements.csv"))?.lines().count(), 5);
     let names: Vec<String> = std::fs::read_dir(&out)?
         .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))

@@ -2,19 +2,21 @@
 //!
 //! Guarantees: a reader, or a process that is stopped in between, sees the old file or the complete new one, never a part (POSIX rename).
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::{Error, Result};
 
 /// Writes `bytes` to `path` as a whole. The temporary file's name is unique to this process and call; it is removed on failure.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Io`] when the path names no file, or the file cannot be written there.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     static CALLS: AtomicU64 = AtomicU64::new(0);
-    let name = path.file_name().ok_or_else(|| Error::Picture {
-        path: path.display().to_string(),
-        cause: "names no file".into(),
-    })?;
+    let name = path
+        .file_name()
+        .ok_or_else(|| Error::io(path, std::io::Error::new(ErrorKind::InvalidInput, "names no file")))?;
     let mut temporary = std::ffi::OsString::from(".");
     temporary.push(name);
     temporary.push(format!(
@@ -50,6 +52,7 @@ mod tests {
             write(&folder.path().join("absent/picture.bin"), b""),
             Err(Error::Io { .. })
         ));
+        assert!(matches!(write(Path::new("/"), b""), Err(Error::Io { .. })));
         Ok(())
     }
 }

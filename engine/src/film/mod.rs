@@ -1,6 +1,7 @@
 //! Pictures: accumulation, files, tone curves, error metrics.
 
 pub mod accumulate;
+pub mod atomic;
 pub mod exr;
 pub mod gpu_film;
 pub mod hdr;
@@ -9,8 +10,6 @@ pub mod picture;
 pub mod png;
 pub mod tone;
 pub mod z_test;
-
-mod atomic;
 
 pub use accumulate::{Accumulator, TwoFloat};
 pub use gpu_film::{FilmBand, GpuFilm, Step};

@@ -1,6 +1,7 @@
 //! Statistics for the tests of samplers.
 
 use super::random::pcg4d;
+use crate::test_chi_square::{chi_square, chi_square_z};
 use glam::{DVec3, UVec4};
 use std::f64::consts::TAU;
 
@@ -12,46 +13,12 @@ pub fn random3(i: u32, seed: u32) -> DVec3 {
 
 /// Upper tail probability of a chi-square statistic, by the Wilson–Hilferty normal approximation.
 pub fn chi_square_p(statistic: f64, degrees: usize) -> f64 {
-    let k = degrees as f64;
-    let z = ((statistic / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
-    0.5 * erfc(z / std::f64::consts::SQRT_2)
+    0.5 * libm::erfc(chi_square_z(statistic, degrees) * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Complementary error function (Abramowitz and Stegun 7.1.26 on the positive side; absolute error 1.5e-7).
-fn erfc(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
-    let poly =
-        t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
-    let tail = poly * (-x * x).exp();
-    if x >= 0.0 { tail } else { 2.0 - tail }
-}
-
-/// p-value of counts against expected counts. Cells expecting fewer than five are pooled; a count in a cell that expects
-/// nothing at all is an error at once.
+/// p-value of counts against expected counts, as [`chi_square`] compares them; 1 for too few to compare.
 pub fn chi_square_test(observed: &[f64], expected: &[f64]) -> f64 {
-    const LEAST_EXPECTED: f64 = 5.0;
-    let (mut statistic, mut cells) = (0.0, 0usize);
-    let (mut pool_o, mut pool_e) = (0.0, 0.0);
-    for (&o, &e) in observed.iter().zip(expected) {
-        if e == 0.0 && o > 0.0 {
-            return 0.0;
-        }
-        if e < LEAST_EXPECTED {
-            pool_o += o;
-            pool_e += e;
-        } else {
-            statistic += (o - e) * (o - e) / e;
-            cells += 1;
-        }
-    }
-    if pool_e >= LEAST_EXPECTED {
-        statistic += (pool_o - pool_e) * (pool_o - pool_e) / pool_e;
-        cells += 1;
-    }
-    if cells < 2 {
-        return 1.0;
-    }
-    chi_square_p(statistic, cells - 1)
+    chi_square(observed, expected).map_or(1.0, |(statistic, degrees)| chi_square_p(statistic, degrees))
 }
 
 /// Cells of the sphere for [`sphere_test`]: even in z and azimuth.

@@ -11,6 +11,8 @@
 //! [`FALSE_ALARM`] each, for a driver never seen before; seeds are fixed.
 
 mod cases;
+#[path = "../../../engine/src/test_chi_square.rs"]
+pub mod chi_square;
 mod easel;
 mod judgement;
 mod lobes;

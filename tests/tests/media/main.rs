@@ -14,9 +14,9 @@ mod slab;
 use std::f64::consts::PI;
 
 use clerestory::gpu::Gpu;
-use clerestory::scene::{Camera, DensityGrid, LightKind, Material, Medium, Mesh, Phase, Projection, Scene};
+use clerestory::scene::{Camera, DensityGrid, LightKind, Material, Medium, Phase, Projection, Scene};
 use clerestory::transport::PathTracerSettings;
-use clerestory_tests::render::{Rendered, render};
+use clerestory_tests::render::{Rendered, cuboid, render};
 use clerestory_tests::statistics::expect_mean;
 use glam::{DVec3, Vec3};
 
@@ -32,26 +32,6 @@ fn medium(sigma_t: f32, albedo: f32, phase: Phase) -> Medium {
         sigma_s: Vec3::splat(sigma_t * albedo),
         phase,
         ..Medium::default()
-    }
-}
-
-/// The faces of a box, outwards.
-fn cuboid(name: &str, material: u32, low: Vec3, high: Vec3) -> Mesh {
-    let at = |i: u32| Vec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), high, low);
-    let faces = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    Mesh {
-        name: name.into(),
-        positions: (0..8).map(at).collect(),
-        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-        material: Some(material),
-        ..Mesh::default()
     }
 }
 

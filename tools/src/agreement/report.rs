@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use clerestory::film::ZTest;
+use clerestory::film::{ZTest, atomic};
 use clerestory::gpu::Caps;
 use clerestory::{Error, Result};
 
@@ -152,7 +152,7 @@ impl AgreementReport {
         })?;
         for (suffix, text) in [("json", json + "\n"), ("md", self.to_markdown())] {
             let path = prefix.with_extension(suffix);
-            std::fs::write(&path, text).map_err(|cause| Error::io(&path, cause))?;
+            atomic::write(&path, text.as_bytes())?;
         }
         Ok(())
     }

@@ -25,8 +25,9 @@ use super::compare::finite;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::{DeviceOptions, Size, parse_duration, parse_size};
 use crate::{output, pictures, statistics};
+use choice::ChoiceReport;
 use files::{Document, ErrorAgainst, Files};
-use progress::Watch;
+use progress::Interruptible;
 
 /// Renders a scene to an EXR picture, a PNG to look at and a JSON report
 #[derive(Debug, Args)]
@@ -210,14 +211,14 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     files.prepare()?;
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
-    let watch = Watch::start()?;
+    let interruptible = Interruptible::start()?;
     let renderer = Renderer::new(&gpu, &scene)?;
     let goal = Goal {
         error: arguments.error,
         time: arguments.time,
     };
     let plan = if goal.error.is_some() || goal.time.is_some() {
-        Some(watch.plan(&renderer, &options, goal)?)
+        Some(interruptible.plan(&renderer, &options, goal)?)
     } else {
         None
     };
@@ -225,7 +226,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         Some(plan) => choice::announce(plan, &options, arguments.explain)?,
         None => options,
     };
-    let (rendered, interrupted) = watch.render(&renderer, &options)?;
+    let (rendered, interrupted) = interruptible.render(&renderer, &options)?;
     drop(renderer);
     let validation = gpu.validation_log();
     drop(gpu);
@@ -243,7 +244,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         tone,
         choice: plan
             .as_ref()
-            .map(|plan| choice::Outcome::new(plan, &rendered, error.as_ref()))
+            .map(|plan| ChoiceReport::new(plan, &rendered, error.as_ref()))
             .transpose()?,
         error,
     };

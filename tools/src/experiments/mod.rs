@@ -1,4 +1,4 @@
-//! Experiments: what `clerestory report NAME` runs. Each is a file of `tools/experiments/`, named as the spec names it.
+//! Experiments: what `clerestory report NAME` runs. Each is a file of `tools/experiments/`, named as the experiment is called.
 //!
 //! An experiment does one of two things:
 //! - it *measures* numbers: `measure = "name"`, tables of a [`measures::Measure`] (errors, counts and speeds of functions and kernels);
@@ -41,6 +41,8 @@ pub struct Experiment {
     pub name: String,
     /// What it shows, in one line.
     pub title: String,
+    /// What is compared with which oracle, on which inputs, and what counts as good: two or three sentences.
+    pub about: String,
     /// Ids of the catalogue's rows that it measures.
     pub systems: Vec<String>,
     measure: Option<String>,
@@ -57,6 +59,11 @@ pub enum Kind<'a> {
 }
 
 impl Experiment {
+    /// The first sentence of what it is about.
+    pub fn about_in_short(&self) -> &str {
+        self.about.find(". ").map_or(&self.about, |end| &self.about[..=end])
+    }
+
     /// What it does.
     ///
     /// # Errors
@@ -128,7 +135,12 @@ mod tests {
     fn every_file_is_sound_and_names_rows_of_the_catalogue() {
         for name in names() {
             let experiment = find(name).unwrap();
-            assert!(!experiment.title.is_empty() && !experiment.systems.is_empty(), "{name}");
+            assert!(!experiment.systems.is_empty(), "{name}");
+            assert!(experiment.title.starts_with(char::is_uppercase), "{name}");
+            let (about, sentences) = (&experiment.about, experiment.about.matches(". ").count() + 1);
+            assert!((2..=3).contains(&sentences) && about.ends_with('.'), "{name}: {about}");
+            assert!(!about.contains(['\n', '\\']), "{name}: {about}");
+            assert!(about.starts_with(experiment.about_in_short()) && experiment.about_in_short().ends_with('.'));
             for id in &experiment.systems {
                 assert!(
                     clerestory::catalogue::all().iter().any(|row| row.id == id),
@@ -147,16 +159,19 @@ mod tests {
     #[test]
     fn an_experiment_is_of_exactly_one_kind() {
         let refused = |text: &str| parse("x", text).unwrap_err().to_string();
-        assert!(refused("title = \"t\"\nsystems = []\n").contains("exactly one"));
-        assert!(refused("title = \"t\"\nsystems = []\nmeasure = \"no such\"\n").contains("is not known"));
-        assert!(refused("title = \"t\"\nsystems = []\ncolour = 1\n").contains("colour"));
+        assert!(refused("title = \"t\"\nabout = \"a\"\nsystems = []\n").contains("exactly one"));
+        assert!(
+            refused("title = \"t\"\nabout = \"a\"\nsystems = []\nmeasure = \"no such\"\n").contains("is not known")
+        );
+        assert!(refused("title = \"t\"\nsystems = []\nmeasure = \"alpha\"\n").contains("about"));
+        assert!(refused("title = \"t\"\nabout = \"a\"\nsystems = []\ncolour = 1\n").contains("colour"));
     }
 
     #[test]
     fn a_file_is_an_experiment_too() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mine.toml");
-        let text = "title = \"t\"\nsystems = []\n[sweep]\nscenes = [\"builtin:cornell-box\"]\nsize = [8, 8]\nspp = [1, 2]\n\
+        let text = "title = \"t\"\nabout = \"a\"\nsystems = []\n[sweep]\nscenes = [\"builtin:cornell-box\"]\nsize = [8, 8]\nspp = [1, 2]\n\
                     reference = { spp = 64 }\n[[sweep.variant]]\nname = \"path\"\n";
         std::fs::write(&path, text).unwrap();
         let experiment = find(path.to_str().unwrap()).unwrap();

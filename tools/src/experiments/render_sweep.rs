@@ -99,6 +99,7 @@ pub fn run(
     Ok(Results {
         experiment: experiment.name.clone(),
         title: experiment.title.clone(),
+        about: experiment.about.clone(),
         systems: experiment.systems.clone(),
         smoke,
         sweep: sweep.clone(),

@@ -13,6 +13,8 @@ pub struct Results {
     pub experiment: String,
     /// What it shows.
     pub title: String,
+    /// What is compared with which oracle, on which inputs, and what counts as good.
+    pub about: String,
     /// Rows of the catalogue that it measures.
     pub systems: Vec<String>,
     /// Whether this is the smallest form.
@@ -31,7 +33,7 @@ pub struct Results {
     pub load: Option<String>,
     /// Whether it was stopped before all pictures were there.
     pub interrupted: bool,
-    /// Pictures measured now, and those found from earlier runs.
+    /// Pictures measured now.
     pub measured: usize,
     /// Pictures found from earlier runs.
     pub found: usize,

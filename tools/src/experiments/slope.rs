@@ -60,19 +60,15 @@ pub fn fit(work: &[f64], mse: &[Vec<f64>]) -> Option<Slope> {
 
 #[cfg(test)]
 mod tests {
+    use clerestory_hard_cases::random::Random;
+
     use super::*;
 
     const WORK: [f64; 5] = [4.0, 16.0, 64.0, 256.0, 1024.0];
 
-    /// A standard normal number by Box and Muller from a linear congruential generator (Knuth's MMIX constants).
-    fn normal(state: &mut u64) -> f64 {
-        let mut uniform = || {
-            *state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            ((*state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        };
-        let (u, v) = (uniform(), uniform());
+    /// A standard normal number by Box and Muller, of uniform ones of 24 bits.
+    fn normal(random: &mut Random) -> f64 {
+        let (u, v) = (1.0 - f64::from(random.unit()), f64::from(random.unit()));
         (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
     }
 
@@ -91,12 +87,12 @@ mod tests {
     fn the_standard_error_covers_the_truth_as_often_as_it_should() {
         // 400 experiments of 6 repeats with 10 % noise in every MSE. |z| ≤ 2.571 (Student's t, 5 degrees of freedom) covers 95 %; the count of misses
         // is binomial with mean 20 and deviation 4.4, and the jackknife of six is only nearly Student's. Beyond 20 ± 4.5 · 4.4 is chance below 1e-5.
-        let mut state = 7;
+        let mut random = Random(7);
         let mut misses = 0;
         for _ in 0..400 {
             let mse: Vec<Vec<f64>> = WORK
                 .iter()
-                .map(|n| (0..6).map(|_| (1.0 + 0.1 * normal(&mut state)) / n).collect())
+                .map(|n| (0..6).map(|_| (1.0 + 0.1 * normal(&mut random)) / n).collect())
                 .collect();
             let slope = fit(&WORK, &mse).unwrap();
             let z = (slope.value + 0.5) / slope.standard_error.unwrap();

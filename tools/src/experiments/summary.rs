@@ -67,8 +67,8 @@ pub fn facts(results: &Results) -> Vec<String> {
         format!("Device: {}; driver: {}.", results.device, results.driver),
         format!("Machine: {}{load}. Clerestory {}.", results.machine, results.engine_version),
         format!(
-            "{width} × {height} pixels, light paths: {}; {} pictures a budget with seeds of their own. {} pictures measured now, {} found from earlier runs.",
-            sweep.path_set, sweep.repeats, results.measured, results.found
+            "{width} × {height} pixels, light paths: {}; {} pictures a budget with seeds of their own.",
+            sweep.path_set, sweep.repeats
         ),
         format!(
             "References: technique {}, {} samples a pixel, a seed of their own; their own variance is subtracted from every MSE.",
@@ -285,7 +285,8 @@ pub(super) mod tests {
         .unwrap();
         Results {
             experiment: "made-up".into(),
-            title: "numbers <without> pictures".into(),
+            title: "Numbers <without> pictures".into(),
+            about: "Compares <nothing> with nothing.".into(),
             systems: vec!["BG-3".into()],
             smoke: true,
             sweep,

@@ -2,7 +2,8 @@
 //!
 //! ```toml
 //! title = "Russian roulette: noise and time"
-//! systems = ["MET-B8"]
+//! about = "Compares two settings. Oracle: a converged reference. Good is the same mean with less error."
+//! systems = ["MET-B8"]   # rows of the catalogue
 //!
 //! [sweep]
 //! scenes = ["builtin:cornell-box", "builtin:passage?width=0.1"]   # any scene address or file

@@ -81,6 +81,8 @@ pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
 
 #[cfg(test)]
 mod tests {
+    use clerestory_hard_cases::random::Random;
+
     use super::*;
 
     #[test]
@@ -103,14 +105,12 @@ mod tests {
     fn the_noise_of_the_reference_leaves_the_mean() {
         // Uniform noise of variance 1/12 in the picture and 1/48 in the reference, 30,000 values. (a − b)² has a deviation of
         // about 0.11, its mean 6.4e-4: five of them is chance below 1e-6.
-        let mut state = 1u64;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1u64 << 24) as f32 - 0.5
+        let mut random = Random(1);
+        let mut noise = |scale: f32| {
+            (0..30_000)
+                .map(|_| 5.0 + scale * (random.unit() - 0.5))
+                .collect::<Vec<f32>>()
         };
-        let mut noise = |scale: f32| (0..30_000).map(|_| 5.0 + scale * uniform()).collect::<Vec<f32>>();
         let test = Picture::from_radiance(100, 100, noise(1.0)).unwrap();
         let mut reference = Picture::from_radiance(100, 100, noise(0.5)).unwrap();
         reference.add_layer(VARIANCE, 3, vec![1.0 / 48.0; 30_000]).unwrap();

@@ -174,8 +174,9 @@ fn strip_html(strip: &Strip) -> Result<String> {
 pub fn html(results: &Results, scenes: &[SceneSeries], strips: &[Strip]) -> Result<String> {
     let title = format!("{}: {}", results.experiment, results.title);
     let mut page = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n<ul>\n",
-        escaped(&title)
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n<p>{1}</p>\n<ul>\n",
+        escaped(&title),
+        inline(&results.about)
     );
     for fact in summary::facts(results) {
         // Writing to a string cannot fail.
@@ -219,8 +220,9 @@ mod tests {
         assert_eq!(page.matches("<svg").count(), 3);
         assert_eq!(page.matches("data:image/png;base64,").count(), 1 + 2 * 3);
         assert!(
-            page.contains("numbers &lt;without&gt; pictures") && page.contains("&lt;fast&gt; &amp; &quot;good&quot;")
+            page.contains("Numbers &lt;without&gt; pictures") && page.contains("&lt;fast&gt; &amp; &quot;good&quot;")
         );
+        assert!(page.contains("<p>Compares &lt;nothing&gt; with nothing.</p>"));
         assert!(page.contains("<b>Smoke run</b>") && page.contains("<code>builtin:ring</code>"));
         assert_eq!(
             page.matches("http").count(),

@@ -205,25 +205,14 @@ fn holds(body: &WorldMesh, point: DVec3) -> bool {
 mod tests {
     use super::*;
     use clerestory::scene::medium::generate::Generator;
+    use clerestory_hard_cases::scenes::cuboid;
 
     fn cube(half: f32, interior: Option<u32>) -> WorldMesh {
-        let corner =
-            |i: u32| Vec3::new(f32::from(i & 1 > 0), f32::from(i & 2 > 0), f32::from(i & 4 > 0)) * 2.0 * half - half;
-        let faces = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
+        let mesh = cuboid("cube", 0, Vec3::splat(-half), Vec3::splat(half));
         WorldMesh {
-            positions: (0..8).map(corner).collect(),
+            positions: mesh.positions,
             normals: Vec::new(),
-            triangles: faces
-                .iter()
-                .flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]])
-                .collect(),
+            triangles: mesh.triangles,
             material: Material {
                 interior,
                 boundary: interior.is_some(),

@@ -5,7 +5,7 @@ use clerestory::scene::{LightKind, Material, Mesh, Scene};
 use glam::{DVec3, Quat, Vec3};
 
 use crate::rays::{RaySet, awkward_rays};
-use crate::scenes::{SMALL, orthographic};
+use crate::scenes::{SMALL, floor, orthographic};
 use crate::{Easel, HardCase, Judgement};
 
 /// An oblique plane's frame: no coordinate of it is round.
@@ -41,19 +41,11 @@ pub(super) const CASE: HardCase = HardCase {
 
 /// A square of the oblique plane, turned in it.
 fn square(name: &str, turn: f32, half: f32) -> Mesh {
-    let corner = |x: f32, z: f32| tilt() * (Quat::from_rotation_y(turn) * Vec3::new(x * half, 0.0, z * half));
-    Mesh {
-        name: name.into(),
-        positions: vec![
-            corner(-1.0, 1.0),
-            corner(1.0, 1.0),
-            corner(1.0, -1.0),
-            corner(-1.0, -1.0),
-        ],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(0),
-        ..Mesh::default()
+    let mut mesh = floor(name, 0, half, 0.0);
+    for position in &mut mesh.positions {
+        *position = tilt() * (Quat::from_rotation_y(turn) * *position);
     }
+    mesh
 }
 
 const RHO: f32 = 0.5;

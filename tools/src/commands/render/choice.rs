@@ -1,16 +1,16 @@
-//! What an automatic choice says: prediction, candidates, and the outcome beside the prediction.
+//! What an automatic choice says: prediction, candidates, and what came of it beside the prediction.
 
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
 use clerestory::plan::{Plan, relative_mse_by_variance};
 use clerestory::render::{RenderOptions, Rendered};
 
 use super::files::ErrorAgainst;
-use crate::failure::Outcome as Result;
+use crate::failure::Outcome;
 use crate::output::{self, Table};
 
 /// The plan and what came of it.
 #[derive(serde::Serialize)]
-pub struct Outcome<'a> {
+pub struct ChoiceReport<'a> {
     /// What was asked for, looked at and predicted.
     #[serde(flatten)]
     plan: &'a Plan,
@@ -22,9 +22,9 @@ pub struct Outcome<'a> {
     error_against_reference: Option<f64>,
 }
 
-impl<'a> Outcome<'a> {
+impl<'a> ChoiceReport<'a> {
     /// What came of a plan.
-    pub fn new(plan: &'a Plan, rendered: &Rendered, error: Option<&ErrorAgainst>) -> Result<Self> {
+    pub fn new(plan: &'a Plan, rendered: &Rendered, error: Option<&ErrorAgainst>) -> Outcome<Self> {
         Ok(Self {
             plan,
             seconds: plan.pilot_seconds + rendered.report.render_seconds,
@@ -51,7 +51,7 @@ impl<'a> Outcome<'a> {
 }
 
 /// Says what is going to be rendered, and returns its options.
-pub fn announce(plan: &Plan, options: &RenderOptions, explain: bool) -> Result<RenderOptions> {
+pub fn announce(plan: &Plan, options: &RenderOptions, explain: bool) -> Outcome<RenderOptions> {
     if explain {
         output::explain(&candidates(plan));
     }

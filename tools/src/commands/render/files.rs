@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clerestory::Error;
 use clerestory::film::picture::RADIANCE;
-use clerestory::film::{ErrorReport, Picture, ToneMap, exr, png};
+use clerestory::film::{ErrorReport, Picture, ToneMap, atomic, exr, png};
 use clerestory::render::FrameReport;
 
-use super::choice;
+use super::choice::ChoiceReport;
 use crate::failure::{Failure, Outcome};
 use crate::{output, pictures};
 
@@ -22,7 +22,7 @@ pub struct Document<'a> {
     /// How the PNG was tone mapped.
     pub tone: ToneMap,
     /// What was asked for, predicted and reached, when technique and samples were chosen.
-    pub choice: Option<choice::Outcome<'a>>,
+    pub choice: Option<ChoiceReport<'a>>,
     /// The error, when there was a reference.
     pub error: Option<ErrorAgainst>,
 }
@@ -105,12 +105,7 @@ impl Files {
         let shown = png::tone_mapped(picture.main_layer()?, picture.width(), &document.tone);
         png::write(&self.png, &shown)?;
         let text = output::json_text(&self.json.display().to_string(), document)? + "\n";
-        // Beside its target first, so that nobody reads half a report.
-        let temporary = self.json.with_extension(format!("json.{}.tmp", std::process::id()));
-        std::fs::write(&temporary, text)
-            .and_then(|()| std::fs::rename(&temporary, &self.json))
-            .map_err(|cause| Error::io(&self.json, cause))?;
-        Ok(())
+        Ok(atomic::write(&self.json, text.as_bytes())?)
     }
 
     /// All names, for a message.

@@ -1,58 +1,37 @@
-//! Watching a rendering: a bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is there.
-
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+//! The progress of a rendering: a bar on a terminal, silence in a pipe, and Ctrl-C that keeps what is there.
 
 use clerestory::plan::{self, Goal, Plan};
 use clerestory::render::{Progress, RenderOptions, Rendered, Renderer};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
-use crate::failure::{Code, Failure, Outcome};
+use crate::failure::Outcome;
 use crate::output;
+use crate::stop::Stop;
 
 /// Steps of the bar.
 const LENGTH: u64 = 1000;
-/// Between two pictures of the bar.
-const TICK: Duration = Duration::from_millis(120);
-
-/// The bar and the wish to stop.
-pub struct Watch {
+/// A rendering that shows a bar and can be stopped.
+pub struct Interruptible {
     bar: ProgressBar,
-    stop: Arc<AtomicBool>,
+    stop: Stop,
 }
 
-impl Watch {
+impl Interruptible {
     /// Begins to listen for Ctrl-C and requests to end. The bar shows itself only where the error output is a terminal.
     pub fn start() -> Outcome<Self> {
-        let bar = ProgressBar::new(LENGTH);
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_bar} {percent:>3} %  {msg}") {
-            bar.set_style(style);
-        }
-        let stop = Arc::new(AtomicBool::new(false));
-        let (wish, shown) = (Arc::clone(&stop), bar.clone());
-        ctrlc::set_handler(move || {
-            if wish.swap(true, Ordering::SeqCst) {
-                std::process::exit(Code::Interrupted as i32);
-            }
-            let line = "stopping after this step; once more stops at once and writes nothing";
-            shown.suspend(|| output::note(line));
-        })
-        .map_err(|cause| Failure {
-            code: Code::Run,
-            message: format!("cannot listen for Ctrl-C: {cause}"),
-            hint: None,
-        })?;
+        let bar = output::bar(LENGTH);
+        let stop = Stop::listen(
+            &bar,
+            "stopping after this step; once more stops at once and writes nothing",
+        )?;
         Ok(Self { bar, stop })
     }
 
     /// Renders pilots and chooses. A wish to stop ends the pilots after the one at hand, and the picture after its first step.
     pub fn plan(&self, renderer: &Renderer, options: &RenderOptions, goal: Goal) -> Outcome<Plan> {
         self.bar.set_message("pilot pictures…");
-        self.bar.enable_steady_tick(TICK);
-        Ok(plan::plan(renderer, options, goal, &mut || {
-            !self.stop.load(Ordering::SeqCst)
-        })?)
+        self.bar.enable_steady_tick(output::TICK);
+        Ok(plan::plan(renderer, options, goal, &mut || !self.stop.wished())?)
     }
 
     /// Renders until done, out of time or told to stop; says whether it was told. The first step is always done.
@@ -65,20 +44,20 @@ impl Watch {
     fn steps(&self, renderer: &Renderer, options: &RenderOptions) -> Outcome<(Rendered, bool)> {
         tracing::info!("rendering; the first step compiles the kernels");
         self.bar.set_message("compiling kernels…");
-        self.bar.enable_steady_tick(TICK);
+        self.bar.enable_steady_tick(output::TICK);
         let mut rendering = renderer.start(options)?;
         let mut first = None;
         while let Some(progress) = rendering.step()? {
             let first = *first.get_or_insert(progress);
             self.bar.set_position((progress.fraction * LENGTH as f64) as u64);
             self.bar.set_message(message(first, progress));
-            if self.stop.load(Ordering::SeqCst) {
+            if self.stop.wished() {
                 break;
             }
         }
         let rendered = rendering.finish()?;
         // A wish that came when all samples were there has stopped nothing.
-        let interrupted = self.stop.load(Ordering::SeqCst) && rendered.report.stopped_early;
+        let interrupted = self.stop.wished() && rendered.report.stopped_early;
         Ok((rendered, interrupted))
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clerestory::Error;
-use clerestory::film::png;
+use clerestory::film::{atomic, png};
 use clerestory_tools::experiments::reference::slug;
 use clerestory_tools::experiments::results::Results;
 use clerestory_tools::experiments::series::{self, Work};
@@ -15,12 +15,7 @@ use crate::failure::Outcome;
 use crate::output;
 
 fn write(path: &Path, text: &str) -> Outcome {
-    // Beside its target first, so that nobody reads half a file.
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(format!(".{}.tmp", std::process::id()));
-    std::fs::write(&temporary, text)
-        .and_then(|()| std::fs::rename(&temporary, path))
-        .map_err(|error| Error::io(path, error).into())
+    Ok(atomic::write(path, text.as_bytes())?)
 }
 
 fn make(folder: &Path) -> Outcome {
@@ -30,7 +25,7 @@ fn make(folder: &Path) -> Outcome {
 /// Writes the tables of a measure: Markdown, JSON, and a CSV for each. Returns the Markdown.
 pub fn tables(folder: &Path, experiment: &Experiment, tables: &[Table]) -> Outcome<String> {
     make(folder)?;
-    let mut page = format!("# {}: {}\n", experiment.name, experiment.title);
+    let mut page = format!("# {}: {}\n\n{}\n", experiment.name, experiment.title, experiment.about);
     for (index, table) in tables.iter().enumerate() {
         page += &format!("\n{}", table.markdown());
         write(&folder.join(format!("{}.csv", index + 1)), &table.csv())?;
@@ -59,7 +54,10 @@ pub fn sweep(folder: &Path, results: &Results) -> Outcome<String> {
         png::write(strips.join(format!("{name}.png")), &strip.composed())?;
     }
     let text = summary::markdown(results, &scenes);
-    let page = format!("# {}: {}\n\n{text}", results.experiment, results.title);
+    let page = format!(
+        "# {}: {}\n\n{}\n\n{text}",
+        results.experiment, results.title, results.about
+    );
     write(&folder.join("report.md"), &page)?;
     write(&folder.join("measurements.csv"), &summary::measurements(results).csv())?;
     let document = serde_json::json!({ "results": results, "statistics": scenes });

@@ -3,7 +3,7 @@
 //! Only the part of the page between two marks is replaced, so that other measurements can stand beside it.
 
 mod files;
-mod watch;
+mod progress;
 
 use std::cell::Cell;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ use super::check_validation;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output;
-use watch::Bar;
+use progress::Bar;
 
 /// Runs experiments by name: error against time and work with plots, slopes and pictures, or tables of measured numbers
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ use watch::Bar;
 Examples:
   clerestory report --list                         the experiments
   clerestory report samplers                       into out/report/samplers: index.html, report.md, report.json, CSV, plots, pictures
-  clerestory report BG-2-convergence roulette      two of them
+  clerestory report convergence roulette           two of them
   clerestory report my-experiment.toml             an experiment of your own; the format is that of tools/experiments/
   clerestory report                                error against time on six scenes, also into RESULTS.md
   clerestory report --smoke                        its smallest form, under two minutes on two cores
@@ -130,12 +130,18 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
 }
 
 fn list() -> Outcome<ExitCode> {
-    let mut table = output::Table::new(&["experiment", "systems", "shows"], &[1, 2]);
+    let mut text = String::new();
     for name in experiments::names() {
         let experiment = experiments::find(name)?;
-        table.row([experiment.name, experiment.systems.join(", "), experiment.title]);
+        text += &format!(
+            "{} ({})\n  {}\n  {}\n",
+            output::bold(&experiment.name),
+            experiment.systems.join(", "),
+            experiment.title,
+            experiment.about_in_short()
+        );
     }
-    output::print(&table.text())?;
+    output::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 

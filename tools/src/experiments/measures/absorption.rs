@@ -4,33 +4,13 @@
 
 use clerestory::Result;
 use clerestory::render::Renderer;
-use clerestory::scene::{Material, Mesh, Scene};
-use glam::{BVec3, Vec3};
+use clerestory::scene::Material;
+use clerestory_hard_cases::scenes::{cuboid, floor_from_above, lamp};
+use glam::Vec3;
 
 use super::Context;
-use super::pictures::{Image, emitter, z_score};
+use super::pictures::{Image, z_score};
 use crate::experiments::table::Table;
-
-/// Twelve triangles that face outwards.
-fn solid_box(scene: &mut Scene, material: Material, lower: Vec3, upper: Vec3) {
-    let corner = |i: u32| Vec3::select(BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), upper, lower);
-    let faces = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let material = scene.add_material(material);
-    scene.place(Mesh {
-        name: "slab".into(),
-        positions: (0..8).map(corner).collect(),
-        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
-        material: Some(material),
-        ..Mesh::default()
-    });
-}
 
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
@@ -52,14 +32,15 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     for ior in [1.0_f32, 1.5] {
         for (thickness, sigma) in [(0.5_f32, 0.0_f64), (0.5, 1.0), (2.0, 1.0), (2.0, 4.0), (5.0, 0.1)] {
-            let mut scene = emitter("slab", Vec3::ONE);
+            let mut scene = floor_from_above(lamp(Vec3::ONE));
             let material = Material {
                 attenuation_color: Vec3::splat((-sigma).exp() as f32),
                 attenuation_distance: 1.0,
                 ..Material::glass("slab", ior)
             };
             let (lower, upper) = (Vec3::new(-3.0, 0.5, -3.0), Vec3::new(3.0, 0.5 + thickness, 3.0));
-            solid_box(&mut scene, material, lower, upper);
+            let material = scene.add_material(material);
+            scene.place(cuboid("slab", material, lower, upper));
             let index = f64::from(ior);
             let reflected = ((index - 1.0) / (index + 1.0)).powi(2);
             // The colour is what the material holds, rounded.

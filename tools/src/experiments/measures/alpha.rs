@@ -5,10 +5,11 @@
 use clerestory::Result;
 use clerestory::render::Renderer;
 use clerestory::scene::{AlphaMode, Material};
+use clerestory_hard_cases::scenes::{floor, floor_from_above, lamp};
 use glam::{Vec3, Vec4};
 
 use super::Context;
-use super::pictures::{Image, add_square, emitter, z_score};
+use super::pictures::{Image, z_score};
 use crate::experiments::table::Table;
 
 /// What the emitter behind shines with.
@@ -46,14 +47,15 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         (0.25, mask, 4),
         (0.75, mask, 4),
     ] {
-        let mut scene = emitter("alpha", Vec3::splat(EMISSION));
+        let mut scene = floor_from_above(lamp(Vec3::splat(EMISSION)));
         for layer in 0..layers {
             let material = Material {
                 base_color: Vec4::new(0.0, 0.0, 0.0, alpha),
                 alpha_mode,
                 ..Material::lambert("black", Vec3::ZERO)
             };
-            add_square(&mut scene, material, 0.25 * (layer + 1) as f32);
+            let material = scene.add_material(material);
+            scene.place(floor("black", material, 4.0, 0.25 * (layer + 1) as f32));
         }
         let through = match alpha_mode {
             AlphaMode::Mask { cutoff } => f64::from(u8::from(alpha < cutoff)),

@@ -5,22 +5,22 @@ mod alpha;
 mod automatic_choice;
 mod barriers;
 mod clock;
-mod coupled;
+mod coupled_reflection;
 mod energy;
 mod errors;
-mod formats;
 mod inputs;
-mod multiscatter;
-mod offset;
+mod multiple_scattering;
 mod path_sets;
-mod phase;
+mod phase_functions;
+mod picture_formats;
 mod pictures;
-mod profile;
+mod ray_offsets;
+mod sample_sums;
+mod scene_profile;
 mod shading_normals;
-mod sphere;
-mod sum;
-mod tangent;
-mod triangle;
+mod sphere_tests;
+mod tangents;
+mod triangle_tests;
 mod wide;
 
 use clerestory::gpu::Gpu;
@@ -62,24 +62,24 @@ const fn on_device(name: &'static str, run: fn(&Context<'_>) -> Result<Vec<Table
     }
 }
 
-/// All measures.
+/// All measures, each called as its experiment and, with underscores, its module.
 pub const MEASURES: &[Measure] = &[
     on_device("absorption", absorption::measure),
     on_device("alpha", alpha::measure),
     on_device("automatic-choice", automatic_choice::measure),
     on_device("barriers", barriers::measure),
-    on_host("coupled reflection", coupled::measure),
-    on_host("multiple scattering", multiscatter::measure),
-    on_host("offsets", offset::measure),
-    on_device("path sets", path_sets::measure),
-    on_host("phase functions", phase::measure),
-    on_host("picture formats", formats::measure),
-    on_device("profile", profile::measure),
-    on_host("shading normals", shading_normals::measure),
-    on_host("spheres", sphere::measure),
-    on_host("sums", sum::measure),
-    on_host("tangents", tangent::measure),
-    on_host("triangles", triangle::measure),
+    on_host("coupled-reflection", coupled_reflection::measure),
+    on_host("multiple-scattering", multiple_scattering::measure),
+    on_device("path-sets", path_sets::measure),
+    on_host("phase-functions", phase_functions::measure),
+    on_host("picture-formats", picture_formats::measure),
+    on_host("ray-offsets", ray_offsets::measure),
+    on_host("sample-sums", sample_sums::measure),
+    on_device("scene-profile", scene_profile::measure),
+    on_host("shading-normals", shading_normals::measure),
+    on_host("sphere-tests", sphere_tests::measure),
+    on_host("tangents", tangents::measure),
+    on_host("triangle-tests", triangle_tests::measure),
 ];
 
 /// The measure of that name.
@@ -125,12 +125,18 @@ mod tests {
     }
 
     #[test]
-    fn every_measure_has_an_experiment() {
+    fn experiment_measure_and_module_have_one_name() {
         for measure in MEASURES {
-            let of = |name: &str| {
-                crate::experiments::find(name).is_ok_and(|found| found.measure.as_deref() == Some(measure.name))
-            };
-            assert!(crate::experiments::names().any(of), "{}", measure.name);
+            let experiment = crate::experiments::find(measure.name).unwrap();
+            assert_eq!(experiment.measure.as_deref(), Some(measure.name));
+            let module = format!("src/experiments/measures/{}.rs", measure.name.replace('-', "_"));
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(&module);
+            assert!(path.is_file(), "no {module}");
+        }
+        for name in crate::experiments::names() {
+            if let Some(measure) = crate::experiments::find(name).unwrap().measure {
+                assert_eq!(measure, name);
+            }
         }
     }
 }

@@ -1,11 +1,9 @@
-//! Small pictures for measures, and simple scenes with closed forms.
+//! Small pictures for measures.
 
 use clerestory::Result;
 use clerestory::film::z_test::{ZTest, z_test};
 use clerestory::film::{Picture, picture};
 use clerestory::render::{FrameReport, RenderOptions, Renderer};
-use clerestory::scene::{Camera, Material, Mesh, Projection, Scene};
-use glam::{DVec3, Vec3};
 use serde_json::json;
 
 /// A picture with the variance of its means.
@@ -27,7 +25,7 @@ impl Image {
     /// # Errors
     /// Those of rendering.
     pub fn render(renderer: &Renderer, size: u32, spp: u32, seed: u32, paths: &str) -> Result<Self> {
-        let options = |spp, seed| RenderOptions {
+        let options = |spp| RenderOptions {
             technique: Some("path".into()),
             size: [size; 2],
             spp,
@@ -35,15 +33,14 @@ impl Image {
             settings: json!({"sampler": "pcg", "path_set": paths}),
             ..RenderOptions::default()
         };
-        for options in [options(1, seed), options(spp, seed)] {
+        let finished = |options| {
             let mut rendering = renderer.start(&options)?;
             while rendering.step()?.is_some() {}
-            if options.spp == spp {
-                let rendered = rendering.finish()?;
-                return Self::of(&rendered.picture, rendered.report);
-            }
-        }
-        Err(clerestory::Error::setting("spp", spp, "makes no picture"))
+            rendering.finish()
+        };
+        finished(options(1))?;
+        let rendered = finished(options(spp))?;
+        Self::of(&rendered.picture, rendered.report)
     }
 
     fn of(picture: &Picture, report: FrameReport) -> Result<Self> {
@@ -100,42 +97,4 @@ impl Image {
 pub fn z_score(difference: f64, deviation: f64, scale: f64) -> f64 {
     let rounding = clerestory::film::z_test::RELATIVE_DEVIATION_FLOOR * scale.abs();
     difference / deviation.max(rounding).max(f64::MIN_POSITIVE)
-}
-
-/// An orthographic camera that looks down at [−1, 1]² from 10 m above.
-pub fn camera_down() -> Camera {
-    let mut camera = Camera::look_at("down", DVec3::Y * 10.0, DVec3::ZERO, -DVec3::Z, 1.0);
-    camera.projection = Projection::Orthographic { half_height: 1.0 };
-    camera
-}
-
-/// Adds a square of 8 m × 8 m at height `y` that faces up.
-pub fn add_square(scene: &mut Scene, material: Material, y: f32) {
-    let material = scene.add_material(material);
-    let corner = |x: f32, z: f32| Vec3::new(4.0 * x, y, 4.0 * z);
-    scene.place(Mesh {
-        name: "square".into(),
-        positions: vec![
-            corner(-1.0, 1.0),
-            corner(1.0, 1.0),
-            corner(1.0, -1.0),
-            corner(-1.0, -1.0),
-        ],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(material),
-        ..Mesh::default()
-    });
-}
-
-/// A black square that shines upwards, seen from above.
-pub fn emitter(name: &str, radiance: Vec3) -> Scene {
-    let mut scene = Scene {
-        name: name.into(),
-        ..Scene::default()
-    };
-    let mut material = Material::lambert("emitter", Vec3::ZERO);
-    material.emission = radiance;
-    add_square(&mut scene, material, 0.0);
-    scene.cameras.push(camera_down());
-    scene
 }

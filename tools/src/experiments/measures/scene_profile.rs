@@ -5,8 +5,9 @@
 use clerestory::Result;
 use clerestory::gpu::Category;
 use clerestory::render::Renderer;
-use clerestory::scene::{ConductorIor, Filter, Image as Texels, Material, Mesh, Scene, Texture, Wrap};
+use clerestory::scene::{ConductorIor, Filter, Image as Texels, Material, Scene, Texture, Wrap};
 use clerestory::{gpu::Gpu, scene};
+use clerestory_hard_cases::scenes::point_triangle;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::Context;
@@ -16,22 +17,13 @@ use crate::experiments::table::Table;
 /// Adds a triangle without area, which no ray meets; its material counts all the same.
 fn add_unseen(scene: &mut Scene, material: Material, full: bool) {
     let place = scene.meshes.first().and_then(|mesh| mesh.positions.first()).copied();
-    let place = place.unwrap_or_default();
-    let material = Some(scene.add_material(material));
-    let mut mesh = Mesh {
-        name: "unseen".into(),
-        positions: vec![place; 3],
-        triangles: vec![[0, 1, 2]],
-        material,
-        ..Mesh::default()
-    };
-    if full {
+    point_triangle(scene, material, place.unwrap_or_default());
+    if let Some(mesh) = scene.meshes.last_mut().filter(|_| full) {
         mesh.normals = vec![Vec3::Y; 3];
         mesh.tangents = vec![Vec4::X; 3];
         mesh.uv0 = vec![Vec2::ZERO; 3];
         mesh.colors = vec![Vec4::ONE; 3];
     }
-    scene.place(mesh);
 }
 
 fn texture(scene: &mut Scene) -> Texture {

@@ -6,8 +6,10 @@ use std::f64::consts::TAU;
 
 use clerestory::Result;
 use clerestory::transport::phase::{
-    henyey_greenstein, henyey_greenstein_sample, schlick_phase, schlick_phase_mean_cosine, schlick_phase_sample,
+    henyey_greenstein, henyey_greenstein_sample, rayleigh_phase, rayleigh_phase_sample, schlick_phase,
+    schlick_phase_mean_cosine, schlick_phase_sample,
 };
+use clerestory_hard_cases::chi_square::{chi_square, chi_square_z};
 
 use super::Context;
 use super::clock::nanoseconds;
@@ -26,9 +28,13 @@ const PANELS: u32 = 512;
 /// e^−36 is below what f64 holds beside one.
 const DEPTH: f64 = 36.0;
 const CELLS: usize = 64;
+/// What functions with a parameter are measured at.
+const PARAMETERS: &[f64] = &[-0.99, -0.5, 0.0, 0.01, 0.5, 0.9, 0.99, 0.999];
 
 struct Phase {
     name: &'static str,
+    /// A single one stands for a function that has none.
+    parameters: &'static [f64],
     density: fn(f64, f64) -> f64,
     sample: fn(f64, f64) -> f64,
     mean_cosine: fn(f64) -> f64,
@@ -36,9 +42,10 @@ struct Phase {
     cumulative: fn(f64, f64) -> f64,
 }
 
-const PHASES: [Phase; 2] = [
+const PHASES: [Phase; 3] = [
     Phase {
         name: "Henyey–Greenstein",
+        parameters: PARAMETERS,
         density: henyey_greenstein,
         sample: henyey_greenstein_sample,
         mean_cosine: |g| g,
@@ -52,10 +59,19 @@ const PHASES: [Phase; 2] = [
     },
     Phase {
         name: "Schlick",
+        parameters: PARAMETERS,
         density: schlick_phase,
         sample: schlick_phase_sample,
         mean_cosine: schlick_phase_mean_cosine,
         cumulative: |c, k| (1.0 + c) * (1.0 - k) / (2.0 * (1.0 - k * c)),
+    },
+    Phase {
+        name: "Rayleigh",
+        parameters: &[0.0],
+        density: |c, _| rayleigh_phase(c),
+        sample: |_, u| rayleigh_phase_sample(u),
+        mean_cosine: |_| 0.0,
+        cumulative: |c, _| 0.125 * (4.0 + c * (3.0 + c * c)),
     },
 ];
 
@@ -70,15 +86,6 @@ fn over_sphere(f: impl Fn(f64) -> f64) -> f64 {
         }
     }
     TAU * sum
-}
-
-/// How many standard deviations χ² of the cells lies above its mean (Wilson and Hilferty's approximation).
-fn chi_square_z(counts: &[u64; CELLS], samples: u64) -> f64 {
-    let expected = samples as f64 / CELLS as f64;
-    let chi: f64 = counts.iter().map(|n| (*n as f64 - expected).powi(2) / expected).sum();
-    let freedom = (CELLS - 1) as f64;
-    let step = 2.0 / (9.0 * freedom);
-    ((chi / freedom).cbrt() - (1.0 - step)) / step.sqrt()
 }
 
 /// The measure.
@@ -99,7 +106,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         ],
     );
     for phase in &PHASES {
-        for parameter in [-0.99, -0.5, 0.0, 0.01, 0.5, 0.9, 0.99, 0.999] {
+        for &parameter in phase.parameters {
             let density = |c| (phase.density)(c, parameter);
             let mean = over_sphere(|c| c * density(c));
             let sample = |u| (phase.sample)(parameter, u);
@@ -112,12 +119,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 worst = worst.max((p - u).abs().min((1.0 - p - u).abs()));
             }
             let mut random = Random::new(table.rows.len() as u32);
-            let mut counts = [0; CELLS];
+            let mut counts = [0.0; CELLS];
             let inputs: Vec<f64> = (0..samples).map(|_| random.unit()).collect();
             for u in &inputs {
                 let cell = ((phase.cumulative)(sample(*u), parameter) * CELLS as f64) as usize;
-                counts[cell.min(CELLS - 1)] += 1;
+                counts[cell.min(CELLS - 1)] += 1.0;
             }
+            let chi_square = chi_square(&counts, &[samples as f64 / CELLS as f64; CELLS]);
             let timed = &inputs[..inputs.len().min(1 << 16)];
             table.row([
                 phase.name.into(),
@@ -126,7 +134,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 ((phase.mean_cosine)(parameter) - mean).into(),
                 (cosines / samples as f64 - mean).into(),
                 worst.into(),
-                chi_square_z(&counts, samples).into(),
+                chi_square
+                    .map_or(f64::NAN, |(statistic, degrees)| chi_square_z(statistic, degrees))
+                    .into(),
                 nanoseconds(context.smoke, timed, |u| density(2.0 * u - 1.0)).into(),
                 nanoseconds(context.smoke, timed, |u| sample(*u)).into(),
             ]);
@@ -134,7 +144,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     }
     table.note(format!(
         "Integrals and means by graded quadrature ({PANELS} panels of five points towards each pole). Samples: {samples} stratified ones for the \
-         mean and the inversion, as many independent ones for χ², whose deviation is standard normal when they follow their density."
+         mean and the inversion, as many independent ones for χ², whose deviation is standard normal when they follow their density. Rayleigh's \
+         function has no parameter."
     ));
     Ok(vec![table])
 }
