@@ -81,7 +81,7 @@ bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMed
     }
     vec3 wi = to * inversesqrt(squared);
     float falloff = light.kind == LIGHT_SPOT ? spot_falloff(-dot(light.direction, wi), light.cos_inner, light.cos_outer) : 1.0;
-    float phase = phase_function(m.phase, m.phase_parameter, dot(wi, path.direction));
+    float phase = phase_function(m.phase, m.phase_parameter, path.direction, wi);
     float weight = power_heuristic(pdf, collision_density(m.sigma_t, bands, t));
     vec3 contribution = path.throughput * m.sigma_s * transmittance(m.sigma_t, t) * light.strength
         * (falloff * phase * weight / (squared * probability * pdf));
@@ -102,7 +102,7 @@ bool sample_collision_light(uint slot, uint place, PathState path, vec3 bands, S
     if (light.radiance == vec3(0.0)) {
         return false;
     }
-    float phase = phase_function(m.phase, m.phase_parameter, dot(light.direction, path.direction));
+    float phase = phase_function(m.phase, m.phase_parameter, path.direction, light.direction);
     float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, phase) : 1.0;
     if (HAS_AIRLIGHT && light.pdf == 0.0 && !light.infinite && m.has_grid == 0u) {
         float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
@@ -126,9 +126,10 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout PathState path) {
     vec2 lobe = bounce_sample(slot, path.bounce, DIMENSION_LOBE);
     vec2 u = bounce_sample(slot, path.bounce, DIMENSION_DIRECTION);
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
-    path.pdf = phase_function(m.phase, m.phase_parameter, c);
+    vec3 wi = normalize(phase_direction(path.direction, c, u.y));
+    path.pdf = phase_function(m.phase, m.phase_parameter, path.direction, wi);
     path.origin = at;
-    path.direction = normalize(phase_direction(path.direction, c, u.y));
+    path.direction = wi;
     path.bounce += 1u;
     if (path.bounce >= push.roulette_start) {
         vec3 t = path.throughput * path.eta_scale;
