@@ -9,7 +9,7 @@ use super::*;
 /// Relative error of closed forms in f32: exponentials of arguments up to 8, and distances of some rounding units.
 const EXACT: f64 = 1e-5;
 
-fn expect_exact(what: &str, picture: &Rendered, expected: [f64; 3]) {
+pub(super) fn expect_exact(what: &str, picture: &Rendered, expected: [f64; 3]) {
     expect_within(what, picture, expected, EXACT);
 }
 
@@ -21,7 +21,7 @@ fn expect_within(what: &str, picture: &Rendered, expected: [f64; 3], error: f64)
     println!("{what}: {:?}, expected {expected:?}", &picture.radiance[..3]);
 }
 
-fn absorber(sigma: [f32; 3]) -> Medium {
+pub(super) fn absorber(sigma: [f32; 3]) -> Medium {
     Medium {
         sigma_a: Vec3::from(sigma),
         ..Medium::default()

@@ -3,7 +3,9 @@
 // A body is a solid that refracts or an invisible boundary. Paths carry the material of the innermost body they are in; what is outside of a
 // body is known for each of its triangles, so bodies may lie in bodies, as long as their surfaces do not cross. A surface of a body tells
 // by its side which body the way to it was in, whatever the path believed: rounding cannot leave a path in the wrong medium for good.
-// Boundaries leave the ray as it is: the search for the next surface begins one rounding unit behind them, so nothing is skipped.
+// Boundaries leave the ray as it is: the search for the next surface begins one rounding unit behind them. A surface at the same distance is
+// not skipped, since boundaries have the last numbers of all triangles and ties go to the first one; of boundaries in one place only
+// the first one is met.
 #ifndef CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
 #define CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
 
