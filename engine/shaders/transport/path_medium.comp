@@ -89,7 +89,7 @@ bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMed
         return false;
     }
     path_airlight_rays[place] = shadow_ray(slot, path, from, light.position, contribution);
-    path_shadow_interiors[place].y = way.interior;
+    path_shadow_starts[place].airlight_interior = way.interior;
     return true;
 }
 
@@ -117,7 +117,8 @@ bool sample_collision_light(uint slot, uint place, PathState path, vec3 bands, S
         shadow_segment(SurfacePoint(from, vec3(0.0)), vec3(0.0), light.point, light.normal, ray.origin, ray.direction);
     }
     path_shadow_rays_out[place] = ray;
-    path_shadow_interiors[place].x = way.interior;
+    path_shadow_starts[place].sampled_interior = way.interior;
+    path_shadow_starts[place].start = 0.0;
     return true;
 }
 

@@ -27,9 +27,16 @@ struct MediumEvent {
     uint flags;   // EVENT_HANDLED, FLAG_AIRLIGHT
 };
 
+// What is known of a place's shadow rays where they start.
+struct ShadowStart {
+    uint sampled_interior;
+    uint airlight_interior;
+    float start;  // of the sampled ray, as in ShadowState
+};
+
 struct ShadowState {
     vec3 transmittance;
-    float start;
+    float start;  // as in MediumState, in lengths of the ray's direction
     Hit hit;
     uint interior;
     uint walks;  // through grids, so far
@@ -38,7 +45,7 @@ struct ShadowState {
 
 layout(set = 4, binding = 0, scalar) restrict buffer PathMediumStates { MediumState path_medium_states[]; };     // by slot
 layout(set = 4, binding = 1, scalar) restrict buffer PathMediumEvents { MediumEvent path_medium_events[]; };     // by place
-layout(set = 4, binding = 2, scalar) restrict buffer PathShadowInteriors { uvec2 path_shadow_interiors[]; };     // by place: of the sampled ray, and of airlight
+layout(set = 4, binding = 2, scalar) restrict buffer PathShadowStarts { ShadowStart path_shadow_starts[]; };        // by place
 layout(set = 4, binding = 3, scalar) restrict buffer PathAirlightRays { ShadowRay path_airlight_rays[]; };       // by place
 layout(set = 4, binding = 4, scalar) restrict buffer PathShadowStates { ShadowState path_shadow_states[]; };     // by place in the shadow queue
 // 64-bit counters, low word first.
@@ -61,6 +68,9 @@ const float NORMAL_MIN = 1.17549435e-38;
 
 // How far a ray has come that passes a surface at a distance of t.
 float past_surface(float t) { return max(t, NORMAL_MIN); }
+
+// The next greater float.
+float next_distance(float t) { return t == 0.0 ? NORMAL_MIN : uintBitsToFloat(floatBitsToUint(t) + (t > 0.0 ? 1u : 0xFFFFFFFFu)); }
 
 // Where the search for the next surface begins: at the next float behind the last one, if there was one.
 float search_start(float start) { return start > 0.0 ? uintBitsToFloat(floatBitsToUint(start) + 1u) : 0.0; }
