@@ -173,6 +173,7 @@ void main() {
     uint outcome = WALK_LEFT;
     SceneMedium m;
     float t = 0.0;  // of a collision, from the start of the way
+    float reached = 0.0;  // by a walk that stopped
     vec3 bands = state.bands;
     bool counted = path_set_contains(push.path_set, path.bounce);
     bool scattering = path_set_continues(push.path_set, path.bounce) && (path_set_lobes(push.path_set) & LOBE_VOLUME) != 0u;
@@ -218,7 +219,10 @@ void main() {
             uvec4 key = uvec4(pixel, push.first_sample + slot % push.sample_count, dimension, push.seed);
             GridWalk walk = begin_grid_walk(m, path.origin, path.direction, way.start, way.end);
             outcome = delta_tracking(m, key, path.throughput, passes, walk, state.bands, weight, emitted);
-            t = walk.t - way.start;
+            t = (walk.entry - way.start) + walk.t;
+            reached = resumed_start(way.start, walk.entry + walk.t);
+            // The search that goes on from the surface itself would miss it.
+            outcome = outcome == WALK_STOPPED && reached >= way.end ? WALK_LEFT : outcome;
             COUNT_MEDIUM(null_collisions, walk.nulls)
             COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == WALK_COLLIDED ? 1u : 0u))
         }
@@ -246,7 +250,7 @@ void main() {
         }
     } else if (outcome == WALK_STOPPED) {
         path.throughput *= weight;
-        state.start = way.start + t;
+        state.start = reached;
         alive = path.throughput != vec3(0.0);
     } else if (crossing.boundary) {
         path.throughput *= weight;

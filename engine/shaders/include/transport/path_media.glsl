@@ -73,6 +73,9 @@ float past_surface(float t) { return max(t, NORMAL_MIN); }
 float next_distance(float t) { return t == 0.0 ? NORMAL_MIN : uintBitsToFloat(floatBitsToUint(t) + (t > 0.0 ? 1u : 0xFFFFFFFFu)); }
 
 // Where the search for the next surface begins: at the next float behind the last one, if there was one.
-float search_start(float start) { return start > 0.0 ? uintBitsToFloat(floatBitsToUint(start) + 1u) : 0.0; }
+float search_start(float start) { return start > 0.0 ? next_distance(start) : 0.0; }
+
+// Where a walk that began at `start` goes on, stopped at t. Each round gets on, however little, lest there be no end of them.
+float resumed_start(float start, float t) { return max(t, next_distance(start)); }
 
 #endif

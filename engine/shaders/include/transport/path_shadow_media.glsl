@@ -68,7 +68,10 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
                               SHADOW_KEY + status.rounds, push.seed);
             outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
             COUNT_MEDIUM(density_lookups, walk.nulls)
-            state.start = outcome == WALK_STOPPED ? walk.t : state.start;
+            float reached = resumed_start(state.start, walk.entry + walk.t);
+            // The search that goes on from the surface itself would miss it.
+            outcome = outcome == WALK_STOPPED && reached >= state.hit.t ? WALK_LEFT : outcome;
+            state.start = outcome == WALK_STOPPED ? reached : state.start;
         }
     }
     // A solid that absorbs has no medium inside, whose walk could stop: this is the whole way through it.
