@@ -77,8 +77,8 @@ void main() {
         out1(2u, schlick_phase(in1(0u), in1(2u)));
         out1(3u, schlick_phase_sample(in1(2u), in1(3u)));
         out3(4u, phase_direction(in3(5u), in1(0u), in1(4u)));
-        out1(7u, phase_function(in_bits(8u), in1(1u), in1(0u)));
-        out1(8u, phase_function_sample(in_bits(8u), in1(1u), in1(3u)));
+        out1(7u, phase_function_sample(in_bits(8u), in1(1u), in1(3u)));
+        out1(8u, phase_function(in_bits(8u), in1(1u), in3(5u), in3(9u)));
         break;
     }
     case 6u: {  // Phong

@@ -81,7 +81,7 @@ bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMed
     }
     vec3 wi = to * inversesqrt(squared);
     float falloff = light.kind == LIGHT_SPOT ? spot_falloff(-dot(light.direction, wi), light.cos_inner, light.cos_outer) : 1.0;
-    float phase = phase_function(m.phase, m.phase_parameter, dot(wi, path.direction));
+    float phase = phase_function(m.phase, m.phase_parameter, path.direction, wi);
     float weight = power_heuristic(pdf, collision_density(m.sigma_t, bands, t));
     vec3 contribution = path.throughput * m.sigma_s * transmittance(m.sigma_t, t) * light.strength
         * (falloff * phase * weight / (squared * probability * pdf));
@@ -89,7 +89,7 @@ bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMed
         return false;
     }
     path_airlight_rays[place] = shadow_ray(slot, path, from, light.position, contribution);
-    path_shadow_interiors[place].y = way.interior;
+    path_shadow_starts[place].airlight_interior = way.interior;
     return true;
 }
 
@@ -102,7 +102,7 @@ bool sample_collision_light(uint slot, uint place, PathState path, vec3 bands, S
     if (light.radiance == vec3(0.0)) {
         return false;
     }
-    float phase = phase_function(m.phase, m.phase_parameter, dot(light.direction, path.direction));
+    float phase = phase_function(m.phase, m.phase_parameter, path.direction, light.direction);
     float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, phase) : 1.0;
     if (HAS_AIRLIGHT && light.pdf == 0.0 && !light.infinite && m.has_grid == 0u) {
         float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
@@ -117,7 +117,8 @@ bool sample_collision_light(uint slot, uint place, PathState path, vec3 bands, S
         shadow_segment(SurfacePoint(from, vec3(0.0)), vec3(0.0), light.point, light.normal, ray.origin, ray.direction);
     }
     path_shadow_rays_out[place] = ray;
-    path_shadow_interiors[place].x = way.interior;
+    path_shadow_starts[place].sampled_interior = way.interior;
+    path_shadow_starts[place].start = 0.0;
     return true;
 }
 
@@ -126,9 +127,10 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout PathState path) {
     vec2 lobe = bounce_sample(slot, path.bounce, DIMENSION_LOBE);
     vec2 u = bounce_sample(slot, path.bounce, DIMENSION_DIRECTION);
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
-    path.pdf = phase_function(m.phase, m.phase_parameter, c);
+    vec3 wi = normalize(phase_direction(path.direction, c, u.y));
+    path.pdf = phase_function(m.phase, m.phase_parameter, path.direction, wi);
     path.origin = at;
-    path.direction = normalize(phase_direction(path.direction, c, u.y));
+    path.direction = wi;
     path.bounce += 1u;
     if (path.bounce >= push.roulette_start) {
         vec3 t = path.throughput * path.eta_scale;
@@ -171,6 +173,7 @@ void main() {
     uint outcome = WALK_LEFT;
     SceneMedium m;
     float t = 0.0;  // of a collision, from the start of the way
+    float reached = 0.0;  // by a walk that stopped
     vec3 bands = state.bands;
     bool counted = path_set_contains(push.path_set, path.bounce);
     bool scattering = path_set_continues(push.path_set, path.bounce) && (path_set_lobes(push.path_set) & LOBE_VOLUME) != 0u;
@@ -216,7 +219,10 @@ void main() {
             uvec4 key = uvec4(pixel, push.first_sample + slot % push.sample_count, dimension, push.seed);
             GridWalk walk = begin_grid_walk(m, path.origin, path.direction, way.start, way.end);
             outcome = delta_tracking(m, key, path.throughput, passes, walk, state.bands, weight, emitted);
-            t = walk.t - way.start;
+            t = (walk.entry - way.start) + walk.t;
+            reached = resumed_start(way.start, walk.entry + walk.t);
+            // The search that goes on from the surface itself would miss it.
+            outcome = outcome == WALK_STOPPED && reached >= way.end ? WALK_LEFT : outcome;
             COUNT_MEDIUM(null_collisions, walk.nulls)
             COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == WALK_COLLIDED ? 1u : 0u))
         }
@@ -244,7 +250,7 @@ void main() {
         }
     } else if (outcome == WALK_STOPPED) {
         path.throughput *= weight;
-        state.start = way.start + t;
+        state.start = reached;
         alive = path.throughput != vec3(0.0);
     } else if (crossing.boundary) {
         path.throughput *= weight;

@@ -35,6 +35,11 @@ layout(push_constant, scalar) uniform Push {
 // Least cosine by which the offset of a ray's origin counts as a way through a medium.
 const float LEAD_COS_MIN = 1.0 / 16.0;
 
+// Length of the way along `direction` that the offset of a ray's origin leaves out.
+float way_left_out(Surface s, vec3 origin, vec3 direction) {
+    return distance(origin, s.point.position) / max(abs(dot(direction, s.geometric_normal)), LEAD_COS_MIN);
+}
+
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
 
@@ -141,13 +146,14 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
                 ray_to_light.origin = start;
                 ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
                 uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : around) : interior;
-                if (HAS_ABSORPTION && passed != OUTSIDE && !light.infinite) {
+                if (HAS_ABSORPTION && !HAS_MEDIA && passed != OUTSIDE && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
                     ray_to_light.contribution *= exp(-load_material(passed).absorption * way);
                 }
                 path_shadow_rays_out[place] = ray_to_light;
                 if (HAS_MEDIA) {
-                    path_shadow_interiors[place].x = passed;
+                    path_shadow_starts[place].sampled_interior = passed;
+                    path_shadow_starts[place].start = -way_left_out(s, start, wi) / length(ray_to_light.direction);
                 }
                 flags |= HAS_MEDIA ? FLAG_SHADOW | FLAG_SAMPLED : FLAG_SHADOW;
             }
@@ -190,8 +196,7 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     }
     path.direction = normalize(wi);
     if (HAS_MEDIA) {
-        float cos_i = abs(dot(path.direction, s.geometric_normal));
-        path_medium_states[slot].start = -distance(path.origin, s.point.position) / max(cos_i, LEAD_COS_MIN);
+        path_medium_states[slot].start = -way_left_out(s, path.origin, path.direction);
     }
     path.pdf = scattered.pdf;
     if (HAS_PATH_AUTOMATON) {

@@ -121,7 +121,13 @@ pub fn equi_angular(start: DVec3, direction: DVec3, t_max: f64, light: DVec3) ->
 /// A distance along the segment, evenly over the angle at the light.
 pub fn equi_angular_sample(e: EquiAngular, t_max: f64, u: f64) -> f64 {
     let (s, c) = (u * e.range).sin_cos();
-    (s * (e.off * e.off + e.along * e.along) / (e.off * c + e.along * s)).clamp(0.0, t_max)
+    // Nothing is left of it, or less, where the end is infinitely far or rounding leads past it.
+    let depth = e.off * c + e.along * s;
+    if depth > 0.0 {
+        (s * (e.off * e.off + e.along * e.along) / depth).clamp(0.0, t_max)
+    } else {
+        t_max
+    }
 }
 
 /// Its density, m⁻¹.
@@ -239,6 +245,17 @@ mod tests {
                 1.0 - real[band],
             );
         }
+    }
+
+    /// The angle to an infinitely far end may be rounded past it.
+    #[test]
+    fn equi_angular_samples_end_where_the_segment_does() {
+        let e = equi_angular(DVec3::ZERO, DVec3::X, FAR_AWAY, DVec3::new(0.7, 0.3, 0.0));
+        let past = EquiAngular {
+            range: e.range * (1.0 + 1e-12),
+            ..e
+        };
+        assert_eq!(equi_angular_sample(past, FAR_AWAY, 1.0), FAR_AWAY);
     }
 
     /// Chi-square at 10⁻⁵, six tests.

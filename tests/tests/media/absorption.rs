@@ -9,7 +9,7 @@ use super::*;
 /// Relative error of closed forms in f32: exponentials of arguments up to 8, and distances of some rounding units.
 const EXACT: f64 = 1e-5;
 
-fn expect_exact(what: &str, picture: &Rendered, expected: [f64; 3]) {
+pub(super) fn expect_exact(what: &str, picture: &Rendered, expected: [f64; 3]) {
     expect_within(what, picture, expected, EXACT);
 }
 
@@ -21,7 +21,7 @@ fn expect_within(what: &str, picture: &Rendered, expected: [f64; 3], error: f64)
     println!("{what}: {:?}, expected {expected:?}", &picture.radiance[..3]);
 }
 
-fn absorber(sigma: [f32; 3]) -> Medium {
+pub(super) fn absorber(sigma: [f32; 3]) -> Medium {
     Medium {
         sigma_a: Vec3::from(sigma),
         ..Medium::default()
@@ -151,6 +151,93 @@ fn shadow_rays_are_attenuated_exactly() {
             };
             assert_eq!(render(gpu, &scene, [4, 4], 4, &stopped).bits(), picture.bits());
             assert!(picture.counters.stalls > 0, "more boundaries than one dispatch passes");
+        }
+    });
+}
+
+#[test]
+fn light_close_to_a_surface_is_attenuated_exactly() {
+    with_gpu(|gpu| {
+        // So dense a medium that the offset of rays' origins, 3·10⁻⁵ m here, is a good part of a free path.
+        let (sigma, height, eye) = (1e4f32, 5e-4f32, 2e-4);
+        let mut scene = Scene::default();
+        scene.media.push(absorber([sigma, 0.5 * sigma, 0.0]));
+        scene.surrounding = Some(0);
+        let white = scene.add_material(Material::lambert("white", Vec3::ONE));
+        scene.place(clerestory_tests::render::floor("floor", white, 2.0, 0.0));
+        scene.add_light(
+            "lamp",
+            LightKind::Point {
+                position: Vec3::new(0.21, height, 0.13),
+                intensity: Vec3::splat(PI as f32 * height * height),
+            },
+        );
+        scene
+            .cameras
+            .push(ray_camera(DVec3::new(0.21, eye, 0.13), DVec3::NEG_Y));
+        let depth = f64::from(sigma) * (f64::from(height) + eye);
+        let expected = [(-depth).exp(), (-0.5 * depth).exp(), 1.0];
+        // Rays of the camera are up to 2·10⁻⁶ m apart, seen from the lamp up to 4·10⁻³: cosines and distances are wrong by the square of
+        // that; heights of 10⁻⁴ m by a rounding unit of 0.2 m at worst, 10⁻⁸ m times 10⁴ m⁻¹.
+        let picture = render(gpu, &scene, [4, 4], 4, &independent());
+        expect_within("close to a surface", &picture, expected, 2e-4);
+    });
+}
+
+/// A body of glass that absorbs, by the attenuation of its material or by a medium inside, around a box of fog, a lamp and a white surface.
+fn tinted_glass(by_medium: bool, lamp_has_area: bool) -> Scene {
+    let sigma = Vec3::new(0.0, 0.6, 1.5);
+    let mut glass = Material::glass("glass", 1.2);
+    let mut scene = Scene::default();
+    if by_medium {
+        scene.media.push(absorber(sigma.to_array()));
+        glass.interior = Some(0);
+    } else {
+        glass.attenuation_color = (-sigma).map(f32::exp);
+        glass.attenuation_distance = 1.0;
+    }
+    let glass = scene.add_material(glass);
+    scene.place(cuboid("glass", glass, Vec3::splat(-2.0), Vec3::splat(2.0)));
+    let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
+    scene.place(clerestory_tests::render::floor("floor", white, 1.0, -1.5));
+    let (low, high) = (Vec3::new(-0.8, -1.0, -0.8), Vec3::new(0.8, 0.5, 0.8));
+    add_box(&mut scene, medium(0.8, 0.9, Phase::Isotropic), low, high);
+    if lamp_has_area {
+        let mut lamp = Material::lambert("lamp", Vec3::ZERO);
+        lamp.emission = Vec3::ONE;
+        let lamp = scene.add_material(lamp);
+        let (low, high) = (Vec3::new(-0.4, 1.2, -0.4), Vec3::new(0.4, 1.4, 0.4));
+        scene.place(cuboid("lamp", lamp, low, high));
+    } else {
+        add_point(&mut scene, Vec3::new(0.2, 1.2, 0.1));
+    }
+    let eye = DVec3::new(0.3, 0.2, 1.6);
+    scene.cameras = vec![Camera::look_at("main", eye, DVec3::new(0.0, -0.7, 0.0), DVec3::Y, 1.0)];
+    scene
+}
+
+#[test]
+fn absorbing_solids_are_bodies_of_absorbing_media() {
+    with_gpu(|gpu| {
+        for lamp_has_area in [false, true] {
+            let settings = |seed, equiangular| PathTracerSettings {
+                seed,
+                equiangular,
+                ..independent()
+            };
+            let truth = render(
+                gpu,
+                &tinted_glass(true, lamp_has_area),
+                [12, 12],
+                128,
+                &settings(1, true),
+            );
+            let scene = tinted_glass(false, lamp_has_area);
+            for equiangular in [true, false] {
+                let picture = render(gpu, &scene, [12, 12], 128, &settings(2, equiangular));
+                let what = format!("tinted glass, area lamp {lamp_has_area}, equi-angular {equiangular}");
+                picture.expect_same_as(&what, &truth.radiance, &truth.variance);
+            }
         }
     });
 }

@@ -101,6 +101,38 @@ fn walks_longer_than_a_dispatch_go_on() {
     });
 }
 
+#[test]
+fn walks_get_on_however_far_the_grid() {
+    with_gpu(|gpu| {
+        // Free paths of the majorant are 10⁻⁶ m, where distances of a kilometre are rounded to 6·10⁻⁵ m.
+        let sigma = [0.0f32, 20.0, 1e6];
+        let (low, high) = (Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 0.01, 1.0));
+        let mut scene = Scene {
+            environment: Some(Environment::uniform(Vec3::ONE)),
+            ..Scene::default()
+        };
+        let absorber = Medium {
+            sigma_a: Vec3::from(sigma),
+            density: Some(layers(2, low, high, |_| 1.0)),
+            ..Medium::default()
+        };
+        add_box(&mut scene, absorber, low, high);
+        scene
+            .cameras
+            .push(ray_camera(DVec3::new(0.21, 1000.0, 0.13), DVec3::NEG_Y));
+        let picture = render(gpu, &scene, [4, 4], 4, &independent());
+        // Each place where a round begins, five in all, and both ends of the way are wrong by half a rounding unit; ten thousand products.
+        let bias = 7.0 * 3e-5 * 20.0 + 1e4 * 6e-8;
+        for (c, (mean, variance)) in picture.mean().into_iter().enumerate().take(2) {
+            let expected = (-0.01 * f64::from(sigma[c])).exp();
+            report(&format!("far grid, band {c}"), mean, variance, expected);
+            expect_mean("far grid", mean, variance, expected, bias * expected);
+        }
+        assert_eq!(picture.mean()[2].0, 0.0);
+        assert!(picture.counters.density_lookups > 16 * 4 * 9000);
+    });
+}
+
 /// A box of a medium in the light of a point, a spot and the sky.
 fn lit_box(medium: Medium) -> Scene {
     let mut scene = Scene {

@@ -100,7 +100,9 @@ fn single_scattering_follows_the_phase_function() {
             Phase::Rayleigh,
         ] {
             let scene = airlight(0.5, 0.8, phase, Vec3::new(3.0, 1.0, 0.0), DVec3::ZERO);
-            let expected = airlight_integral(0.5, 0.4, 3.0, 1.0, |c| phase_function(phase, c));
+            let expected = airlight_integral(0.5, 0.4, 3.0, 1.0, |c| {
+                phase_function(phase, DVec3::X, DVec3::new(c, (1.0 - c * c).max(0.0).sqrt(), 0.0))
+            });
             for equiangular in [true, false] {
                 let p = picture(gpu, &scene, "direct", 64, equiangular);
                 expect_value(

@@ -4,7 +4,8 @@
 // Selle and Jarosz, "Residual Ratio Tracking for Estimating Attenuation in Participating Media" (2014); stepping through blocks of
 // Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing" (1987); bands as in transport/medium.glsl.
 // Guarantees: unbiased wherever majorants bound the density; at most GRID_WALK_QUOTA iterations a call, after which the walk can go on from where
-// it stands, since free flight has no memory. Random numbers are hashes of a key and the number of the draw.
+// it stands, since free flight has no memory; where f32 does not tell one stop from the next, a rounding unit of the way is left out. Random
+// numbers are hashes of a key and the number of the draw.
 #ifndef CLERESTORY_TRANSPORT_MEDIA_TRACKING_GLSL
 #define CLERESTORY_TRANSPORT_MEDIA_TRACKING_GLSL
 
@@ -25,7 +26,8 @@ const uint WALK_STOPPED = 1u;   // by the quota
 const uint WALK_COLLIDED = 2u;
 
 struct GridWalk {
-    vec3 origin;   // in cells
+    float entry;   // distance along the ray from which the others count, so that steps are not lost beside a long way to the grid
+    vec3 origin;   // in cells, where the walk begins
     vec3 direction;
     vec3 inverse;
     ivec3 block;
@@ -48,9 +50,11 @@ GridWalk begin_grid_walk(SceneMedium m, vec3 origin, vec3 direction, float t, fl
     vec3 t1 = (vec3(m.cells) - w.origin) * w.inverse;
     vec3 near = min(t0, t1);
     vec3 far = max(t0, t1);
-    w.t = max(t, max(near.x, max(near.y, near.z)));
-    w.t_end = min(t_end, min(far.x, min(far.y, far.z)));
-    w.block = clamp(ivec3(floor((w.origin + w.t * w.direction) / m.block)), ivec3(0), ivec3(m.blocks) - 1);
+    w.entry = max(t, max(near.x, max(near.y, near.z)));
+    w.t = 0.0;
+    w.t_end = min(t_end, min(far.x, min(far.y, far.z))) - w.entry;
+    w.origin += w.entry * w.direction;
+    w.block = clamp(ivec3(floor(w.origin / m.block)), ivec3(0), ivec3(m.blocks) - 1);
     w.draw = 0u;
     w.nulls = 0u;
     return w;

@@ -81,7 +81,9 @@ EquiAngular equi_angular(vec3 start, vec3 direction, float t_max, vec3 light) {
 float equi_angular_sample(EquiAngular e, float t_max, float u) {
     float angle = u * e.range;
     float s = sin(angle);
-    return clamp(s * (e.off * e.off + e.along * e.along) / (e.off * cos(angle) + e.along * s), 0.0, t_max);
+    // Nothing is left of it, or less, where the end is infinitely far or rounding leads past it.
+    float depth = e.off * cos(angle) + e.along * s;
+    return depth > 0.0 ? clamp(s * (e.off * e.off + e.along * e.along) / depth, 0.0, t_max) : t_max;
 }
 
 float equi_angular_pdf(EquiAngular e, float t) {

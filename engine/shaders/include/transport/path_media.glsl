@@ -3,7 +3,9 @@
 // A body is a solid that refracts or an invisible boundary. Paths carry the material of the innermost body they are in; what is outside of a
 // body is known for each of its triangles, so bodies may lie in bodies, as long as their surfaces do not cross. A surface of a body tells
 // by its side which body the way to it was in, whatever the path believed: rounding cannot leave a path in the wrong medium for good.
-// Boundaries leave the ray as it is: the search for the next surface begins one rounding unit behind them, so nothing is skipped.
+// Boundaries leave the ray as it is: the search for the next surface begins one rounding unit behind them. A surface at the same distance is
+// not skipped, since boundaries have the last numbers of all triangles and ties go to the first one; of boundaries in one place only
+// the first one is met.
 #ifndef CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
 #define CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
 
@@ -25,9 +27,16 @@ struct MediumEvent {
     uint flags;   // EVENT_HANDLED, FLAG_AIRLIGHT
 };
 
+// What is known of a place's shadow rays where they start.
+struct ShadowStart {
+    uint sampled_interior;
+    uint airlight_interior;
+    float start;  // of the sampled ray, as in ShadowState
+};
+
 struct ShadowState {
     vec3 transmittance;
-    float start;
+    float start;  // as in MediumState, in lengths of the ray's direction
     Hit hit;
     uint interior;
     uint walks;  // through grids, so far
@@ -36,7 +45,7 @@ struct ShadowState {
 
 layout(set = 4, binding = 0, scalar) restrict buffer PathMediumStates { MediumState path_medium_states[]; };     // by slot
 layout(set = 4, binding = 1, scalar) restrict buffer PathMediumEvents { MediumEvent path_medium_events[]; };     // by place
-layout(set = 4, binding = 2, scalar) restrict buffer PathShadowInteriors { uvec2 path_shadow_interiors[]; };     // by place: of the sampled ray, and of airlight
+layout(set = 4, binding = 2, scalar) restrict buffer PathShadowStarts { ShadowStart path_shadow_starts[]; };        // by place
 layout(set = 4, binding = 3, scalar) restrict buffer PathAirlightRays { ShadowRay path_airlight_rays[]; };       // by place
 layout(set = 4, binding = 4, scalar) restrict buffer PathShadowStates { ShadowState path_shadow_states[]; };     // by place in the shadow queue
 // 64-bit counters, low word first.
@@ -60,7 +69,13 @@ const float NORMAL_MIN = 1.17549435e-38;
 // How far a ray has come that passes a surface at a distance of t.
 float past_surface(float t) { return max(t, NORMAL_MIN); }
 
+// The next greater float.
+float next_distance(float t) { return t == 0.0 ? NORMAL_MIN : uintBitsToFloat(floatBitsToUint(t) + (t > 0.0 ? 1u : 0xFFFFFFFFu)); }
+
 // Where the search for the next surface begins: at the next float behind the last one, if there was one.
-float search_start(float start) { return start > 0.0 ? uintBitsToFloat(floatBitsToUint(start) + 1u) : 0.0; }
+float search_start(float start) { return start > 0.0 ? next_distance(start) : 0.0; }
+
+// Where a walk that began at `start` goes on, stopped at t. Each round gets on, however little, lest there be no end of them.
+float resumed_start(float start, float t) { return max(t, next_distance(start)); }
 
 #endif

@@ -10,6 +10,7 @@
 #include "transport/media_tracking.glsl"
 #include "transport/path_bodies.glsl"
 
+layout(constant_id = 10) const bool HAS_ABSORPTION = true;  // absorbing solids
 layout(constant_id = 20) const bool HAS_GRIDS = true;
 layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
 
@@ -35,8 +36,10 @@ ShadowRay first_ray(uint place, uint rays) {
 }
 
 ShadowState begin_ray(uint place, uint rays, float t_max, uint walks) {
-    uvec2 interiors = path_shadow_interiors[place];
-    return ShadowState(vec3(1.0), 0.0, no_hit(t_max), (rays & FLAG_AIRLIGHT) != 0u ? interiors.y : interiors.x, walks, rays);
+    ShadowStart from = path_shadow_starts[place];
+    bool airlight = (rays & FLAG_AIRLIGHT) != 0u;
+    return ShadowState(vec3(1.0), airlight ? 0.0 : from.start, no_hit(t_max), airlight ? from.airlight_interior : from.sampled_interior, walks,
+                       rays);
 }
 
 // The next surface of a ray to which the way has been searched: passes a boundary, ends elsewhere. True when the ray has ended, its transmittance
@@ -65,8 +68,15 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
                               SHADOW_KEY + status.rounds, push.seed);
             outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
             COUNT_MEDIUM(density_lookups, walk.nulls)
-            state.start = outcome == WALK_STOPPED ? walk.t : state.start;
+            float reached = resumed_start(state.start, walk.entry + walk.t);
+            // The search that goes on from the surface itself would miss it.
+            outcome = outcome == WALK_STOPPED && reached >= state.hit.t ? WALK_LEFT : outcome;
+            state.start = outcome == WALK_STOPPED ? reached : state.start;
         }
+    }
+    // A solid that absorbs has no medium inside, whose walk could stop: this is the whole way through it.
+    if (HAS_ABSORPTION && crossing.interior != OUTSIDE && outcome == WALK_LEFT && state.transmittance != vec3(0.0)) {
+        state.transmittance *= transmittance(load_material(crossing.interior).absorption, max(state.hit.t - state.start, 0.0) * scale);
     }
     bool ended = outcome == WALK_LEFT && (!met || state.transmittance == vec3(0.0));
     if (!ended) {

@@ -9,28 +9,30 @@
 #include "scene/records.glsl"
 #include "transport/warp.glsl"
 
-// Below this |g| the inversion loses its digits and the lobe is taken as isotropic.
-const float HENYEY_GREENSTEIN_MIN = 1e-3;
-
-float henyey_greenstein(float c, float g) {
-    // 1 + g^2 - 2 g c without its cancellation at the peak.
-    float a = abs(g);
-    float d = (1.0 - a) * (1.0 - a) + 2.0 * (a - g * c);
-    return UNIFORM_SPHERE_PDF * (1.0 - g * g) / (d * sqrt(d));
+// Henyey and Greenstein's density of a = |g|, where the cosine is x = 1 - c below that of the peak.
+float henyey_greenstein_below_peak(float x, float a) {
+    // 1 + g^2 - 2 g c without its cancellation.
+    float d = (1.0 - a) * (1.0 - a) + 2.0 * a * x;
+    return UNIFORM_SPHERE_PDF * (1.0 - a) * (1.0 + a) / (d * sqrt(d));
 }
+
+float henyey_greenstein(float c, float g) { return henyey_greenstein_below_peak(max(1.0 - (g < 0.0 ? -c : c), 0.0), abs(g)); }
 
 float henyey_greenstein_sample(float g, float u) {
-    if (abs(g) < HENYEY_GREENSTEIN_MIN) {
-        return 1.0 - 2.0 * u;
-    }
-    float s = (1.0 - g * g) / (1.0 - g + 2.0 * g * u);
-    return clamp((1.0 + g * g - s * s) / (2.0 * g), -1.0, 1.0);
+    // The inversion as a distance from the peak, which neither cancels there nor divides by g.
+    float a = abs(g);
+    float s = 1.0 - a + 2.0 * a * u;
+    float x = (1.0 - a) * (1.0 - u) * ((1.0 - a) * (1.0 + a) / s + 1.0 - a) / s;
+    float c = clamp(1.0 - x, -1.0, 1.0);
+    return g < 0.0 ? -c : c;
 }
 
-float schlick_phase(float c, float k) {
-    float d = 1.0 - k * c;
-    return UNIFORM_SPHERE_PDF * (1.0 - k * k) / (d * d);
+float schlick_below_peak(float x, float a) {
+    float d = 1.0 - a + a * x;
+    return UNIFORM_SPHERE_PDF * (1.0 - a) * (1.0 + a) / (d * d);
 }
+
+float schlick_phase(float c, float k) { return schlick_below_peak(max(1.0 - (k < 0.0 ? -c : c), 0.0), abs(k)); }
 
 float schlick_phase_sample(float k, float u) {
     float x = 2.0 * u - 1.0;
@@ -47,11 +49,15 @@ float rayleigh_phase_sample(float u) {
     return clamp(q < 0.0 ? 1.0 / z - z : z - 1.0 / z, -1.0, 1.0);
 }
 
-// The phase function of a medium: `kind` is one of PHASE_..., `parameter` g or k.
-float phase_function(uint kind, float parameter, float c) {
-    return kind == PHASE_HENYEY_GREENSTEIN ? henyey_greenstein(c, parameter)
-        : kind == PHASE_SCHLICK ? schlick_phase(c, parameter)
-        : kind == PHASE_RAYLEIGH ? rayleigh_phase(c) : UNIFORM_SPHERE_PDF;
+// The phase function of a medium, from propagation direction w to wi: `kind` is one of PHASE_..., `parameter` g or k.
+float phase_function(uint kind, float parameter, vec3 w, vec3 wi) {
+    // Half the square of the chord to the peak is 1 - c without its cancellation.
+    vec3 chord = parameter < 0.0 ? wi + w : wi - w;
+    float x = 0.5 * dot(chord, chord);
+    float a = abs(parameter);
+    return kind == PHASE_HENYEY_GREENSTEIN ? henyey_greenstein_below_peak(x, a)
+        : kind == PHASE_SCHLICK ? schlick_below_peak(x, a)
+        : kind == PHASE_RAYLEIGH ? rayleigh_phase(1.0 - x) : UNIFORM_SPHERE_PDF;
 }
 
 float phase_function_sample(uint kind, float parameter, float u) {

@@ -37,6 +37,15 @@ pub(in crate::scene) fn check(scene: &Scene) -> Result<(), Fault> {
             format!("{index} is out of range; there are {count} media"),
         );
     }
+    if let Some(index) = scene.surrounding
+        && let medium = &scene.media[index as usize]
+        && medium.density.is_none()
+        && (medium.emission.cmpgt(Vec3::ZERO) & medium.sigma_t().cmpeq(Vec3::ZERO)).any()
+    {
+        let cause =
+            format!("{index} emits without extinction in some band: without end, it would be infinitely bright");
+        return fault("surrounding", cause);
+    }
     for (i, material) in scene.materials.iter().enumerate() {
         check_use(material, count)
             .map_err(|(at, cause)| (format!("materials[{i}] {:?}.{at}", material.name), cause))?;
@@ -181,6 +190,14 @@ mod tests {
                 "more than 4096",
             ),
             (refusal(|s| s.surrounding = Some(1)), "surrounding: 1 is out of range"),
+            (
+                refusal(|s| {
+                    s.media[0].density = None;
+                    s.media[0].emission.y = 1.0;
+                    (s.media[0].sigma_a.y, s.media[0].sigma_s.y) = (0.0, 0.0);
+                }),
+                "infinitely bright",
+            ),
             (
                 refusal(|s| s.materials[0].interior = Some(7)),
                 "interior: 7 is out of range",

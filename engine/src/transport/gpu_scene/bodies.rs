@@ -7,7 +7,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::geometry::{Geometry, corners_of};
+use super::geometry::{Geometry, corners_of, instances_in_order};
 use crate::scene::{Material, Scene};
 
 /// The bodies of a scene.
@@ -34,7 +34,7 @@ impl Bodies {
     pub(super) fn place(scene: &Scene, geometry: &mut Geometry) -> Self {
         let mut bodies = Self::default();
         let mut first_triangle = 0;
-        for instance in &scene.instances {
+        for instance in instances_in_order(scene) {
             let mesh = &scene.meshes[instance.mesh as usize];
             let end = first_triangle + mesh.triangles.len();
             let material = mesh

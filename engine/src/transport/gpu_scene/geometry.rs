@@ -1,7 +1,8 @@
 //! All instances of a scene flattened to world space: vertices with what the profile says is used of them, and triangles.
 //!
 //! Transforms are applied in f64 and rounded once; a mirroring one swaps two corners, so that front faces stay front faces. Triangles
-//! keep the order of instances.
+//! keep the order of instances, those of invisible boundaries behind all others: of hits at one distance the first triangle counts, so a
+//! surface in the plane of a boundary is met before the boundary is passed.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +11,7 @@ use glam::{DMat3, Vec3};
 use crate::accel::MAX_COORDINATE;
 use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
-use crate::scene::{Scene, SceneProfile};
+use crate::scene::{Instance, Scene, SceneProfile};
 use crate::{Error, Result};
 
 /// All instances flattened to world space.
@@ -25,6 +26,20 @@ pub(super) struct Geometry {
     pub(super) triangles: Vec<SceneTriangle>,
 }
 
+/// Instances in the order of their triangles.
+pub(super) fn instances_in_order(scene: &Scene) -> impl Iterator<Item = &Instance> {
+    let bounds_medium = |instance: &&Instance| {
+        let material = scene.meshes[instance.mesh as usize].material;
+        material.is_some_and(|index| scene.materials[index as usize].boundary)
+    };
+    let boundaries = scene.instances.iter().filter(bounds_medium);
+    scene
+        .instances
+        .iter()
+        .filter(move |instance| !bounds_medium(instance))
+        .chain(boundaries)
+}
+
 impl Geometry {
     pub(super) fn flatten(scene: &Scene, profile: &SceneProfile) -> Result<Self> {
         let mut all = Self::default();
@@ -32,7 +47,7 @@ impl Geometry {
         let has_attributes =
             profile.has_shading_normals || profile.has_textures || profile.has_normal_maps || profile.has_vertex_colors;
         let mut placed = 0u32;
-        for instance in &scene.instances {
+        for instance in instances_in_order(scene) {
             let mesh = &scene.meshes[instance.mesh as usize];
             let base = placed;
             placed = u32::try_from(mesh.positions.len())

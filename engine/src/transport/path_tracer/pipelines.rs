@@ -188,6 +188,7 @@ impl TracePipelines {
                 shadow: gpu.compute_pipeline(&path_shadow_media::Spec {
                     bvh2_quota,
                     resumes,
+                    has_absorption: profile.has_absorption,
                     has_grids,
                     has_homogeneous,
                     ..Default::default()
@@ -208,6 +209,7 @@ impl TracePipelines {
                     has_vertex_colors,
                     bvh2_quota,
                     resumes,
+                    has_absorption: profile.has_absorption,
                     has_grids,
                     has_homogeneous,
                     ..Default::default()

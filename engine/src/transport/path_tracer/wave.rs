@@ -10,7 +10,8 @@ use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP};
 use crate::gpu::shaders::sets::{PathBuffers, PathMedia};
 use crate::gpu::shaders::transport::{path_camera, path_medium};
 use crate::gpu::shaders::types::{
-    FilmAov, FilmPixel, GatheredLight, Hit, MediumEvent, MediumState, PathAov, PathState, ShadowRay, ShadowState,
+    FilmAov, FilmPixel, GatheredLight, Hit, MediumEvent, MediumState, PathAov, PathState, ShadowRay, ShadowStart,
+    ShadowState,
 };
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 use crate::{Error, Result};
@@ -56,7 +57,7 @@ pub(super) type MediumCounters = path_medium::PathMediumCounters;
 pub(super) struct MediaBuffers {
     states: Buffer,
     events: Buffer,
-    interiors: Buffer,
+    shadow_starts: Buffer,
     airlight_rays: Buffer,
     shadow_states: Buffer,
     pub counters: Buffer,
@@ -210,7 +211,7 @@ impl WaveBuffers {
             return PathMedia {
                 path_medium_states: none,
                 path_medium_events: none,
-                path_shadow_interiors: none,
+                path_shadow_starts: none,
                 path_airlight_rays: none,
                 path_shadow_states: none,
                 medium_counters: none,
@@ -219,7 +220,7 @@ impl WaveBuffers {
         PathMedia {
             path_medium_states: media.states.view(),
             path_medium_events: media.events.view(),
-            path_shadow_interiors: media.interiors.view(),
+            path_shadow_starts: media.shadow_starts.view(),
             path_airlight_rays: media.airlight_rays.view(),
             path_shadow_states: media.shadow_states.view(),
             medium_counters: media.counters.view(),
@@ -261,7 +262,7 @@ impl MediaBuffers {
         Ok(Self {
             states: work("path medium states", size_of::<MediumState>(), slots)?,
             events: work("path medium events", size_of::<MediumEvent>(), slots)?,
-            interiors: work("path shadow interiors", size_of::<[u32; 2]>(), lit_slots)?,
+            shadow_starts: work("path shadow starts", size_of::<ShadowStart>(), lit_slots)?,
             airlight_rays: work("path airlight rays", size_of::<ShadowRay>(), airlight_slots)?,
             shadow_states: work("path shadow states", size_of::<ShadowState>(), lit_slots)?,
             counters: work("path medium counters", size_of::<MediumCounters>(), 1)?,
