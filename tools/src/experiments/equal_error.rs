@@ -8,7 +8,7 @@
 pub enum Cost {
     /// Between two budgets, or at one.
     Measured(f64),
-    /// The least budget has reached it already: the cost is at most this.
+    /// The least budget has reached it already, or this one with an error that is lost in noise: the cost is at most this.
     AtMost(f64),
     /// The greatest budget has not reached it: the cost is above this.
     Above(f64),
@@ -58,12 +58,11 @@ pub fn cost_of(curve: &[(f64, f64)], error: f64) -> Option<Cost> {
     for pair in curve.windows(2) {
         let ((c0, e0), (c1, e1)) = (pair[0], pair[1]);
         if e1 <= error {
-            // An error that is lost in the reference's noise has no logarithm.
-            let share = if e1 > 0.0 {
-                (error / e0).ln() / (e1 / e0).ln()
-            } else {
-                1.0
-            };
+            // An error that is lost in the reference's noise has no logarithm: how early the curve crossed is not known.
+            if e1 <= 0.0 {
+                return Some(Cost::AtMost(c1));
+            }
+            let share = (error / e0).ln() / (e1 / e0).ln();
             return Some(Cost::Measured(c0 * (c1 / c0).powf(share)));
         }
     }
@@ -84,6 +83,15 @@ mod tests {
         assert_eq!(cost_of(&curve, 2.0), Some(Cost::AtMost(0.1)));
         assert_eq!(cost_of(&curve, 0.1), Some(Cost::Above(1.6)));
         assert_eq!(cost_of(&[], 0.1), None);
+    }
+
+    #[test]
+    fn an_error_lost_in_noise_bounds_the_cost_only() {
+        for lost in [0.0, -0.01] {
+            let curve = [(1.0, 0.5), (4.0, lost), (16.0, 0.1)];
+            assert_eq!(cost_of(&curve, 0.2), Some(Cost::AtMost(4.0)));
+            assert_eq!(cost_of(&curve, 0.5), Some(Cost::Measured(1.0)));
+        }
     }
 
     #[test]

@@ -178,7 +178,7 @@ fn scene(results: &SceneResults) -> SceneSeries {
 
 fn variant(results: &VariantResults) -> Series {
     let points: Vec<SeriesPoint> = results.points.iter().map(point).collect();
-    let fit = |work: Work, mse: fn(&Measurement) -> f64| {
+    let fit = |work: Work, mse: fn(&Measurement) -> f64, reference_error: fn(&Measurement) -> f64| {
         // A budget that an interruption has left with fewer repeats waits for them.
         let most = results.points.iter().map(|point| point.measurements.len()).max()?;
         let whole = || {
@@ -187,14 +187,21 @@ fn variant(results: &VariantResults) -> Series {
         };
         let works: Vec<f64> = whole().map(|(_, point)| point.work(work)).collect();
         let errors = whole().map(|(point, _)| point.measurements.iter().map(mse).collect());
-        slope::fit(&works, &errors.collect::<Vec<Vec<f64>>>())
+        let by_reference = whole().flat_map(|(point, _)| &point.measurements).map(reference_error);
+        slope::fit(
+            &works,
+            &errors.collect::<Vec<Vec<f64>>>(),
+            by_reference.fold(0.0, f64::max),
+        )
     };
+    let relative: [fn(&Measurement) -> f64; 2] =
+        [|one| one.error.relative_mse, |one| one.error.reference_relative_error];
     Series {
         name: results.name.clone(),
         refused: results.refused.clone(),
-        slope: fit(Work::Samples, |one| one.error.relative_mse),
-        absolute_slope: fit(Work::Samples, |one| one.error.mse),
-        time_slope: fit(Work::Seconds, |one| one.error.relative_mse),
+        slope: fit(Work::Samples, relative[0], relative[1]),
+        absolute_slope: fit(Work::Samples, |one| one.error.mse, |one| one.error.reference_error),
+        time_slope: fit(Work::Seconds, relative[0], relative[1]),
         expected_slope: results.expected_slope,
         seconds_to_error: None,
         rays_to_error: None,

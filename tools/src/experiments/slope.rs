@@ -4,7 +4,14 @@
 //! their logarithms and roots are not. The standard error is the delete-one jackknife over the repeats (Efron and Stein, *The Jackknife Estimate of
 //! Variance*, 1981): whatever the budgets of one repeat have in common (a seed, whose samples recur in its larger budgets) is left out
 //! together.
-//! Guarantees: deterministic; budgets whose mean MSE is not above 0 (the reference's noise hides them) are left out and counted.
+//! Near the noise only fluctuations upwards have a logarithm, and a fit through those is too flat. A budget counts where its mean MSE is
+//! above [`SIGNIFICANT`] standard errors of it: those of the repeats and of the reference's noise, which all repeats share. The budgets that
+//! count are chosen once and serve every replicate of the jackknife.
+//! Guarantees: deterministic; budgets that do not count are left out and counted. A replicate's mean MSE is at least the full mean less one
+//! standard error, so that what counts has a logarithm in every replicate.
+
+/// How many standard errors above 0 a budget's mean MSE must lie.
+pub const SIGNIFICANT: f64 = 3.0;
 
 /// A fitted exponent.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -15,8 +22,10 @@ pub struct Slope {
     pub standard_error: Option<f64>,
     /// Budgets that were fitted.
     pub budgets: usize,
-    /// Budgets left out since no error was left to see.
+    /// Budgets left out since their error does not stand out from the noise.
     pub hidden: usize,
+    /// Repeats of every budget: the standard error has one degree of freedom fewer.
+    pub repeats: usize,
 }
 
 /// Ordinary least squares slope of y on x; `None` for fewer than two different x.
@@ -30,21 +39,33 @@ pub fn least_squares(points: &[(f64, f64)]) -> Option<f64> {
 }
 
 /// The exponent of RMSE against work. `work[i]` is that of budget i, `mse[i][r]` the unbiased MSE of its repeat r; every budget has the same
-/// repeats in the same order. `None` when fewer than two budgets can be fitted.
-pub fn fit(work: &[f64], mse: &[Vec<f64>]) -> Option<Slope> {
+/// repeats in the same order. `reference_error` is the standard error of any of them by the reference's noise; that by the repeats is added
+/// to it, with a single repeat as 0. `None` when fewer than two budgets can be fitted.
+pub fn fit(work: &[f64], mse: &[Vec<f64>], reference_error: f64) -> Option<Slope> {
     let repeats = mse.iter().map(Vec::len).min().unwrap_or(0);
-    let points = |left_out: Option<usize>| -> Vec<(f64, f64)> {
-        let point = |(work, mse): (&f64, &Vec<f64>)| {
-            let kept = mse[..repeats].iter().enumerate().filter(|(r, _)| Some(*r) != left_out);
-            let (sum, count) = kept.fold((0.0, 0), |(sum, count), (_, mse)| (sum + mse, count + 1));
-            let mean = sum / f64::from(count.max(1));
-            (mean > 0.0 && *work > 0.0).then(|| (work.ln(), 0.5 * mean.ln()))
-        };
-        work.iter().zip(mse).filter_map(point).collect()
+    let mean_without = |mse: &[f64], left_out: Option<usize>| {
+        let kept = mse.iter().enumerate().filter(|(r, _)| Some(*r) != left_out);
+        let (sum, count) = kept.fold((0.0, 0), |(sum, count), (_, mse)| (sum + mse, count + 1));
+        sum / f64::from(count.max(1))
     };
-    let all = points(None);
-    let value = least_squares(&all)?;
-    let without: Option<Vec<f64>> = (0..repeats).map(|r| least_squares(&points(Some(r)))).collect();
+    let stands_out = |mse: &[f64]| {
+        let (n, mean) = (mse.len() as f64, mean_without(mse, None));
+        let squares: f64 = mse.iter().map(|mse| (mse - mean).powi(2)).sum();
+        let by_repeats = squares / (n * (n - 1.0).max(1.0));
+        mean > 0.0 && mean > SIGNIFICANT * (by_repeats + reference_error * reference_error).sqrt()
+    };
+    let counting: Vec<(f64, &[f64])> = work
+        .iter()
+        .zip(mse)
+        .map(|(work, mse)| (*work, &mse[..repeats]))
+        .filter(|(work, mse)| *work > 0.0 && stands_out(mse))
+        .collect();
+    let slope_without = |left_out: Option<usize>| {
+        let point = |(work, mse): &(f64, &[f64])| (work.ln(), 0.5 * mean_without(mse, left_out).ln());
+        least_squares(&counting.iter().map(point).collect::<Vec<_>>())
+    };
+    let value = slope_without(None)?;
+    let without: Option<Vec<f64>> = (0..repeats).map(|r| slope_without(Some(r))).collect();
     let standard_error = without.filter(|slopes| slopes.len() >= 2).map(|slopes| {
         let n = slopes.len() as f64;
         let mean = slopes.iter().sum::<f64>() / n;
@@ -53,8 +74,9 @@ pub fn fit(work: &[f64], mse: &[Vec<f64>]) -> Option<Slope> {
     Some(Slope {
         value,
         standard_error,
-        budgets: all.len(),
-        hidden: work.len() - all.len(),
+        budgets: counting.len(),
+        hidden: work.len() - counting.len(),
+        repeats,
     })
 }
 
@@ -76,7 +98,7 @@ mod tests {
     fn exact_power_laws_are_recovered() {
         for exponent in [-0.5, -0.75, -1.0] {
             let mse: Vec<Vec<f64>> = WORK.iter().map(|n| vec![3.0 * n.powf(2.0 * exponent); 4]).collect();
-            let slope = fit(&WORK, &mse).unwrap();
+            let slope = fit(&WORK, &mse, 0.0).unwrap();
             assert!((slope.value - exponent).abs() < 1e-12, "{slope:?}");
             assert!(slope.standard_error.unwrap() < 1e-12);
             assert_eq!((slope.budgets, slope.hidden), (5, 0));
@@ -94,7 +116,7 @@ mod tests {
                 .iter()
                 .map(|n| (0..6).map(|_| (1.0 + 0.1 * normal(&mut random)) / n).collect())
                 .collect();
-            let slope = fit(&WORK, &mse).unwrap();
+            let slope = fit(&WORK, &mse, 0.0).unwrap();
             let z = (slope.value + 0.5) / slope.standard_error.unwrap();
             misses += u32::from(z.abs() > 2.571);
         }
@@ -105,7 +127,7 @@ mod tests {
     fn a_bias_flattens_the_slope_unless_it_is_subtracted() {
         let with_reference_noise = |kept: f64| {
             let mse: Vec<Vec<f64>> = WORK.iter().map(|n| vec![1.0 / n + kept * 1e-3; 2]).collect();
-            fit(&WORK, &mse).unwrap().value
+            fit(&WORK, &mse, 0.0).unwrap().value
         };
         assert!(with_reference_noise(1.0) > -0.47);
         assert!((with_reference_noise(0.0) + 0.5).abs() < 1e-12);
@@ -113,12 +135,68 @@ mod tests {
 
     #[test]
     fn what_cannot_be_fitted_is_said() {
-        assert!(fit(&[4.0], &[vec![1.0]]).is_none());
-        assert!(fit(&[4.0, 4.0], &[vec![1.0], vec![1.0]]).is_none());
-        assert!(fit(&[], &[]).is_none());
-        let one_repeat = fit(&[1.0, 4.0], &[vec![1.0], vec![0.25]]).unwrap();
+        assert!(fit(&[4.0], &[vec![1.0]], 0.0).is_none());
+        assert!(fit(&[4.0, 4.0], &[vec![1.0], vec![1.0]], 0.0).is_none());
+        assert!(fit(&[], &[], 0.0).is_none());
+        let one_repeat = fit(&[1.0, 4.0], &[vec![1.0], vec![0.25]], 0.0).unwrap();
         assert_eq!(one_repeat.standard_error, None);
-        let hidden = fit(&[1.0, 4.0, 16.0], &[vec![1.0, 1.0], vec![0.25, 0.25], vec![-0.1, 0.05]]).unwrap();
+        let hidden = fit(
+            &[1.0, 4.0, 16.0],
+            &[vec![1.0, 1.0], vec![0.25, 0.25], vec![-0.1, 0.05]],
+            0.0,
+        )
+        .unwrap();
         assert_eq!((hidden.budgets, hidden.hidden), (2, 1));
+    }
+
+    #[test]
+    fn every_replicate_fits_the_same_budgets() {
+        // The last budget's mean is above 0, without its first repeat it is below.
+        let mse = [vec![1.0; 4], vec![0.25; 4], vec![0.06, -0.01, -0.01, -0.01]];
+        let slope = fit(&[1.0, 4.0, 16.0], &mse, 0.0).unwrap();
+        assert_eq!((slope.budgets, slope.hidden, slope.repeats), (2, 1, 4));
+        assert!((slope.value + 0.5).abs() < 1e-12 && slope.standard_error.unwrap() < 1e-12);
+        // One that counts by little does so in every replicate.
+        let mse = [vec![1.0; 3], vec![0.25; 3], vec![0.02, 0.07, 0.07]];
+        let slope = fit(&[1.0, 4.0, 16.0], &mse, 0.0).unwrap();
+        assert_eq!((slope.budgets, slope.hidden), (3, 0));
+        assert!(slope.standard_error.unwrap().is_finite());
+        // The reference's noise hides what its repeats agree on.
+        assert_eq!(fit(&[1.0, 4.0, 16.0], &mse, 0.1).map(|slope| slope.hidden), None);
+        assert_eq!(fit(&[1.0, 4.0, 16.0], &mse, 0.05).map(|slope| slope.hidden), Some(1));
+    }
+
+    #[test]
+    fn slopes_do_not_flatten_near_the_noise_of_the_reference() {
+        // The reference's noise, one number for all pictures of an experiment, has a deviation of 1/250: the budgets' MSEs are 62, 16, 4, 1 and
+        // 1/4 of it. Each picture has 5 % of its own. The third budget, at 4 deviations, counts where the noise is above −1, which is 0.29 on
+        // average: 0.5 · 0.29 / 4 in the logarithm, times its leverage of 1 / (2 ln 4), is 0.013. The deviation of one experiment's slope is below
+        // 0.06, that of the mean of 1000 below 0.002: beyond 0.025 is chance below 1e-8.
+        let (noise, mut state) = (1.0 / 250.0, 11);
+        // Where the reference's noise is not known, the last budget counts in every other experiment, whenever the noise lifts it: those slopes are
+        // flat by far more than the tolerance. Known, it takes a noise of 2.75 deviations: 3 in 1000, and 20 is chance below 1e-9.
+        let mut sum = 0.0;
+        let mut lifted = 0;
+        let mut lifted_unknown = Vec::new();
+        for _ in 0..1000 {
+            let shared = noise * normal(&mut state);
+            let mse: Vec<Vec<f64>> = WORK
+                .iter()
+                .map(|n| (0..4).map(|_| (1.0 + 0.05 * normal(&mut state)) / n + shared).collect())
+                .collect();
+            let (known, unknown) = (fit(&WORK, &mse, noise).unwrap(), fit(&WORK, &mse, 0.0).unwrap());
+            sum += known.value;
+            lifted += u32::from(known.hidden == 0);
+            lifted_unknown.extend((unknown.hidden == 0).then_some(unknown.value));
+        }
+        let bias = sum / 1000.0 + 0.5;
+        assert!(bias.abs() < 0.025, "{bias}");
+        assert!(lifted < 20, "{lifted}");
+        let flattened = lifted_unknown.iter().sum::<f64>() / lifted_unknown.len() as f64 + 0.5;
+        assert!(
+            lifted_unknown.len() > 500 && flattened > 0.05,
+            "{} of 1000, {flattened}",
+            lifted_unknown.len()
+        );
     }
 }

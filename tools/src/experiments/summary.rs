@@ -8,19 +8,31 @@ use super::slope::Slope;
 use super::sweep::Budget;
 use super::table::{Cell, Table};
 
-/// How many standard errors a slope may lie off besides the tolerance.
-const SLOPE_SIGMAS: f64 = 2.0;
+/// Student's t with 1, 2, … 30 degrees of freedom: within ± these it lies with probability 95 % (Abramowitz and Stegun, *Handbook of
+/// Mathematical Functions*, table 26.10).
+const STUDENT_95: [f64; 30] = [
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131, 2.120,
+    2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042,
+];
 /// How far a slope may lie off what is expected.
 pub const SLOPE_TOLERANCE: f64 = 0.05;
 const NONE: &str = "–";
 
-/// Whether a slope is what it should be: within [`SLOPE_TOLERANCE`], "?" where only its standard error does not exclude that.
+/// How many standard errors from so many repeats a number may lie off by chance; beyond the table its last entry, which is a little wide.
+fn student(repeats: usize) -> f64 {
+    STUDENT_95[repeats.saturating_sub(2).min(STUDENT_95.len() - 1)]
+}
+
+/// Whether a slope is what it should be: within [`SLOPE_TOLERANCE`], "within noise" where only its standard error does not exclude that.
 fn verdict(series: &Series) -> &'static str {
     let (Some(slope), Some(expected)) = (series.slope, series.expected_slope) else {
         return NONE;
     };
     let off = (slope.value - expected).abs();
-    let margin = slope.standard_error.unwrap_or(f64::INFINITY) * SLOPE_SIGMAS;
+    let Some(standard_error) = slope.standard_error else {
+        return "not testable";
+    };
+    let margin = standard_error * student(slope.repeats);
     match off {
         off if off <= SLOPE_TOLERANCE => "yes",
         off if off <= SLOPE_TOLERANCE + margin => "within noise",
@@ -38,7 +50,7 @@ pub fn slope_text(slope: Option<Slope>) -> String {
         .map_or(String::new(), |error| format!(" ± {error:.3}"));
     let hidden = match slope.hidden {
         0 => String::new(),
-        hidden => format!(" ({hidden} below the reference's noise)"),
+        hidden => format!(" ({hidden} lost in noise)"),
     };
     format!("{:.3}{error}{hidden}", slope.value)
 }
@@ -63,6 +75,19 @@ pub fn facts(results: &Results) -> Vec<String> {
         .as_ref()
         .filter(|_| results.measured > 0)
         .map_or(String::new(), |load| format!("; load average {load} when it began"));
+    let measurements = || {
+        let variants = results.scenes.iter().flat_map(|scene| &scene.variants);
+        variants
+            .flat_map(|variant| &variant.points)
+            .flat_map(|point| &point.measurements)
+    };
+    let skipped: u64 = measurements().map(|one| one.error.skipped).sum();
+    if skipped > 0 {
+        let pictures = measurements().filter(|one| one.error.skipped > 0).count();
+        facts.push(format!(
+            "**{skipped} pixels left out** of the errors of {pictures} pictures: picture, reference or its variance is not finite there."
+        ));
+    }
     facts.extend([
         format!("Device: {}; driver: {}.", results.device, results.driver),
         format!("Machine: {}{load}. Clerestory {}.", results.machine, results.engine_version),
@@ -133,8 +158,9 @@ pub fn overview(scenes: &[SceneSeries]) -> Table {
         }
     }
     table.note(
-        "As expected: the slope against samples lies within 0.05 of the one that the experiment names; \"within noise\": only by twice its \
-         standard error more. Equal error: the least that all variants of a scene reach, read off straight lines between budgets in logarithms. \
+        "As expected: the slope against samples lies within 0.05 of the one that the experiment names; \"within noise\": only by its \
+         standard error times Student's t at 95 % for repeats − 1 degrees of freedom more; \"not testable\": one repeat has no standard \
+         error. Lost in noise: budgets whose mean MSE is not above 3 standard errors, by the repeats and the reference together. Equal error: the least that all variants of a scene reach, read off straight lines between budgets in logarithms. \
          Speed-up: over the first variant.",
     );
     table
@@ -217,6 +243,7 @@ pub fn measurements(results: &Results) -> Table {
             "FLIP",
             "99.9 % quantile",
             "not finite",
+            "pixels left out",
             "time",
             "key",
         ],
@@ -249,6 +276,7 @@ pub fn measurements(results: &Results) -> Table {
                     one.flip.into(),
                     one.quantile_999.into(),
                     Cell::Count(one.non_finite),
+                    Cell::Count(one.error.skipped),
                     one.time.as_str().into(),
                     one.key.as_str().into(),
                 ]);
@@ -323,18 +351,62 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn pixels_left_out_are_said() {
+        let mut results = made_up_results();
+        assert!(!facts(&results).iter().any(|fact| fact.contains("left out")));
+        results.scenes[0].variants[1].points[0].measurements[0].error.skipped = 7;
+        results.scenes[0].variants[0].points[1].measurements[2].error.skipped = 1;
+        let text = facts(&results).join("\n");
+        assert!(
+            text.contains("**8 pixels left out** of the errors of 2 pictures"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn quantiles_of_student_hold_95_percent() {
+        // With t = √ν tan θ the density is proportional to cos^(ν − 1) θ. Integrals by the midpoint rule, which errs far below 1e-6 here; the
+        // table's rounding of 0.0005 moves the share by at most twice that times the density there, which is below 0.07.
+        let integral = |power: i32, end: f64| {
+            let steps = 10_000;
+            let width = end / f64::from(steps);
+            let heights = (0..steps).map(|step| (width * (f64::from(step) + 0.5)).cos().powi(power));
+            heights.sum::<f64>() * width
+        };
+        for (index, quantile) in STUDENT_95.iter().enumerate() {
+            let power = i32::try_from(index).unwrap();
+            let end = (quantile / f64::from(power + 1).sqrt()).atan();
+            let share = integral(power, end) / integral(power, std::f64::consts::FRAC_PI_2);
+            assert!((share - 0.95).abs() < 2.0 * 0.0005 * 0.07, "{}: {share}", power + 1);
+        }
+        assert_eq!((student(2), student(31), student(99)), (12.706, 2.042, 2.042));
+    }
+
+    #[test]
     fn verdicts_weigh_the_noise() {
         let results = made_up_results();
         let mut series = series::of(&results)[0].series[0].clone();
         assert_eq!(verdict(&series), "yes");
-        for (value, error, expected) in [(-0.54, 0.0, "yes"), (-0.6, 0.01, "no"), (-0.6, 0.03, "within noise")] {
+        for (value, standard_error, repeats, expected) in [
+            (-0.54, Some(0.0), 5, "yes"),
+            (-0.6, Some(0.01), 5, "no"),
+            (-0.6, Some(0.03), 5, "within noise"),
+            // 0.05 beyond the tolerance are 2.5 standard errors, within 12.7 and 4.3 but not within 2.23 and 2.04.
+            (-0.6, Some(0.02), 2, "within noise"),
+            (-0.6, Some(0.02), 3, "within noise"),
+            (-0.6, Some(0.02), 11, "no"),
+            (-0.6, Some(0.02), 99, "no"),
+            (-0.6, None, 1, "not testable"),
+            (-0.5, None, 1, "not testable"),
+        ] {
             series.slope = Some(Slope {
                 value,
-                standard_error: Some(error),
+                standard_error,
                 budgets: 3,
                 hidden: 0,
+                repeats,
             });
-            assert_eq!(verdict(&series), expected);
+            assert_eq!(verdict(&series), expected, "{value} ± {standard_error:?}, {repeats}");
         }
         series.expected_slope = None;
         assert_eq!(verdict(&series), NONE);

@@ -17,7 +17,7 @@
 //! [sweep.reference]
 //! spp = 4096                      # samples a pixel; 16 times the most of a variant leaves its noise below 1/16 of their MSE
 //! technique = "path"              # default
-//! settings = { roulette_cap = 0.9 }  # default: the technique's, with independent samples where it has a `sampler`
+//! settings = { roulette_cap = 0.9 }  # default: the technique's; of its samplers only the independent one, "pcg", is allowed
 //!
 //! [[sweep.variant]]
 //! name = "from bounce 3"
@@ -52,6 +52,8 @@ const SMOKE_SECONDS: [f64; 2] = [0.05, 0.2];
 const SMOKE_REPEATS: u32 = 2;
 const SMOKE_REFERENCE_SPP: u32 = 1024;
 const DEFAULT_REPEATS: u32 = 5;
+/// The sampler whose samples are independent.
+const INDEPENDENT: &str = "pcg";
 
 /// What a sweep renders.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -245,7 +247,15 @@ impl Sweep {
             }
             self.settings(&variant.technique, &variant.settings)?;
         }
-        self.reference_settings()?;
+        let reference = self.reference_settings()?;
+        if let Some(sampler) = reference.get("sampler").filter(|sampler| **sampler != INDEPENDENT) {
+            return Err(wrong(
+                "reference.settings.sampler",
+                sampler,
+                "makes samples that depend on each other: the variance layer, which counts them as independent, would overestimate the \
+                 reference's variance, and too much would be subtracted from every error; wanted is \"pcg\"",
+            ));
+        }
         Ok(())
     }
 
@@ -290,7 +300,9 @@ impl Sweep {
         let mut given = self.reference.settings.clone();
         let info = techniques::by_id(&self.reference.technique)?;
         if (info.default_settings)().get("sampler").is_some() {
-            given.entry("sampler").or_insert_with(|| Value::String("pcg".into()));
+            given
+                .entry("sampler")
+                .or_insert_with(|| Value::String(INDEPENDENT.into()));
         }
         self.settings(&self.reference.technique, &given)
     }
@@ -344,6 +356,11 @@ mod tests {
             ("name = \"b\"", "name = \"a\"", "twice"),
             ("name = \"b\"", "name = \"b\"\ntechnique = \"magic\"", "magic"),
             ("1024", "1", "reference.spp"),
+            (
+                "spp = 1024",
+                "spp = 1024, settings = { sampler = \"sobol\" }",
+                "overestimate the reference's variance",
+            ),
         ] {
             let message = changed(from, to).unwrap_err();
             assert!(message.contains(word), "{to}: {message}");

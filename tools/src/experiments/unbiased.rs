@@ -4,7 +4,10 @@
 //! estimate of var b (the reference's variance layer) leaves an unbiased estimate of the picture's own MSE, so that errors fall as
 //! samples^(−½) however many there are. A single estimate may come out below 0 where it is far below the reference's noise.
 //! For the relative MSE the same weights 1 / (b² + ε) are applied to both terms.
-//! Guarantees: deterministic; the pixels are those that [`clerestory::film::compare`] counts: finite in both pictures.
+//! What stays is the same for all pictures against one reference: its realised squared error is not its variance. By the central limit
+//! theorem its values are nearly normal, so that (b − E b)² has the variance 2 (var b)²; channels of a pixel count as fully correlated, which
+//! bounds the standard error of the mean from above.
+//! Guarantees: deterministic; pixels that are not finite in the picture, the reference or its variance are left out and counted.
 
 use clerestory::film::Picture;
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
@@ -22,6 +25,12 @@ pub struct UnbiasedError {
     pub reference_mse: f64,
     /// Mean of var b / (b² + ε).
     pub reference_relative_mse: f64,
+    /// Standard error of `mse` by the reference's noise alone.
+    pub reference_error: f64,
+    /// Standard error of `relative_mse` by the reference's noise alone.
+    pub reference_relative_error: f64,
+    /// Pixels left out since picture, reference or variance is not finite there.
+    pub skipped: u64,
 }
 
 /// Neumaier's compensated sum is the engine's own; pictures here are small enough for pairwise halves, which err by log₂ n roundings.
@@ -51,10 +60,14 @@ pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
         });
     }
     let mut terms: [Vec<f64>; 4] = Default::default();
+    let mut pixel_squares: [Vec<f64>; 2] = Default::default();
+    let mut skipped = 0;
     for ((a, b), variance) in a.pixels().zip(b.pixels()).zip(variance.pixels()) {
-        if a.iter().chain(&b).any(|value| !value.is_finite()) {
+        if a.iter().chain(&b).chain(&variance).any(|value| !value.is_finite()) {
+            skipped += 1;
             continue;
         }
+        let mut of_pixel = [0.0; 2];
         for channel in 0..3 {
             let [a, b, variance] = [a, b, variance].map(|pixel| f64::from(pixel[channel]));
             let (error, weight) = ((a - b) * (a - b), 1.0 / (b * b + RELATIVE_MSE_OFFSET));
@@ -67,15 +80,24 @@ pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
             for (terms, term) in terms.iter_mut().zip(of) {
                 terms.push(term);
             }
+            of_pixel[0] += variance;
+            of_pixel[1] += variance * weight;
+        }
+        for (squares, variance) in pixel_squares.iter_mut().zip(of_pixel) {
+            squares.push(2.0 * variance * variance);
         }
     }
     let count = terms[0].len().max(1) as f64;
     let [mse, relative_mse, reference_mse, reference_relative_mse] = terms.map(|terms| sum(&terms) / count);
+    let [reference_error, reference_relative_error] = pixel_squares.map(|squares| sum(&squares).sqrt() / count);
     Ok(UnbiasedError {
         mse,
         relative_mse,
         reference_mse,
         reference_relative_mse,
+        reference_error,
+        reference_relative_error,
+        skipped,
     })
 }
 
@@ -99,6 +121,22 @@ mod tests {
         assert_eq!(error.reference_mse, 1.0 / 3.0);
         assert!((error.relative_mse - 4.0 / 1.01 / 3.0).abs() < 1e-15);
         assert!((error.reference_relative_mse - 1.0 / 1.01 / 3.0).abs() < 1e-15);
+        let by_reference = 2.0f64.sqrt() / 3.0;
+        assert!((error.reference_error - by_reference).abs() < 1e-15);
+        assert!((error.reference_relative_error - by_reference / 1.01).abs() < 1e-15);
+        assert_eq!(error.skipped, 1);
+    }
+
+    #[test]
+    fn pixels_without_a_finite_variance_are_left_out_and_counted() {
+        let test = Picture::from_radiance(3, 1, vec![2.0; 9]).unwrap();
+        for wrong in [f32::NAN, f32::INFINITY] {
+            let mut reference = Picture::from_radiance(3, 1, vec![1.0; 9]).unwrap();
+            let variance = vec![0.5, 0.5, 0.5, 0.5, wrong, 0.5, 0.25, 0.25, 0.25];
+            reference.add_layer(VARIANCE, 3, variance).unwrap();
+            let error = measure(&test, &reference).unwrap();
+            assert_eq!((error.mse, error.reference_mse, error.skipped), (0.625, 0.375, 1));
+        }
     }
 
     #[test]
