@@ -172,7 +172,7 @@ mod tests {
         // 1/4 of it. Each picture has 5 % of its own. The third budget, at 4 deviations, counts where the noise is above −1, which is 0.29 on
         // average: 0.5 · 0.29 / 4 in the logarithm, times its leverage of 1 / (2 ln 4), is 0.013. The deviation of one experiment's slope is below
         // 0.06, that of the mean of 1000 below 0.002: beyond 0.025 is chance below 1e-8.
-        let (noise, mut state) = (1.0 / 250.0, 11);
+        let (noise, mut state) = (1.0 / 250.0, Random(11));
         // Where the reference's noise is not known, the last budget counts in every other experiment, whenever the noise lifts it: those slopes are
         // flat by far more than the tolerance. Known, it takes a noise of 2.75 deviations: 3 in 1000, and 20 is chance below 1e-9.
         let mut sum = 0.0;
