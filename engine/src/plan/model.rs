@@ -6,6 +6,9 @@ const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=1.5;
 /// less as what is left in a pixel is rough.
 const BELIEF: f64 = 0.5;
 
+/// What a number may exceed a whole one by and still count as that.
+const HAIR: f64 = 1e-6;
+
 /// Relative MSE over samples a pixel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ErrorModel {
@@ -33,8 +36,15 @@ impl ErrorModel {
         SLOPES.start() + BELIEF * (measured - SLOPES.start())
     }
 
-    /// Relative MSE expected of `samples` samples a pixel; 0 without a measurement.
+    /// Relative MSE expected of `samples` samples a pixel: between measurements by the power law through both, beyond the last by the
+    /// slope; 0 without a measurement.
     pub fn relative_mse(&self, samples: f64) -> f64 {
+        for pair in self.points.windows(2) {
+            let [(n0, e0), (n1, e1)] = [pair[0], pair[1]];
+            if samples < n1 && e0 > 0.0 && e1 > 0.0 {
+                return e0 * (e1 / e0).powf((samples / n0).ln() / (n1 / n0).ln());
+            }
+        }
         let Some((n, e)) = self.points.last() else { return 0.0 };
         e * (samples / n).powf(-self.slope())
     }
@@ -45,9 +55,16 @@ impl ErrorModel {
         if *e <= 0.0 {
             return 1;
         }
-        // A hair less than the next whole number is that number.
+        // Between measurements: where the power law through two of them meets it.
+        for pair in self.points.windows(2) {
+            let [(n0, e0), (n1, e1)] = [pair[0], pair[1]];
+            if relative_mse >= e1 && e0 > e1 && e1 > 0.0 {
+                let samples = n0 * (n1 / n0).powf((e0 / relative_mse).ln() / (e0 / e1).ln());
+                return (samples - HAIR).ceil().max(1.0) as u32;
+            }
+        }
         let samples = n * (e / relative_mse.max(f64::MIN_POSITIVE)).powf(1.0 / self.slope());
-        (samples - 1e-6).ceil().clamp(1.0, f64::from(u32::MAX)) as u32
+        (samples - HAIR).ceil().clamp(1.0, f64::from(u32::MAX)) as u32
     }
 }
 
@@ -87,6 +104,14 @@ mod tests {
         // Steeper than independent samples: half of the surplus is believed, and no more than the steepest.
         error.add(64, 0.1 / 4_f64.powf(1.4));
         assert!((error.slope() - 1.2).abs() < 1e-12);
+        // Between measurements the curve goes through both.
+        let between = error.relative_mse(32.0);
+        assert!(
+            (between - 0.1 / 2_f64.powf(1.4)).abs() < 1e-9 && error.samples(between) == 32,
+            "{between}"
+        );
+        assert_eq!(error.samples(0.1), 16);
+        assert_eq!(error.samples(0.2), 8);
         error.add(256, 1e-9);
         assert!((error.slope() - 1.25).abs() < 1e-12);
         error.add(1024, 0.0);
