@@ -19,8 +19,8 @@ const PILOT_SIDE: u32 = 8;
 const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 /// Share of the predicted time that pilots may take.
 pub const PILOT_SHARE: f64 = 0.15;
-/// The error of a black picture, which is all that pilots without light know.
-const UNKNOWN_ERROR: f64 = 1.0;
+/// Relative MSE of a black picture, which is all that pilots without light know.
+const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
 /// Seconds of rounds that pilots may take whatever the picture costs, where no time is to be kept.
 const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
@@ -147,6 +147,15 @@ impl Trial {
         }
     }
 
+    /// Relative MSE expected of that many samples a pixel.
+    fn relative_mse(&self, samples: u32) -> f64 {
+        if self.lit {
+            self.error.relative_mse(f64::from(samples))
+        } else {
+            UNKNOWN_RELATIVE_MSE
+        }
+    }
+
     /// Writes what the pilots have found to the candidate.
     pub fn predict(&self, candidate: &mut Candidate, goal: Goal, spent: f64) {
         candidate.pilot_spp = self.spp;
@@ -155,10 +164,7 @@ impl Trial {
         candidate.seconds_a_sample = self.cost.sample;
         candidate.spp = self.samples(goal, spent);
         candidate.lit = self.lit;
-        candidate.error = match self.lit {
-            true => self.error.relative_mse(f64::from(candidate.spp)).sqrt(),
-            false => UNKNOWN_ERROR,
-        };
+        candidate.error = self.relative_mse(candidate.spp).sqrt();
         candidate.seconds = self.cost.seconds(f64::from(candidate.spp));
     }
 }
@@ -183,7 +189,7 @@ pub fn rounds(
         // Under a time alone all take equally long, and the one with the smaller error is the better one.
         let cost = |trial: &Trial| match goal.error {
             Some(_) => predicted(trial),
-            None => trial.error.relative_mse(f64::from(trial.samples(goal, spent))),
+            None => trial.relative_mse(trial.samples(goal, spent)),
         };
         let best = trials.iter().flatten().map(&cost).fold(f64::INFINITY, f64::min);
         let picture = trials.iter().flatten().map(predicted).fold(f64::INFINITY, f64::min);
