@@ -1,6 +1,7 @@
 //! The rows, ordered by document and id. Tests that speak for several systems have a name of their own.
 
 use super::{Row, measured, part, unbiased};
+use crate::techniques::Bias;
 use crate::transport::PathSet;
 
 const RADIOMETRY: &[&str] = &[
@@ -62,7 +63,7 @@ const ESTIMATION: &[&str] = &[
 
 pub(super) const ROWS: &[Row] = &[
     measured(
-        "tools/report",
+        "clerestory report error-in-media",
         part(
             "BG-1",
             "radiometry, transport between surfaces and in media",
@@ -72,7 +73,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "tools/report",
+        "clerestory report convergence",
         unbiased(part(
             "BG-2",
             "Monte Carlo and importance sampling",
@@ -83,7 +84,7 @@ pub(super) const ROWS: &[Row] = &[
     ),
     Row {
         path_set: Some(PathSet::ALL),
-        experiment: "tools/report",
+        experiment: "clerestory report error-against-time",
         ..unbiased(part(
             "BG-3",
             "path tracer, surfaces and media: technique `path`",
@@ -198,6 +199,57 @@ pub(super) const ROWS: &[Row] = &[
             &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
         ),
     ),
+    Row {
+        bias: Some(Bias::Consistent("marched: the step; the others are unbiased")),
+        experiment: "clerestory report free-flight",
+        ..part(
+            "PM-VOL-1",
+            "transmittance: analytic, ratio tracking, and ray marching as their baseline",
+            "Jensen and Christensen 1998; Novák et al. 2014",
+            "engine/src/transport/free_flight.rs",
+            &[
+                "engine/src/transport/free_flight.rs::marched_transmittance_errs_by_the_step_and_in_the_middle_by_its_square",
+                "engine/src/transport/free_flight.rs::ratio_tracking_is_unbiased_however_loose_the_majorant",
+            ],
+        )
+    },
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-2",
+            "free flight through homogeneous media",
+            "Jensen and Christensen 1998; Wilkie et al. 2014",
+            "engine/src/transport/medium.rs",
+            &[
+                "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
+                "engine/src/transport/medium.rs::extremes_stay_finite",
+            ],
+        )),
+    ),
+    Row {
+        bias: Some(Bias::Consistent("the step")),
+        experiment: "clerestory report free-flight",
+        ..part(
+            "PM-VOL-3",
+            "free flight by ray marching, steps fixed or adaptive (baseline)",
+            "Jensen and Christensen 1998",
+            "engine/src/transport/free_flight.rs",
+            &["engine/src/transport/free_flight.rs::marched_flights_are_biased_by_their_step"],
+        )
+    },
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-4",
+            "free flight by delta tracking",
+            "Woodcock et al. 1965; Coleman 1968",
+            "engine/src/transport/free_flight.rs",
+            &[
+                "engine/src/transport/free_flight.rs::tracked_flights_follow_their_distribution_however_loose_the_majorant",
+                "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
+            ],
+        )),
+    ),
     measured(
         "clerestory agreement --scene cornell-box,cornell-point",
         part(
@@ -236,7 +288,7 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     measured(
-        "tools/report",
+        "clerestory report roulette",
         unbiased(part(
             "MET-B8",
             "path estimation: light sampling, BRDF sampling, Russian roulette",
@@ -321,7 +373,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "tools/report",
+        "clerestory report samplers",
         unbiased(part(
             "CL-SOBOL",
             "Owen-scrambled Sobol' points by hashing",
@@ -365,7 +417,7 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     measured(
-        "tools/report",
+        "clerestory report light-sampling",
         unbiased(part(
             "CL-LIGHTS",
             "choice of lights by power",
@@ -436,7 +488,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "tools/report",
+        "clerestory report error-against-time",
         part(
             "CL-ERROR",
             "error metrics: MSE, relative MSE, bias, quantile, FLIP",

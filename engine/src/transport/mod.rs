@@ -4,6 +4,7 @@ pub mod albedo;
 pub mod bsdf;
 pub mod distribution;
 pub mod environment;
+pub mod free_flight;
 pub mod fresnel;
 pub mod ggx;
 pub mod gpu_scene;

@@ -21,6 +21,7 @@ pub mod summary;
 pub mod sweep;
 pub mod table;
 pub mod unbiased;
+pub mod watch;
 pub mod web_page;
 
 use std::path::Path;

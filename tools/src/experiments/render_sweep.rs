@@ -11,7 +11,7 @@ use clerestory::film::metrics::{CompareOptions, compare};
 use clerestory::film::picture::RADIANCE;
 use clerestory::film::{Picture, ToneCurve, ToneMap, exr};
 use clerestory::gpu::Gpu;
-use clerestory::render::{Progress, RenderOptions, Rendered, Renderer};
+use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{Scene, SceneProfile};
 use clerestory::{Error, Result};
 use serde_json::Value;
@@ -23,19 +23,8 @@ use super::reference::{self, Identity};
 use super::results::{Point, Results, SceneResults, VariantResults};
 use super::sweep::{Budget, SPP_MAX, Sweep, Variant};
 use super::unbiased;
+use super::watch::Watch;
 use crate::machine;
-
-/// Who watches a sweep.
-pub trait Watch {
-    /// A picture begins: what it is, and how many of the sweep's pictures were done before.
-    fn begin(&self, what: &str, done: usize, all: usize);
-    /// A step of the picture at hand is done.
-    fn step(&self, progress: Progress);
-    /// Something that a reader of the error output should know.
-    fn note(&self, line: &str);
-    /// Whether to stop.
-    fn stopped(&self) -> bool;
-}
 
 /// Where a sweep keeps its things.
 #[derive(Debug, Clone)]

@@ -1,4 +1,4 @@
-//! `clerestory report`: runs experiments by name; without names, error against time of the path tracer, into a page of results.
+//! `clerestory report`: runs experiments by name; without names, error against time on surfaces and in media, into a page of results.
 //!
 //! Only the part of the page between two marks is replaced, so that other measurements can stand beside it.
 
@@ -15,6 +15,7 @@ use clerestory::{Result, scene};
 use clerestory_tools::experiments::measures::{self, Context};
 use clerestory_tools::experiments::render_sweep::{self, Places};
 use clerestory_tools::experiments::sweep::Sweep;
+use clerestory_tools::experiments::watch::Watch;
 use clerestory_tools::experiments::{self, Experiment, Kind};
 use clerestory_tools::page::Block;
 
@@ -32,7 +33,7 @@ Examples:
   clerestory report samplers                       into out/report/samplers: index.html, report.md, report.json, CSV, plots, pictures
   clerestory report convergence roulette           two of them
   clerestory report my-experiment.toml             an experiment of your own; the format is that of tools/experiments/
-  clerestory report                                error against time on six scenes, also into RESULTS.md
+  clerestory report                                error against time on surfaces and in media, also into RESULTS.md
   clerestory report --smoke                        its smallest form, under two minutes on two cores
   clerestory report --scene model.glb --repeat 3 -o model.md
 
@@ -40,7 +41,7 @@ Finished pictures are kept in the experiment's folder, references in a folder of
 stopped, and a changed experiment renders only what is missing. Changes of scenes, settings, kernels and driver are noticed by \
 themselves; after a change of the engine's Rust code that changes pictures, --fresh measures anew.")]
 pub struct Arguments {
-    /// Experiments by name or .toml file, into a folder each; without any, error-against-time, also into RESULTS.md
+    /// Experiments by name or .toml file, into a folder each; without any, error-against-time and error-in-media, also into RESULTS.md
     #[arg(value_name = "EXPERIMENT")]
     experiments: Vec<String>,
     /// Lists the experiments
@@ -77,35 +78,39 @@ pub struct Arguments {
     device: DeviceOptions,
 }
 
-/// What runs without names.
-const DEFAULT: &str = "error-against-time";
-const BLOCK: Block = Block {
-    name: "error against time",
-    command: "clerestory report",
-};
+/// What runs without names, and the part of the page that it writes.
+const DEFAULTS: [(&str, Block); 2] = [
+    (
+        "error-against-time",
+        Block {
+            name: "error against time",
+            command: "clerestory report",
+        },
+    ),
+    (
+        "error-in-media",
+        Block {
+            name: "error against time in media",
+            command: "clerestory report",
+        },
+    ),
+];
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if arguments.list {
         return list();
     }
-    let into_page = arguments.experiments.is_empty();
-    let names = if into_page {
-        vec![DEFAULT.to_owned()]
-    } else {
-        arguments.experiments.clone()
-    };
-    let found: Result<Vec<Experiment>> = names.iter().map(|name| experiments::find(name)).collect();
+    let found = wanted(arguments)?;
     let bar = Bar::start()?;
     // Opened for the first experiment that needs it, and kept: kernels compile once.
     let mut gpu = None;
-    for experiment in found? {
+    for (experiment, block) in found {
         let about = format!("{}: {}", experiment.name, experiment.title);
         let interrupted = match experiment.kind()? {
             Kind::Measure(name) => {
                 output::note(&about);
-                measure(arguments, &experiment, name)?;
-                false
+                measure(arguments, &experiment, name, &bar)?
             }
             Kind::Sweep(sweep) => {
                 let gpu = match &mut gpu {
@@ -113,7 +118,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
                     None => gpu.insert(arguments.device.open()?),
                 };
                 output::note(&about);
-                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar, into_page)?
+                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar, block)?
             }
         };
         if interrupted {
@@ -127,6 +132,19 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         check_validation(&log)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The experiments to run, with the part of the page that each writes. Scenes of the command line's stand in for those of one experiment.
+fn wanted(arguments: &Arguments) -> Result<Vec<(Experiment, Option<Block>)>> {
+    if arguments.experiments.is_empty() {
+        let count = if arguments.scenes.is_empty() { DEFAULTS.len() } else { 1 };
+        let found = DEFAULTS[..count].iter();
+        return found
+            .map(|(name, block)| Ok((experiments::find(name)?, Some(*block))))
+            .collect();
+    }
+    let found = arguments.experiments.iter();
+    found.map(|name| Ok((experiments::find(name)?, None))).collect()
 }
 
 fn list() -> Outcome<ExitCode> {
@@ -151,19 +169,22 @@ fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
     arguments.folder.join(format!("{}{form}", experiment.name))
 }
 
-/// The tables go to standard output and, with all digits, into the folder.
-fn measure(arguments: &Arguments, experiment: &Experiment, name: &str) -> Outcome {
+/// The tables go to standard output and, with all digits, into the folder. Says whether it was interrupted.
+fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar) -> Outcome<bool> {
     let open = || Gpu::headless(&arguments.device.options());
     let context = Context {
         smoke: arguments.smoke,
         gpu: &open,
+        watch: bar,
     };
-    let tables = (measures::find(name)?.run)(&context)?;
+    let tables = (measures::find(name)?.run)(&context);
+    bar.clear();
+    let tables = tables?;
     let folder = folder(arguments, experiment);
     let page = files::tables(&folder, experiment, &tables)?;
     output::print(&page)?;
     output::note(&format!("wrote {}", folder.display()));
-    Ok(())
+    Ok(bar.stopped())
 }
 
 /// The sweep with the changes that the command line asks for.
@@ -187,7 +208,7 @@ fn render(
     sweep: &Sweep,
     gpu: &Gpu,
     bar: &Bar,
-    into_page: bool,
+    block: Option<Block>,
 ) -> Outcome<bool> {
     let places = Places {
         folder: folder(arguments, experiment),
@@ -206,11 +227,12 @@ fn render(
         }
     })?;
     let text = files::sweep(&places.folder, &results)?;
-    if into_page && !results.interrupted {
-        BLOCK.write(&arguments.output, &text)?;
-        output::note(&format!("wrote {}", arguments.output.display()));
-    } else {
-        output::print(&text)?;
+    match block.filter(|_| !results.interrupted) {
+        Some(block) => {
+            block.write(&arguments.output, &text)?;
+            output::note(&format!("wrote {}", arguments.output.display()));
+        }
+        None => output::print(&text)?,
     }
     output::note(&format!(
         "{} pictures measured, {} found from earlier runs; wrote {}",

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use clerestory::render::Progress;
-use clerestory_tools::experiments::render_sweep::Watch;
+use clerestory_tools::experiments::watch::Watch;
 use indicatif::ProgressBar;
 
 use crate::failure::Outcome;

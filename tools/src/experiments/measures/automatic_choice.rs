@@ -11,6 +11,7 @@ use clerestory::{Result, scene};
 use super::Context;
 use crate::experiments::table::Table;
 use crate::experiments::unbiased;
+use crate::experiments::watch::Watch;
 
 /// Scenes with an error (root of the relative MSE) or a time (seconds) to keep. None of them had a part in the making of the planner.
 const PAIRS: [(&str, Asked); 12] = [
@@ -39,10 +40,16 @@ enum Asked {
     Seconds(f64),
 }
 
-fn render(renderer: &Renderer, options: &RenderOptions) -> Result<Rendered> {
+/// `None` when it was stopped.
+fn render(renderer: &Renderer, options: &RenderOptions, watch: &dyn Watch) -> Result<Option<Rendered>> {
     let mut rendering = renderer.start(options)?;
-    while rendering.step()?.is_some() {}
-    rendering.finish()
+    while let Some(progress) = rendering.step()? {
+        watch.step(progress);
+        if watch.stopped() {
+            return Ok(None);
+        }
+    }
+    rendering.finish().map(Some)
 }
 
 /// The measure.
@@ -50,9 +57,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let (side, reference_spp, pairs) = if context.smoke {
         (8, 512, &PAIRS[..1])
     } else {
-        (64, 4096, &PAIRS[..])
+        (64, 1024, &PAIRS[..])
     };
-    let gpu = (context.gpu)()?;
+    let (gpu, watch) = ((context.gpu)()?, context.watch);
     let mut table = Table::new(
         "Asked, predicted and reached",
         &[
@@ -69,23 +76,24 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "samples a pixel",
         ],
     );
-    let mut kept = 0_u64;
+    let (mut kept, mut done) = (0_u64, 0_usize);
     for &(address, asked) in pairs {
+        watch.begin(address, done, pairs.len());
         let renderer = Renderer::new(&gpu, &scene::load(address)?)?;
         let base = RenderOptions {
             technique: Some("path".into()),
             size: [side; 2],
             ..RenderOptions::default()
         };
-        let reference = render(
-            &renderer,
-            &RenderOptions {
-                spp: reference_spp,
-                seed: REFERENCE_SEED,
-                settings: serde_json::json!({ "sampler": "pcg" }),
-                ..base.clone()
-            },
-        )?;
+        let of_reference = RenderOptions {
+            spp: reference_spp,
+            seed: REFERENCE_SEED,
+            settings: serde_json::json!({ "sampler": "pcg" }),
+            ..base.clone()
+        };
+        let Some(reference) = render(&renderer, &of_reference, watch)? else {
+            break;
+        };
         let goal = match asked {
             Asked::Error(error) => Goal {
                 error: Some(error),
@@ -97,8 +105,10 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             },
         };
         let start = Instant::now();
-        let plan = plan(&renderer, &base, goal, &mut || true)?;
-        let rendered = render(&renderer, &plan.options(&base))?;
+        let plan = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
+        let Some(rendered) = render(&renderer, &plan.options(&base), watch)? else {
+            break;
+        };
         let seconds = start.elapsed().as_secs_f64();
         let error = unbiased::measure(&rendered.picture, &reference.picture)?
             .relative_mse
@@ -108,6 +118,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let wanted = goal.error.unwrap_or(choice.error);
         let ratio = error / wanted;
         let in_time = goal.time.is_none_or(|time| seconds <= FACTOR * time.as_secs_f64());
+        done += 1;
         kept += u64::from((1.0 / FACTOR..=FACTOR).contains(&ratio) && in_time);
         let or_dash = |value: Option<f64>| value.map_or_else(|| "-".into(), Into::into);
         table.row([
@@ -125,9 +136,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         ]);
     }
     table.note(format!(
-        "{kept} of {} within a factor of {FACTOR} of the asked error, or of the predicted one in the asked time. Errors: root of the relative \
-         MSE, {side} × {side} pixels, against {reference_spp} independent samples a pixel whose variance is subtracted.",
-        pairs.len()
+        "{kept} of {done} within a factor of {FACTOR} of the asked error, or of the predicted one in the asked time. Errors: root of the relative \
+         MSE, {side} × {side} pixels, against {reference_spp} independent samples a pixel whose variance is subtracted."
     ));
     Ok(vec![table])
 }

@@ -8,6 +8,7 @@ mod clock;
 mod coupled_reflection;
 mod energy;
 mod errors;
+mod free_flight;
 mod inputs;
 mod multiple_scattering;
 mod path_sets;
@@ -27,6 +28,7 @@ use clerestory::gpu::Gpu;
 use clerestory::{Error, Result};
 
 use super::table::Table;
+use super::watch::Watch;
 
 /// What a measure is given.
 pub struct Context<'a> {
@@ -34,6 +36,8 @@ pub struct Context<'a> {
     pub smoke: bool,
     /// Opens the device, for measures that need one.
     pub gpu: &'a dyn Fn() -> Result<Gpu>,
+    /// Sees the progress of measures that take long. A measure that is stopped gives the rows that it has.
+    pub watch: &'a dyn Watch,
 }
 
 /// A measure by name.
@@ -69,6 +73,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("automatic-choice", automatic_choice::measure),
     on_device("barriers", barriers::measure),
     on_host("coupled-reflection", coupled_reflection::measure),
+    on_host("free-flight", free_flight::measure),
     on_host("multiple-scattering", multiple_scattering::measure),
     on_device("path-sets", path_sets::measure),
     on_host("phase-functions", phase_functions::measure),
@@ -95,6 +100,7 @@ pub fn find(name: &str) -> Result<&'static Measure> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::watch::Unwatched;
     use super::*;
 
     fn check(measure: &Measure, tables: &[Table]) {
@@ -105,7 +111,11 @@ mod tests {
     }
 
     fn run_all(needs_device: bool, gpu: &dyn Fn() -> Result<Gpu>) {
-        let context = Context { smoke: true, gpu };
+        let context = Context {
+            smoke: true,
+            gpu,
+            watch: &Unwatched,
+        };
         for measure in MEASURES.iter().filter(|measure| measure.needs_device == needs_device) {
             match (measure.run)(&context) {
                 Ok(tables) => check(measure, &tables),
