@@ -15,6 +15,7 @@ mod lights_without_power;
 mod many_lights;
 mod media_albedo_one;
 mod media_extents;
+mod media_grids;
 mod media_narrow_phase;
 mod million_samples;
 mod nested_dielectrics;
@@ -54,4 +55,5 @@ pub(crate) const ALL: &[HardCase] = &[
     media_extents::CASE,
     media_albedo_one::CASE,
     media_narrow_phase::CASE,
+    media_grids::CASE,
 ];

@@ -10,7 +10,7 @@ use crate::{Easel, HardCase, Judgement};
 pub(super) const CASE: HardCase = HardCase {
     name: "nested-dielectrics",
     breaks: "At the inner surface light passes from glass to glass, but the renderer takes its outside for air.",
-    expects: "White glass in white glass vanishes in a white furnace. A slab inside of a slab of equal index vanishes where its index is given relative to what is around it (1); given absolutely it reflects as in air, which costs 2R more: T = (1 − R)/(1 + 3R) instead of (1 − R)/(1 + R).",
+    expects: "White glass in white glass vanishes in a white furnace. A slab inside of a slab of equal index vanishes where its index is given relative to what is around it (1); given absolutely it reflects as in air, which costs 2R more: T = (1 − R)/(1 + 3R) instead of (1 − R)/(1 + R). Ink around a clear slab absorbs before it and behind it.",
     picture: || {
         let mut scene = load("builtin:cornell-box?sphere=glass&boxes=tall")?;
         let glass = scene.add_material(Material::glass("outer", 1.33));
@@ -24,8 +24,8 @@ pub(super) const CASE: HardCase = HardCase {
         Ok(scene)
     },
     documented: Some(
-        "The inside of a body that stands in another one is computed against air, and leaving it ends the outer body's absorption. \
-         Give the inner material the ratio of both indices as its ior (at least 1), or leave a gap of air between the bodies.",
+        "A body that stands in another one refracts as against air. Give the inner material the ratio of both indices as its ior (at \
+         least 1), or leave a gap of air between the bodies.",
     ),
     techniques: Some(judge),
     ..HardCase::BASE
@@ -33,11 +33,16 @@ pub(super) const CASE: HardCase = HardCase {
 
 /// A slab in a slab above a lamp, seen straight on.
 fn slabs(inner_ior: f32) -> Scene {
+    slab_in(Material::glass("outer", 1.5), inner_ior)
+}
+
+/// A slab of 0.2 m in the middle of one of 0.6 m of a material.
+fn slab_in(outer: Material, inner_ior: f32) -> Scene {
     let mut scene = Scene {
         name: "slabs".into(),
         ..Scene::default()
     };
-    let outer = scene.add_material(Material::glass("outer", 1.5));
+    let outer = scene.add_material(outer);
     let inner = scene.add_material(Material::glass("inner", inner_ior));
     let lamp = scene.add_material(lamp(Vec3::ONE));
     scene.place(cuboid(
@@ -88,5 +93,14 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         [one; 3],
         [0.0, 1.0 - two / one],
     )?;
+
+    // 0.2 m of ink above the inner slab and 0.2 m below it, each of which halves the light.
+    let ink = Material {
+        attenuation_color: Vec3::splat(0.5),
+        attenuation_distance: 0.2,
+        ..Material::glass("outer", 1.0)
+    };
+    let painted = easel.paint(&slab_in(ink, 1.0), SMALL, 64)?;
+    judgement.mean("clear slab in ink", &painted, [0.25; 3], 0.0)?;
     Ok(judgement)
 }

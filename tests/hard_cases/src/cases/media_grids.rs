@@ -1,0 +1,92 @@
+//! Grids of densities with one dense cell among empty ones, of a single cell, and from a tenth of a millimetre to ten kilometres.
+
+use clerestory::Result;
+use clerestory::scene::{DensityGrid, Environment, Material, Medium, Scene};
+use glam::{DVec3, Vec3};
+
+use crate::scenes::{SMALL, camera_down, cuboid, floor_from_above, lamp};
+use crate::{Easel, HardCase, Judgement};
+
+pub(super) const CASE: HardCase = HardCase {
+    name: "media-grids",
+    breaks: "Marching leaps over a dense layer between empty ones; a walk by one majorant for the whole grid never ends in what is nearly empty; steps along a way of kilometres round to nothing.",
+    expects: "A floor of radiance 1 seen down a column of cells has exp(−h · mean density · σ), however the density is spread over the cells and whatever their size, and a grid that only scatters cannot be seen in a uniform environment.",
+    picture: || {
+        let mut scene = column(&layer(9), 1.0, 3.0, 0.0);
+        scene.environment = Some(Environment::uniform(Vec3::ONE));
+        Ok(scene)
+    },
+    techniques: Some(judge),
+    ..HardCase::BASE
+};
+
+/// Cells of the columns.
+const CELLS: usize = 64;
+/// Density of the thin one among dense cells, and of the dense one among thin cells.
+const FAINT: f32 = 1e-4;
+
+/// All density in one cell: its mean is 1.
+fn layer(at: usize) -> Vec<f32> {
+    let mut values = vec![0.0; CELLS];
+    values[at] = CELLS as f32;
+    values
+}
+
+/// A grid of one column of cells between floor and camera, in a box as high as it is wide, above a floor of radiance 1 (`glow`) or a black one.
+fn column(densities: &[f32], height: f32, sigma_a: f32, glow: f32) -> Scene {
+    let mut scene = floor_from_above(lamp(Vec3::splat(glow)));
+    let size = [1, densities.len() as u32, 1];
+    let corner = DVec3::new(f64::from(height), f64::from(height), f64::from(height));
+    let (low, high) = (DVec3::new(-corner.x, 0.0, -corner.z), corner);
+    scene.media.push(Medium {
+        name: "column".into(),
+        sigma_a: Vec3::splat(sigma_a),
+        density: Some(
+            DensityGrid {
+                values: densities.to_vec(),
+                ..DensityGrid::from_fn(size, |_| 0.0)
+            }
+            .in_box(low, high),
+        ),
+        ..Medium::default()
+    });
+    let boundary = scene.add_material(Material {
+        interior: Some(0),
+        boundary: true,
+        ..Material::default()
+    });
+    // Floor and boundary stay apart: faces in one plane have no order.
+    scene.place(cuboid("boundary", boundary, low.as_vec3(), high.as_vec3()));
+    for position in &mut scene.meshes[0].positions {
+        *position = Vec3::new(position.x * height, -0.1 * height, position.z * height);
+    }
+    scene.cameras = vec![camera_down(0.5 * height, 2.0 * f64::from(height))];
+    scene
+}
+
+fn judge(easel: &Easel<'_>) -> Result<Judgement> {
+    let mut judgement = Judgement::default();
+    let mut seen = |what: &str, densities: &[f32], height: f32, depth: f64| {
+        let mean = densities.iter().map(|d| f64::from(*d)).sum::<f64>() / densities.len() as f64;
+        let sigma = depth / (mean * f64::from(height));
+        let painted = easel.paint(&column(densities, height, sigma as f32, 1.0), SMALL, 64)?;
+        judgement.mean(what, &painted, [(-depth).exp(); 3], 1e-4)
+    };
+    seen("one cell", &[1.0], 1.0, 1.0)?;
+    for (height, word) in [(1e-4, "1e-4 m"), (1.0, "1 m"), (1e4, "1e4 m")] {
+        seen(&format!("a dense cell in a column of {word}"), &layer(9), height, 1.0)?;
+    }
+    seen("a dense cell at the end", &layer(CELLS - 1), 1.0, 0.5)?;
+    let mut faint = vec![FAINT; CELLS];
+    faint[30] = 1.0 / FAINT;
+    seen("densities of 1 to 10⁸", &faint, 1.0, 1.0)?;
+    let empty = easel.paint(&column(&[0.0; CELLS], 1.0, 1e4, 1.0), SMALL, 16)?;
+    judgement.exactly("cells without density", &empty, [1.0; 3]);
+
+    let mut furnace = column(&layer(20), 1.0, 0.0, 1.0);
+    furnace.media[0].sigma_s = Vec3::splat(3.0);
+    furnace.environment = Some(Environment::uniform(Vec3::ONE));
+    let painted = easel.paint(&furnace, SMALL, 64)?;
+    judgement.mean("a scattering layer in a furnace", &painted, [1.0; 3], 1e-5)?;
+    Ok(judgement)
+}
