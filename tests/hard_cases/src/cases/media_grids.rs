@@ -4,7 +4,7 @@ use clerestory::Result;
 use clerestory::scene::{DensityGrid, Environment, Material, Medium, Scene};
 use glam::{DVec3, Vec3};
 
-use crate::scenes::{SMALL, camera_down, cuboid, floor_from_above, lamp};
+use crate::scenes::{SMALL, camera_down, cuboid, floor_from_above, lamp, orthographic};
 use crate::{Easel, HardCase, Judgement};
 
 pub(super) const CASE: HardCase = HardCase {
@@ -12,8 +12,12 @@ pub(super) const CASE: HardCase = HardCase {
     breaks: "Marching leaps over a dense layer between empty ones; a walk by one majorant for the whole grid never ends in what is nearly empty; steps along a way of kilometres round to nothing.",
     expects: "A floor of radiance 1 seen down a column of cells has exp(−h · mean density · σ), however the density is spread over the cells and whatever their size, and a grid that only scatters cannot be seen in a uniform environment.",
     picture: || {
-        let mut scene = column(&layer(9), 1.0, 3.0, 0.0);
+        let mut densities = layer(9);
+        (densities[30], densities[50]) = (16.0, 4.0);
+        let mut scene = column(&densities, 1.0, 0.0, 0.5);
+        scene.media[0].sigma_a = Vec3::new(0.3, 0.6, 0.9);
         scene.environment = Some(Environment::uniform(Vec3::ONE));
+        scene.cameras = vec![orthographic(DVec3::new(2.0, 1.1, 3.0), DVec3::Y * 0.4, DVec3::Y, 1.3)];
         Ok(scene)
     },
     techniques: Some(judge),
