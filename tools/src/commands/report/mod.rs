@@ -154,12 +154,14 @@ fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
 /// The tables go to standard output and, with all digits, into the folder.
 fn measure(arguments: &Arguments, experiment: &Experiment, name: &str) -> Outcome {
     let open = || Gpu::headless(&arguments.device.options());
+    let folder = folder(arguments, experiment);
     let context = Context {
         smoke: arguments.smoke,
         gpu: &open,
+        folder: &folder,
+        progress: &|line| line.lines().for_each(output::note),
     };
     let tables = (measures::find(name)?.run)(&context)?;
-    let folder = folder(arguments, experiment);
     let page = files::tables(&folder, experiment, &tables)?;
     output::print(&page)?;
     output::note(&format!("wrote {}", folder.display()));

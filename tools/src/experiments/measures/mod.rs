@@ -9,6 +9,7 @@ mod coupled_reflection;
 mod energy;
 mod errors;
 mod inputs;
+mod mitsuba;
 mod multiple_scattering;
 mod path_sets;
 mod phase_functions;
@@ -23,6 +24,8 @@ mod tangents;
 mod triangle_tests;
 mod wide;
 
+use std::path::Path;
+
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result};
 
@@ -34,6 +37,10 @@ pub struct Context<'a> {
     pub smoke: bool,
     /// Opens the device, for measures that need one.
     pub gpu: &'a dyn Fn() -> Result<Gpu>,
+    /// For files beside the tables; a measure that writes some makes it.
+    pub folder: &'a Path,
+    /// Takes lines about the progress of measures that take minutes.
+    pub progress: &'a dyn Fn(&str),
 }
 
 /// A measure by name.
@@ -69,6 +76,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("automatic-choice", automatic_choice::measure),
     on_device("barriers", barriers::measure),
     on_host("coupled-reflection", coupled_reflection::measure),
+    on_device("mitsuba", mitsuba::measure),
     on_host("multiple-scattering", multiple_scattering::measure),
     on_device("path-sets", path_sets::measure),
     on_host("phase-functions", phase_functions::measure),
@@ -105,7 +113,13 @@ mod tests {
     }
 
     fn run_all(needs_device: bool, gpu: &dyn Fn() -> Result<Gpu>) {
-        let context = Context { smoke: true, gpu };
+        let folder = tempfile::tempdir().unwrap();
+        let context = Context {
+            smoke: true,
+            gpu,
+            folder: folder.path(),
+            progress: &|_| {},
+        };
         for measure in MEASURES.iter().filter(|measure| measure.needs_device == needs_device) {
             match (measure.run)(&context) {
                 Ok(tables) => check(measure, &tables),
