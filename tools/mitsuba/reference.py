@@ -33,6 +33,7 @@ def parse_arguments():
     parser.add_argument("--spp", type=int, default=16, help="samples a pixel in each pass (default %(default)s)")
     parser.add_argument("--sampler", default="independent", choices=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"])
     parser.add_argument("--seed", type=int, default=0, help="seed of the first pass; pass i takes seed + i")
+    parser.add_argument("--integrator", choices=["path", "volpath", "volpathmis"], help="in place of the scene's")
     parser.add_argument("--each", action="store_true", help="also writes every pass, to PREFIX.f32")
     parser.add_argument("--max-depth", type=int, default=-1, help="path length limit in edges, -1 for none")
     parser.add_argument("--rr-depth", type=int, default=5, help="edges before Russian roulette")
@@ -63,8 +64,8 @@ def main():
 
     variant = set_variant(mitsuba, arguments.variant)
     scene = mitsuba.load_file(arguments.scene, sampler=arguments.sampler, spp=arguments.spp)
-    # The exporter's file names the integrator that its media want.
-    kind = xml.etree.ElementTree.parse(arguments.scene).getroot().find("integrator").get("type")
+    # The exporter's file names an integrator that can hold its media.
+    kind = arguments.integrator or xml.etree.ElementTree.parse(arguments.scene).getroot().find("integrator").get("type")
     integrator = mitsuba.load_dict({"type": kind, "max_depth": arguments.max_depth, "rr_depth": arguments.rr_depth})
 
     def render(seed):

@@ -1,7 +1,7 @@
 //! Agreement with an independent renderer: converged pictures of [`mitsuba::scenes`] by this engine and by Mitsuba 3, compared within their noise.
 //!
 //! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and Mitsuba's
-//! rough surfaces (single scattering, separable masking), and compared by [`film::z_test`]: value by value, by blocks of
+//! rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared by [`film::z_test`]: value by value, by blocks of
 //! 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error:
 //! [`Race`].
 //! Guarantees: pictures and errors depend on the options and the drivers alone; times are wall-clock and processor seconds, medians.
@@ -27,7 +27,7 @@ use clerestory::{Error, Result};
 use crate::mitsuba::export;
 use crate::mitsuba::scenes::{ComparedScene, scenes};
 pub use peer::mitsuba_version;
-use peer::{Peer, Request, Variant};
+use peer::{Integrator, Peer, Request, Variant};
 use race::Course;
 pub use race::{Contender, EqualError, Race};
 pub use report::{AgreementReport, Machine, SceneAgreement};
@@ -201,6 +201,7 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
         name: "mitsuba",
         variant: Variant::Auto,
         sampler: "independent",
+        integrator: Integrator::of_reference(&one.scene),
         passes: options.passes,
         samples: options.samples_per_pass,
         seed: options.seed,
@@ -237,6 +238,7 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
             gpu,
             scene,
             camera,
+            entries: Integrator::contenders(&one.scene),
             peer: &peer,
             exported: &exported.scene,
             has_llvm: theirs.variant == Variant::Llvm.name(),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clerestory::film::atomic;
+use clerestory::scene::{Medium, Scene};
 use clerestory::{Error, Result};
 
 use super::AgreementOptions;
@@ -34,6 +35,88 @@ impl Variant {
     }
 }
 
+/// How Mitsuba walks, and whether Russian roulette ends its paths.
+///
+/// `volpathmis` weighs each path to a light by the densities of both ways to find it, and counts the roulette's chance in one of them only: with
+/// survival q and densities u and n the two parts sum to q·u / (q·u + n) + n / (u + n) < 1. That is a bias of up to 1 % for light that needs many
+/// bounces (a white furnace around a cloud of albedo 1 shows it); without roulette there is none, and `volpath` has none. But `volpath`
+/// follows one band at a time, so that media whose extinction has a colour are noisy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Integrator {
+    /// Surfaces alone.
+    Path,
+    Volpath,
+    VolpathMis,
+    VolpathMisWithoutRoulette,
+}
+
+impl Integrator {
+    /// As Mitsuba calls it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Volpath => "volpath",
+            Self::VolpathMis | Self::VolpathMisWithoutRoulette => "volpathmis",
+        }
+    }
+
+    /// Path length in edges from which on roulette may end a path.
+    fn roulette_depth(self) -> u32 {
+        match self {
+            // No path is as long.
+            Self::VolpathMisWithoutRoulette => 1_000_000_000,
+            _ => super::ROULETTE_START,
+        }
+    }
+
+    /// The one without bias for converged pictures.
+    pub(super) fn of_reference(scene: &Scene) -> Self {
+        match Walk::of(scene) {
+            Walk::Surfaces => Self::Path,
+            Walk::Grey => Self::Volpath,
+            Walk::Coloured => Self::VolpathMisWithoutRoulette,
+        }
+    }
+
+    /// Those that race, each with its samplers.
+    pub(super) fn contenders(scene: &Scene) -> &'static [(Self, &'static str)] {
+        const SAMPLERS: [&str; 2] = ["independent", "multijitter"];
+        match Walk::of(scene) {
+            Walk::Surfaces => &[(Self::Path, SAMPLERS[0]), (Self::Path, SAMPLERS[1])],
+            Walk::Grey => &[
+                (Self::Volpath, SAMPLERS[0]),
+                (Self::Volpath, SAMPLERS[1]),
+                (Self::VolpathMis, SAMPLERS[1]),
+            ],
+            Walk::Coloured => &[(Self::VolpathMis, SAMPLERS[0]), (Self::VolpathMis, SAMPLERS[1])],
+        }
+    }
+}
+
+/// What paths meet in a scene.
+enum Walk {
+    Surfaces,
+    /// Media whose bands have one extinction.
+    Grey,
+    Coloured,
+}
+
+impl Walk {
+    fn of(scene: &Scene) -> Self {
+        // Extinction is a sum of two coefficients, rounded band by band.
+        const ROUNDING: f32 = 1e-6;
+        let is_grey = |medium: &Medium| {
+            let extinction = medium.sigma_t();
+            extinction.max_element() - extinction.min_element() <= ROUNDING * extinction.max_element()
+        };
+        match scene.media.as_slice() {
+            [] => Self::Surfaces,
+            media if media.iter().all(is_grey) => Self::Grey,
+            _ => Self::Coloured,
+        }
+    }
+}
+
 /// What to render.
 pub(super) struct Request<'a> {
     pub(super) scene: &'a Path,
@@ -41,6 +124,7 @@ pub(super) struct Request<'a> {
     pub(super) name: &'a str,
     pub(super) variant: Variant,
     pub(super) sampler: &'a str,
+    pub(super) integrator: Integrator,
     /// Independent pictures.
     pub(super) passes: u32,
     /// Samples a pixel in each.
@@ -166,6 +250,8 @@ impl<'a> Peer<'a> {
             .arg(request.scene)
             .arg(&prefix)
             .args(["--variant", request.variant.name(), "--sampler", request.sampler])
+            .args(["--integrator", request.integrator.name()])
+            .args(["--rr-depth", &request.integrator.roulette_depth().to_string()])
             .args(["--passes", &request.passes.to_string()])
             .args(["--spp", &request.samples.to_string()])
             .args(["--seed", &request.seed.to_string()])
@@ -205,6 +291,27 @@ mod tests {
             "{{\"renderer\": \"mitsuba 3\", \"variant\": \"scalar_rgb\", \"width\": 2, \"height\": 1, \"passes\": {passes}, \
              \"seconds_each\": [0.5, 0.25], \"cpu_seconds\": 1.5, \"non_finite_values\": {non_finite}, \"spp\": 4}}"
         )
+    }
+
+    #[test]
+    fn references_are_walked_without_bias() {
+        let integrator = |colour| {
+            let mut scene = Scene::default();
+            scene.media.extend(colour);
+            Integrator::of_reference(&scene)
+        };
+        let medium = |sigma_s: [f32; 3], sigma_a: [f32; 3]| Medium {
+            sigma_s: sigma_s.into(),
+            sigma_a: sigma_a.into(),
+            ..Medium::default()
+        };
+        assert_eq!(integrator(None), Integrator::Path);
+        // One extinction by rounded sums.
+        let grey = medium([0.9, 0.88, 0.85], [0.1, 0.12, 0.15]);
+        assert_eq!(integrator(Some(grey)), Integrator::Volpath);
+        let coloured = integrator(Some(medium([1.0, 2.0, 3.0], [0.0; 3])));
+        assert_eq!(coloured, Integrator::VolpathMisWithoutRoulette);
+        assert!(coloured.roulette_depth() > Integrator::VolpathMis.roulette_depth());
     }
 
     #[test]

@@ -19,7 +19,7 @@ use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
 
 use super::AgreementOptions;
-use super::peer::{Peer, Request, Variant};
+use super::peer::{Integrator, Peer, Request, Variant};
 use super::spread;
 use crate::machine::median;
 
@@ -31,7 +31,7 @@ const SCALAR: &str = "scalar_rgb";
 /// A renderer with a sampler, and what its pictures take.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Contender {
-    /// `clerestory`, or Mitsuba's variant.
+    /// `clerestory`, or Mitsuba's variant with, in media, its integrator.
     pub renderer: String,
     /// Its sampler as it calls it.
     pub sampler: String,
@@ -50,6 +50,11 @@ pub struct Contender {
 }
 
 impl Contender {
+    /// Renderer and sampler.
+    pub fn name(&self) -> String {
+        format!("{}, {}", self.renderer, self.sampler)
+    }
+
     /// Seconds until the error is `error`.
     pub fn seconds_to(&self, error: f64) -> f64 {
         self.seconds * self.relative_mse / error
@@ -136,7 +141,7 @@ impl Race {
             }
         };
         let against_best = against(best(&|one| !one.is_ours())?);
-        let against_scalar = against(best(&|one| one.renderer == SCALAR)?);
+        let against_scalar = against(best(&|one| one.renderer.starts_with(SCALAR))?);
         Some(Self {
             contenders,
             against_best,
@@ -192,11 +197,13 @@ impl Turns {
     }
 }
 
-/// What is raced on, and with whom.
+/// What is raced on.
 pub(super) struct Course<'a> {
     pub(super) gpu: &'a Gpu,
     pub(super) scene: Arc<GpuScene>,
     pub(super) camera: &'a Camera,
+    /// With whom, and how, in Mitsuba.
+    pub(super) entries: &'static [(Integrator, &'static str)],
     pub(super) peer: &'a Peer<'a>,
     /// The scene as exported.
     pub(super) exported: &'a Path,
@@ -227,12 +234,12 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
     } else {
         &[Variant::Scalar]
     };
-    let entries = variants
-        .iter()
-        .flat_map(|variant| ["independent", "multijitter"].map(|sampler| (*variant, sampler)));
-    let mut theirs: Vec<_> = entries
-        .map(|(variant, sampler)| (variant, sampler, Turns::default()))
-        .collect();
+    let mut theirs = Vec::new();
+    for variant in variants {
+        for (integrator, sampler) in course.entries {
+            theirs.push((*variant, *integrator, *sampler, Turns::default()));
+        }
+    }
     for round in 0..options.timing_rounds {
         // Past the converged pictures' seeds; one more a turn for the picture that compiles.
         let first_seed = (options.seed)
@@ -241,12 +248,13 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
         for (_, tracer, turns) in &mut ours {
             turns.ours(tracer, first_seed, options)?;
         }
-        for (variant, sampler, turns) in &mut theirs {
+        for (variant, integrator, sampler, turns) in &mut theirs {
             let mut timed = course.peer.render(&Request {
                 scene: course.exported,
                 name: "timed",
                 variant: *variant,
                 sampler,
+                integrator: *integrator,
                 passes: options.timing_pictures,
                 samples: options.timing_samples,
                 seed: first_seed,
@@ -261,9 +269,13 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
     let ours = ours
         .into_iter()
         .map(|(sampler, _, turns)| turns.contender(OURS, sampler, paths, course.reference));
-    let theirs = theirs
-        .into_iter()
-        .map(|(variant, sampler, turns)| turns.contender(variant.name(), sampler, paths, course.reference));
+    let theirs = theirs.into_iter().map(|(variant, integrator, sampler, turns)| {
+        let renderer = match integrator {
+            Integrator::Path => variant.name().to_owned(),
+            _ => format!("{} {}", variant.name(), integrator.name()),
+        };
+        turns.contender(&renderer, sampler, paths, course.reference)
+    });
     let contenders: Option<Vec<_>> = ours.chain(theirs).collect();
     let contenders = contenders.ok_or_else(|| Error::Picture {
         path: course.exported.display().to_string(),

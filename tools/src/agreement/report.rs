@@ -182,12 +182,11 @@ impl AgreementReport {
                     let [ours, theirs] = race.pair(&race.against_best);
                     let _ = writeln!(
                         text,
-                        " {} | {} | {:.2e} | {}, {} | {} | {:.2e} | {} | {} |",
+                        " {} | {} | {:.2e} | {} | {} | {:.2e} | {} | {} |",
                         ours.sampler,
                         millions(ours),
                         ours.relative_mse,
-                        theirs.renderer,
-                        theirs.sampler,
+                        theirs.name(),
                         millions(theirs),
                         theirs.relative_mse,
                         ratio(&race.against_best),
@@ -321,10 +320,15 @@ impl AgreementReport {
                 ratio(&race.against_scalar),
             );
         }
-        // Scenes may differ in whether LLVM ran; the longest list holds all contenders.
-        let Some((_, widest)) = races().max_by_key(|(_, race)| race.contenders.len()) else {
-            return;
-        };
+        // Media have other integrators; a table for each list of contenders keeps columns full.
+        let names = |race: &Race| race.contenders.iter().map(Contender::name).collect::<Vec<_>>();
+        let mut lists: Vec<Vec<String>> = Vec::new();
+        for (_, race) in races() {
+            let list = names(race);
+            if !lists.contains(&list) {
+                lists.push(list);
+            }
+        }
         type Shown = fn(&Contender, f64) -> String;
         let tables: [(&str, Shown); 3] = [
             (
@@ -340,20 +344,15 @@ impl AgreementReport {
             ("Millions of camera paths a second", |one, _| millions(one)),
         ];
         for (title, shown) in tables {
-            let _ = write!(page, "\n{title}:\n\n| scene |");
-            for one in &widest.contenders {
-                let _ = write!(page, " {}, {} |", one.renderer, one.sampler);
-            }
-            let _ = writeln!(page, "\n|---|{}", "---:|".repeat(widest.contenders.len()));
-            for (s, race) in races() {
-                let _ = write!(page, "| {} |", s.name);
-                for wanted in &widest.contenders {
-                    let same = |one: &&Contender| one.renderer == wanted.renderer && one.sampler == wanted.sampler;
-                    let cell = race.contenders.iter().find(same);
-                    let cell = cell.map_or("–".into(), |one| shown(one, race.against_best.error));
-                    let _ = write!(page, " {cell} |");
+            let _ = write!(page, "\n{title}:\n");
+            for list in &lists {
+                let _ = writeln!(page, "\n| scene | {} |", list.join(" | "));
+                let _ = writeln!(page, "|---|{}", "---:|".repeat(list.len()));
+                for (s, race) in races().filter(|(_, race)| names(race) == *list) {
+                    let error = race.against_best.error;
+                    let cells: Vec<String> = race.contenders.iter().map(|one| shown(one, error)).collect();
+                    let _ = writeln!(page, "| {} | {} |", s.name, cells.join(" | "));
                 }
-                page.push('\n');
             }
         }
     }

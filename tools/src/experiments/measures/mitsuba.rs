@@ -116,7 +116,7 @@ fn tables(report: &AgreementReport) -> Vec<Table> {
             ours.sampler.as_str().into(),
             best.error.into(),
             best.our_seconds.into(),
-            format!("{}, {}", theirs.renderer, theirs.sampler).into(),
+            theirs.name().into(),
             best.their_seconds.into(),
             best.ratio.into(),
             finite(best.ratio_error),
