@@ -3,6 +3,7 @@
 
 Writes PREFIX.exr (channels R, G, B: mean radiance; variance.R, variance.G, variance.B: variance of the mean, per channel) and PREFIX.json
 (settings, seconds, paths per second). Each pass has a seed of its own, so passes are independent whatever the sampler does within one.
+With --each the passes themselves go to PREFIX.f32: 32-bit floats, little-endian, by pass, row, column, channel.
 """
 
 import argparse
@@ -32,6 +33,8 @@ def parse_arguments():
     parser.add_argument("--spp", type=int, default=16, help="samples a pixel in each pass (default %(default)s)")
     parser.add_argument("--sampler", default="independent", choices=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"])
     parser.add_argument("--seed", type=int, default=0, help="seed of the first pass; pass i takes seed + i")
+    parser.add_argument("--integrator", choices=["path", "volpath", "volpathmis"], help="in place of the scene's")
+    parser.add_argument("--each", action="store_true", help="also writes every pass, to PREFIX.f32")
     parser.add_argument("--max-depth", type=int, default=-1, help="path length limit in edges, -1 for none")
     parser.add_argument("--rr-depth", type=int, default=5, help="edges before Russian roulette")
     arguments = parser.parse_args()
@@ -61,8 +64,8 @@ def main():
 
     variant = set_variant(mitsuba, arguments.variant)
     scene = mitsuba.load_file(arguments.scene, sampler=arguments.sampler, spp=arguments.spp)
-    # The exporter's file names the integrator that its media want.
-    kind = xml.etree.ElementTree.parse(arguments.scene).getroot().find("integrator").get("type")
+    # The exporter's file names an integrator that can hold its media.
+    kind = arguments.integrator or xml.etree.ElementTree.parse(arguments.scene).getroot().find("integrator").get("type")
     integrator = mitsuba.load_dict({"type": kind, "max_depth": arguments.max_depth, "rr_depth": arguments.rr_depth})
 
     def render(seed):
@@ -77,7 +80,7 @@ def main():
         first_seconds = time.perf_counter() - start
 
     # Welford's update: no cancellation between large sums.
-    mean, squares, seconds, cpu_start = 0.0, 0.0, [], time.process_time()
+    mean, squares, seconds, each, cpu_start = 0.0, 0.0, [], [], time.process_time()
     for index in range(arguments.passes):
         start = time.perf_counter()
         picture = render(arguments.seed + index)
@@ -85,6 +88,8 @@ def main():
         difference = picture - mean
         mean = mean + difference / (index + 1)
         squares = squares + difference * (picture - mean)
+        if arguments.each:
+            each.append(picture)
     cpu_seconds = time.process_time() - cpu_start
     variance_of_mean = squares / (arguments.passes - 1) / arguments.passes
 
@@ -93,6 +98,9 @@ def main():
     layers = numpy.concatenate([mean, variance_of_mean], axis=2).astype(numpy.float32)
     bitmap = mitsuba.Bitmap(layers, pixel_format=mitsuba.Bitmap.PixelFormat.MultiChannel, channel_names=names)
     bitmap.write(arguments.prefix + ".exr")
+
+    if arguments.each:
+        numpy.stack(each).astype("<f4").tofile(arguments.prefix + ".f32")
 
     total = sum(seconds)
     report = {

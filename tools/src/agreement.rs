@@ -1,19 +1,21 @@
 //! Agreement with an independent renderer: converged pictures of [`mitsuba::scenes`] by this engine and by Mitsuba 3, compared within their noise.
 //!
 //! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and Mitsuba's
-//! rough surfaces (single scattering, separable masking), and compared by [`film::z_test`]: value by value, by blocks of
-//! 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the same run the speed of both renderers is measured in turns.
-//! Guarantees: pictures depend on the options and the driver alone; times are wall-clock and processor seconds, medians of the rounds.
+//! rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared by [`film::z_test`]: value by value, by blocks of
+//! 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error:
+//! [`Race`].
+//! Guarantees: pictures and errors depend on the options and the drivers alone; times are wall-clock and processor seconds, medians.
 //!
 //! [`mitsuba::scenes`]: crate::mitsuba::scenes
 //! [`film::z_test`]: fn@clerestory::film::z_test
 
 mod peer;
+mod race;
 mod report;
+mod spread;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE};
 use clerestory::film::{CompareOptions, Picture, ToneMap, compare, exr, png, z_test};
@@ -22,11 +24,14 @@ use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
 
-use crate::machine::median;
+use crate::experiments::watch::Watch;
 use crate::mitsuba::export;
 use crate::mitsuba::scenes::{ComparedScene, scenes};
-use peer::{Peer, Variant};
-pub use report::{AgreementReport, Machine, SceneAgreement, Speed};
+pub use peer::mitsuba_version;
+use peer::{Integrator, Peer, Request, Variant};
+use race::Course;
+pub use race::{Contender, EqualError, Race};
+pub use report::{AgreementReport, Machine, SceneAgreement};
 
 /// What to compare, and how long to work at it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -41,18 +46,15 @@ pub struct AgreementOptions {
     pub samples_per_pass: u32,
     /// Seed of both renderers.
     pub seed: u32,
-    /// Rounds of the speed measurement, in each of which every renderer has its turn; 0 measures nothing.
+    /// Rounds of the timed pictures, in each of which every renderer has its turn with each of its samplers; 0 times nothing.
     pub timing_rounds: u32,
-    /// Width and height of the timed pictures, pixels.
-    pub timing_size: u32,
-    /// Samples a pixel of a timed picture.
+    /// Independent timed pictures a turn, 2 or more; with the rounds 3 or more.
+    pub timing_pictures: u32,
+    /// Samples a pixel of a timed picture, a square number for Mitsuba's multijittered sampler; a power of four suits Sobol' points too.
     pub timing_samples: u32,
     /// The Python that has Mitsuba.
     #[serde(skip)]
     pub python: PathBuf,
-    /// `tools/mitsuba/reference.py`.
-    #[serde(skip)]
-    pub script: PathBuf,
     /// Folder for scenes and pictures, made if need be.
     #[serde(skip)]
     pub output: PathBuf,
@@ -62,8 +64,8 @@ pub struct AgreementOptions {
 }
 
 impl Default for AgreementOptions {
-    /// All scenes at 64², 128 passes of 16 samples. Python comes from `CLERESTORY_MITSUBA_PYTHON`, else `python3`; paths are relative to the
-    /// repository's root.
+    /// All scenes at 64², 128 passes of 16 samples; timed are three rounds of two pictures of 256 samples, with which Mitsuba's LLVM variant
+    /// loses less than 5 % of its speed to fixed costs. Python comes from `CLERESTORY_MITSUBA_PYTHON`, else `python3`.
     fn default() -> Self {
         Self {
             scenes: Vec::new(),
@@ -72,12 +74,11 @@ impl Default for AgreementOptions {
             samples_per_pass: 16,
             seed: 2,
             timing_rounds: 3,
-            timing_size: 128,
-            timing_samples: 16,
+            timing_pictures: 2,
+            timing_samples: 256,
             python: std::env::var_os("CLERESTORY_MITSUBA_PYTHON").map_or_else(|| "python3".into(), PathBuf::from),
-            script: "tools/mitsuba/reference.py".into(),
             output: "out/agreement".into(),
-            results: Some("tools/mitsuba/results".into()),
+            results: None,
         }
     }
 }
@@ -89,19 +90,23 @@ const BLOCK: u32 = 8;
 /// Radiance difference shown as full white in the difference pictures, in units of its standard deviation.
 const FULL_SCALE_Z: f32 = 5.0;
 
-/// Compares all wanted scenes on a device, calling `progress` with a line before each and after each, and writes the report.
+/// Compares all wanted scenes on a device, until `watch` says to stop, and writes the report after each.
 ///
 /// # Errors
 /// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the exporter and
 /// the files. A picture that disagrees is no error: see [`AgreementReport::passes`].
-pub fn run_with(gpu: &Gpu, options: &AgreementOptions, mut progress: impl FnMut(&str)) -> Result<AgreementReport> {
+pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Result<AgreementReport> {
     let wanted = selected(options)?;
     let mut done = Vec::new();
     let mut mitsuba = String::new();
     for one in &wanted {
-        progress(&format!("{}: {}", one.name, one.shows));
+        if watch.stopped() {
+            break;
+        }
+        watch.begin(&format!("{}: {}", one.name, one.shows), done.len(), wanted.len());
         let (scene, version) = compare_scene(gpu, one, options)?;
-        progress(&scene.to_string());
+        watch.note(&format!("{}: {}", one.name, one.shows));
+        scene.to_string().lines().for_each(|line| watch.note(line));
         mitsuba = version;
         done.push(scene);
         // Written after every scene, so that a run that is cut short leaves what it has found.
@@ -143,7 +148,7 @@ fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
         ("size", options.size, BLOCK),
         ("passes", options.passes, 2),
         ("samples_per_pass", options.samples_per_pass, 1),
-        ("timing_size", options.timing_size, 1),
+        ("timing_pictures", options.timing_pictures, 2),
         ("timing_samples", options.timing_samples, 1),
     ] {
         if value < least {
@@ -156,6 +161,18 @@ fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
             options.size.to_string(),
             format!("is not a multiple of {BLOCK}"),
         );
+    }
+    if options.timing_samples.isqrt().pow(2) != options.timing_samples {
+        return refuse(
+            "timing_samples",
+            options.timing_samples.to_string(),
+            "is not a square".into(),
+        );
+    }
+    let pictures = u64::from(options.timing_rounds) * u64::from(options.timing_pictures);
+    if options.timing_rounds > 0 && pictures < spread::PICTURES_MIN as u64 {
+        let cause = format!("times {pictures} pictures, below {}", spread::PICTURES_MIN);
+        return refuse("timing_rounds", options.timing_rounds.to_string(), cause);
     }
     let all = scenes()?;
     let names: Vec<_> = all.iter().map(|one| one.name).collect();
@@ -183,14 +200,18 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
     let folder = options.output.join(one.name);
     let size = [options.size; 2];
     let exported = export(&one.scene, "", size, &folder)?;
-    let peer = Peer::new(options, &folder);
-    let theirs = peer.render(
-        &exported.scene,
-        "mitsuba",
-        Variant::Auto,
-        options.passes,
-        options.samples_per_pass,
-    )?;
+    let peer = Peer::new(options, &folder)?;
+    let theirs = peer.render(&Request {
+        scene: &exported.scene,
+        name: "mitsuba",
+        variant: Variant::Auto,
+        sampler: "independent",
+        integrator: Integrator::of_reference(&one.scene),
+        passes: options.passes,
+        samples: options.samples_per_pass,
+        seed: options.seed,
+        each: false,
+    })?;
 
     let scene = Arc::new(GpuScene::new(gpu, &one.scene)?);
     let camera = one.scene.camera(None).ok_or_else(|| Error::Setting {
@@ -216,17 +237,19 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
     let blocks = z_test(&a_block, &a_block_var, &b_block, &b_block_var, SIGNIFICANCE)?;
     let errors = compare(&ours, &reference, &CompareOptions::default())?;
 
-    let mut speed = None;
+    let mut race = None;
     if options.timing_rounds > 0 {
-        let timed = export(&one.scene, "", [options.timing_size; 2], &folder.join("timed"))?;
-        let mut tracer = PathTracer::new(gpu, scene, camera, [options.timing_size; 2], settings(options))?;
-        speed = Some(measure(
-            &mut tracer,
-            &peer,
-            &timed.scene,
-            theirs.variant.starts_with("llvm"),
-            options,
-        )?);
+        let course = Course {
+            gpu,
+            scene,
+            camera,
+            entries: Integrator::contenders(&one.scene),
+            peer: &peer,
+            exported: &exported.scene,
+            has_llvm: theirs.variant == Variant::Llvm.name(),
+            reference: b,
+        };
+        race = race::run(&course, options)?;
     }
     Ok((
         SceneAgreement {
@@ -241,7 +264,7 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
             values,
             blocks,
             non_finite: non_finite.total(),
-            speed,
+            race,
         },
         theirs.renderer,
     ))
@@ -309,67 +332,6 @@ fn block_means(values: &[f32], size: u32, power: i32) -> Vec<f32> {
     sums.iter().map(|sum| (sum / scale) as f32).collect()
 }
 
-/// Times in turns: this engine, Mitsuba's scalar variant, its LLVM variant where there is one.
-fn measure(
-    tracer: &mut PathTracer,
-    peer: &Peer<'_>,
-    scene: &Path,
-    has_llvm: bool,
-    options: &AgreementOptions,
-) -> Result<Speed> {
-    let mut samples = 0;
-    let mut wall = [Vec::new(), Vec::new(), Vec::new()];
-    let mut cpu = [Vec::new(), Vec::new(), Vec::new()];
-    // The first wave compiles the kernels.
-    tracer.step(1)?;
-    for round in 0..options.timing_rounds {
-        samples += if round == 0 { 1 } else { 0 } + options.timing_samples;
-        let (paths, processor, clock) = (tracer.counters().paths, cpu_seconds(), Instant::now());
-        tracer.render(samples)?;
-        let paths = (tracer.counters().paths - paths) as f64;
-        wall[0].push(paths / clock.elapsed().as_secs_f64());
-        cpu[0].extend(
-            processor
-                .zip(cpu_seconds())
-                .map(|(before, after)| paths / (after - before)),
-        );
-        for (i, variant) in [(1, Variant::Scalar), (2, Variant::Llvm)] {
-            if variant == Variant::Llvm && !has_llvm {
-                continue;
-            }
-            let timed = peer.render(scene, "timed", variant, 2, options.timing_samples)?;
-            wall[i].extend(timed.paths_per_second);
-            cpu[i].push(timed.paths_per_cpu_second);
-        }
-    }
-    let [ours, scalar, llvm] = wall.map(middle);
-    let [ours_cpu, scalar_cpu, llvm_cpu] = cpu.map(middle);
-    Ok(Speed {
-        ours,
-        scalar,
-        llvm,
-        ours_cpu,
-        scalar_cpu,
-        llvm_cpu,
-    })
-}
-
-fn middle(values: Vec<f64>) -> Option<f64> {
-    Some(median(values)).filter(|middle| !middle.is_nan())
-}
-
-/// Processor seconds of this process so far, all threads; `None` where the system does not say.
-fn cpu_seconds() -> Option<f64> {
-    /// Clock ticks a second that Linux reports to programs.
-    const TICKS: f64 = 100.0;
-    /// User and system time, counted behind the program's name.
-    const FIELDS: std::ops::RangeInclusive<usize> = 11..=12;
-    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks: Option<Vec<f64>> = fields.get(FIELDS)?.iter().map(|field| field.parse().ok()).collect();
-    Some(ticks?.iter().sum::<f64>() / TICKS)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -390,8 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn medians_and_squared_z() {
-        assert_eq!((middle(vec![4.0, 1.0]), middle(vec![])), (Some(2.5), None));
+    fn squared_z_counts_values_with_noise() {
         // z = 2 and 0 where there is noise; the value without noise does not count.
         let (a, b) = ([3.0, 1.0, 5.0], [1.0, 1.0, 5.0]);
         assert_eq!(mean_squared_z(&a, &[0.5, 0.5, 0.0], &b, &[0.5, 0.5, 0.0]), 2.0);
@@ -410,6 +371,19 @@ mod tests {
         }));
         assert!(refused(AgreementOptions {
             passes: 1,
+            ..Default::default()
+        }));
+        // Not a square, and fewer pictures than have a standard error.
+        assert!(refused(AgreementOptions {
+            timing_samples: 128,
+            ..Default::default()
+        }));
+        assert!(refused(AgreementOptions {
+            timing_rounds: 1,
+            ..Default::default()
+        }));
+        assert!(!refused(AgreementOptions {
+            timing_rounds: 0,
             ..Default::default()
         }));
         assert!(!refused(AgreementOptions::default()));

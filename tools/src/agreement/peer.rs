@@ -1,11 +1,19 @@
-//! Mitsuba 3 in a process of its own, through `tools/mitsuba/reference.py`.
+//! Mitsuba 3 in a process of its own, through `tools/mitsuba/reference.py`, which is part of this program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use clerestory::film::atomic;
+use clerestory::scene::{Medium, Scene};
 use clerestory::{Error, Result};
 
 use super::AgreementOptions;
+
+/// The script that renders with Mitsuba.
+const SCRIPT: &str = include_str!("../../mitsuba/reference.py");
+const SCRIPT_NAME: &str = "reference.py";
+/// Prints the version; fails where there is no Mitsuba.
+const PROBE: &str = "import mitsuba, numpy; print(mitsuba.__version__)";
 
 /// Which of Mitsuba's variants renders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,99 +24,328 @@ pub(super) enum Variant {
     Llvm,
 }
 
+impl Variant {
+    /// As Mitsuba calls it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Scalar => "scalar_rgb",
+            Self::Llvm => "llvm_ad_rgb",
+        }
+    }
+}
+
+/// How Mitsuba walks, and whether Russian roulette ends its paths.
+///
+/// `volpathmis` weighs each path to a light by the densities of both ways to find it, and counts the roulette's chance in one of them only: with
+/// survival q and densities u and n the two parts sum to q·u / (q·u + n) + n / (u + n) < 1. That is a bias of up to 1 % for light that needs many
+/// bounces (a white furnace around a cloud of albedo 1 shows it); without roulette there is none, and `volpath` has none. But `volpath`
+/// follows one band at a time, so that media whose extinction has a colour are noisy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Integrator {
+    /// Surfaces alone.
+    Path,
+    Volpath,
+    VolpathMis,
+    VolpathMisWithoutRoulette,
+}
+
+impl Integrator {
+    /// As Mitsuba calls it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Volpath => "volpath",
+            Self::VolpathMis | Self::VolpathMisWithoutRoulette => "volpathmis",
+        }
+    }
+
+    /// Path length in edges from which on roulette may end a path.
+    fn roulette_depth(self) -> u32 {
+        match self {
+            // No path is as long.
+            Self::VolpathMisWithoutRoulette => 1_000_000_000,
+            _ => super::ROULETTE_START,
+        }
+    }
+
+    /// The one without bias for converged pictures.
+    pub(super) fn of_reference(scene: &Scene) -> Self {
+        match Walk::of(scene) {
+            Walk::Surfaces => Self::Path,
+            Walk::Grey => Self::Volpath,
+            Walk::Coloured => Self::VolpathMisWithoutRoulette,
+        }
+    }
+
+    /// Those that race, each with its samplers.
+    pub(super) fn contenders(scene: &Scene) -> &'static [(Self, &'static str)] {
+        const SAMPLERS: [&str; 2] = ["independent", "multijitter"];
+        match Walk::of(scene) {
+            Walk::Surfaces => &[(Self::Path, SAMPLERS[0]), (Self::Path, SAMPLERS[1])],
+            Walk::Grey => &[
+                (Self::Volpath, SAMPLERS[0]),
+                (Self::Volpath, SAMPLERS[1]),
+                (Self::VolpathMis, SAMPLERS[1]),
+            ],
+            Walk::Coloured => &[(Self::VolpathMis, SAMPLERS[0]), (Self::VolpathMis, SAMPLERS[1])],
+        }
+    }
+}
+
+/// What paths meet in a scene.
+enum Walk {
+    Surfaces,
+    /// Media whose bands have one extinction.
+    Grey,
+    Coloured,
+}
+
+impl Walk {
+    fn of(scene: &Scene) -> Self {
+        // Extinction is a sum of two coefficients, rounded band by band.
+        const ROUNDING: f32 = 1e-6;
+        let is_grey = |medium: &Medium| {
+            let extinction = medium.sigma_t();
+            extinction.max_element() - extinction.min_element() <= ROUNDING * extinction.max_element()
+        };
+        match scene.media.as_slice() {
+            [] => Self::Surfaces,
+            media if media.iter().all(is_grey) => Self::Grey,
+            _ => Self::Coloured,
+        }
+    }
+}
+
+/// What to render.
+pub(super) struct Request<'a> {
+    pub(super) scene: &'a Path,
+    /// Of the files that come of it.
+    pub(super) name: &'a str,
+    pub(super) variant: Variant,
+    pub(super) sampler: &'a str,
+    pub(super) integrator: Integrator,
+    /// Independent pictures.
+    pub(super) passes: u32,
+    /// Samples a pixel in each.
+    pub(super) samples: u32,
+    /// Of the first pass; the others count on from it, and so does one more pass that is not counted.
+    pub(super) seed: u32,
+    /// Whether to return the passes.
+    pub(super) each: bool,
+}
+
 /// How to reach Mitsuba, and where its files go.
 pub(super) struct Peer<'a> {
-    options: &'a AgreementOptions,
+    python: &'a Path,
     folder: &'a Path,
+    script: PathBuf,
 }
 
 /// What a run of it gave.
 pub(super) struct Rendered {
+    /// Mean of the passes with its variance.
     pub(super) picture: PathBuf,
     /// Name and version.
     pub(super) renderer: String,
     pub(super) variant: String,
     /// Of each pass.
-    pub(super) paths_per_second: Vec<f64>,
-    pub(super) paths_per_cpu_second: f64,
+    pub(super) seconds_each: Vec<f64>,
+    /// Processor seconds a pass, mean.
+    pub(super) cpu_seconds_each: f64,
+    /// RGB values of each pass, where they were asked for.
+    pub(super) pictures: Vec<Vec<f32>>,
 }
 
 /// The part of `reference.json` that is needed here.
-#[derive(serde::Deserialize)]
+#[derive(Debug, serde::Deserialize)]
 struct Answer {
     renderer: String,
     variant: String,
-    width: u32,
-    height: u32,
-    passes: u32,
-    spp_per_pass: u32,
+    width: usize,
+    height: usize,
+    passes: usize,
     seconds_each: Vec<f64>,
     cpu_seconds: f64,
     non_finite_values: u64,
 }
 
+impl Answer {
+    /// Reads and checks it.
+    fn parse(text: &str) -> Result<Self, String> {
+        let answer: Self = serde_json::from_str(text).map_err(|cause| cause.to_string())?;
+        if answer.non_finite_values > 0 {
+            return Err(format!(
+                "Mitsuba's picture has {} values that are not finite",
+                answer.non_finite_values
+            ));
+        }
+        if answer.passes == 0 || answer.seconds_each.len() != answer.passes {
+            return Err(format!(
+                "{} times for {} passes",
+                answer.seconds_each.len(),
+                answer.passes
+            ));
+        }
+        Ok(answer)
+    }
+
+    /// The passes in the raw file.
+    fn pictures(&self, bytes: &[u8]) -> Result<Vec<Vec<f32>>, String> {
+        let values = self.width * self.height * 3;
+        let wanted = self.passes * values * size_of::<f32>();
+        if values == 0 || bytes.len() != wanted {
+            return Err(format!("{} bytes in place of {wanted}", bytes.len()));
+        }
+        let (words, _) = bytes.as_chunks();
+        let all: Vec<f32> = words.iter().map(|word| f32::from_le_bytes(*word)).collect();
+        Ok(all.chunks(values).map(<[f32]>::to_vec).collect())
+    }
+}
+
+/// Runs Python and returns what it printed.
+fn run(python: &Path, command: &mut Command) -> Result<String> {
+    let failed = |cause: String| Error::setting("python", python.display(), cause);
+    let output = command
+        .output()
+        .map_err(|cause| failed(format!("cannot be run: {cause}")))?;
+    if output.status.success() {
+        return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
+    }
+    let text = String::from_utf8_lossy(&output.stderr);
+    let last = text.trim().lines().last().unwrap_or("no message");
+    Err(failed(format!(
+        "did not run Mitsuba 3 ({}): {last}; see tools/mitsuba/README.md",
+        output.status
+    )))
+}
+
+/// The version of Mitsuba that a Python has.
+///
+/// # Errors
+/// [`Error::Setting`] when it cannot be run or has no Mitsuba.
+pub fn mitsuba_version(python: &Path) -> Result<String> {
+    run(python, Command::new(python).args(["-c", PROBE]))
+}
+
 impl<'a> Peer<'a> {
-    pub(super) fn new(options: &'a AgreementOptions, folder: &'a Path) -> Self {
-        Self { options, folder }
+    /// Files go to `folder`, the script beside it.
+    pub(super) fn new(options: &'a AgreementOptions, folder: &'a Path) -> Result<Self> {
+        std::fs::create_dir_all(&options.output).map_err(|cause| Error::io(&options.output, cause))?;
+        let script = options.output.join(SCRIPT_NAME);
+        atomic::write(&script, SCRIPT.as_bytes())?;
+        Ok(Self {
+            python: &options.python,
+            folder,
+            script,
+        })
     }
 
     /// Renders and waits.
-    pub(super) fn render(
-        &self,
-        scene: &Path,
-        name: &str,
-        variant: Variant,
-        passes: u32,
-        samples: u32,
-    ) -> Result<Rendered> {
-        let prefix = self.folder.join(name);
-        let variant = match variant {
-            Variant::Auto => "auto",
-            Variant::Scalar => "scalar_rgb",
-            Variant::Llvm => "llvm_ad_rgb",
-        };
-        let output = Command::new(&self.options.python)
-            .arg(&self.options.script)
-            .arg(scene)
+    pub(super) fn render(&self, request: &Request<'_>) -> Result<Rendered> {
+        let prefix = self.folder.join(request.name);
+        let mut command = Command::new(self.python);
+        command
+            .arg(&self.script)
+            .arg(request.scene)
             .arg(&prefix)
-            .args(["--variant", variant])
-            .args(["--passes", &passes.to_string(), "--spp", &samples.to_string()])
-            .args(["--seed", &self.options.seed.to_string()])
-            .output();
-        let failed = |cause: String| Error::Setting {
-            name: "python".into(),
-            value: self.options.python.display().to_string(),
-            cause,
+            .args(["--variant", request.variant.name(), "--sampler", request.sampler])
+            .args(["--integrator", request.integrator.name()])
+            .args(["--rr-depth", &request.integrator.roulette_depth().to_string()])
+            .args(["--passes", &request.passes.to_string()])
+            .args(["--spp", &request.samples.to_string()])
+            .args(["--seed", &request.seed.to_string()])
+            .args(request.each.then_some("--each"));
+        run(self.python, &mut command)?;
+        let read = |suffix: &str| {
+            let path = prefix.with_extension(suffix);
+            let bytes = std::fs::read(&path).map_err(|cause| Error::io(&path, cause))?;
+            Ok::<_, Error>((bytes, path.display().to_string()))
         };
-        let output = output.map_err(|cause| failed(format!("cannot be run: {cause}")))?;
-        if !output.status.success() {
-            let text = String::from_utf8_lossy(&output.stderr);
-            let last = text.trim().lines().last().unwrap_or("no message").to_string();
-            return Err(failed(format!(
-                "did not render with Mitsuba 3 ({}): {last}; see tools/mitsuba/README.md",
-                output.status
-            )));
+        let (bytes, path) = read("json")?;
+        let answer = Answer::parse(&String::from_utf8_lossy(&bytes)).map_err(|cause| Error::Picture { path, cause })?;
+        let mut pictures = Vec::new();
+        if request.each {
+            let (bytes, path) = read("f32")?;
+            pictures = answer
+                .pictures(&bytes)
+                .map_err(|cause| Error::Picture { path, cause })?;
         }
-        let path = prefix.with_extension("json");
-        let text = std::fs::read_to_string(&path).map_err(|cause| Error::io(&path, cause))?;
-        let wrong = |cause: String| Error::Picture {
-            path: path.display().to_string(),
-            cause,
-        };
-        let answer: Answer = serde_json::from_str(&text).map_err(|cause| wrong(cause.to_string()))?;
-        if answer.non_finite_values > 0 {
-            return Err(wrong(format!(
-                "Mitsuba's picture has {} values that are not finite",
-                answer.non_finite_values
-            )));
-        }
-        let paths = f64::from(answer.width) * f64::from(answer.height) * f64::from(answer.spp_per_pass);
         Ok(Rendered {
             picture: prefix.with_extension("exr"),
+            cpu_seconds_each: answer.cpu_seconds / answer.passes as f64,
             renderer: answer.renderer,
             variant: answer.variant,
-            paths_per_second: answer.seconds_each.iter().map(|seconds| paths / seconds).collect(),
-            paths_per_cpu_second: paths * f64::from(answer.passes) / answer.cpu_seconds,
+            seconds_each: answer.seconds_each,
+            pictures,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(passes: usize, non_finite: u64) -> String {
+        format!(
+            "{{\"renderer\": \"mitsuba 3\", \"variant\": \"scalar_rgb\", \"width\": 2, \"height\": 1, \"passes\": {passes}, \
+             \"seconds_each\": [0.5, 0.25], \"cpu_seconds\": 1.5, \"non_finite_values\": {non_finite}, \"spp\": 4}}"
+        )
+    }
+
+    #[test]
+    fn references_are_walked_without_bias() {
+        let integrator = |colour| {
+            let mut scene = Scene::default();
+            scene.media.extend(colour);
+            Integrator::of_reference(&scene)
+        };
+        let medium = |sigma_s: [f32; 3], sigma_a: [f32; 3]| Medium {
+            sigma_s: sigma_s.into(),
+            sigma_a: sigma_a.into(),
+            ..Medium::default()
+        };
+        assert_eq!(integrator(None), Integrator::Path);
+        // One extinction by rounded sums.
+        let grey = medium([0.9, 0.88, 0.85], [0.1, 0.12, 0.15]);
+        assert_eq!(integrator(Some(grey)), Integrator::Volpath);
+        let coloured = integrator(Some(medium([1.0, 2.0, 3.0], [0.0; 3])));
+        assert_eq!(coloured, Integrator::VolpathMisWithoutRoulette);
+        assert!(coloured.roulette_depth() > Integrator::VolpathMis.roulette_depth());
+    }
+
+    #[test]
+    fn answers_are_read_and_unsound_ones_refused() {
+        let answer = Answer::parse(&text(2, 0)).unwrap();
+        assert_eq!(
+            (answer.width, answer.seconds_each.len(), answer.cpu_seconds),
+            (2, 2, 1.5)
+        );
+        assert!(Answer::parse(&text(3, 0)).unwrap_err().contains("2 times for 3 passes"));
+        assert!(Answer::parse(&text(2, 7)).unwrap_err().contains("7 values"));
+        assert!(Answer::parse("{}").unwrap_err().contains("renderer"));
+    }
+
+    #[test]
+    fn raw_passes_are_split_in_order() {
+        let answer = Answer::parse(&text(2, 0)).unwrap();
+        let bytes: Vec<u8> = (0..12u8).flat_map(|i| f32::from(i).to_le_bytes()).collect();
+        let pictures = answer.pictures(&bytes).unwrap();
+        assert_eq!(
+            pictures,
+            [[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], [6.0, 7.0, 8.0, 9.0, 10.0, 11.0]]
+        );
+        assert!(
+            answer
+                .pictures(&bytes[1..])
+                .unwrap_err()
+                .contains("47 bytes in place of 48")
+        );
+    }
+
+    #[test]
+    fn a_python_that_is_not_there_is_an_error() {
+        let refused = mitsuba_version(Path::new("no/such/python")).unwrap_err().to_string();
+        assert!(refused.contains("cannot be run"), "{refused}");
     }
 }

@@ -3,11 +3,13 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
 use clerestory::film::{ZTest, atomic};
 use clerestory::gpu::Caps;
 use clerestory::{Error, Result};
 
 use super::AgreementOptions;
+use super::race::{Contender, EqualError, Race};
 use crate::machine;
 
 /// What everything ran on.
@@ -37,23 +39,6 @@ impl Machine {
     }
 }
 
-/// Camera paths a second, medians; `None` where nothing was measured. `…_cpu` are a processor second of all threads, which a busy machine changes less.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Speed {
-    /// This engine.
-    pub ours: Option<f64>,
-    /// Mitsuba's `scalar_rgb`.
-    pub scalar: Option<f64>,
-    /// Mitsuba's `llvm_ad_rgb`.
-    pub llvm: Option<f64>,
-    /// This engine, a processor second.
-    pub ours_cpu: Option<f64>,
-    /// `scalar_rgb`, a processor second.
-    pub scalar_cpu: Option<f64>,
-    /// `llvm_ad_rgb`, a processor second.
-    pub llvm_cpu: Option<f64>,
-}
-
 /// One scene's comparison.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct SceneAgreement {
@@ -79,8 +64,8 @@ pub struct SceneAgreement {
     pub relative_bias: f64,
     /// Samples of ours that were left out because they were not finite.
     pub non_finite: u64,
-    /// Both renderers' speed.
-    pub speed: Option<Speed>,
+    /// Both renderers' time to equal error; `None` where nothing was timed and where pictures have no noise.
+    pub race: Option<Race>,
 }
 
 impl SceneAgreement {
@@ -95,7 +80,8 @@ impl SceneAgreement {
         self.blocks.accepted < self.blocks.tests || self.values.bias_z.abs() > BIAS_Z_MAX
     }
 
-    fn verdict(&self) -> &'static str {
+    /// In words.
+    pub fn verdict(&self) -> &'static str {
         match (self.passes(), self.is_suspicious()) {
             (true, false) => "agrees",
             (true, true) => "agrees, look again",
@@ -157,51 +143,98 @@ impl AgreementReport {
         Ok(())
     }
 
-    /// The speed beside Mitsuba's with the errors of the same scenes, as a part of a page of results.
+    /// Agreement and time to equal error, one row a scene, as a part of a page of results.
     pub fn to_results_block(&self) -> String {
         let (m, o) = (&self.machine, &self.options);
         let agreeing = self.scenes.iter().filter(|scene| scene.passes()).count();
         let mut text = format!(
-            "- Device: {}; driver: {}. Machine: {}, {} threads. Reference: {}, both of its variants in the same run.\n",
+            "- Device: {}; driver: {}. Machine: {}, {} threads. Reference: {}.\n",
             m.device, m.driver, m.processor, m.threads, m.mitsuba
         );
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "- {agreeing} of {} scenes agree with Mitsuba in a z-test of every value: {1} × {1} pixels, {2} samples a pixel on both sides. Relative \
-             MSE and bias are between these pictures.",
+            "- {agreeing} of {} scenes agree with Mitsuba in a z-test of every value: {1} × {1} pixels, {2} samples a pixel on both sides; bias is \
+             between these pictures.",
             self.scenes.len(),
             o.size,
             o.passes * o.samples_per_pass
         );
-        let _ = writeln!(
-            text,
-            "- Speed: millions of camera paths a second of wall clock, {0} × {0} pixels × {1} samples, medians of {2} rounds in which the \
-             renderers take turns. Ratios are ours over theirs, above 1 this engine is faster; in brackets a processor second, which other \
-             work on the machine changes less.\n\n\
-             | scene | relative MSE | bias | | ours | `scalar_rgb` | `llvm_ad_rgb` | ratio to scalar | ratio to LLVM |\n\
-             |---|---:|---:|---|---:|---:|---:|---:|---:|",
-            o.timing_size, o.timing_samples, o.timing_rounds
+        let _ = writeln!(text, "- {}", self.race_method());
+        for line in self.race_summary() {
+            let _ = writeln!(text, "- {line}");
+        }
+        text.push_str(
+            "\n| scene | agrees? | bias | ours | M paths/s | relative MSE | Mitsuba's best | M paths/s | relative MSE | ratio to best | ratio to scalar |\n\
+             |---|---|---:|---|---:|---:|---|---:|---:|---:|---:|\n",
         );
         for s in &self.scenes {
-            let Some(v) = &s.speed else { continue };
-            let _ = writeln!(
+            let _ = write!(
                 text,
-                "| {} | {:.2e} | {:+.3} % | {} | {} | {} | {} | {} ({}) | {} ({}) |",
+                "| {} | {} | {:+.3} % |",
                 s.name,
-                s.relative_mse,
-                s.relative_bias * 100.0,
                 s.verdict(),
-                millions(v.ours),
-                millions(v.scalar),
-                millions(v.llvm),
-                ratio(v.ours, v.scalar),
-                ratio(v.ours_cpu, v.scalar_cpu),
-                ratio(v.ours, v.llvm),
-                ratio(v.ours_cpu, v.llvm_cpu),
+                s.relative_bias * 100.0
             );
+            match &s.race {
+                None => text.push_str(" – | – | – | – | – | – | – | – |\n"),
+                Some(race) => {
+                    let [ours, theirs] = race.pair(&race.against_best);
+                    let _ = writeln!(
+                        text,
+                        " {} | {} | {:.2e} | {} | {} | {:.2e} | {} | {} |",
+                        ours.sampler,
+                        millions(ours),
+                        ours.relative_mse,
+                        theirs.name(),
+                        millions(theirs),
+                        theirs.relative_mse,
+                        ratio(&race.against_best),
+                        ratio(&race.against_scalar),
+                    );
+                }
+            }
         }
         text
+    }
+
+    /// How times to equal error were measured, in a paragraph.
+    pub fn race_method(&self) -> String {
+        let o = &self.options;
+        format!(
+            "Time to equal error: every renderer takes turns with each of its samplers (here `sobol` and `pcg`; Mitsuba's `scalar_rgb` and `llvm_ad_rgb` with \
+             `independent` and `multijitter`), {} independent pictures each of {1} × {1} pixels × {2} samples. Relative MSE is that of one such picture, by \
+             the variance between them over the squares of one converged picture + {3}; paths a second are of wall clock, medians. A contender's \
+             seconds to an error are its seconds a picture × its relative MSE / that error, which takes the MSE to fall as 1/samples \
+             around these pictures. Compared are the samplers and variants of either side that are there first. Ratios are Mitsuba's seconds over \
+             ours, above 1 this engine is faster, ± their standard error by that of the errors; in brackets the ratio of processor \
+             seconds, which other work on the machine changes less.",
+            o.timing_rounds * o.timing_pictures,
+            o.size,
+            o.timing_samples,
+            RELATIVE_MSE_OFFSET,
+        )
+    }
+
+    /// In how many scenes this engine is first, and the mean ratios; nothing when nothing was timed.
+    pub fn race_summary(&self) -> Vec<String> {
+        let races: Vec<&Race> = self.scenes.iter().filter_map(|scene| scene.race.as_ref()).collect();
+        let line = |whom: &str, of: fn(&Race) -> &EqualError| {
+            let ratios: Vec<f64> = races.iter().map(|race| of(race).ratio).collect();
+            let first = ratios.iter().filter(|ratio| **ratio > 1.0).count();
+            let mean = (ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64).exp();
+            format!(
+                "Against {whom} this engine is faster to equal error in {first} of {} scenes; geometric mean of the ratios {mean:.2}.",
+                ratios.len()
+            )
+        };
+        if races.is_empty() {
+            return Vec::new();
+        }
+        vec![
+            line("Mitsuba's best", |race| &race.against_best),
+            line("its scalar variant", |race| &race.against_scalar),
+        ]
     }
 
     /// The report as a page.
@@ -256,43 +289,158 @@ impl AgreementReport {
                 s.verdict(),
             );
         }
-        if self.scenes.iter().any(|s| s.speed.is_some()) {
-            let _ = writeln!(
-                page,
-                "\n## Speed\n\nMillions of camera paths a second at {0} × {0} pixels × {1} samples, medians of {2} rounds in which the renderers take turns; in \
-                 brackets a processor second of all threads, which other work on the machine changes less. Ratios are ours over theirs.\n\n\
-                 | scene | ours | scalar_rgb | llvm_ad_rgb | ratio to scalar | ratio to LLVM |\n|---|---|---|---|---|---|",
-                o.timing_size, o.timing_samples, o.timing_rounds
-            );
-            for s in &self.scenes {
-                if let Some(v) = &s.speed {
-                    let _ = writeln!(
-                        page,
-                        "| {} | {} ({}) | {} ({}) | {} ({}) | {} ({}) | {} ({}) |",
-                        s.name,
-                        millions(v.ours),
-                        millions(v.ours_cpu),
-                        millions(v.scalar),
-                        millions(v.scalar_cpu),
-                        millions(v.llvm),
-                        millions(v.llvm_cpu),
-                        ratio(v.ours, v.scalar),
-                        ratio(v.ours_cpu, v.scalar_cpu),
-                        ratio(v.ours, v.llvm),
-                        ratio(v.ours_cpu, v.llvm_cpu),
-                    );
-                }
+        if self.scenes.iter().any(|s| s.race.is_some()) {
+            page.push_str("\n## Time to equal error\n\n");
+            page.push_str(&self.race_method());
+            page.push_str("\n\n");
+            for line in self.race_summary() {
+                let _ = writeln!(page, "- {line}");
             }
+            self.write_races(&mut page);
         }
         page
     }
+
+    /// Tables of all contenders, a row a scene: seconds to the error of our best, and what they come of.
+    fn write_races(&self, page: &mut String) {
+        let races = || self.scenes.iter().filter_map(|s| s.race.as_ref().map(|race| (s, race)));
+        page.push_str(
+            "\n| scene | relative MSE to reach | our seconds | Mitsuba's | ratio to best | ratio to scalar |\n|---|---:|---:|---:|---:|---:|\n",
+        );
+        for (s, race) in races() {
+            let best = &race.against_best;
+            let _ = writeln!(
+                page,
+                "| {} | {:.2e} | {:.3} | {:.3} | {} | {} |",
+                s.name,
+                best.error,
+                best.our_seconds,
+                best.their_seconds,
+                ratio(best),
+                ratio(&race.against_scalar),
+            );
+        }
+        // Media have other integrators; a table for each list of contenders keeps columns full.
+        let names = |race: &Race| race.contenders.iter().map(Contender::name).collect::<Vec<_>>();
+        let mut lists: Vec<Vec<String>> = Vec::new();
+        for (_, race) in races() {
+            let list = names(race);
+            if !lists.contains(&list) {
+                lists.push(list);
+            }
+        }
+        type Shown = fn(&Contender, f64) -> String;
+        let tables: [(&str, Shown); 3] = [
+            (
+                "Seconds to the relative MSE to reach, in brackets processor seconds",
+                |one, error| {
+                    let cpu = one.cpu_seconds_to(error).map_or("–".into(), |cpu| format!("{cpu:.3}"));
+                    format!("{:.3} ({cpu})", one.seconds_to(error))
+                },
+            ),
+            ("Relative MSE of one picture with its standard error", |one, _| {
+                format!("{:.2e} ± {:.0e}", one.relative_mse, one.relative_mse_error)
+            }),
+            ("Millions of camera paths a second", |one, _| millions(one)),
+        ];
+        for (title, shown) in tables {
+            let _ = write!(page, "\n{title}:\n");
+            for list in &lists {
+                let _ = writeln!(page, "\n| scene | {} |", list.join(" | "));
+                let _ = writeln!(page, "|---|{}", "---:|".repeat(list.len()));
+                for (s, race) in races().filter(|(_, race)| names(race) == *list) {
+                    let error = race.against_best.error;
+                    let cells: Vec<String> = race.contenders.iter().map(|one| shown(one, error)).collect();
+                    let _ = writeln!(page, "| {} | {} |", s.name, cells.join(" | "));
+                }
+            }
+        }
+    }
 }
 
-fn millions(value: Option<f64>) -> String {
-    value.map_or("–".into(), |v| format!("{:.3}", v * 1e-6))
+/// Millions of camera paths a second.
+fn millions(one: &Contender) -> String {
+    format!("{:.3}", one.paths_per_second * 1e-6)
 }
 
-fn ratio(ours: Option<f64>, theirs: Option<f64>) -> String {
-    ours.zip(theirs)
-        .map_or("–".into(), |(ours, theirs)| format!("{:.2}", ours / theirs))
+fn ratio(of: &EqualError) -> String {
+    let cpu = of.cpu_ratio.map_or("–".into(), |cpu| format!("{cpu:.2}"));
+    format!("{:.2} ± {:.2} ({cpu})", of.ratio, of.ratio_error)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use clerestory::film::z_test;
+
+    use super::super::race::tests::made_up_race;
+    use super::*;
+
+    /// Two scenes that nobody has rendered, one without times.
+    fn made_up() -> AgreementReport {
+        let values = z_test(&[1.0], &[1.0], &[1.0], &[1.0], 0.01).unwrap();
+        let scene = |name: &str, race| SceneAgreement {
+            name: name.into(),
+            shows: "nothing".into(),
+            triangles: 12,
+            variant: "llvm_ad_rgb".into(),
+            values: values.clone(),
+            blocks: values.clone(),
+            mean_squared_z: 1.0,
+            mean_squared_z_blocks: 1.0,
+            relative_mse: 1e-3,
+            relative_bias: -0.001,
+            non_finite: 0,
+            race,
+        };
+        AgreementReport {
+            machine: Machine {
+                processor: "none".into(),
+                threads: 2,
+                device: "none".into(),
+                driver: "none".into(),
+                mitsuba: "mitsuba 3".into(),
+            },
+            options: AgreementOptions::default(),
+            scenes: vec![scene("raced", Race::new(made_up_race())), scene("not raced", None)],
+        }
+    }
+
+    #[test]
+    fn the_block_has_one_row_a_scene_and_names_both_bests() {
+        let text = made_up().to_results_block();
+        assert!(
+            text.contains(
+                "| raced | agrees | -0.100 % | sobol | 0.500 | 5.00e-1 | llvm_ad_rgb, independent | 2.000 | 1.00e0 | 0.50 ± 0.02 (0.50) | 3.00 ± 0.13 (3.00) |"
+            ),
+            "{text}"
+        );
+        assert!(text.contains("| not raced | agrees | -0.100 % | – |"), "{text}");
+        assert!(
+            text.contains(
+                "best this engine is faster to equal error in 0 of 1 scenes; geometric mean of the ratios 0.50"
+            )
+        );
+        assert!(text.contains("variant this engine is faster to equal error in 1 of 1 scenes"));
+        let columns: Vec<usize> = text
+            .lines()
+            .filter(|line| line.starts_with('|'))
+            .map(|line| line.matches('|').count())
+            .collect();
+        assert_eq!(columns, [12; 4]);
+    }
+
+    #[test]
+    fn the_page_has_every_contender() {
+        let text = made_up().to_markdown();
+        assert!(text.contains("| raced | 5.00e-1 | 2.000 | 1.000 | 0.50"), "{text}");
+        for contender in [
+            "clerestory, sobol",
+            "clerestory, pcg",
+            "scalar_rgb, multijitter",
+            "llvm_ad_rgb, multijitter",
+        ] {
+            assert_eq!(text.matches(contender).count(), 3, "{contender}");
+        }
+        assert!(text.contains("| 2.000 (4.000) | 3.800 (7.600) |"), "{text}");
+    }
 }

@@ -5,22 +5,24 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory_tools::agreement::{AgreementOptions, run_with};
+use clerestory_tools::experiments::watch::Watch;
 use clerestory_tools::mitsuba::scenes::scenes;
 use clerestory_tools::page::Block;
 
 use super::check_validation;
+use super::progress::Bar;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output;
 
-/// Compares converged pictures with those of Mitsuba 3, within their noise, and measures both renderers' speed
+/// Compares converged pictures with those of Mitsuba 3, within their noise, and measures both renderers' time to equal error
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Run it from the repository's root. It needs a Python that has the package `mitsuba`: tools/mitsuba/README.md says how to get it.
+It needs a Python that has the package `mitsuba`: tools/mitsuba/README.md says how to get it.
 
 Examples:
   clerestory agreement --list
-  clerestory agreement --scene cornell --timing-rounds 0
+  clerestory agreement --scene cornell-box --timing-rounds 0
   clerestory agreement --python ~/mitsuba/bin/python --results tools/mitsuba/results --page RESULTS.md")]
 pub struct Arguments {
     /// Only these scenes
@@ -41,9 +43,15 @@ pub struct Arguments {
     /// Seed of both renderers
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().seed)]
     seed: u32,
-    /// Rounds of the speed measurement; 0 measures nothing
+    /// Rounds of timed pictures, in each of which both renderers have their turns; 0 times nothing
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_rounds)]
     timing_rounds: u32,
+    /// Timed pictures a turn
+    #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_pictures)]
+    timing_pictures: u32,
+    /// Samples a pixel of a timed picture, a square number
+    #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_samples)]
+    timing_spp: u32,
     /// The Python that has Mitsuba; by default CLERESTORY_MITSUBA_PYTHON, else python3
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
@@ -53,7 +61,7 @@ pub struct Arguments {
     /// Writes the report to NAME.md and NAME.json
     #[arg(long, value_name = "NAME")]
     results: Option<PathBuf>,
-    /// Writes speed and error beside Mitsuba's into a marked part of this page; the rest of it stays
+    /// Writes errors and times to equal error beside Mitsuba's into a marked part of this page; the rest of it stays
     #[arg(long, value_name = "FILE.md")]
     page: Option<PathBuf>,
     /// Prints the report as JSON, else as Markdown
@@ -80,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     }
     if arguments.page.is_some() && arguments.timing_rounds == 0 {
         return Err(Failure::usage(
-            "--page wants speeds, and --timing-rounds 0 measures none",
+            "--page wants times, and --timing-rounds 0 measures none",
         ));
     }
     let defaults = AgreementOptions::default();
@@ -91,17 +99,25 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         samples_per_pass: arguments.spp,
         seed: arguments.seed,
         timing_rounds: arguments.timing_rounds,
-        python: arguments.python.clone().unwrap_or(defaults.python.clone()),
+        timing_pictures: arguments.timing_pictures,
+        timing_samples: arguments.timing_spp,
+        python: arguments.python.clone().unwrap_or(defaults.python),
         output: arguments.output.clone(),
         results: arguments.results.clone(),
-        ..defaults
     };
     options.check()?;
     let gpu = arguments.device.open()?;
-    let report = run_with(&gpu, &options, |line| line.lines().for_each(output::note))?;
+    let bar = Bar::start()?;
+    let report = run_with(&gpu, &options, &bar);
+    bar.clear();
+    let report = report?;
     let log = gpu.validation_log();
     drop(gpu);
     check_validation(&log)?;
+    if bar.stopped() {
+        output::note("interrupted; the reports hold what was compared before");
+        return Ok(Code::Interrupted.into());
+    }
     if let Some(page) = &arguments.page {
         BLOCK.write(page, &report.to_results_block())?;
         output::note(&format!("wrote {}", page.display()));

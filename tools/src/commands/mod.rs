@@ -5,6 +5,7 @@ mod bench;
 mod compare;
 mod info;
 mod list;
+mod progress;
 mod render;
 mod report;
 mod scenes;

@@ -149,6 +149,18 @@ impl PathTracer {
         Ok(())
     }
 
+    /// Forgets everything gathered so far and goes on with another seed: an independent picture of the same view, with the kernels there are.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn restart(&mut self, seed: u32) -> Result<()> {
+        self.film.clear()?;
+        self.settings.seed = seed;
+        self.pending = None;
+        self.cursor = Cursor::default();
+        Ok(())
+    }
+
     /// Renders one more wave towards `samples` samples a pixel; `None` when all are there. The first wave also compiles the kernels.
     ///
     /// # Errors

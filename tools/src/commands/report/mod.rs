@@ -3,7 +3,6 @@
 //! Only the part of the page between two marks is replaced, so that other measurements can stand beside it.
 
 mod files;
-mod progress;
 
 use std::cell::Cell;
 use std::path::PathBuf;
@@ -20,10 +19,10 @@ use clerestory_tools::experiments::{self, Experiment, Kind};
 use clerestory_tools::page::Block;
 
 use super::check_validation;
+use super::progress::Bar;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output;
-use progress::Bar;
 
 /// Runs experiments by name: error against time and work with plots, slopes and pictures, or tables of measured numbers
 #[derive(Debug, Args)]
@@ -172,15 +171,16 @@ fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
 /// The tables go to standard output and, with all digits, into the folder. Says whether it was interrupted.
 fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar) -> Outcome<bool> {
     let open = || Gpu::headless(&arguments.device.options());
+    let folder = folder(arguments, experiment);
     let context = Context {
         smoke: arguments.smoke,
         gpu: &open,
+        folder: &folder,
         watch: bar,
     };
     let tables = (measures::find(name)?.run)(&context);
     bar.clear();
     let tables = tables?;
-    let folder = folder(arguments, experiment);
     let page = files::tables(&folder, experiment, &tables)?;
     output::print(&page)?;
     output::note(&format!("wrote {}", folder.display()));

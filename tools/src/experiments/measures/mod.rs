@@ -10,6 +10,7 @@ mod energy;
 mod errors;
 mod free_flight;
 mod inputs;
+mod mitsuba;
 mod multiple_scattering;
 mod path_sets;
 mod phase_functions;
@@ -24,6 +25,8 @@ mod tangents;
 mod triangle_tests;
 mod wide;
 
+use std::path::Path;
+
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result};
 
@@ -36,6 +39,8 @@ pub struct Context<'a> {
     pub smoke: bool,
     /// Opens the device, for measures that need one.
     pub gpu: &'a dyn Fn() -> Result<Gpu>,
+    /// For files beside the tables; a measure that writes some makes it.
+    pub folder: &'a Path,
     /// Sees the progress of measures that take long. A measure that is stopped gives the rows that it has.
     pub watch: &'a dyn Watch,
 }
@@ -74,6 +79,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("barriers", barriers::measure),
     on_host("coupled-reflection", coupled_reflection::measure),
     on_host("free-flight", free_flight::measure),
+    on_device("mitsuba", mitsuba::measure),
     on_host("multiple-scattering", multiple_scattering::measure),
     on_device("path-sets", path_sets::measure),
     on_host("phase-functions", phase_functions::measure),
@@ -111,9 +117,11 @@ mod tests {
     }
 
     fn run_all(needs_device: bool, gpu: &dyn Fn() -> Result<Gpu>) {
+        let folder = tempfile::tempdir().unwrap();
         let context = Context {
             smoke: true,
             gpu,
+            folder: folder.path(),
             watch: &Unwatched,
         };
         for measure in MEASURES.iter().filter(|measure| measure.needs_device == needs_device) {

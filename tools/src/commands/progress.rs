@@ -25,7 +25,7 @@ impl Bar {
     /// Begins to listen for Ctrl-C and requests to end. The bar shows itself only where the error output is a terminal.
     pub fn start() -> Outcome<Self> {
         let bar = output::bar(0);
-        let stop = Stop::listen(&bar, "stopping; finished pictures are kept. Once more stops at once")?;
+        let stop = Stop::listen(&bar, "stopping; what is finished is kept. Once more stops at once")?;
         Ok(Self {
             bar,
             stop,

@@ -1,0 +1,367 @@
+//! Time to equal error: both renderers with their samplers take turns at pictures of a scene, and each picture counts by its seconds and its error.
+//!
+//! Speed and error come from the same pictures. The relative MSE is that of [`spread`](super::spread): the variance between independent pictures,
+//! over the same weights for all, so no reference's noise is in it; that the renderers agree in expectation is for the z-test to show.
+//! A Monte Carlo picture of n samples takes time in proportion to n and has an error in proportion to 1/n, so a contender with s seconds
+//! and error m a picture reaches an error e in s · m / e seconds. The one assumption is MSE ∝ 1/n between the timed picture and e: it
+//! is exact for independent samples and holds near the timed picture for stratified ones. To use it least, e is the error of this engine's
+//! best picture, and all contenders take the same number of samples.
+//! Guarantees: pictures and errors depend on the options and the drivers alone; times are medians over all pictures.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use clerestory::gpu::Gpu;
+use clerestory::scene::Camera;
+use clerestory::transport::random::SamplerKind;
+use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
+use clerestory::{Error, Result};
+
+use super::AgreementOptions;
+use super::peer::{Integrator, Peer, Request, Variant};
+use super::spread;
+use crate::machine::median;
+
+/// This engine's name as a contender.
+const OURS: &str = "clerestory";
+/// Mitsuba's scalar variant.
+const SCALAR: &str = "scalar_rgb";
+
+/// A renderer with a sampler, and what its pictures take.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Contender {
+    /// `clerestory`, or Mitsuba's variant with, in media, its integrator.
+    pub renderer: String,
+    /// Its sampler as it calls it.
+    pub sampler: String,
+    /// Independent pictures that were timed.
+    pub pictures: usize,
+    /// Seconds of wall clock a picture, median.
+    pub seconds: f64,
+    /// Processor seconds of all threads a picture, median of the rounds; `None` where the system does not say.
+    pub cpu_seconds: Option<f64>,
+    /// Camera paths a second of wall clock.
+    pub paths_per_second: f64,
+    /// Relative MSE of one picture.
+    pub relative_mse: f64,
+    /// Its standard error.
+    pub relative_mse_error: f64,
+}
+
+impl Contender {
+    /// Renderer and sampler.
+    pub fn name(&self) -> String {
+        format!("{}, {}", self.renderer, self.sampler)
+    }
+
+    /// Seconds until the error is `error`.
+    pub fn seconds_to(&self, error: f64) -> f64 {
+        self.seconds * self.relative_mse / error
+    }
+
+    /// Processor seconds until the error is `error`.
+    pub fn cpu_seconds_to(&self, error: f64) -> Option<f64> {
+        self.cpu_seconds.map(|seconds| seconds * self.relative_mse / error)
+    }
+
+    fn is_ours(&self) -> bool {
+        self.renderer == OURS
+    }
+
+    /// Relative standard error of the seconds to an error, by that of the relative MSE alone.
+    fn uncertainty(&self) -> f64 {
+        self.relative_mse_error / self.relative_mse
+    }
+}
+
+/// The time of two contenders to one error.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct EqualError {
+    /// Index of ours.
+    pub ours: usize,
+    /// Index of theirs.
+    pub theirs: usize,
+    /// The relative MSE to reach: that of our best contender's timed picture.
+    pub error: f64,
+    /// Our seconds to it.
+    pub our_seconds: f64,
+    /// Their seconds to it.
+    pub their_seconds: f64,
+    /// Their seconds over ours: above 1 this engine is faster.
+    pub ratio: f64,
+    /// Standard error of the ratio by the errors' own uncertainty; that of the times is not in it.
+    pub ratio_error: f64,
+    /// Their processor seconds over ours.
+    pub cpu_ratio: Option<f64>,
+}
+
+/// All contenders on one scene.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Race {
+    /// Ours first.
+    pub contenders: Vec<Contender>,
+    /// Our best against Mitsuba's best variant and sampler.
+    pub against_best: EqualError,
+    /// Our best against the best sampler of Mitsuba's scalar variant.
+    pub against_scalar: EqualError,
+}
+
+impl Race {
+    /// Compares; `None` without ours, without Mitsuba's scalar variant, and where a contender's pictures have no noise or took no time, so
+    /// that there is no error to reach.
+    pub(super) fn new(contenders: Vec<Contender>) -> Option<Self> {
+        let is_sound = |one: &Contender| one.seconds > 0.0 && one.relative_mse > 0.0 && one.relative_mse.is_finite();
+        if !contenders.iter().all(is_sound) {
+            return None;
+        }
+        // Least seconds to any error.
+        let best = |wanted: &dyn Fn(&Contender) -> bool| {
+            let cost = |i: &usize| contenders[*i].seconds_to(1.0);
+            let all = (0..contenders.len()).filter(|i| wanted(&contenders[*i]));
+            all.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+        };
+        let ours = best(&Contender::is_ours)?;
+        let against = |theirs: usize| {
+            let (a, b) = (&contenders[ours], &contenders[theirs]);
+            let error = a.relative_mse;
+            let (our_seconds, their_seconds) = (a.seconds_to(error), b.seconds_to(error));
+            let ratio = their_seconds / our_seconds;
+            EqualError {
+                ours,
+                theirs,
+                error,
+                our_seconds,
+                their_seconds,
+                ratio,
+                ratio_error: ratio * a.uncertainty().hypot(b.uncertainty()),
+                cpu_ratio: (b.cpu_seconds_to(error).zip(a.cpu_seconds_to(error)))
+                    .filter(|(_, ours)| *ours > 0.0)
+                    .map(|(theirs, ours)| theirs / ours),
+            }
+        };
+        let against_best = against(best(&|one| !one.is_ours())?);
+        let against_scalar = against(best(&|one| one.renderer.starts_with(SCALAR))?);
+        Some(Self {
+            contenders,
+            against_best,
+            against_scalar,
+        })
+    }
+
+    /// The two of a comparison, ours first.
+    pub fn pair(&self, of: &EqualError) -> [&Contender; 2] {
+        [&self.contenders[of.ours], &self.contenders[of.theirs]]
+    }
+}
+
+/// What the turns of one contender gave.
+#[derive(Default)]
+struct Turns {
+    seconds: Vec<f64>,
+    cpu_seconds: Vec<f64>,
+    pictures: Vec<Vec<f32>>,
+}
+
+impl Turns {
+    fn contender(self, renderer: &str, sampler: &str, paths: f64, reference: &[f32]) -> Option<Contender> {
+        let spread = spread::measure(&self.pictures, reference)?;
+        let seconds = median(self.seconds);
+        Some(Contender {
+            renderer: renderer.into(),
+            sampler: sampler.into(),
+            pictures: self.pictures.len(),
+            seconds,
+            cpu_seconds: Some(median(self.cpu_seconds)).filter(|seconds| seconds.is_finite()),
+            paths_per_second: paths / seconds,
+            relative_mse: spread.relative_mse,
+            relative_mse_error: spread.standard_error,
+        })
+    }
+
+    /// One more turn of this engine. A picture counts from clearing the film until its values are in the host's memory.
+    fn ours(&mut self, tracer: &mut PathTracer, first_seed: u32, options: &AgreementOptions) -> Result<()> {
+        let processor = cpu_seconds();
+        for index in 0..options.timing_pictures {
+            let clock = Instant::now();
+            tracer.restart(first_seed.wrapping_add(index))?;
+            tracer.render(options.timing_samples)?;
+            let (picture, _) = tracer.picture()?;
+            self.seconds.push(clock.elapsed().as_secs_f64());
+            self.pictures.push(picture.main_layer()?.values().to_vec());
+        }
+        let spent = processor.zip(cpu_seconds()).map(|(before, after)| after - before);
+        self.cpu_seconds
+            .extend(spent.map(|spent| spent / f64::from(options.timing_pictures)));
+        Ok(())
+    }
+}
+
+/// What is raced on.
+pub(super) struct Course<'a> {
+    pub(super) gpu: &'a Gpu,
+    pub(super) scene: Arc<GpuScene>,
+    pub(super) camera: &'a Camera,
+    /// With whom, and how, in Mitsuba.
+    pub(super) entries: &'static [(Integrator, &'static str)],
+    pub(super) peer: &'a Peer<'a>,
+    /// The scene as exported.
+    pub(super) exported: &'a Path,
+    /// Whether Mitsuba's LLVM variant runs here.
+    pub(super) has_llvm: bool,
+    /// The converged picture that weighs the errors.
+    pub(super) reference: &'a [f32],
+}
+
+/// Lets all contenders render in turns.
+pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Option<Race>> {
+    let size = [options.size; 2];
+    let samplers = [(SamplerKind::Sobol, "sobol"), (SamplerKind::Pcg, "pcg")];
+    let mut ours = Vec::new();
+    for (sampler, name) in samplers {
+        let settings = PathTracerSettings {
+            sampler,
+            ..super::settings(options)
+        };
+        let mut tracer = PathTracer::new(course.gpu, course.scene.clone(), course.camera, size, settings)?;
+        // The first picture compiles the kernels, as LLVM's does.
+        tracer.render(options.timing_samples)?;
+        tracer.picture()?;
+        ours.push((name, tracer, Turns::default()));
+    }
+    let variants: &[Variant] = if course.has_llvm {
+        &[Variant::Scalar, Variant::Llvm]
+    } else {
+        &[Variant::Scalar]
+    };
+    let mut theirs = Vec::new();
+    for variant in variants {
+        for (integrator, sampler) in course.entries {
+            theirs.push((*variant, *integrator, *sampler, Turns::default()));
+        }
+    }
+    for round in 0..options.timing_rounds {
+        // Past the converged pictures' seeds; one more a turn for the picture that compiles.
+        let first_seed = (options.seed)
+            .wrapping_add(options.passes + 1)
+            .wrapping_add(round * (options.timing_pictures + 1));
+        for (_, tracer, turns) in &mut ours {
+            turns.ours(tracer, first_seed, options)?;
+        }
+        for (variant, integrator, sampler, turns) in &mut theirs {
+            let mut timed = course.peer.render(&Request {
+                scene: course.exported,
+                name: "timed",
+                variant: *variant,
+                sampler,
+                integrator: *integrator,
+                passes: options.timing_pictures,
+                samples: options.timing_samples,
+                seed: first_seed,
+                each: true,
+            })?;
+            turns.seconds.append(&mut timed.seconds_each);
+            turns.cpu_seconds.push(timed.cpu_seconds_each);
+            turns.pictures.append(&mut timed.pictures);
+        }
+    }
+    let paths = f64::from(options.size).powi(2) * f64::from(options.timing_samples);
+    let ours = ours
+        .into_iter()
+        .map(|(sampler, _, turns)| turns.contender(OURS, sampler, paths, course.reference));
+    let theirs = theirs.into_iter().map(|(variant, integrator, sampler, turns)| {
+        let renderer = match integrator {
+            Integrator::Path => variant.name().to_owned(),
+            _ => format!("{} {}", variant.name(), integrator.name()),
+        };
+        turns.contender(&renderer, sampler, paths, course.reference)
+    });
+    let contenders: Option<Vec<_>> = ours.chain(theirs).collect();
+    let contenders = contenders.ok_or_else(|| Error::Picture {
+        path: course.exported.display().to_string(),
+        cause: "the timed pictures have different sizes".into(),
+    })?;
+    Ok(Race::new(contenders))
+}
+
+/// Processor seconds of this process so far, all threads; `None` where the system does not say.
+fn cpu_seconds() -> Option<f64> {
+    /// Clock ticks a second that Linux reports to programs.
+    const TICKS: f64 = 100.0;
+    /// User and system time, counted behind the program's name.
+    const FIELDS: std::ops::RangeInclusive<usize> = 11..=12;
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
+    let ticks: Option<Vec<f64>> = fields.get(FIELDS)?.iter().map(|field| field.parse().ok()).collect();
+    Some(ticks?.iter().sum::<f64>() / TICKS)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A contender that nobody has run.
+    pub(in super::super) fn made_up(renderer: &str, sampler: &str, seconds: f64, relative_mse: f64) -> Contender {
+        Contender {
+            renderer: renderer.into(),
+            sampler: sampler.into(),
+            pictures: 6,
+            seconds,
+            cpu_seconds: Some(2.0 * seconds),
+            paths_per_second: 1e6 / seconds,
+            relative_mse,
+            relative_mse_error: 0.03 * relative_mse,
+        }
+    }
+
+    /// Ours needs 2 · 0.5, Mitsuba's best 0.5 · 1 and its scalar variant 2 · 1.5.
+    pub(in super::super) fn made_up_race() -> Vec<Contender> {
+        vec![
+            made_up("clerestory", "sobol", 2.0, 0.5),
+            made_up("clerestory", "pcg", 1.9, 1.0),
+            made_up("scalar_rgb", "independent", 2.0, 1.5),
+            made_up("scalar_rgb", "multijitter", 4.0, 1.0),
+            made_up("llvm_ad_rgb", "independent", 0.5, 1.0),
+            made_up("llvm_ad_rgb", "multijitter", 0.7, 0.8),
+        ]
+    }
+
+    #[test]
+    fn the_best_of_both_sides_are_compared_at_our_error() {
+        let race = Race::new(made_up_race()).unwrap();
+        let best = race.against_best;
+        assert_eq!((best.ours, best.theirs, race.against_scalar.theirs), (0, 4, 2));
+        assert_eq!((best.error, best.our_seconds, best.their_seconds), (0.5, 2.0, 1.0));
+        assert_eq!((best.ratio, best.cpu_ratio), (0.5, Some(0.5)));
+        assert!((best.ratio_error - 0.5 * 0.03 * 2.0f64.sqrt()).abs() < 1e-15);
+        assert_eq!(race.against_scalar.ratio, 3.0);
+        assert_eq!(race.pair(&best)[1].sampler, "independent");
+    }
+
+    #[test]
+    fn without_noise_or_without_one_side_there_is_no_comparison() {
+        let all = made_up_race();
+        assert_eq!(Race::new(all[..2].to_vec()), None);
+        assert_eq!(Race::new(all[2..].to_vec()), None);
+        let without_llvm = Race::new(all[..4].to_vec()).unwrap();
+        assert_eq!(without_llvm.against_best, without_llvm.against_scalar);
+        let mut silent = all;
+        silent[3].relative_mse = 0.0;
+        assert_eq!(Race::new(silent), None);
+    }
+
+    #[test]
+    fn turns_become_a_contender_by_medians_and_spread() {
+        let turns = |pictures| Turns {
+            seconds: vec![3.0, 1.0, 2.0],
+            cpu_seconds: vec![],
+            pictures,
+        };
+        let pictures = vec![vec![1.0], vec![2.0], vec![3.0]];
+        let one = turns(pictures).contender("r", "s", 10.0, &[3.0]).unwrap();
+        assert_eq!((one.seconds, one.cpu_seconds, one.paths_per_second), (2.0, None, 5.0));
+        assert!((one.relative_mse - 1.0 / 9.01).abs() < 1e-15);
+        assert_eq!(one.pictures, 3);
+        assert_eq!(turns(vec![vec![1.0]; 2]).contender("r", "s", 10.0, &[3.0]), None);
+    }
+}
