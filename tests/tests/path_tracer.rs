@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use clerestory::scene::{Environment, LightKind, Material, Scene};
+use clerestory::scene::{Environment, LightKind, Material, Mesh, Scene};
 use clerestory::transport::PathTracerSettings;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, LOBE_ALL, bsdf_sample};
@@ -298,6 +298,38 @@ fn lights_are_chosen_in_the_end_as_often_as_their_weights_say() {
             places.into_iter().map(of).sum::<f64>() + 0.5
         };
         picture.expect_values("four lights", &floor_picture(16, irradiance));
+    });
+}
+
+// The flux of an environment grows with the square of the scene's size, what it adds to a picture does not.
+#[test]
+fn noise_of_a_lamp_under_a_sky_does_not_grow_with_the_scene() {
+    with_gpu(|gpu| {
+        let variance_with_triangle_at = |place: f32| {
+            let mut scene = lambert_floor();
+            scene.environment = Some(Environment::uniform(Vec3::splat(0.1)));
+            scene.add_light(
+                "lamp",
+                LightKind::Point {
+                    position: Vec3::Y,
+                    intensity: Vec3::ONE,
+                },
+            );
+            scene.place(Mesh {
+                name: "far".into(),
+                positions: [Vec3::ZERO, Vec3::X, Vec3::Z].map(|corner| corner + place).to_vec(),
+                triangles: vec![[0, 1, 2]],
+                material: Some(0),
+                ..Mesh::default()
+            });
+            let picture = render(gpu, &scene, SMALL, 64, &independent());
+            picture.variance.iter().map(|v| f64::from(*v)).sum::<f64>()
+        };
+        let (near, far) = (variance_with_triangle_at(20.0), variance_with_triangle_at(2000.0));
+        assert!(
+            (near..1.5 * near).contains(&far) || (far..1.5 * far).contains(&near),
+            "{near} {far}"
+        );
     });
 }
 

@@ -1,5 +1,5 @@
 //! Everything that light sampling chooses among, and the probabilities of the choice: by power, as [`lights`](crate::transport::lights)
-//! has it, then by texel of the environment.
+//! has it, with half of the choices at most for the environment; then by texel of the environment.
 
 use glam::{DVec3, UVec2, Vec3};
 
@@ -97,7 +97,10 @@ impl Lights {
         let mut environment_cdf = Vec::new();
         if let Some(map) = scene.environment.as_ref().filter(|_| profile.has_environment()) {
             environment_cdf = environment_distribution(map)?;
-            powers.push(environment_power(map, radius));
+            // Scattered rays find the environment by themselves, and other lights seldom: with its power, which grows with the scene's size,
+            // it would take the samples from lamps within.
+            let (power, others) = (environment_power(map, radius), powers.iter().sum::<f64>());
+            powers.push(if others > 0.0 { power.min(others) } else { power });
             records.push(SceneLight {
                 kind: LIGHT_ENVIRONMENT,
                 ..SceneLight::default()
