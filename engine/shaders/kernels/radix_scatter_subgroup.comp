@@ -10,7 +10,7 @@
 layout(local_size_x_id = 0) in;
 
 #include "kernels/radix_subgroup.glsl"
-#include "kernels/team_sum.glsl"
+#include "kernels/wrapping_sum.glsl"
 
 layout(constant_id = 5) const uint KEYS_A_LANE = 8u;
 layout(constant_id = 6) const uint MAX_SUBGROUPS = 16u;
@@ -40,7 +40,7 @@ void first_places(uint team) {
         own += scratch[total_at(digit)];
     }
     uint total;
-    uint before = team_exclusive_sum(own, total);
+    uint before = team_exclusive(own, total);
     for (uint digit = first; digit < last; ++digit) {
         places[digit] = before + scratch[count_at(digit, team)];
         before += scratch[total_at(digit)];

@@ -63,7 +63,7 @@ pub struct RadixSortOptions {
     pub order: Order,
     /// The bits of keys that are compared, counted from the lowest; fewer bits take fewer passes.
     pub bits: Range<u32>,
-    /// What teams are.
+    /// What teams are; [`Form::Shared`] is the serial form here.
     pub form: Form,
 }
 
@@ -175,9 +175,8 @@ impl Tuning {
             lanes,
         };
         if caps.kind == DeviceKind::Cpu {
-            let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
             let lanes = caps.subgroup_size.max(1);
-            let teams = 2 * threads.min(64) * lanes;
+            let teams = stream::serial_groups() * lanes;
             [
                 serial(1 << 16, 8, 128, teams, lanes),
                 serial(u32::MAX, 11, 2048, teams, lanes),
@@ -200,7 +199,11 @@ impl RadixSort {
             let cause = format!("is not a part of 0..{}", 32 * options.key.words());
             return Err(Error::setting("bits", format!("{bits:?}"), cause));
         }
-        let form = options.form.on(gpu.caps(), "radix sort")?;
+        // Ranks without subgroup operations come from walking blocks alone.
+        let form = match options.form.on(gpu.caps(), "radix sort")? {
+            Form::Subgroup => Form::Subgroup,
+            _ => Form::Serial,
+        };
         let [few, many] = Tuning::of(gpu.caps(), form);
         let plans = [
             Plan::new(gpu, &options, form, few)?,
