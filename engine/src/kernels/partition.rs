@@ -114,6 +114,8 @@ impl Partition {
         }
         stream::check_words(buffers.flagged, 1)?;
         let stream = self.first.record(pass, buffers.flags, None, count, scratch)?;
+        // All may be in one buffer.
+        stream.between_stages(pass, &[buffers.output.buffer, buffers.flagged.buffer]);
         let set = PartitionSet {
             stream_scratch: scratch.view(),
             partition_flags: buffers.flags,

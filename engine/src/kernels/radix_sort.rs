@@ -17,9 +17,7 @@ use crate::gpu::shaders::kernels::{
 };
 use crate::gpu::shaders::sets::{RadixSerialSet, RadixSubgroupSet};
 use crate::gpu::shaders::types::StreamPlan;
-use crate::gpu::{
-    Buffer, BufferBarrier, Caps, Category, ComputePipeline, DeviceKind, Gpu, Pass, TexelView, rw_compute_to_compute,
-};
+use crate::gpu::{Buffer, Caps, Category, ComputePipeline, DeviceKind, Gpu, Pass, TexelView};
 use crate::{Error, Result};
 
 /// Width of keys.
@@ -96,7 +94,7 @@ pub struct SortBuffers<'a> {
 ///
 /// Barriers: what wrote the input must have been made visible to [`Access::COMPUTE`](crate::gpu::Access::COMPUTE), and so must earlier uses
 /// of the other sides and of the scratch memory have ended. After it, both sides and the scratch memory have been read and written by
-/// compute shaders, and a count on the device has been read by one: [`rw_compute_to_compute`] and its like are what the next use wants.
+/// compute shaders, and a count on the device has been read by one: [`rw_compute_to_compute`](crate::gpu::rw_compute_to_compute) and its like are what the next use wants.
 #[derive(Debug)]
 pub struct RadixSort {
     gpu: Gpu,
@@ -277,11 +275,9 @@ impl RadixSort {
         let digits = plan.digits(&self.options.bits);
         for (index, digit) in digits.iter().enumerate() {
             if index > 0 {
-                stream.between_stages(pass);
-                let written = buffers.keys.iter().chain(buffers.values.iter().flatten());
-                let barriers: Vec<BufferBarrier<'_>> =
-                    written.map(|side| rw_compute_to_compute(side.buffer())).collect();
-                pass.barrier(&barriers);
+                let sides = buffers.keys.iter().chain(buffers.values.iter().flatten());
+                let sides: Vec<&Buffer> = sides.map(|side| side.buffer()).collect();
+                stream.between_stages(pass, &sides);
             }
             plan.record(pass, &stream, buffers, index % 2, self.push(stream.plan, digit))?;
         }
@@ -439,12 +435,12 @@ impl Plan {
                 stream.dispatch(pass, count, &subgroup_set, &push)?;
             }
         }
-        stream.between_stages(pass);
+        stream.between_stages(pass, &[]);
         let set = radix_scan::Set0 {
             stream_scratch: stream.scratch.view(),
         };
         pass.dispatch(&self.scan, &[&set], &push, [self.scan_groups, 1, 1])?;
-        stream.between_stages(pass);
+        stream.between_stages(pass, &[]);
         match &self.kernels {
             Kernels::Serial { scatter, .. } => {
                 let push = radix_scatter_serial::Push {

@@ -74,7 +74,8 @@ impl ReduceWords {
         };
         let push = words_kernel::Push { plan: stream.plan };
         stream.dispatch(pass, &self.stages[0], &set, &push)?;
-        stream.between_stages(pass);
+        // Both stages have the binding.
+        stream.between_stages(pass, &[result.buffer]);
         pass.dispatch(&self.stages[1], &[&set], &push, [1, 1, 1])
     }
 }
@@ -173,7 +174,8 @@ impl ReduceBox {
         };
         let push = box_kernel::Push { plan: stream.plan };
         stream.dispatch(pass, &self.stages[0], &set, &push)?;
-        stream.between_stages(pass);
+        // Both stages have the binding.
+        stream.between_stages(pass, &[result.buffer]);
         pass.dispatch(&self.stages[1], &[&set], &push, [1, 1, 1])
     }
 }

@@ -121,6 +121,8 @@ impl Scan {
             stream::check_words(view, count.capacity().into())?;
         }
         let stream = self.first.record(pass, buffers.input, buffers.heads, count, scratch)?;
+        // The input may be in the same buffer.
+        stream.between_stages(pass, &[buffers.output.buffer]);
         let set = ScanApplySet {
             stream_scratch: scratch.view(),
             scan_in: buffers.input,
@@ -176,7 +178,7 @@ impl ScanTotals {
         stream::scratch_bytes(2 + 2 * u64::from(self.teams.shape.max_teams(capacity)))
     }
 
-    /// Records both stages, and waits for them.
+    /// Records both stages; a barrier after them is the caller's.
     pub fn record<'a>(
         &self,
         pass: &mut Pass<'_>,
@@ -198,12 +200,11 @@ impl ScanTotals {
             Variant::Plain(kernel) => stream.dispatch(pass, kernel, &set, &scan_reduce::Push { plan })?,
             Variant::Subgroup(kernel) => stream.dispatch(pass, kernel, &set, &scan_reduce_subgroup::Push { plan })?,
         }
-        stream.between_stages(pass);
+        stream.between_stages(pass, &[]);
         let set = scan_totals::Set0 {
             stream_scratch: scratch.view(),
         };
         pass.dispatch(&self.totals, &[&set], &scan_totals::Push { plan }, [1, 1, 1])?;
-        stream.between_stages(pass);
         Ok(stream)
     }
 }

@@ -373,17 +373,17 @@ impl Stream<'_> {
         }
     }
 
-    /// Waits until what earlier stages have written to the scratch memory can be read and written again, by dispatches and as their arguments.
-    pub fn between_stages(&self, pass: &mut Pass<'_>) {
-        let barrier = match self.groups {
-            Some(_) => rw_compute_to_compute(self.scratch),
-            None => BufferBarrier {
-                buffer: self.scratch,
-                from: Access::COMPUTE | Access::INDIRECT_READ,
-                to: Access::COMPUTE | Access::INDIRECT_READ,
-            },
+    /// Waits until what earlier stages have written to the scratch memory can be read and written again, by dispatches and as their arguments,
+    /// and until they have done with other buffers.
+    pub fn between_stages(&self, pass: &mut Pass<'_>, others: &[&Buffer]) {
+        let scratch = BufferBarrier {
+            buffer: self.scratch,
+            from: Access::COMPUTE | Access::INDIRECT_READ,
+            to: Access::COMPUTE | Access::INDIRECT_READ,
         };
-        pass.barrier(&[barrier]);
+        let others = others.iter().map(|buffer| rw_compute_to_compute(buffer));
+        let barriers: Vec<_> = std::iter::once(scratch).chain(others).collect();
+        pass.barrier(&barriers);
     }
 }
 

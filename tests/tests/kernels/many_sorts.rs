@@ -1,7 +1,7 @@
 //! Many sorts of random sizes and patterns, by batches in one submission. `CLERESTORY_SORTS` sets their number; without it there are some
 //! thousand.
 
-use clerestory::gpu::{BufferDesc, Category, Gpu, compute_to_transfer, transfer_to_compute};
+use clerestory::gpu::{BufferDesc, Gpu, compute_to_transfer, transfer_to_compute};
 use clerestory::kernels::{Count, Form, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
