@@ -23,8 +23,8 @@ shared uint subgroup_counts[MAX_SUBGROUPS * BINS];
 // The live lanes whose digit is this lane's.
 uvec4 lanes_with_digit(uint digit, bool live) {
     uvec4 lanes = subgroupBallot(live);
-    for (uint bit = 0u; bit < DIGIT_BITS; ++bit) {
-        bool is_set = (digit >> bit & 1u) != 0u;
+    for (uint bit = 1u; bit < BINS; bit <<= 1u) {
+        bool is_set = (digit & bit) != 0u;
         uvec4 with_bit = subgroupBallot(is_set);
         lanes &= is_set ? with_bit : ~with_bit;
     }

@@ -47,7 +47,7 @@ impl Histogram {
             prepare: Prepare::new(gpu)?,
             pipeline: gpu.compute_pipeline(&kernel::Spec {
                 local_size_x: teams.lanes,
-                bins,
+                counters: bins + 1,
             })?,
         })
     }

@@ -325,18 +325,18 @@ impl Plan {
         let count = (options.bits.len() as u32).div_ceil(tuning.digit_bits);
         let digit_bits = (options.bits.len() as u32).div_ceil(count);
         let (lanes, key_words, has_values) = (tuning.lanes, options.key.words(), options.values);
-        let serial = form == Form::Serial;
+        let (serial, bins) = (form == Form::Serial, 1 << digit_bits);
         let kernels = if serial {
             Kernels::Serial {
                 count: gpu.compute_pipeline(&radix_count_serial::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                 })?,
                 scatter: gpu.compute_pipeline(&radix_scatter_serial::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                 })?,
@@ -345,13 +345,13 @@ impl Plan {
             Kernels::Subgroup {
                 count: gpu.compute_pipeline(&radix_count_subgroup::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                 })?,
                 scatter: gpu.compute_pipeline(&radix_scatter_subgroup::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                     keys_a_lane: KEYS_A_LANE,
@@ -361,7 +361,7 @@ impl Plan {
         };
         let scan = gpu.compute_pipeline(&radix_scan::Spec {
             local_size_x: lanes,
-            digit_bits,
+            bins,
             serial,
             ..Default::default()
         })?;
@@ -369,7 +369,7 @@ impl Plan {
             up_to: tuning.up_to,
             shape: tuning.shape,
             digit_bits,
-            scan_groups: (1u32 << digit_bits).div_ceil(if serial { lanes } else { 1 }),
+            scan_groups: bins.div_ceil(if serial { lanes } else { 1 }),
             scan,
             kernels,
         })
