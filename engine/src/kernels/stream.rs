@@ -443,7 +443,7 @@ mod tests {
             for count in counts {
                 let block = stream_block(count, tile, max_teams);
                 let teams = stream_teams(count, block);
-                assert!(teams <= max_teams && block % tile == 0);
+                assert!(teams <= max_teams && block.is_multiple_of(tile));
                 let mut next = 0;
                 for team in 0..teams + 2 {
                     let [first, last] = stream_range(team, count, block);
