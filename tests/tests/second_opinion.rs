@@ -23,21 +23,32 @@ fn folder(below: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(below)
 }
 
-/// The unoptimized module of a kernel for Vulkan 1.0, with a workgroup of fixed size: spirv-reflect cannot read modules with another. `None`
-/// for kernels with subgroup operations, which came with Vulkan 1.1.
+/// The unoptimized module of a kernel for Vulkan 1.0. Where specialization constants set the size of the workgroup, all of them become plain
+/// constants, since spirv-reflect cannot read modules whose arrays have such sizes. `None` for kernels with subgroup operations, which came with
+/// Vulkan 1.1.
 fn compiled_for_1_0(file: &Path) -> Result<Option<Vec<u8>>, String> {
     let source = std::fs::read_to_string(file).map_err(|error| error.to_string())?;
     if source.contains("GL_KHR_shader_subgroup") {
         return Ok(None);
     }
-    let fixed = source.replace("local_size_x_id = 0", "local_size_x = 64");
-    if fixed == source {
-        return compiled(file, &["--target-env=vulkan1.0"]).map(Some);
+    let environment = "--target-env=vulkan1.0";
+    if !source.contains("local_size_x_id") {
+        return compiled(file, &[environment]).map(Some);
     }
+    let flat = String::from_utf8(compiled(file, &[environment, "-E"])?).map_err(|error| error.to_string())?;
+    // The preprocessor leaves no space after the parenthesis.
+    let plain: String = flat
+        .replace("local_size_x_id = 0", "local_size_x = 64")
+        .lines()
+        .map(|line| match line.split_once(")const ") {
+            Some((constant, rest)) if constant.starts_with("layout(constant_id") => format!("const {rest}\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
-    let copy = folder.path().join("fixed.comp");
-    std::fs::write(&copy, fixed).map_err(|error| error.to_string())?;
-    compiled(&copy, &["--target-env=vulkan1.0"]).map(Some)
+    let copy = folder.path().join("plain.comp");
+    std::fs::write(&copy, plain).map_err(|error| error.to_string())?;
+    compiled(&copy, &[environment]).map(Some)
 }
 
 /// The unoptimized module of a kernel for a version of Vulkan.

@@ -1,5 +1,5 @@
 #version 460
-// Gather (element i from place index[i]) or scatter (element i to place index[i]) of elements of some words. Indices out of range are counted;
+// Gather (element i from the place that index i names) or scatter (element i to that place) of elements of some words. Indices out of range are counted;
 // a gather then gives zeros, a scatter writes nothing.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -166,7 +166,7 @@ fn many_keys_take_the_other_plan() {
 
 /// 2²⁴ + 3 keys are more than 65,535 workgroups of 256 lanes could take one each, and blocks as long as the loop quota lets them be.
 #[test]
-#[ignore = "takes about a minute"]
+#[ignore = "takes several seconds and much memory"]
 fn sixteen_million_keys_are_as_by_std() {
     with_gpu(|gpu| {
         let sort = RadixSort::new(gpu, RadixSortOptions::new(KeyWidth::Bits32, true)).unwrap();
