@@ -34,7 +34,7 @@ pub use race::{Contender, EqualError, Race};
 pub use report::{AgreementReport, Machine, SceneAgreement};
 
 /// What to compare, and how long to work at it.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementOptions {
     /// Names of the scenes; empty: all of them.
     pub scenes: Vec<String>,
@@ -61,6 +61,10 @@ pub struct AgreementOptions {
     /// The report's files without their suffix (`.md`, `.json`); none when `None`.
     #[serde(skip)]
     pub results: Option<PathBuf>,
+    /// What the report at `results` holds of this machine and these options stays in it. Without a selection of scenes only those are
+    /// compared that it does not hold.
+    #[serde(skip)]
+    pub keep: bool,
 }
 
 impl Default for AgreementOptions {
@@ -79,6 +83,7 @@ impl Default for AgreementOptions {
             python: std::env::var_os("CLERESTORY_MITSUBA_PYTHON").map_or_else(|| "python3".into(), PathBuf::from),
             output: "out/agreement".into(),
             results: None,
+            keep: false,
         }
     }
 }
@@ -97,33 +102,37 @@ const FULL_SCALE_Z: f32 = 5.0;
 /// the files. A picture that disagrees is no error: see [`AgreementReport::passes`].
 pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Result<AgreementReport> {
     let wanted = selected(options)?;
-    let mut done = Vec::new();
-    let mut mitsuba = String::new();
-    for one in &wanted {
+    let machine = Machine::read(gpu.caps(), &format!("mitsuba {}", mitsuba_version(&options.python)?));
+    let mut report = AgreementReport {
+        options: options.clone(),
+        scenes: Vec::new(),
+        machine,
+    };
+    if let Some(prefix) = options.results.as_ref().filter(|_| options.keep) {
+        report.scenes = AgreementReport::kept(prefix, &report.machine, options);
+    }
+    let order: Vec<&str> = scenes()?.iter().map(|one| one.name).collect();
+    let place = |name: &str| order.iter().position(|known| *known == name);
+    for (done, one) in wanted.iter().enumerate() {
         if watch.stopped() {
             break;
         }
-        watch.begin(&format!("{}: {}", one.name, one.shows), done.len(), wanted.len());
-        let (scene, version) = compare_scene(gpu, one, options)?;
+        if options.scenes.is_empty() && report.scenes.iter().any(|kept| kept.name == one.name) {
+            continue;
+        }
+        watch.begin(&format!("{}: {}", one.name, one.shows), done, wanted.len());
+        let scene = compare_scene(gpu, one, options)?;
         watch.note(&format!("{}: {}", one.name, one.shows));
         scene.to_string().lines().for_each(|line| watch.note(line));
-        mitsuba = version;
-        done.push(scene);
+        report.scenes.retain(|kept| kept.name != one.name);
+        report.scenes.push(scene);
+        report.scenes.sort_by_key(|scene| place(&scene.name));
         // Written after every scene, so that a run that is cut short leaves what it has found.
-        let report = AgreementReport {
-            machine: Machine::read(gpu.caps(), &mitsuba),
-            options: options.clone(),
-            scenes: done.clone(),
-        };
         if let Some(prefix) = &options.results {
             report.write(prefix)?;
         }
     }
-    Ok(AgreementReport {
-        machine: Machine::read(gpu.caps(), &mitsuba),
-        options: options.clone(),
-        scenes: done,
-    })
+    Ok(report)
 }
 
 impl AgreementOptions {
@@ -196,7 +205,7 @@ fn settings(options: &AgreementOptions) -> PathTracerSettings {
     }
 }
 
-fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> Result<(SceneAgreement, String)> {
+fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> Result<SceneAgreement> {
     let folder = options.output.join(one.name);
     let size = [options.size; 2];
     let exported = export(&one.scene, "", size, &folder)?;
@@ -251,23 +260,20 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
         };
         race = race::run(&course, options)?;
     }
-    Ok((
-        SceneAgreement {
-            name: one.name.into(),
-            shows: one.shows.into(),
-            triangles: exported.triangles as u64,
-            variant: theirs.variant,
-            mean_squared_z: mean_squared_z(a, a_var, b, b_var),
-            mean_squared_z_blocks: mean_squared_z(&a_block, &a_block_var, &b_block, &b_block_var),
-            relative_mse: errors.relative_mse,
-            relative_bias: errors.relative_bias,
-            values,
-            blocks,
-            non_finite: non_finite.total(),
-            race,
-        },
-        theirs.renderer,
-    ))
+    Ok(SceneAgreement {
+        name: one.name.into(),
+        shows: one.shows.into(),
+        triangles: exported.triangles as u64,
+        variant: theirs.variant,
+        mean_squared_z: mean_squared_z(a, a_var, b, b_var),
+        mean_squared_z_blocks: mean_squared_z(&a_block, &a_block_var, &b_block, &b_block_var),
+        relative_mse: errors.relative_mse,
+        relative_bias: errors.relative_bias,
+        values,
+        blocks,
+        non_finite: non_finite.total(),
+        race,
+    })
 }
 
 /// Both pictures as EXR and PNG, and their difference in units of its standard deviation.

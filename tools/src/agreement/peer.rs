@@ -146,8 +146,6 @@ pub(super) struct Peer<'a> {
 pub(super) struct Rendered {
     /// Mean of the passes with its variance.
     pub(super) picture: PathBuf,
-    /// Name and version.
-    pub(super) renderer: String,
     pub(super) variant: String,
     /// Of each pass.
     pub(super) seconds_each: Vec<f64>,
@@ -160,7 +158,6 @@ pub(super) struct Rendered {
 /// The part of `reference.json` that is needed here.
 #[derive(Debug, serde::Deserialize)]
 struct Answer {
-    renderer: String,
     variant: String,
     width: usize,
     height: usize,
@@ -274,7 +271,6 @@ impl<'a> Peer<'a> {
         Ok(Rendered {
             picture: prefix.with_extension("exr"),
             cpu_seconds_each: answer.cpu_seconds / answer.passes as f64,
-            renderer: answer.renderer,
             variant: answer.variant,
             seconds_each: answer.seconds_each,
             pictures,
@@ -323,7 +319,7 @@ mod tests {
         );
         assert!(Answer::parse(&text(3, 0)).unwrap_err().contains("2 times for 3 passes"));
         assert!(Answer::parse(&text(2, 7)).unwrap_err().contains("7 values"));
-        assert!(Answer::parse("{}").unwrap_err().contains("renderer"));
+        assert!(Answer::parse("{}").unwrap_err().contains("variant"));
     }
 
     #[test]

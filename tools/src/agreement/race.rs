@@ -29,7 +29,7 @@ const OURS: &str = "clerestory";
 const SCALAR: &str = "scalar_rgb";
 
 /// A renderer with a sampler, and what its pictures take.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Contender {
     /// `clerestory`, or Mitsuba's variant with, in media, its integrator.
     pub renderer: String,
@@ -76,7 +76,7 @@ impl Contender {
 }
 
 /// The time of two contenders to one error.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct EqualError {
     /// Index of ours.
     pub ours: usize,
@@ -97,7 +97,7 @@ pub struct EqualError {
 }
 
 /// All contenders on one scene.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Race {
     /// Ours first.
     pub contenders: Vec<Contender>,

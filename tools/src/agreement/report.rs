@@ -13,7 +13,7 @@ use super::race::{Contender, EqualError, Race};
 use crate::machine;
 
 /// What everything ran on.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Machine {
     /// Processor as the system names it.
     pub processor: String,
@@ -40,7 +40,7 @@ impl Machine {
 }
 
 /// One scene's comparison.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SceneAgreement {
     /// Its name.
     pub name: String,
@@ -111,7 +111,7 @@ impl std::fmt::Display for SceneAgreement {
 }
 
 /// All comparisons of a run.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementReport {
     /// What it ran on.
     pub machine: Machine,
@@ -122,6 +122,25 @@ pub struct AgreementReport {
 }
 
 impl AgreementReport {
+    /// The scenes of the report at `prefix` that were compared on this machine with these options, whatever their selection; none where
+    /// there is no such report.
+    pub(super) fn kept(prefix: &Path, machine: &Machine, options: &AgreementOptions) -> Vec<SceneAgreement> {
+        let text = std::fs::read_to_string(prefix.with_extension("json")).unwrap_or_default();
+        let same = |report: &Self| {
+            let of_all = |options: &AgreementOptions| {
+                let scenes = Vec::new();
+                serde_json::to_value(AgreementOptions {
+                    scenes,
+                    ..options.clone()
+                })
+            };
+            let options = of_all(&report.options).ok().zip(of_all(options).ok());
+            report.machine == *machine && options.is_some_and(|(theirs, ours)| theirs == ours)
+        };
+        let report = serde_json::from_str::<Self>(&text).ok().filter(same);
+        report.map_or_else(Vec::new, |report| report.scenes)
+    }
+
     /// Whether every scene agrees.
     pub fn passes(&self) -> bool {
         self.scenes.iter().all(SceneAgreement::passes)
@@ -442,5 +461,25 @@ pub(super) mod tests {
             assert_eq!(text.matches(contender).count(), 3, "{contender}");
         }
         assert!(text.contains("| 2.000 (4.000) | 3.800 (7.600) |"), "{text}");
+    }
+
+    #[test]
+    fn reports_of_the_same_options_and_machine_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let (report, prefix) = (made_up(), folder.path().join("report"));
+        let kept = |options: &AgreementOptions| AgreementReport::kept(&prefix, &report.machine, options).len();
+        assert_eq!(kept(&report.options), 0);
+        report.write(&prefix).unwrap();
+        assert_eq!(kept(&report.options), report.scenes.len());
+        let mut others = report.options.clone();
+        others.scenes = vec!["one".into()];
+        assert_eq!(kept(&others), report.scenes.len());
+        others.size += 8;
+        assert_eq!(kept(&others), 0);
+        let elsewhere = Machine {
+            threads: 3,
+            ..report.machine.clone()
+        };
+        assert!(AgreementReport::kept(&prefix, &elsewhere, &report.options).is_empty());
     }
 }

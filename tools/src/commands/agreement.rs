@@ -61,6 +61,10 @@ pub struct Arguments {
     /// Writes the report to NAME.md and NAME.json
     #[arg(long, value_name = "NAME")]
     results: Option<PathBuf>,
+    /// Keeps the scenes that the report at --results holds, if it is of this machine and these options; without --scene only the others
+    /// are compared
+    #[arg(long, requires = "results")]
+    keep: bool,
     /// Writes errors and times to equal error beside Mitsuba's into a marked part of this page; the rest of it stays
     #[arg(long, value_name = "FILE.md")]
     page: Option<PathBuf>,
@@ -104,6 +108,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         python: arguments.python.clone().unwrap_or(defaults.python),
         output: arguments.output.clone(),
         results: arguments.results.clone(),
+        keep: arguments.keep,
     };
     options.check()?;
     let gpu = arguments.device.open()?;
