@@ -301,13 +301,20 @@ fn lights_are_chosen_in_the_end_as_often_as_their_weights_say() {
     });
 }
 
-// The flux of an environment grows with the square of the scene's size, what it adds to a picture does not.
+// The flux of a sun and a sky grows with the square of the scene's size, what they add to a picture does not.
 #[test]
 fn noise_of_a_lamp_under_a_sky_does_not_grow_with_the_scene() {
     with_gpu(|gpu| {
         let variance_with_triangle_at = |place: f32| {
             let mut scene = lambert_floor();
             scene.environment = Some(Environment::uniform(Vec3::splat(0.1)));
+            scene.add_light(
+                "sun",
+                LightKind::Directional {
+                    direction: Vec3::NEG_Y,
+                    irradiance: Vec3::splat(0.1),
+                },
+            );
             scene.add_light(
                 "lamp",
                 LightKind::Point {

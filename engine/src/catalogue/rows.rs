@@ -474,7 +474,7 @@ pub(super) const ROWS: &[Row] = &[
         "clerestory report light-sampling",
         unbiased(part(
             "CL-LIGHTS",
-            "choice of lights by power",
+            "choice of lights by power, limited for distant ones",
             "Shirley, Wang and Zimmerman 1996 (inversion of the cumulative distribution)",
             "engine/src/transport/distribution.rs",
             &[

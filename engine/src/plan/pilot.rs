@@ -21,6 +21,8 @@ const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 pub const PILOT_SHARE: f64 = 0.15;
 /// Relative MSE of a black picture, which is all that pilots without light know.
 const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
+/// Beyond the relative MSE of what has met light.
+const UNLIT_COST: f64 = f64::MAX;
 /// Seconds of rounds that pilots may take whatever the picture costs, where no time is to be kept.
 const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
@@ -159,7 +161,7 @@ impl Trial {
     /// Writes what the pilots have found to the candidate.
     pub fn predict(&self, candidate: &mut Candidate, goal: Goal, spent: f64) {
         candidate.pilot_spp = self.spp;
-        candidate.pilot_error = self.error.relative_mse(f64::from(self.spp)).sqrt();
+        candidate.pilot_error = self.relative_mse(self.spp).sqrt();
         candidate.slope = self.error.slope();
         candidate.seconds_a_sample = self.cost.sample;
         candidate.spp = self.samples(goal, spent);
@@ -189,7 +191,9 @@ pub fn rounds(
         // Under a time alone all take equally long, and the one with the smaller error is the better one.
         let cost = |trial: &Trial| match goal.error {
             Some(_) => predicted(trial),
-            None => trial.relative_mse(trial.samples(goal, spent)),
+            // What has met no light is the last choice, but goes on as long as nothing else has.
+            None if trial.lit => trial.relative_mse(trial.samples(goal, spent)),
+            None => UNLIT_COST,
         };
         let best = trials.iter().flatten().map(&cost).fold(f64::INFINITY, f64::min);
         let picture = trials.iter().flatten().map(predicted).fold(f64::INFINITY, f64::min);

@@ -1,5 +1,5 @@
 //! Everything that light sampling chooses among, and the probabilities of the choice: by power, as [`lights`](crate::transport::lights)
-//! has it, with half of the choices at most for the environment; then by texel of the environment.
+//! has it, with limits for distant ones; then by texel of the environment.
 
 use glam::{DVec3, UVec2, Vec3};
 
@@ -97,10 +97,7 @@ impl Lights {
         let mut environment_cdf = Vec::new();
         if let Some(map) = scene.environment.as_ref().filter(|_| profile.has_environment()) {
             environment_cdf = environment_distribution(map)?;
-            // Scattered rays find the environment by themselves, and other lights seldom: with its power, which grows with the scene's size,
-            // it would take the samples from lamps within.
-            let (power, others) = (environment_power(map, radius), powers.iter().sum::<f64>());
-            powers.push(if others > 0.0 { power.min(others) } else { power });
+            powers.push(environment_power(map, radius));
             records.push(SceneLight {
                 kind: LIGHT_ENVIRONMENT,
                 ..SceneLight::default()
@@ -108,6 +105,7 @@ impl Lights {
             // The lights' table has one more entry than there are lights; the texels' begins behind it.
             environment = environment_block(map, &environment_cdf, records.len() as u32 + 1);
         }
+        share_choices(&records, &mut powers);
         if has_unsampled && records.is_empty() {
             // Kernels that know of emission also sample lights: a dark one to choose.
             powers.push(0.0);
@@ -136,6 +134,28 @@ impl Lights {
             area: self.has_unsampled || some(&[LIGHT_TRIANGLE]),
             punctual: some(&[LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL]),
             environment: some(&[LIGHT_ENVIRONMENT]),
+        }
+    }
+}
+
+/// Limits the choices of distant lights, whose power grows with the square of the scene's radius while what they add to a picture does not:
+/// half of them at most for the environment, which scattered rays may find too, and half for all distant lights where there are others.
+/// Against a choice by power alone that at most doubles the variance of what a light adds.
+fn share_choices(records: &[SceneLight], powers: &mut [f64]) {
+    let total = |powers: &[f64], wanted: &dyn Fn(u32) -> bool| -> f64 {
+        let of = records.iter().zip(powers).filter(|(light, _)| wanted(light.kind));
+        of.map(|(_, power)| *power).sum()
+    };
+    let is_environment = |kind| kind == LIGHT_ENVIRONMENT;
+    let is_distant = |kind| kind == LIGHT_ENVIRONMENT || kind == LIGHT_DIRECTIONAL;
+    for limited in [&is_environment as &dyn Fn(u32) -> bool, &is_distant] {
+        let (own, others) = (total(powers, limited), total(powers, &|kind| !limited(kind)));
+        if others > 0.0 && own > others {
+            for (light, power) in records.iter().zip(powers.iter_mut()) {
+                if limited(light.kind) {
+                    *power *= others / own;
+                }
+            }
         }
     }
 }

@@ -61,15 +61,9 @@ pub struct Arguments {
     /// Measures everything anew, references included
     #[arg(long)]
     fresh: bool,
-    /// File whose marked part is replaced when no experiment is named; it is made if there is none
-    #[arg(
-        short,
-        long,
-        value_name = "FILE",
-        default_value = "RESULTS.md",
-        conflicts_with = "experiments"
-    )]
-    output: PathBuf,
+    /// File whose marked parts are replaced when no experiment is named, made if there is none; by default RESULTS.md, with --smoke none
+    #[arg(short, long, value_name = "FILE", conflicts_with = "experiments")]
+    output: Option<PathBuf>,
     /// Folder that keeps the references
     #[arg(long, value_name = "FOLDER", default_value = "out/references")]
     references: PathBuf,
@@ -77,6 +71,8 @@ pub struct Arguments {
     device: DeviceOptions,
 }
 
+/// The page of results.
+const PAGE: &str = "RESULTS.md";
 /// What runs without names, and the part of the page that it writes.
 const DEFAULTS: [(&str, Block); 2] = [
     (
@@ -121,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             }
         };
         if interrupted {
-            output::note("interrupted; the same command goes on where this stopped");
+            output::note("interrupted; the same command goes on where a sweep stopped, and takes a measure anew");
             return Ok(Code::Interrupted.into());
         }
     }
@@ -181,10 +177,14 @@ fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar
     let tables = (measures::find(name)?.run)(&context);
     bar.clear();
     let tables = tables?;
+    if bar.stopped() {
+        // Whole tables of an earlier run are worth more than the part of this one.
+        return Ok(true);
+    }
     let page = files::tables(&folder, experiment, &tables)?;
     output::print(&page)?;
     output::note(&format!("wrote {}", folder.display()));
-    Ok(bar.stopped())
+    Ok(false)
 }
 
 /// The sweep with the changes that the command line asks for.
@@ -227,10 +227,14 @@ fn render(
         }
     })?;
     let text = files::sweep(&places.folder, &results)?;
-    match block.filter(|_| !results.interrupted) {
-        Some(block) => {
-            block.write(&arguments.output, &text)?;
-            output::note(&format!("wrote {}", arguments.output.display()));
+    let page = arguments
+        .output
+        .clone()
+        .or_else(|| (!arguments.smoke).then(|| PAGE.into()));
+    match block.zip(page).filter(|_| !results.interrupted) {
+        Some((block, page)) => {
+            block.write(&page, &text)?;
+            output::note(&format!("wrote {}", page.display()));
         }
         None => output::print(&text)?,
     }

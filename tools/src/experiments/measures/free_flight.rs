@@ -73,8 +73,8 @@ const PROFILES: [Profile; 4] = [
         name: "thin layers",
         extinction: |t| if within_layer(t) < LAYER_WIDTH { LAYER } else { 0.0 },
         depth: |t| {
-            let before = layers_before(t) * LAYER_WIDTH;
-            LAYER * (before + within_layer(t).clamp(0.0, LAYER_WIDTH))
+            let begun = from_first_layer(t).max(-1.0).floor() + 1.0;
+            LAYER * (begun * LAYER_WIDTH - (LAYER_WIDTH - within_layer(t)).max(0.0))
         },
         greatest: LAYER,
     },
@@ -85,11 +85,7 @@ fn from_first_layer(t: f64) -> f64 {
     (t - 0.5 * LAYER_EVERY) / LAYER_EVERY
 }
 
-fn layers_before(t: f64) -> f64 {
-    from_first_layer(t).floor().max(0.0)
-}
-
-/// Distance from the begin of the last layer begun; before the first one it is negative, and no layer's.
+/// Distance from the begin of the last layer begun; without end before the first one.
 fn within_layer(t: f64) -> f64 {
     let from = from_first_layer(t);
     if from < 0.0 {
@@ -273,4 +269,29 @@ fn flights(context: &Context<'_>, samples: u32) -> Table {
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let samples = if context.smoke { 2000 } else { 1_000_000 };
     Ok(vec![transmittances(context, samples), flights(context, samples)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depths_are_the_integrals_of_their_extinction() {
+        /// Steps of the midpoint rule; a jump of the extinction costs at most its height times a step.
+        const STEPS: u32 = 100_000;
+        for profile in &PROFILES {
+            for t in [0.0, 0.1, 0.117, 0.2, 0.346, 0.7, T_MAX] {
+                let step = t / f64::from(STEPS);
+                let at = |i: u32| (profile.extinction)((f64::from(i) + 0.5) * step);
+                let integral = (0..STEPS).map(at).sum::<f64>() * step;
+                let exact = (profile.depth)(t);
+                assert!(
+                    (integral - exact).abs() < 1e-8 + 8.0 * step * profile.greatest,
+                    "{}: {t}",
+                    profile.name
+                );
+                assert!((0..STEPS).all(|i| at(i) <= profile.greatest));
+            }
+        }
+    }
 }
