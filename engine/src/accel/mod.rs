@@ -21,7 +21,10 @@
 //! `transport/path_candidates.glsl`, `path_extend.glsl` and `path_shadow.glsl`, where the names of the index's constants stand.
 
 pub mod bvh2;
+pub mod lbvh;
+pub mod morton;
 pub mod offset;
+pub mod optimise;
 pub mod sphere;
 pub mod triangle;
 
