@@ -90,14 +90,7 @@ pub fn clustered_hierarchy(
 }
 
 /// Splits a range by its bits up to `end`; what may go on comes into `next`.
-fn decide(
-    sorted: &SortedCodes,
-    leaf_size: u32,
-    range: Pending,
-    end: u32,
-    tree: &mut BoxTree,
-    next: &mut Vec<Pending>,
-) {
+fn decide(sorted: &SortedCodes, leaf_size: u32, range: Pending, end: u32, tree: &mut BoxTree, next: &mut Vec<Pending>) {
     let mut stack = vec![range];
     while let Some(mut range) = stack.pop() {
         let count = (range.last - range.first + 1) as u32;
@@ -116,7 +109,10 @@ fn decide(
             let members = &sorted.codes[range.first..=range.last];
             let below = members.partition_point(|code| code >> (sorted.bits - 1 - range.decided) & 1 == 0);
             let decided = range.decided + 1;
-            let halves = [(range.first, range.first + below - 1), (range.first + below, range.last)];
+            let halves = [
+                (range.first, range.first + below - 1),
+                (range.first + below, range.last),
+            ];
             for (side, (first, last)) in halves.into_iter().enumerate().rev() {
                 stack.push(Pending {
                     first,

@@ -31,10 +31,16 @@ mod tests {
         // 10⁵ kernels of 0.2 m in a room of 144 m²: a point lies in 87 of them.
         assert_eq!(automatic_leaf_size(kernels(100_000, 0.2), 144.0, LEAF_SHARE), 11);
         assert_eq!(automatic_leaf_size(kernels(200_000, 0.2), 144.0, LEAF_SHARE), 22);
-        assert_eq!(automatic_leaf_size(kernels(1000, 0.2), 144.0, LEAF_SHARE), LEAST_LEAF_SIZE);
+        assert_eq!(
+            automatic_leaf_size(kernels(1000, 0.2), 144.0, LEAF_SHARE),
+            LEAST_LEAF_SIZE
+        );
         assert_eq!(automatic_leaf_size(kernels(0, 0.2), 144.0, LEAF_SHARE), LEAST_LEAF_SIZE);
         for scene in [0.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(automatic_leaf_size(kernels(1000, 0.2), scene, LEAF_SHARE), LEAST_LEAF_SIZE);
+            assert_eq!(
+                automatic_leaf_size(kernels(1000, 0.2), scene, LEAF_SHARE),
+                LEAST_LEAF_SIZE
+            );
         }
         assert_eq!(automatic_leaf_size([f64::NAN], 1.0, LEAF_SHARE), LEAST_LEAF_SIZE);
         // The printed constant would ask for 700.

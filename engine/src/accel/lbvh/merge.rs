@@ -22,7 +22,11 @@ pub struct MergePoint {
 
 /// All merge points by level, those of a level by place.
 pub fn merge_points(sorted: &SortedCodes) -> Vec<MergePoint> {
-    let differing = sorted.codes.windows(2).enumerate().filter(|(_, pair)| pair[0] != pair[1]);
+    let differing = sorted
+        .codes
+        .windows(2)
+        .enumerate()
+        .filter(|(_, pair)| pair[0] != pair[1]);
     let mut points: Vec<MergePoint> = differing
         .map(|(place, pair)| MergePoint {
             level: sorted.bits - 1 - (pair[0] ^ pair[1]).ilog2(),
@@ -95,7 +99,12 @@ impl Ascent {
 
 /// The hierarchy over boxes, of which `sorted` has the codes. A node stands where its merge point does, so the places of points inside of
 /// leaves stay empty. `observe` sees the sizes before the first level and after each that has points.
-pub fn merged_hierarchy(boxes: &[Aabb], sorted: &SortedCodes, leaf_size: u32, mut observe: impl FnMut(&[u32])) -> BoxTree {
+pub fn merged_hierarchy(
+    boxes: &[Aabb],
+    sorted: &SortedCodes,
+    leaf_size: u32,
+    mut observe: impl FnMut(&[u32]),
+) -> BoxTree {
     if sorted.order.is_empty() {
         return BoxTree::single_leaf(Vec::new(), Aabb::EMPTY);
     }

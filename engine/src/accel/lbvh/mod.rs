@@ -7,11 +7,20 @@
 //! Guarantees: the same tree whatever the number of threads; every box the exact union of what it holds; any set of finite boxes gives a
 //! tree, equal codes and equal boxes included.
 
+pub mod clustered;
+pub mod leaf_threshold;
+pub mod merge;
 pub mod radix;
 mod ray_index;
+pub mod split_lists;
 pub mod tree;
 
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of};
 
 #[cfg(test)]
+mod builders_tests;
+#[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+pub(crate) use tests::hard_boxes;

@@ -52,7 +52,12 @@ pub fn split_list_hierarchy(boxes: &[Aabb], sorted: &SortedCodes, leaf_size: u32
 /// Places behind which each level from the second on is cut.
 fn splits_by_level(sorted: &SortedCodes) -> Vec<Vec<u32>> {
     let mut levels = vec![Vec::new(); sorted.bits as usize];
-    for (place, pair) in sorted.codes.windows(2).enumerate().filter(|(_, pair)| pair[0] != pair[1]) {
+    for (place, pair) in sorted
+        .codes
+        .windows(2)
+        .enumerate()
+        .filter(|(_, pair)| pair[0] != pair[1])
+    {
         let level = sorted.bits - 1 - (pair[0] ^ pair[1]).ilog2();
         for below in &mut levels[level as usize..] {
             below.push(place as u32);
