@@ -9,6 +9,9 @@ const uint LBVH_GROUP_SIZE = 64u;
 const uint LBVH_NONE = 0xFFFFFFFFu;
 // Words of a node between the stages: boxes of both children, their words, the parent's.
 const uint LBVH_NODE_WORDS = 15u;
+// Words of a node and of a triangle where rays traverse them.
+const uint LBVH_BVH2_NODE_WORDS = 16u;
+const uint LBVH_BVH2_TRIANGLE_WORDS = 12u;
 const uint LBVH_COUNT_BITS = 4u;
 const uint LBVH_COUNT_MASK = (1u << LBVH_COUNT_BITS) - 1u;
 // More steps than any way to the root has: bits of a code and of a place.
