@@ -23,6 +23,7 @@ pub mod catalogue;
 pub mod error;
 pub mod film;
 pub mod gpu;
+pub mod kernels;
 pub mod plan;
 pub mod render;
 pub mod scene;

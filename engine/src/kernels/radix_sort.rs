@@ -1,0 +1,494 @@
+//! Radix sort of 32- or 64-bit keys, alone or with 32-bit values.
+//!
+//! Least-significant-digit first; each digit takes three stages (counts by team, prefix sums of the counts, scatter), after Satish, Harris
+//! and Garland, "Designing efficient sorting algorithms for manycore GPUs" (IPDPS 2009), section 4. In the serial form a team is an
+//! invocation that walks its block with counters of its own and digits as wide as private memory allows; in the subgroup form a team is a
+//! workgroup, and subgroups rank equal digits by ballots (Ashkiani and others, "GPU multisplit", PPoPP 2016).
+//!
+//! Guarantees: stable in either order; the same bits on every device and in every form; equal to [`radix_sort`], its twin. Keys are
+//! unsigned: those of other types want an order-preserving map first. Only the bits of [`RadixSortOptions::bits`] are compared.
+
+use std::ops::Range;
+
+use super::stream::{self, Count, Form, Prepare, SERIAL_QUOTA, Shape, Stream};
+use crate::gpu::ash::vk;
+use crate::gpu::shaders::kernels::{
+    radix_count_serial, radix_count_subgroup, radix_scan, radix_scatter_serial, radix_scatter_subgroup,
+};
+use crate::gpu::shaders::sets::{RadixSerialSet, RadixSubgroupSet};
+use crate::gpu::shaders::types::StreamPlan;
+use crate::gpu::{
+    Buffer, BufferBarrier, Caps, Category, ComputePipeline, DeviceKind, Gpu, Pass, TexelView, rw_compute_to_compute,
+};
+use crate::{Error, Result};
+
+/// Width of keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum KeyWidth {
+    /// One word.
+    #[default]
+    Bits32,
+    /// Two words, the low one first: `u64` in memory on little-endian hosts.
+    Bits64,
+}
+
+impl KeyWidth {
+    /// Words of a key.
+    pub fn words(self) -> u32 {
+        match self {
+            Self::Bits32 => 1,
+            Self::Bits64 => 2,
+        }
+    }
+}
+
+/// Which keys come first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Order {
+    /// The smallest.
+    #[default]
+    Ascending,
+    /// The largest. Equal keys still keep their order.
+    Descending,
+}
+
+/// What to sort, and how.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RadixSortOptions {
+    /// Width of keys.
+    pub key: KeyWidth,
+    /// Every key has a 32-bit value that goes where it goes.
+    pub values: bool,
+    /// Which keys come first.
+    pub order: Order,
+    /// The bits of keys that are compared, counted from the lowest; fewer bits take fewer passes.
+    pub bits: Range<u32>,
+    /// What teams are.
+    pub form: Form,
+}
+
+impl RadixSortOptions {
+    /// Ascending, by all bits.
+    pub fn new(key: KeyWidth, values: bool) -> Self {
+        Self {
+            key,
+            values,
+            order: Order::Ascending,
+            bits: 0..32 * key.words(),
+            form: Form::Auto,
+        }
+    }
+}
+
+/// Where keys and values are: two sides each, of buffers made by [`RadixSort::keys`] and [`RadixSort::values`].
+///
+/// The input is on side 0. Each digit goes from one side to the other, so both sides are written, and [`RadixSort::side`] says where
+/// the result is.
+#[derive(Debug, Clone, Copy)]
+pub struct SortBuffers<'a> {
+    /// The keys.
+    pub keys: [&'a TexelView; 2],
+    /// The values, where the sort has any.
+    pub values: Option<[&'a TexelView; 2]>,
+}
+
+/// A radix sort for one kind of keys.
+///
+/// Barriers: what wrote the input must have been made visible to [`Access::COMPUTE`](crate::gpu::Access::COMPUTE), and so must earlier uses
+/// of the other sides and of the scratch memory have ended. After it, both sides and the scratch memory have been read and written by
+/// compute shaders, and a count on the device has been read by one: [`rw_compute_to_compute`] and its like are what the next use wants.
+#[derive(Debug)]
+pub struct RadixSort {
+    gpu: Gpu,
+    options: RadixSortOptions,
+    prepare: Prepare,
+    /// With narrow digits for few keys, and with wide ones for many.
+    plans: [Plan; 2],
+}
+
+/// Pipelines for one width of digits.
+#[derive(Debug)]
+struct Plan {
+    /// The most keys that it is for.
+    up_to: u32,
+    shape: Shape,
+    digit_bits: u32,
+    scan_groups: u32,
+    scan: ComputePipeline<radix_scan::Kernel>,
+    kernels: Kernels,
+}
+
+#[derive(Debug)]
+enum Kernels {
+    Serial {
+        count: ComputePipeline<radix_count_serial::Kernel>,
+        scatter: ComputePipeline<radix_scatter_serial::Kernel>,
+    },
+    Subgroup {
+        count: ComputePipeline<radix_count_subgroup::Kernel>,
+        scatter: ComputePipeline<radix_scatter_subgroup::Kernel>,
+    },
+}
+
+/// The digits of a form, by measurement.
+#[derive(Debug, Clone, Copy)]
+struct Tuning {
+    up_to: u32,
+    digit_bits: u32,
+    shape: Shape,
+    lanes: u32,
+}
+
+/// Keys that a lane of the subgroup form holds at once.
+const KEYS_A_LANE: u32 = 8;
+/// Subgroups that have a row of counters each in the subgroup form.
+const SUBGROUP_ROWS: u32 = 16;
+
+impl Tuning {
+    fn of(caps: &Caps, form: Form) -> [Self; 2] {
+        if form == Form::Subgroup {
+            // Subgroups may turn out smaller than the device's size: at least 8 lanes where that is 8 or more.
+            let lanes = SUBGROUP_ROWS * caps.subgroup_size.min(8);
+            let tile = lanes * KEYS_A_LANE;
+            let tuning = Self {
+                up_to: u32::MAX,
+                digit_bits: 8,
+                shape: Shape {
+                    tile,
+                    quota: u32::MAX / tile * tile,
+                    teams_a_group: 1,
+                    teams: 1024,
+                },
+                lanes,
+            };
+            return [tuning; 2];
+        }
+        let serial = |up_to, digit_bits, tile, teams: u32, lanes| Self {
+            up_to,
+            digit_bits,
+            shape: Shape {
+                tile,
+                quota: SERIAL_QUOTA * 4,
+                teams_a_group: lanes,
+                teams,
+            },
+            lanes,
+        };
+        if caps.kind == DeviceKind::Cpu {
+            let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
+            let lanes = caps.subgroup_size.max(1);
+            let teams = 2 * threads.min(64) * lanes;
+            [
+                serial(1 << 16, 8, 128, teams, lanes),
+                serial(u32::MAX, 11, 2048, teams, lanes),
+            ]
+        } else {
+            [serial(u32::MAX, 4, 64, 1 << 14, 64); 2]
+        }
+    }
+}
+
+impl RadixSort {
+    /// Makes the pipelines.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when `bits` is empty or passes the key's width, [`Error::MissingFeature`] as [`Form::on`],
+    /// [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, options: RadixSortOptions) -> Result<Self> {
+        let bits = &options.bits;
+        if bits.is_empty() || bits.end > 32 * options.key.words() {
+            let cause = format!("is not a part of 0..{}", 32 * options.key.words());
+            return Err(Error::setting("bits", format!("{bits:?}"), cause));
+        }
+        let form = options.form.on(gpu.caps(), "radix sort")?;
+        let [few, many] = Tuning::of(gpu.caps(), form);
+        let plans = [
+            Plan::new(gpu, &options, form, few)?,
+            Plan::new(gpu, &options, form, many)?,
+        ];
+        Ok(Self {
+            gpu: gpu.clone(),
+            options,
+            prepare: Prepare::new(gpu)?,
+            plans,
+        })
+    }
+
+    /// What it sorts.
+    pub fn options(&self) -> &RadixSortOptions {
+        &self.options
+    }
+
+    /// A buffer for one side of `count` keys.
+    ///
+    /// # Errors
+    /// As [`Gpu::storage_texels`].
+    pub fn keys(&self, name: &str, count: u32) -> Result<TexelView> {
+        self.side_of(name, u64::from(count) * u64::from(self.options.key.words()))
+    }
+
+    /// A buffer for one side of `count` values.
+    ///
+    /// # Errors
+    /// As [`Gpu::storage_texels`].
+    pub fn values(&self, name: &str, count: u32) -> Result<TexelView> {
+        self.side_of(name, count.into())
+    }
+
+    fn side_of(&self, name: &str, words: u64) -> Result<TexelView> {
+        let format = vk::Format::R32G32B32A32_UINT;
+        self.gpu.storage_texels(name, Category::Work, format, words.div_ceil(4))
+    }
+
+    /// Bytes of scratch memory for up to `capacity` keys.
+    pub fn scratch_bytes(&self, capacity: u32) -> u64 {
+        let plan = self.plan(capacity);
+        let bins = 1u64 << plan.digit_bits;
+        stream::scratch_bytes(bins * (1 + u64::from(plan.shape.max_teams(capacity))))
+    }
+
+    /// The side of the buffers that holds the result of a sort of up to `capacity` keys.
+    pub fn side(&self, capacity: u32) -> usize {
+        self.plan(capacity).digits(&self.options.bits).len() % 2
+    }
+
+    /// Records a sort of side 0 and returns the side that holds the result. With a count on the device, both depend on the capacity only.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when there are more than 2³¹ keys, or a buffer is too small, [`Error::Setting`] when there are values and
+    /// the sort has none, or the other way round; and as [`Pass::dispatch`].
+    pub fn record(
+        &self,
+        pass: &mut Pass<'_>,
+        buffers: &SortBuffers<'_>,
+        count: Count<'_>,
+        scratch: &Buffer,
+    ) -> Result<usize> {
+        let capacity = count.capacity();
+        self.check(buffers, capacity, scratch)?;
+        if matches!(count, Count::Host(0)) {
+            return Ok(self.side(0));
+        }
+        let plan = self.plan(capacity);
+        let stream = self.prepare.begin(pass, &plan.shape, count, scratch)?;
+        let digits = plan.digits(&self.options.bits);
+        for (index, digit) in digits.iter().enumerate() {
+            if index > 0 {
+                stream.between_stages(pass);
+                let written = buffers.keys.iter().chain(buffers.values.iter().flatten());
+                let barriers: Vec<BufferBarrier<'_>> =
+                    written.map(|side| rw_compute_to_compute(side.buffer())).collect();
+                pass.barrier(&barriers);
+            }
+            plan.record(pass, &stream, buffers, index % 2, self.push(stream.plan, digit))?;
+        }
+        Ok(digits.len() % 2)
+    }
+
+    fn plan(&self, capacity: u32) -> &Plan {
+        let [few, many] = &self.plans;
+        if capacity <= few.up_to { few } else { many }
+    }
+
+    fn check(&self, buffers: &SortBuffers<'_>, capacity: u32, scratch: &Buffer) -> Result<()> {
+        stream::check_count("radix sort", capacity)?;
+        if buffers.values.is_some() != self.options.values {
+            let given = if buffers.values.is_some() { "given" } else { "missing" };
+            return Err(Error::setting("values", given, "is not what the sort was made for"));
+        }
+        let key_bytes = u64::from(capacity) * 4 * u64::from(self.options.key.words());
+        for side in buffers.keys {
+            stream::check_size(side.buffer(), key_bytes)?;
+        }
+        for side in buffers.values.iter().flatten() {
+            stream::check_size(side.buffer(), u64::from(capacity) * 4)?;
+        }
+        stream::check_size(scratch, self.scratch_bytes(capacity))
+    }
+
+    fn push(&self, plan: StreamPlan, digit: &Range<u32>) -> radix_scan::Push {
+        let mask = (1 << digit.len()) - 1;
+        radix_scan::Push {
+            plan,
+            shift: digit.start,
+            mask,
+            flip: match self.options.order {
+                Order::Ascending => 0,
+                Order::Descending => mask,
+            },
+        }
+    }
+}
+
+impl Plan {
+    fn new(gpu: &Gpu, options: &RadixSortOptions, form: Form, tuning: Tuning) -> Result<Self> {
+        // Digits of equal width need the fewest counters for their number.
+        let count = (options.bits.len() as u32).div_ceil(tuning.digit_bits);
+        let digit_bits = (options.bits.len() as u32).div_ceil(count);
+        let (lanes, key_words, has_values) = (tuning.lanes, options.key.words(), options.values);
+        let serial = form == Form::Serial;
+        let kernels = if serial {
+            Kernels::Serial {
+                count: gpu.compute_pipeline(&radix_count_serial::Spec {
+                    local_size_x: lanes,
+                    digit_bits,
+                    key_words,
+                    has_values,
+                })?,
+                scatter: gpu.compute_pipeline(&radix_scatter_serial::Spec {
+                    local_size_x: lanes,
+                    digit_bits,
+                    key_words,
+                    has_values,
+                })?,
+            }
+        } else {
+            Kernels::Subgroup {
+                count: gpu.compute_pipeline(&radix_count_subgroup::Spec {
+                    local_size_x: lanes,
+                    digit_bits,
+                    key_words,
+                    has_values,
+                })?,
+                scatter: gpu.compute_pipeline(&radix_scatter_subgroup::Spec {
+                    local_size_x: lanes,
+                    digit_bits,
+                    key_words,
+                    has_values,
+                    keys_a_lane: KEYS_A_LANE,
+                    max_subgroups: SUBGROUP_ROWS,
+                })?,
+            }
+        };
+        let scan = gpu.compute_pipeline(&radix_scan::Spec {
+            local_size_x: lanes,
+            digit_bits,
+            serial,
+            ..Default::default()
+        })?;
+        Ok(Self {
+            up_to: tuning.up_to,
+            shape: tuning.shape,
+            digit_bits,
+            scan_groups: (1u32 << digit_bits).div_ceil(if serial { lanes } else { 1 }),
+            scan,
+            kernels,
+        })
+    }
+
+    /// The bits of each digit, the lowest first.
+    fn digits(&self, bits: &Range<u32>) -> Vec<Range<u32>> {
+        let starts = bits.clone().step_by(self.digit_bits as usize);
+        starts
+            .map(|start| start..(start + self.digit_bits).min(bits.end))
+            .collect()
+    }
+
+    /// The three stages of one digit.
+    fn record(
+        &self,
+        pass: &mut Pass<'_>,
+        stream: &Stream<'_>,
+        buffers: &SortBuffers<'_>,
+        from: usize,
+        push: radix_scan::Push,
+    ) -> Result<()> {
+        let (from, to) = (from, 1 - from);
+        // Kernels without values have the bindings nevertheless.
+        let values = buffers.values.unwrap_or(buffers.keys);
+        let serial_set = RadixSerialSet {
+            stream_scratch: stream.scratch.view(),
+            radix_keys_in: buffers.keys[from],
+            radix_keys_out: buffers.keys[to].buffer().view(),
+            radix_values_in: values[from],
+            radix_values_out: values[to].buffer().view(),
+        };
+        let subgroup_set = RadixSubgroupSet {
+            stream_scratch: stream.scratch.view(),
+            radix_keys_from: buffers.keys[from].buffer().view(),
+            radix_keys_to: buffers.keys[to].buffer().view(),
+            radix_values_from: values[from].buffer().view(),
+            radix_values_to: values[to].buffer().view(),
+        };
+        let radix_scan::Push {
+            plan,
+            shift,
+            mask,
+            flip,
+        } = push;
+        match &self.kernels {
+            Kernels::Serial { count, .. } => {
+                let push = radix_count_serial::Push {
+                    plan,
+                    shift,
+                    mask,
+                    flip,
+                };
+                stream.dispatch(pass, count, &serial_set, &push)?;
+            }
+            Kernels::Subgroup { count, .. } => {
+                let push = radix_count_subgroup::Push {
+                    plan,
+                    shift,
+                    mask,
+                    flip,
+                };
+                stream.dispatch(pass, count, &subgroup_set, &push)?;
+            }
+        }
+        stream.between_stages(pass);
+        let set = radix_scan::Set0 {
+            stream_scratch: stream.scratch.view(),
+        };
+        pass.dispatch(&self.scan, &[&set], &push, [self.scan_groups, 1, 1])?;
+        stream.between_stages(pass);
+        match &self.kernels {
+            Kernels::Serial { scatter, .. } => {
+                let push = radix_scatter_serial::Push {
+                    plan,
+                    shift,
+                    mask,
+                    flip,
+                };
+                stream.dispatch(pass, scatter, &serial_set, &push)
+            }
+            Kernels::Subgroup { scatter, .. } => {
+                let push = radix_scatter_subgroup::Push {
+                    plan,
+                    shift,
+                    mask,
+                    flip,
+                };
+                stream.dispatch(pass, scatter, &subgroup_set, &push)
+            }
+        }
+    }
+}
+
+/// Twin of [`RadixSort`]: digits of `digit_bits` bits from the lowest of `bits` up, each by a stable counting sort. `values` is empty or as
+/// long as `keys`.
+pub fn radix_sort(keys: &mut [u64], values: &mut [u32], bits: Range<u32>, order: Order, digit_bits: u32) {
+    for start in bits.clone().step_by(digit_bits.clamp(1, 16) as usize) {
+        let width = (bits.end - start).min(digit_bits.clamp(1, 16));
+        let mask = (1u64 << width) - 1;
+        let flip = if order == Order::Descending { mask } else { 0 };
+        let digit = |key: u64| ((key >> start & mask) ^ flip) as usize;
+        let mut places = vec![0usize; mask as usize + 1];
+        for key in keys.iter() {
+            places[digit(*key)] += 1;
+        }
+        let mut before = 0;
+        for place in &mut places {
+            before += std::mem::replace(place, before);
+        }
+        let (old_keys, old_values) = (keys.to_vec(), values.to_vec());
+        for (at, key) in old_keys.into_iter().enumerate() {
+            let place = &mut places[digit(key)];
+            keys[*place] = key;
+            if let (Some(target), Some(value)) = (values.get_mut(*place), old_values.get(at)) {
+                *target = *value;
+            }
+            *place += 1;
+        }
+    }
+}
