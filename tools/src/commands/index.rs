@@ -94,9 +94,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         for (name, build) in INDEXES {
             let mut measured = measure(&triangles, &rays, build, arguments.repeat)?;
             (measured.scene, measured.index) = (address.clone(), name.into());
-            let first = all.get(base).unwrap_or(&measured);
-            measured.sah_ratio = measured.sah_cost / first.sah_cost;
-            measured.steps_ratio = measured.steps / first.steps;
+            if let Some(first) = all.get(base) {
+                measured.sah_ratio = measured.sah_cost / first.sah_cost;
+                measured.steps_ratio = measured.steps / first.steps;
+            }
             all.push(measured);
         }
     }

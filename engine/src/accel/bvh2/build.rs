@@ -101,6 +101,11 @@ fn classify(triangle: &[Vec3; 3], index: u32) -> Usable {
     })
 }
 
+/// Whether rays can meet a triangle: in range, and of an area in f64.
+pub(in crate::accel) fn can_be_met(triangle: &[Vec3; 3]) -> bool {
+    matches!(classify(triangle, 0), Usable::Yes(_))
+}
+
 /// The triangles that rays can meet, in order, and how many were left out.
 pub(in crate::accel) fn usable(triangles: &[[Vec3; 3]]) -> (Vec<Reference>, IndexStatistics) {
     let classified: Vec<Usable> = triangles

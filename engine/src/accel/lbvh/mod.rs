@@ -8,6 +8,7 @@
 //! tree, equal codes and equal boxes included.
 
 pub mod clustered;
+mod device;
 pub mod leaf_threshold;
 pub mod merge;
 pub mod radix;
@@ -15,7 +16,8 @@ mod ray_index;
 pub mod split_lists;
 pub mod tree;
 
-pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of};
+pub use device::{LbvhBuffers, LbvhBuild, LbvhBuilder};
+pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};
 
 #[cfg(test)]
 mod builders_tests;

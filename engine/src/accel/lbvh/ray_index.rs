@@ -3,12 +3,17 @@
 use super::radix::{LeafRule, SortedCodes, hierarchy};
 use super::tree::{BoxTree, Child};
 use crate::Result;
-use crate::accel::bvh2::build::{assemble, check_count, check_range, leaf_word, usable};
+use crate::accel::bvh2::build::{assemble, can_be_met, check_count, check_range, leaf_word, usable};
 use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE};
 use crate::accel::morton::{MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS};
 use crate::accel::optimise::{MAX_TREELET, Restructuring, restructure};
+use crate::accel::{MAX_COORDINATE, RayIndex};
 use bytemuck::Zeroable;
 use glam::Vec3;
+use rayon::prelude::*;
+
+/// Bits of a child word that hold the number of triangles.
+const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
 
 /// Whether to spend time on the tree after it stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -117,6 +122,88 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
     let indices: Vec<u32> = order.iter().map(|place| references[*place as usize].index).collect();
     let positions = indices.iter().map(|index| triangles[*index as usize]).collect();
     Ok(assemble("lbvh", nodes, positions, indices, statistics))
+}
+
+/// Refits an index to its triangles where they are now: the tree stays what it was, boxes and corners are new. Triangles that were left
+/// out stay so, and those that have lost their area shrink to points. Best where little has moved, since boxes grow where neighbours part.
+///
+/// # Errors
+/// [`Error::Setting`](crate::Error::Setting) for another number of triangles, or for one that has moved out of range.
+pub fn refit(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
+    check_moved(index, triangles)?;
+    let statistics = index.statistics();
+    let count = statistics.triangles as usize;
+    let indices = index.indices()[..count].to_vec();
+    let positions = moved_corners(&indices, triangles);
+    let mut nodes = if count < 2 { Vec::new() } else { index.nodes().to_vec() };
+    let mut order = Vec::with_capacity(nodes.len());
+    let mut pending: Vec<usize> = (0..nodes.len().min(1)).collect();
+    while let Some(node) = pending.pop() {
+        order.push(node);
+        let inner = nodes[node].children.into_iter().filter(|word| word & COUNT_MASK == 0);
+        pending.extend(inner.map(|word| (word >> COUNT_BITS) as usize));
+    }
+    for node in order.into_iter().rev() {
+        nodes[node].triangles = 0;
+        for side in 0..2 {
+            let word = nodes[node].children[side];
+            let place = (word >> COUNT_BITS) as usize;
+            nodes[node].bounds[side] = match word & COUNT_MASK {
+                0 => nodes[place].bounds[0].union(nodes[place].bounds[1]),
+                count => {
+                    let corners = positions[place..place + count as usize].iter().flatten();
+                    corners.fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner + Vec3::ZERO))
+                }
+            };
+        }
+    }
+    let excluded = crate::accel::IndexStatistics {
+        triangles: statistics.triangles,
+        excluded_range: statistics.excluded_range,
+        excluded_degenerate: statistics.excluded_degenerate,
+        ..Default::default()
+    };
+    Ok(assemble(index.name(), nodes, positions, indices, excluded))
+}
+
+/// Refuses triangles that an index cannot be refitted to.
+pub(super) fn check_moved(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<()> {
+    let statistics = index.statistics();
+    let count = statistics.triangles + statistics.excluded_range + statistics.excluded_degenerate;
+    if triangles.len() as u64 != count {
+        let cause = format!("is not the {count} that the index was built of");
+        return Err(crate::Error::setting("triangles", triangles.len(), cause));
+    }
+    let indices = &index.indices()[..statistics.triangles as usize];
+    let outside = |i: &&u32| {
+        triangles[**i as usize]
+            .iter()
+            .any(|v| !v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
+    };
+    match indices.iter().find(outside) {
+        None => Ok(()),
+        Some(i) => {
+            let corners = format!("{:?}", triangles[*i as usize]);
+            Err(crate::Error::setting(
+                format!("triangles[{i}]"),
+                corners,
+                "has moved out of range",
+            ))
+        }
+    }
+}
+
+/// Corners of some triangles; those without an area become points, which no ray meets.
+pub(super) fn moved_corners(indices: &[u32], triangles: &[[Vec3; 3]]) -> Vec<[Vec3; 3]> {
+    let corners = |i: &u32| {
+        let triangle = triangles[*i as usize];
+        if can_be_met(&triangle) {
+            triangle
+        } else {
+            [triangle[0]; 3]
+        }
+    };
+    indices.par_iter().map(corners).collect()
 }
 
 /// The nodes in the kernels' layout, at the places they have; the root is the first.

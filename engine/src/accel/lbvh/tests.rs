@@ -266,6 +266,39 @@ fn hits_are_those_of_the_binned_tree() {
 }
 
 #[test]
+fn refitted_trees_have_the_hits_of_new_ones() {
+    let mut random = Random(46);
+    let mut triangles = soup(&mut random, 1200, 0.1);
+    triangles[5][2].y = f32::NAN;
+    triangles[6][1] = triangles[6][0];
+    let before = build(&triangles, &LbvhSettings::default()).expect("valid");
+    let same = refit(&before, &triangles).expect("unmoved");
+    assert!(same.texels() == before.texels());
+    for triangle in &mut triangles {
+        let shift = random.vector() * 0.05;
+        triangle.iter_mut().for_each(|v| *v += shift);
+    }
+    triangles[9][1] = triangles[9][2];
+    let moved = refit(&before, &triangles).expect("in range");
+    let anew = build(&triangles, &LbvhSettings::default()).expect("valid");
+    let mut hits = 0;
+    for _ in 0..3000 {
+        let ray = ray(random.vector() * 1.5, random.direction());
+        let (a, b) = (moved.closest_hit(&ray), anew.closest_hit(&ray));
+        assert_eq!(bytemuck::bytes_of(&a), bytemuck::bytes_of(&b));
+        hits += u32::from(a.is_hit());
+    }
+    assert!(hits > 300, "{hits}");
+    assert!(refit(&before, &triangles[1..]).is_err());
+    triangles[8][0].x = f32::INFINITY;
+    assert!(refit(&before, &triangles).is_err());
+    for count in [0, 1, 2] {
+        let few = build(&triangles[..count], &LbvhSettings::default()).expect("valid");
+        assert!(refit(&few, &triangles[..count]).expect("unmoved").texels() == few.texels());
+    }
+}
+
+#[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
     let triangles = soup(&mut Random(45), 20_000, 0.02);
     for quality in [BuildQuality::Fast, BuildQuality::High] {
