@@ -4,12 +4,13 @@
 // Each invocation climbs from a leaf. At a node the first to arrive leaves what it brings and ends, the second goes on: nobody waits, so
 // nothing is asked of the scheduler, and which of both it is does not show in the tree (Karras 2012; the choice of the parent by the
 // neighbouring differences is Apetrei's, 2014). A node is named by the last place of its left child. The host fills `lbvh_arrivals` with
-// LBVH_NONE.
+// zero.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "accel/lbvh.glsl"
+#include "accel/lbvh_fence.glsl"
 
 layout(local_size_x = LBVH_GROUP_SIZE) in;
 
@@ -19,6 +20,8 @@ layout(constant_id = 0) const uint LBVH_CODE_WORDS = 1u;
 struct LbvhMail {
     float cost;
     uint height;
+    // First place of a left child, last of a right one.
+    uint end;
 };
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer LbvhBoxes { LbvhBox lbvh_boxes[]; };
@@ -58,15 +61,23 @@ bool lbvh_less(uvec3 a, uvec3 b) {
 }
 
 void lbvh_store_box(uint word, LbvhBox box) {
-    for (uint axis = 0u; axis < 3u; ++axis) {
-        lbvh_nodes[word + axis] = box.lower[axis];
-        lbvh_nodes[word + 3u + axis] = box.upper[axis];
-    }
+    lbvh_nodes[word] = box.lower.x;
+    lbvh_nodes[word + 1u] = box.lower.y;
+    lbvh_nodes[word + 2u] = box.lower.z;
+    lbvh_nodes[word + 3u] = box.upper.x;
+    lbvh_nodes[word + 4u] = box.upper.y;
+    lbvh_nodes[word + 5u] = box.upper.z;
 }
 
 LbvhBox lbvh_load_box(uint word) {
     return LbvhBox(ivec3(lbvh_nodes[word], lbvh_nodes[word + 1u], lbvh_nodes[word + 2u]),
                    ivec3(lbvh_nodes[word + 3u], lbvh_nodes[word + 4u], lbvh_nodes[word + 5u]));
+}
+
+void lbvh_drop(uint node, uint last) {
+    if (node < last) {
+        lbvh_kept[node] = 0u;
+    }
 }
 
 void main() {
@@ -88,19 +99,19 @@ void main() {
         uint node = LBVH_NODE_WORDS * parent;
         lbvh_store_box(node + 6u * side, box);
         lbvh_nodes[node + 12u + side] = int(word);
-        lbvh_mails[2u * parent + side] = LbvhMail(cost, height);
+        lbvh_mails[2u * parent + side] = LbvhMail(cost, height, is_left ? first : last);
         if ((word & LBVH_COUNT_MASK) == 0u) {
             lbvh_nodes[LBVH_NODE_WORDS * (word >> LBVH_COUNT_BITS) + 14u] = int(parent << 1 | side);
         }
-        memoryBarrierBuffer();
-        uint other = atomicExchange(lbvh_arrivals[parent], is_left ? first : last);
-        memoryBarrierBuffer();
-        climbing = other != LBVH_NONE;
+        lbvh_fence();
+        climbing = atomicAdd(lbvh_arrivals[parent], 1u) != 0u;
+        lbvh_fence();
+        // The first to arrive ends here.
         if (climbing) {
-            first = is_left ? first : other;
-            last = is_left ? other : last;
             box = lbvh_union(box, lbvh_load_box(node + 6u * (1u - side)));
             LbvhMail sibling = lbvh_mails[2u * parent + 1u - side];
+            first = is_left ? first : sibling.end;
+            last = is_left ? sibling.end : last;
             float area = lbvh_half_area(box);
             uint count = last - first + 1u;
             precise float split_cost = area + (cost + sibling.cost);
@@ -111,17 +122,22 @@ void main() {
             cost = is_leaf ? leaf_cost : split_cost;
             word = is_leaf ? first << LBVH_COUNT_BITS | count : parent << LBVH_COUNT_BITS;
             lbvh_kept[parent] = is_leaf ? 0u : 1u;
+            // What a leaf holds stays not: one node less than it has primitives, which are eight at most.
             if (is_leaf) {
-                for (uint inside = first; inside < last; ++inside) {
-                    lbvh_kept[inside] = 0u;
-                }
+                lbvh_drop(first, last);
+                lbvh_drop(first + 1u, last);
+                lbvh_drop(first + 2u, last);
+                lbvh_drop(first + 3u, last);
+                lbvh_drop(first + 4u, last);
+                lbvh_drop(first + 5u, last);
+                lbvh_drop(first + 6u, last);
             }
             if (is_root) {
                 lbvh_nodes[node + 14u] = 0;
                 lbvh_state.root = parent;
                 lbvh_state.height = height;
-                climbing = false;
             }
+            climbing = !is_root;
         }
     }
 }

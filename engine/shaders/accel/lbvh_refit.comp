@@ -8,6 +8,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "accel/lbvh.glsl"
+#include "accel/lbvh_fence.glsl"
 
 layout(local_size_x = LBVH_GROUP_SIZE) in;
 
@@ -41,13 +42,16 @@ void main() {
         uint at = LBVH_BVH2_NODE_WORDS * node;
         uvec3 lower = floatBitsToUint(ordered_floats(box.lower));
         uvec3 upper = floatBitsToUint(ordered_floats(box.upper));
-        for (uint axis = 0u; axis < 3u; ++axis) {
-            lbvh_words[at + 6u * side + axis] = lower[axis];
-            lbvh_words[at + 6u * side + 3u + axis] = upper[axis];
-        }
-        memoryBarrierBuffer();
+        uint own = at + 6u * side;
+        lbvh_words[own] = lower.x;
+        lbvh_words[own + 1u] = lower.y;
+        lbvh_words[own + 2u] = lower.z;
+        lbvh_words[own + 3u] = upper.x;
+        lbvh_words[own + 4u] = upper.y;
+        lbvh_words[own + 5u] = upper.z;
+        lbvh_fence();
         bool is_second = atomicAdd(lbvh_arrivals[node], 1u) != 0u;
-        memoryBarrierBuffer();
+        lbvh_fence();
         climbing = is_second && node != 0u;
         if (climbing) {
             uint other = at + 6u * (1u - side);

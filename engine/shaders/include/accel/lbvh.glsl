@@ -6,7 +6,6 @@
 #define CLERESTORY_ACCEL_LBVH_GLSL
 
 const uint LBVH_GROUP_SIZE = 64u;
-const uint LBVH_NONE = 0xFFFFFFFFu;
 // Words of a node between the stages: boxes of both children, their words, the parent's.
 const uint LBVH_NODE_WORDS = 15u;
 // Words of a node and of a triangle where rays traverse them.

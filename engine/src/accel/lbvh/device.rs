@@ -17,9 +17,11 @@ use crate::gpu::shaders::accel::{
     lbvh_boxes, lbvh_codes, lbvh_emit, lbvh_grid, lbvh_hierarchy, lbvh_rank_scan, lbvh_rank_sums, lbvh_ranks,
     lbvh_refit, lbvh_refit_triangles,
 };
-use crate::gpu::shaders::constants::{LBVH_GROUP_SIZE, LBVH_NODE_WORDS, LBVH_NONE, LBVH_RANK_BLOCKS};
+use crate::gpu::shaders::constants::{LBVH_GROUP_SIZE, LBVH_NODE_WORDS, LBVH_RANK_BLOCKS};
 use crate::gpu::shaders::types::LbvhState;
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings,
+};
 use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
 use glam::Vec3;
 
@@ -120,24 +122,26 @@ impl LbvhBuilder {
         } else {
             KeyWidth::Bits64
         };
+        let lbvh_fences = gpu.caps().kind != DeviceKind::Cpu;
         let mut options = RadixSortOptions::new(key, true);
         options.bits = 0..settings.code_bits;
         Ok(Self {
             gpu: gpu.clone(),
             settings: *settings,
             sort: RadixSort::new(gpu, options)?,
-            boxes: gpu.compute_pipeline(&())?,
+            boxes: gpu.compute_pipeline(&Default::default())?,
             grid: gpu.compute_pipeline(&lbvh_grid::Spec { lbvh_axis_bits })?,
             codes: gpu.compute_pipeline(&lbvh_codes::Spec { lbvh_axis_bits })?,
             hierarchy: gpu.compute_pipeline(&lbvh_hierarchy::Spec {
                 lbvh_code_words: key.words(),
+                lbvh_fences,
             })?,
-            rank_sums: gpu.compute_pipeline(&())?,
-            rank_scan: gpu.compute_pipeline(&())?,
-            ranks: gpu.compute_pipeline(&())?,
-            emit: gpu.compute_pipeline(&())?,
-            refit_triangles: gpu.compute_pipeline(&())?,
-            refit: gpu.compute_pipeline(&())?,
+            rank_sums: gpu.compute_pipeline(&Default::default())?,
+            rank_scan: gpu.compute_pipeline(&Default::default())?,
+            ranks: gpu.compute_pipeline(&Default::default())?,
+            emit: gpu.compute_pipeline(&Default::default())?,
+            refit_triangles: gpu.compute_pipeline(&Default::default())?,
+            refit: gpu.compute_pipeline(&lbvh_refit::Spec { lbvh_fences })?,
         })
     }
 
@@ -172,7 +176,7 @@ impl LbvhBuilder {
             ],
             sort_scratch: buffer("lbvh sort", self.sort.scratch_bytes(count))?,
             nodes: buffer("lbvh nodes", 4 * u64::from(LBVH_NODE_WORDS) * inner)?,
-            mails: buffer("lbvh mails", 16 * inner)?,
+            mails: buffer("lbvh mails", 24 * inner)?,
             arrivals: buffer("lbvh arrivals", 4 * inner)?,
             kept: buffer("lbvh kept", 4 * inner)?,
             blocks: buffer("lbvh blocks", 4 * u64::from(LBVH_RANK_BLOCKS))?,
@@ -244,7 +248,7 @@ impl LbvhBuilder {
         let side = self.sort.side(count);
         recorder.pass("lbvh: hierarchy", |pass| {
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
-            pass.fill(buffers.arrivals.view(), LBVH_NONE)?;
+            pass.fill(buffers.arrivals.view(), 0)?;
             pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             let set = lbvh_hierarchy::Set0 {
                 lbvh_boxes: buffers.boxes.view(),
