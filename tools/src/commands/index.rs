@@ -5,14 +5,16 @@ use std::time::Instant;
 
 use clap::Args;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
-use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
+use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::{Ray, RayIndex, TraversalCounters};
+use clerestory::gpu::{PassTiming, Timings};
 use clerestory::scene::Scene;
 use clerestory::{Result, scene};
 use clerestory_tools::machine::median;
 use glam::Vec3;
 
 use crate::failure::{Failure, Outcome};
+use crate::options::DeviceOptions;
 use crate::output::{self, Table};
 
 /// Compares ray indexes: build time, surface area cost, depth, and what rays visit
@@ -22,7 +24,8 @@ Examples:
   clerestory index
   clerestory index --scene 'builtin:sphere-flake?level=5' --repeat 9 --json
 
-Build times are medians by wall clock on the host's threads. Steps are nodes and triangles that a ray visits, exact counts of the same \
+Build times are medians by wall clock on the host's threads; that of the device is the least time of its passes, whose tree is the host's \
+to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
 rays for every index: half of them leave the camera, half leave surfaces in random directions.")]
 pub struct Arguments {
     /// A scene; may be given several times
@@ -37,6 +40,8 @@ pub struct Arguments {
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 /// Scenes of a quarter of a million triangles and of fewer.
@@ -62,6 +67,8 @@ struct Measured {
     /// Nodes and triangles a ray, and the ratio to those of the first index.
     steps: f64,
     steps_ratio: f64,
+    /// Milliseconds by pass, of builds on the device.
+    stages: Vec<(String, f64)>,
 }
 
 /// Builds an index.
@@ -85,6 +92,8 @@ fn fast(code_bits: u32) -> LbvhSettings {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let gpu = arguments.device.open()?;
+    let builder = LbvhBuilder::new(&gpu, &fast(30))?;
     let mut all: Vec<Measured> = Vec::new();
     for address in &arguments.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
@@ -100,6 +109,21 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             }
             all.push(measured);
         }
+        let mut device = measure(&triangles, &rays, INDEXES[1].1, 1)?;
+        (device.scene, device.index) = (address.clone(), "lbvh, fast, device".into());
+        (device.sah_ratio, device.steps_ratio) = (device.sah_cost / all[base].sah_cost, device.steps / all[base].steps);
+        let mut best: Option<Timings> = None;
+        for _ in 0..=arguments.repeat {
+            let timings = builder.build(&triangles)?.timings;
+            if best.as_ref().is_none_or(|best| timings.seconds() < best.seconds()) {
+                best = Some(timings);
+            }
+        }
+        let best = best.unwrap_or_default();
+        device.seconds = best.seconds();
+        let stage = |pass: &PassTiming| (pass.name.clone(), pass.nanoseconds.unwrap_or(0) as f64 * 1e-6);
+        device.stages = best.passes.iter().map(stage).collect();
+        all.push(device);
     }
     if arguments.json {
         output::print_json(&serde_json::json!({ "engine_version": env!("CARGO_PKG_VERSION"), "indexes": all }))?;
@@ -130,7 +154,16 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             format!("{:.3}", one.steps_ratio),
         ]);
     }
-    output::print(&table.text())?;
+    let mut text = table.text();
+    for one in all.iter().filter(|one| !one.stages.is_empty()) {
+        let stages: Vec<String> = one
+            .stages
+            .iter()
+            .map(|(name, ms)| format!("{name} {ms:.2} ms"))
+            .collect();
+        text += &format!("\n{}: {}", one.scene, stages.join(", "));
+    }
+    output::print(&(text + "\n"))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -158,6 +191,7 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
         sah_ratio: 1.0,
         steps: (counters.nodes + counters.triangles) as f64 / rays.len() as f64,
         steps_ratio: 1.0,
+        stages: Vec::new(),
     })
 }
 

@@ -29,6 +29,9 @@ use glam::Vec3;
 const NODE_QUARTERS: u64 = 4;
 const TRIANGLE_QUARTERS: u64 = 3;
 
+/// Nodes of an index, corners and indices of its triangles.
+type Parts = (Vec<Bvh2Node>, Vec<[Vec3; 3]>, Vec<u32>);
+
 /// A finished build.
 #[derive(Debug)]
 pub struct LbvhBuild {
@@ -436,7 +439,7 @@ impl LbvhBuilder {
     }
 
     /// The finished index: nodes, corners and indices of triangles.
-    fn read(&self, buffers: &LbvhBuffers, nodes: u32) -> Result<(Vec<Bvh2Node>, Vec<[Vec3; 3]>, Vec<u32>)> {
+    fn read(&self, buffers: &LbvhBuffers, nodes: u32) -> Result<Parts> {
         let node_quarters = (NODE_QUARTERS * u64::from(nodes)) as usize;
         let quarters = node_quarters + TRIANGLE_QUARTERS as usize * buffers.count as usize;
         let words: Vec<[u32; 4]> = self.gpu.read(buffers.quarters.buffer().view(), quarters)?;

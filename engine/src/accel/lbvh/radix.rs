@@ -59,6 +59,7 @@ impl SortedCodes {
     }
 
     /// How the codes at a place and the next differ when their lowest `skipped` bits do not count: larger where a higher bit differs.
+    #[cfg(test)]
     pub(crate) fn difference(&self, place: usize, skipped: u32) -> (u64, u32) {
         let codes = (self.codes[place] ^ self.codes[place + 1]) >> skipped;
         (codes, (place ^ (place + 1)) as u32)

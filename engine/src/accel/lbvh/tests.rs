@@ -159,8 +159,7 @@ fn the_order_of_climbing_never_shows() {
         let mut pairs = vec![(0u32, root)];
         while let Some((node, split)) = pairs.pop() {
             assert!(!std::mem::replace(&mut reached[split], true));
-            for side in 0..2 {
-                let word = words[split][side];
+            for (side, word) in words[split].into_iter().enumerate() {
                 match tree.nodes[node as usize].children[side] {
                     Child::Leaf { first, count } => assert_eq!(word, first << 4 | count, "{name}"),
                     Child::Inner(child) => {

@@ -135,11 +135,11 @@ impl BoxTree {
             if count == 0 || end > self.order.len() {
                 return Err(TreeFault::Leaf { first, count });
             }
-            for place in first as usize..end {
-                let primitive = self.order[place];
-                let seen = present.get_mut(primitive as usize);
-                if std::mem::replace(&mut placed[place], true) || seen.is_none_or(|s| std::mem::replace(s, true)) {
-                    return Err(TreeFault::Repeated(primitive));
+            let places = first as usize..end;
+            for (placed, primitive) in placed[places.clone()].iter_mut().zip(&self.order[places]) {
+                let seen = present.get_mut(*primitive as usize);
+                if std::mem::replace(placed, true) || seen.is_none_or(|s| std::mem::replace(s, true)) {
+                    return Err(TreeFault::Repeated(*primitive));
                 }
             }
             leaves += 1;
