@@ -6,6 +6,7 @@ cargo build --release -p clerestory-samples --bins
 samples="${CARGO_TARGET_DIR:-target}/release"
 out=samples/pictures
 "$samples/hello_triangle_offscreen" "$out/hello_triangle_offscreen.png"
+"$samples/sort_on_the_gpu" "$out/sort_on_the_gpu.png"
 "$samples/embed_headless" "$out/embed_headless.png" --size 240x180 --spp 256
 "$samples/embed_host_device" "$out/embed_host_device.png" --size 180x180 --spp 256
 beside=$(mktemp -d)

@@ -88,6 +88,33 @@ fn hello_triangle_offscreen_draws_its_corners() {
 }
 
 #[test]
+fn sort_on_the_gpu_sorts_its_colours() {
+    let picture = picture_of(env!("CARGO_BIN_EXE_sort_on_the_gpu"), &[]);
+    assert_eq!(picture.dimensions(), (512, 512));
+    let luma = |[r, g, b]: [f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    let bands: Vec<f32> = (0..8)
+        .map(|band| {
+            luma(mean(
+                &picture,
+                [0.0, 1.0],
+                [0.5 + band as f32 / 16.0, 0.5 + (band + 1) as f32 / 16.0],
+            ))
+        })
+        .collect();
+    assert!(bands.is_sorted() && bands[7] > bands[0] + 100.0, "{bands:?}");
+    // The colours above are not sorted, and are the same ones.
+    let mut halves: Vec<_> = picture
+        .as_raw()
+        .chunks(3 * 512 * 256)
+        .map(|half| half.as_chunks::<3>().0.to_vec())
+        .collect();
+    halves.iter_mut().for_each(|half| half.sort());
+    assert!(halves[0] == halves[1]);
+    let above = [[0.0, 0.1], [0.4, 0.5]].map(|down| luma(mean(&picture, [0.0, 1.0], down)));
+    assert!((above[0] - above[1]).abs() < 30.0, "{above:?}");
+}
+
+#[test]
 fn embed_headless_renders_its_balls() {
     let options = ["--size", "64x48", "--spp", "8"];
     let picture = picture_of(env!("CARGO_BIN_EXE_embed_headless"), &options);

@@ -26,6 +26,8 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("transport/path_compact_scan.comp", "SampledBuffer"),
     ("transport/path_compact_scatter.comp", "SampledBuffer"),
     ("transport/path_resolve.comp", "SampledBuffer"),
+    ("kernels/radix_count_serial.comp", "SampledBuffer"),
+    ("kernels/radix_scatter_serial.comp", "SampledBuffer"),
     ("accel/trace_any.comp", "SampledBuffer"),
     ("accel/trace_closest.comp", "SampledBuffer"),
     ("transport/path_extend.comp", "SampledBuffer"),
@@ -39,6 +41,21 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("transport/path_shadow_media_alpha.comp", "SampledBuffer"),
     // Comparisons of specialization constants.
     ("twin_random.comp", "SpecConstantOp"),
+    ("kernels/partition.comp", "SpecConstantOp"),
+    ("kernels/partition_subgroup.comp", "SpecConstantOp"),
+    ("kernels/permute.comp", "SpecConstantOp"),
+    ("kernels/radix_count_subgroup.comp", "SpecConstantOp"),
+    ("kernels/radix_scan.comp", "SpecConstantOp"),
+    ("kernels/radix_scatter_subgroup.comp", "SpecConstantOp"),
+    ("kernels/reduce_box.comp", "SpecConstantOp"),
+    ("kernels/reduce_words.comp", "SpecConstantOp"),
+    ("kernels/scan_apply.comp", "SpecConstantOp"),
+    ("kernels/scan_apply_subgroup.comp", "SpecConstantOp"),
+    ("kernels/scan_reduce.comp", "SpecConstantOp"),
+    ("kernels/scan_reduce_subgroup.comp", "SpecConstantOp"),
+    ("kernels/scan_totals.comp", "SpecConstantOp"),
+    // Arrays of a specialized size.
+    ("kernels/histogram.comp", "InvalidArraySize"),
 ];
 
 /// The module without its line numbers, which naga takes only inside functions.
@@ -154,9 +171,9 @@ fn unused_bindings_are_told_from_used_ones() {
     assert_eq!(used("path_chunks"), Some(false));
 }
 
-/// Buffers of the path tracer that are two, one read and one written, and change places with every bounce. What both would be for one
-/// dispatch is checked when it is recorded.
-const IN_TURNS: [&str; 2] = ["path_queue", "path_states"];
+/// Buffers that are two, one read and one written, and change places: those of the path tracer with every bounce, those of the radix sort with
+/// every digit. What both would be for one dispatch is checked when it is recorded.
+const IN_TURNS: [&str; 4] = ["path_queue", "path_states", "radix_keys", "radix_values"];
 
 #[test]
 fn no_kernel_reads_by_texels_what_it_writes() {
@@ -177,7 +194,8 @@ fn no_kernel_reads_by_texels_what_it_writes() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
-    let expected =
+    let of_paths =
         ["flags", "hits", "queue", "shadow_queue", "shadow_rays", "states"].map(|name| format!("path_{name}"));
-    assert!(stems.iter().eq(&expected), "{stems:?}");
+    let of_sorts = ["keys", "values"].map(|name| format!("radix_{name}"));
+    assert!(stems.iter().eq(of_paths.iter().chain(&of_sorts)), "{stems:?}");
 }

@@ -7,7 +7,7 @@
 layout(local_size_x_id = 0) in;
 
 #include "kernels/radix.glsl"
-#include "kernels/team_sum.glsl"
+#include "kernels/wrapping_sum.glsl"
 
 layout(constant_id = 4) const bool SERIAL = true;
 
@@ -30,7 +30,7 @@ void main() {
             own += scratch[count_at(digit, team)];
         }
         uint total;
-        before = team_exclusive_sum(own, total);
+        before = team_exclusive(own, total);
     }
     for (uint team = first; team < last; ++team) {
         uint own = scratch[count_at(digit, team)];

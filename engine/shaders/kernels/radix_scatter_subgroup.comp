@@ -10,7 +10,7 @@
 layout(local_size_x_id = 0) in;
 
 #include "kernels/radix_subgroup.glsl"
-#include "kernels/team_sum.glsl"
+#include "kernels/wrapping_sum.glsl"
 
 layout(constant_id = 5) const uint KEYS_A_LANE = 8u;
 layout(constant_id = 6) const uint MAX_SUBGROUPS = 16u;
@@ -23,8 +23,8 @@ shared uint subgroup_counts[MAX_SUBGROUPS * BINS];
 // The live lanes whose digit is this lane's.
 uvec4 lanes_with_digit(uint digit, bool live) {
     uvec4 lanes = subgroupBallot(live);
-    for (uint bit = 0u; bit < DIGIT_BITS; ++bit) {
-        bool is_set = (digit >> bit & 1u) != 0u;
+    for (uint bit = 1u; bit < BINS; bit <<= 1u) {
+        bool is_set = (digit & bit) != 0u;
         uvec4 with_bit = subgroupBallot(is_set);
         lanes &= is_set ? with_bit : ~with_bit;
     }
@@ -40,7 +40,7 @@ void first_places(uint team) {
         own += scratch[total_at(digit)];
     }
     uint total;
-    uint before = team_exclusive_sum(own, total);
+    uint before = team_exclusive(own, total);
     for (uint digit = first; digit < last; ++digit) {
         places[digit] = before + scratch[count_at(digit, team)];
         before += scratch[total_at(digit)];

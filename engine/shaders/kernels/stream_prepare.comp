@@ -20,7 +20,8 @@ void main() {
     uint wanted = stream_counts[0];
     uint count = wanted <= push.capacity ? wanted : 0u;
     uint teams = stream_teams(count, stream_block(count, push.plan.tile, push.plan.max_teams));
-    stream_groups[0] = (teams + push.teams_a_group - 1u) / push.teams_a_group;
+    // One at least: kernels write their results for no elements, too.
+    stream_groups[0] = max((teams + push.teams_a_group - 1u) / push.teams_a_group, 1u);
     stream_groups[1] = 1u;
     stream_groups[2] = 1u;
     stream_count = count;

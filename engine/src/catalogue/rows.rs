@@ -131,6 +131,60 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory bench --sort",
+        part(
+            "PM-B-1",
+            "inclusive and exclusive scan, segmented scan, reductions",
+            "Blelloch 1990; Sengupta et al. 2007; Dotsenko et al. 2008",
+            "engine/src/kernels/scan.rs",
+            &[
+                "tests/tests/kernels/blocks.rs::scans_are_as_their_twin",
+                "tests/tests/kernels/blocks.rs::reductions_of_words_are_as_their_twin",
+                "tests/tests/kernels/blocks.rs::boxes_are_exact_and_leave_nans_out",
+                "engine/src/kernels/stream.rs::every_element_is_in_one_block",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory bench --sort",
+        part(
+            "PM-B-2",
+            "stream compaction",
+            "Blelloch 1990",
+            "engine/src/kernels/partition.rs",
+            &["tests/tests/kernels/blocks.rs::partitions_are_as_their_twins"],
+        ),
+    ),
+    measured(
+        "clerestory bench --sort",
+        part(
+            "PM-B-3",
+            "split",
+            "Blelloch 1990",
+            "engine/src/kernels/partition.rs",
+            &[
+                "tests/tests/kernels/blocks.rs::partitions_are_as_their_twins",
+                "tests/tests/kernels/blocks.rs::splits_by_bits_sort",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory bench --sort",
+        part(
+            "PM-B-4",
+            "radix sort of 32- and 64-bit keys, with or without values",
+            "Satish, Harris and Garland 2009; Ashkiani et al. 2016",
+            "engine/src/kernels/radix_sort.rs",
+            &[
+                "tests/tests/kernels/sort.rs::every_size_and_pattern_is_as_by_std",
+                "tests/tests/kernels/sort.rs::bits_and_orders_are_those_asked_for",
+                "tests/tests/kernels/sort.rs::runs_give_the_same_bits",
+                "tests/tests/kernels/sort.rs::many_keys_take_the_other_plan",
+                "tests/tests/kernels/many_sorts.rs::sorts_of_random_sizes_and_patterns_are_as_by_std",
+            ],
+        ),
+    ),
+    measured(
         "clerestory agreement --scene cornell-point,sphere-flake",
         part(
             "PM-F-1",

@@ -8,8 +8,20 @@
 //! Kernels over a stream reduce, then scan, then work: no workgroup ever waits for another. A team, which is a workgroup or a single
 //! invocation ([`Form`]), owns a contiguous block of the stream, so results are the same bits whatever the device.
 
+mod histogram;
+mod partition;
+mod permute;
 mod radix_sort;
+mod reduce;
+mod scan;
 mod stream;
 
+pub use histogram::{Histogram, MAX_BINS, histogram};
+pub use partition::{Keep, Partition, PartitionBuffers, PartitionOptions, compact, split};
+pub use permute::{Direction, Permute, PermuteBuffers, gather, scatter};
 pub use radix_sort::{KeyWidth, Order, RadixSort, RadixSortOptions, SortBuffers, radix_sort};
-pub use stream::{Count, Form, StreamStatus};
+pub use reduce::{
+    BoxElements, ReduceBox, ReduceWords, float_of_ordered, nan_bits, ordered_float, reduce_box, reduce_words,
+};
+pub use scan::{Scan, ScanBuffers, ScanOptions, scan};
+pub use stream::{Count, Form, Operation, StreamStatus, stream_block, stream_range, stream_teams};

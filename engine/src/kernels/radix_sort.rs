@@ -17,9 +17,7 @@ use crate::gpu::shaders::kernels::{
 };
 use crate::gpu::shaders::sets::{RadixSerialSet, RadixSubgroupSet};
 use crate::gpu::shaders::types::StreamPlan;
-use crate::gpu::{
-    Buffer, BufferBarrier, Caps, Category, ComputePipeline, DeviceKind, Gpu, Pass, TexelView, rw_compute_to_compute,
-};
+use crate::gpu::{Buffer, Caps, Category, ComputePipeline, DeviceKind, Gpu, Pass, TexelView};
 use crate::{Error, Result};
 
 /// Width of keys.
@@ -63,7 +61,7 @@ pub struct RadixSortOptions {
     pub order: Order,
     /// The bits of keys that are compared, counted from the lowest; fewer bits take fewer passes.
     pub bits: Range<u32>,
-    /// What teams are.
+    /// What teams are; [`Form::Shared`] is the serial form here.
     pub form: Form,
 }
 
@@ -96,7 +94,7 @@ pub struct SortBuffers<'a> {
 ///
 /// Barriers: what wrote the input must have been made visible to [`Access::COMPUTE`](crate::gpu::Access::COMPUTE), and so must earlier uses
 /// of the other sides and of the scratch memory have ended. After it, both sides and the scratch memory have been read and written by
-/// compute shaders, and a count on the device has been read by one: [`rw_compute_to_compute`] and its like are what the next use wants.
+/// compute shaders, and a count on the device has been read by one: [`rw_compute_to_compute`](crate::gpu::rw_compute_to_compute) and its like are what the next use wants.
 #[derive(Debug)]
 pub struct RadixSort {
     gpu: Gpu,
@@ -175,9 +173,8 @@ impl Tuning {
             lanes,
         };
         if caps.kind == DeviceKind::Cpu {
-            let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
             let lanes = caps.subgroup_size.max(1);
-            let teams = 2 * threads.min(64) * lanes;
+            let teams = stream::serial_groups() * lanes;
             [
                 serial(1 << 16, 8, 128, teams, lanes),
                 serial(u32::MAX, 11, 2048, teams, lanes),
@@ -200,7 +197,11 @@ impl RadixSort {
             let cause = format!("is not a part of 0..{}", 32 * options.key.words());
             return Err(Error::setting("bits", format!("{bits:?}"), cause));
         }
-        let form = options.form.on(gpu.caps(), "radix sort")?;
+        // Ranks without subgroup operations come from walking blocks alone.
+        let form = match options.form.on(gpu.caps(), "radix sort")? {
+            Form::Subgroup => Form::Subgroup,
+            _ => Form::Serial,
+        };
         let [few, many] = Tuning::of(gpu.caps(), form);
         let plans = [
             Plan::new(gpu, &options, form, few)?,
@@ -274,11 +275,9 @@ impl RadixSort {
         let digits = plan.digits(&self.options.bits);
         for (index, digit) in digits.iter().enumerate() {
             if index > 0 {
-                stream.between_stages(pass);
-                let written = buffers.keys.iter().chain(buffers.values.iter().flatten());
-                let barriers: Vec<BufferBarrier<'_>> =
-                    written.map(|side| rw_compute_to_compute(side.buffer())).collect();
-                pass.barrier(&barriers);
+                let sides = buffers.keys.iter().chain(buffers.values.iter().flatten());
+                let sides: Vec<&Buffer> = sides.map(|side| side.buffer()).collect();
+                stream.between_stages(pass, &sides);
             }
             plan.record(pass, &stream, buffers, index % 2, self.push(stream.plan, digit))?;
         }
@@ -326,18 +325,18 @@ impl Plan {
         let count = (options.bits.len() as u32).div_ceil(tuning.digit_bits);
         let digit_bits = (options.bits.len() as u32).div_ceil(count);
         let (lanes, key_words, has_values) = (tuning.lanes, options.key.words(), options.values);
-        let serial = form == Form::Serial;
+        let (serial, bins) = (form == Form::Serial, 1 << digit_bits);
         let kernels = if serial {
             Kernels::Serial {
                 count: gpu.compute_pipeline(&radix_count_serial::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                 })?,
                 scatter: gpu.compute_pipeline(&radix_scatter_serial::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                 })?,
@@ -346,13 +345,13 @@ impl Plan {
             Kernels::Subgroup {
                 count: gpu.compute_pipeline(&radix_count_subgroup::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                 })?,
                 scatter: gpu.compute_pipeline(&radix_scatter_subgroup::Spec {
                     local_size_x: lanes,
-                    digit_bits,
+                    bins,
                     key_words,
                     has_values,
                     keys_a_lane: KEYS_A_LANE,
@@ -362,7 +361,7 @@ impl Plan {
         };
         let scan = gpu.compute_pipeline(&radix_scan::Spec {
             local_size_x: lanes,
-            digit_bits,
+            bins,
             serial,
             ..Default::default()
         })?;
@@ -370,7 +369,7 @@ impl Plan {
             up_to: tuning.up_to,
             shape: tuning.shape,
             digit_bits,
-            scan_groups: (1u32 << digit_bits).div_ceil(if serial { lanes } else { 1 }),
+            scan_groups: bins.div_ceil(if serial { lanes } else { 1 }),
             scan,
             kernels,
         })
@@ -436,12 +435,12 @@ impl Plan {
                 stream.dispatch(pass, count, &subgroup_set, &push)?;
             }
         }
-        stream.between_stages(pass);
+        stream.between_stages(pass, &[]);
         let set = radix_scan::Set0 {
             stream_scratch: stream.scratch.view(),
         };
         pass.dispatch(&self.scan, &[&set], &push, [self.scan_groups, 1, 1])?;
-        stream.between_stages(pass);
+        stream.between_stages(pass, &[]);
         match &self.kernels {
             Kernels::Serial { scatter, .. } => {
                 let push = radix_scatter_serial::Push {

@@ -4,7 +4,9 @@
 //! block is longer than the quota that its form allows, and no more workgroups are dispatched than every device takes.
 
 use crate::gpu::interface::{BindingSet, ComputeShader};
-use crate::gpu::shaders::constants::{STREAM_COUNT_ON_DEVICE, STREAM_HEADER_WORDS};
+use crate::gpu::shaders::constants::{
+    OPERATION_MAX, OPERATION_MIN, OPERATION_SUM, SCAN_ITEMS, STREAM_COUNT_ON_DEVICE, STREAM_HEADER_WORDS,
+};
 use crate::gpu::shaders::kernels::stream_prepare;
 use crate::gpu::shaders::types::StreamPlan;
 use crate::gpu::{
@@ -22,12 +24,14 @@ pub(super) const SERIAL_QUOTA: u32 = 1 << 15;
 /// What a team of a kernel is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Form {
-    /// The one that suits the device: serial on software drivers and where subgroup operations are missing.
+    /// The one that suits the device: serial on software drivers, else with subgroup operations where there are any.
     #[default]
     Auto,
     /// Single invocations that walk their blocks alone: no barriers, no subgroup operations.
     Serial,
-    /// Workgroups with subgroup operations (ballot and arithmetic), of any subgroup size from 4 to 128.
+    /// Workgroups with shared memory, and no subgroup operations.
+    Shared,
+    /// Workgroups with subgroup operations (ballot and shuffle), of any subgroup size from 4 to 128.
     Subgroup,
 }
 
@@ -39,17 +43,19 @@ impl Form {
     pub fn on(self, caps: &Caps, kernel: &str) -> Result<Self> {
         let able = caps.subgroup.basic
             && caps.subgroup.ballot
-            && caps.subgroup.arithmetic
+            && caps.subgroup.shuffle
             && (4..=128).contains(&caps.subgroup_size);
         match self {
             Self::Auto if able && caps.kind != DeviceKind::Cpu => Ok(Self::Subgroup),
+            Self::Auto if caps.kind != DeviceKind::Cpu => Ok(Self::Shared),
             Self::Auto | Self::Serial => Ok(Self::Serial),
+            Self::Shared => Ok(Self::Shared),
             Self::Subgroup if able => Ok(Self::Subgroup),
             Self::Subgroup => Err(Error::MissingFeature {
-                feature: "subgroup ballot and arithmetic in compute shaders, of 4 to 128 lanes".into(),
+                feature: "subgroup ballot and shuffle in compute shaders, of 4 to 128 lanes".into(),
                 needed_by: kernel.into(),
                 device: caps.device.clone(),
-                instead: "choose Form::Serial".into(),
+                instead: "choose Form::Shared or Form::Serial".into(),
             }),
         }
     }
@@ -140,6 +146,130 @@ impl Shape {
     }
 }
 
+/// The teams of scans, reductions and what is built of them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Teams {
+    pub form: Form,
+    /// Invocations of a workgroup.
+    pub lanes: u32,
+    pub shape: Shape,
+}
+
+impl Teams {
+    /// Teams of kernels whose lanes take some consecutive elements at once.
+    pub fn new(caps: &Caps, form: Form, kernel: &str) -> Result<Self> {
+        let form = form.on(caps, kernel)?;
+        if form != Form::Serial {
+            let lanes = caps.max_workgroup_invocations.min(256);
+            let tile = lanes * SCAN_ITEMS;
+            return Ok(Self {
+                form,
+                lanes,
+                shape: Shape {
+                    tile,
+                    quota: tile << 11,
+                    teams_a_group: 1,
+                    teams: 1024,
+                },
+            });
+        }
+        let (lanes, teams, tile) = if caps.kind == DeviceKind::Cpu {
+            let lanes = caps.subgroup_size.max(1);
+            (lanes, serial_groups() * lanes, 256)
+        } else {
+            (64, 1 << 14, 64)
+        };
+        Ok(Self {
+            form,
+            lanes,
+            shape: Shape {
+                tile,
+                quota: SERIAL_QUOTA / 2,
+                teams_a_group: lanes,
+                teams,
+            },
+        })
+    }
+
+    /// Teams that are workgroups in any case, of kernels without barriers in their loops, with so many loop iterations an element.
+    pub fn workgroups(caps: &Caps, iterations: u32) -> Self {
+        let lanes = if caps.kind == DeviceKind::Cpu {
+            64
+        } else {
+            caps.max_workgroup_invocations.min(256)
+        };
+        let tile = lanes * 4;
+        Self {
+            form: Form::Shared,
+            lanes,
+            shape: Shape {
+                tile,
+                quota: (lanes * SERIAL_QUOTA / iterations.max(1) / tile).max(1) * tile,
+                teams_a_group: 1,
+                teams: if caps.kind == DeviceKind::Cpu {
+                    4 * serial_groups()
+                } else {
+                    1024
+                },
+            },
+        }
+    }
+
+    pub fn serial(&self) -> bool {
+        self.form == Form::Serial
+    }
+}
+
+/// Workgroups that keep all threads of a software driver busy.
+pub(super) fn serial_groups() -> u32 {
+    2 * std::thread::available_parallelism()
+        .map_or(1, |n| n.get() as u32)
+        .min(64)
+}
+
+/// One kernel, without or with subgroup operations.
+#[derive(Debug)]
+pub(super) enum Variant<P, S> {
+    Plain(ComputePipeline<P>),
+    Subgroup(ComputePipeline<S>),
+}
+
+/// An operation of scans and reductions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Operation {
+    /// The sum; of scans modulo 2³².
+    #[default]
+    Sum,
+    /// The minimum of unsigned words.
+    Min,
+    /// The maximum of unsigned words.
+    Max,
+}
+
+impl Operation {
+    pub(super) fn code(self) -> u32 {
+        match self {
+            Self::Sum => OPERATION_SUM,
+            Self::Min => OPERATION_MIN,
+            Self::Max => OPERATION_MAX,
+        }
+    }
+
+    /// What changes nothing. Twin of `scan_identity`.
+    pub fn identity(self) -> u32 {
+        if self == Self::Min { u32::MAX } else { 0 }
+    }
+
+    /// Twin of `scan_operation`.
+    pub fn apply(self, a: u32, b: u32) -> u32 {
+        match self {
+            Self::Sum => a.wrapping_add(b),
+            Self::Min => a.min(b),
+            Self::Max => a.max(b),
+        }
+    }
+}
+
 /// Twin of `stream_block`.
 pub fn stream_block(count: u32, tile: u32, max_teams: u32) -> u32 {
     count.div_ceil(tile).div_ceil(max_teams).max(1) * tile
@@ -200,7 +330,8 @@ impl Prepare {
                     max_teams,
                 },
                 scratch,
-                groups: Some(teams.div_ceil(shape.teams_a_group)),
+                // One at least: kernels write their results for no elements, too.
+                groups: Some(teams.div_ceil(shape.teams_a_group).max(1)),
             });
         };
         let plan = StreamPlan {
@@ -242,18 +373,31 @@ impl Stream<'_> {
         }
     }
 
-    /// Waits until what earlier stages have written to the scratch memory can be read and written again, by dispatches and as their arguments.
-    pub fn between_stages(&self, pass: &mut Pass<'_>) {
-        let barrier = match self.groups {
-            Some(_) => rw_compute_to_compute(self.scratch),
-            None => BufferBarrier {
-                buffer: self.scratch,
-                from: Access::COMPUTE | Access::INDIRECT_READ,
-                to: Access::COMPUTE | Access::INDIRECT_READ,
-            },
+    /// Waits until what earlier stages have written to the scratch memory can be read and written again, by dispatches and as their arguments,
+    /// and until they have done with other buffers.
+    pub fn between_stages(&self, pass: &mut Pass<'_>, others: &[&Buffer]) {
+        let scratch = BufferBarrier {
+            buffer: self.scratch,
+            from: Access::COMPUTE | Access::INDIRECT_READ,
+            to: Access::COMPUTE | Access::INDIRECT_READ,
         };
-        pass.barrier(&[barrier]);
+        let others = others.iter().map(|buffer| rw_compute_to_compute(buffer));
+        let barriers: Vec<_> = std::iter::once(scratch).chain(others).collect();
+        pass.barrier(&barriers);
     }
+}
+
+/// Fails when a range is too small for so many words.
+pub(super) fn check_words(view: BufferView<'_>, words: u64) -> Result<()> {
+    if view.bytes < 4 * words {
+        return Err(Error::LimitExceeded {
+            name: view.buffer.name().into(),
+            bytes: 4 * words,
+            limit_name: "size of the range",
+            limit: view.bytes,
+        });
+    }
+    Ok(())
 }
 
 /// Bytes of scratch memory with `words` words for the kernel itself.
@@ -299,7 +443,7 @@ mod tests {
             for count in counts {
                 let block = stream_block(count, tile, max_teams);
                 let teams = stream_teams(count, block);
-                assert!(teams <= max_teams && block % tile == 0);
+                assert!(teams <= max_teams && block.is_multiple_of(tile));
                 let mut next = 0;
                 for team in 0..teams + 2 {
                     let [first, last] = stream_range(team, count, block);

@@ -4,11 +4,12 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
+use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Result, scene};
 use clerestory_tools::machine::median;
 
-use super::check_validation;
+use super::{check_validation, sort_rates};
 use crate::failure::{Failure, Outcome};
 use crate::options::{DeviceOptions, Size, parse_size};
 use crate::output::{self, Table};
@@ -35,6 +36,9 @@ pub struct Arguments {
     /// Pixels: WIDTHxHEIGHT, or the height alone
     #[arg(long, default_value = "128", value_parser = parse_size)]
     size: Size,
+    /// Measures keys per second of the radix sort beside the standard library's instead
+    #[arg(long)]
+    sort: bool,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -81,6 +85,9 @@ struct Measured {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
+    if arguments.sort {
+        return run_sort(gpu, arguments);
+    }
     let mut all = Vec::new();
     for address in &arguments.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
@@ -125,6 +132,25 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         caps.device, caps.driver, arguments.repeat
     ));
     output::print(&format!("{head}\n{}", table.text()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_sort(gpu: Gpu, arguments: &Arguments) -> Outcome<ExitCode> {
+    let rates = sort_rates::measure(&gpu, arguments.repeat)?;
+    let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
+    drop(gpu);
+    check_validation(&log)?;
+    if arguments.json {
+        output::print_json(&serde_json::json!({
+            "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "sorts": rates,
+        }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let head = output::one_line(&format!(
+        "{}, driver {}; random 32-bit keys a second, medians of {} runs",
+        caps.device, caps.driver, arguments.repeat
+    ));
+    output::print(&format!("{head}\n{}", sort_rates::table(&rates)))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -9,6 +9,7 @@ mod list;
 mod render;
 mod report;
 mod scenes;
+mod sort_rates;
 mod stability;
 
 use std::io::IsTerminal;

@@ -9,12 +9,11 @@
 
 // Invocations of a workgroup: the specialization constant 0.
 #define LANES gl_WorkGroupSize.x
-layout(constant_id = 1) const uint DIGIT_BITS = 4u;
+// Digits that there are, a power of two.
+layout(constant_id = 1) const uint BINS = 16u;
 // 32-bit words of a key, the low one first: 1 or 2.
 layout(constant_id = 2) const uint KEY_WORDS = 1u;
 layout(constant_id = 3) const bool HAS_VALUES = false;
-
-#define BINS (1u << DIGIT_BITS)
 
 layout(push_constant, scalar) uniform Push {
     StreamPlan plan;

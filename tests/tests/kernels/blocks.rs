@@ -1,0 +1,325 @@
+//! Scans, partitions, reductions, histograms and permutations against their twins.
+
+use clerestory::Error;
+use clerestory::gpu::{Buffer, Gpu, transfer_to_compute};
+use clerestory::kernels::{
+    BoxElements, Count, Direction, Histogram, Keep, Operation, Partition, PartitionBuffers, PartitionOptions, Permute,
+    PermuteBuffers, ReduceBox, ReduceWords, Scan, ScanBuffers, ScanOptions, compact, gather, histogram, ordered_float,
+    reduce_box, reduce_words, scan, scatter, split,
+};
+use clerestory_tests::random::Random;
+use clerestory_tests::with_gpu;
+
+use super::{FORMS, PATTERNS, Pattern, SIZES, empty, read, run, words};
+
+/// Every other time the count is read from a buffer.
+fn counted(counts: &Buffer, count: u32, turn: usize) -> Count<'_> {
+    if turn.is_multiple_of(2) {
+        Count::Host(count)
+    } else {
+        Count::Device {
+            view: counts.view(),
+            capacity: count,
+        }
+    }
+}
+
+/// Words that are not 0 now and then, the first word or not.
+fn flags(random: &mut Random, count: u32, one_in: usize) -> Vec<u32> {
+    (0..count)
+        .map(|_| {
+            if random.below(one_in) == 0 {
+                1 + random.word() / 2
+            } else {
+                0
+            }
+        })
+        .collect()
+}
+
+fn check_scan(gpu: &Gpu, options: ScanOptions, random: &mut Random) {
+    let kernel = Scan::new(gpu, options).unwrap();
+    for (turn, size) in SIZES.into_iter().enumerate() {
+        let values = random.choose(&PATTERNS).words(random, size);
+        let heads = flags(random, size, [2, 40, 5000][turn % 3]);
+        let input = words(gpu, "input", &values);
+        let head_words = words(gpu, "heads", &heads);
+        let output = empty(gpu, "output", 4 * u64::from(size));
+        let scratch = empty(gpu, "scratch", kernel.scratch_bytes(size));
+        let counts = words(gpu, "count", &[size]);
+        // Every third time in place.
+        let target = if turn % 3 == 2 { &input } else { &output };
+        let buffers = ScanBuffers {
+            input: input.view(),
+            heads: options.segmented.then_some(head_words.view()),
+            output: target.view(),
+        };
+        run(gpu, |pass| {
+            kernel.record(pass, &buffers, counted(&counts, size, turn), &scratch)
+        });
+        let heads = options.segmented.then_some(heads.as_slice());
+        let (expected, total) = scan(&values, heads, options.operation, options.inclusive);
+        assert!(read(gpu, target, size as usize) == expected, "{size}: {options:?}");
+        assert_eq!(
+            gpu.read::<u32>(kernel.total(&scratch), 1).unwrap(),
+            [total],
+            "{size}: {options:?}"
+        );
+    }
+}
+
+#[test]
+fn scans_are_as_their_twin() {
+    with_gpu(|gpu| {
+        let mut random = Random(51);
+        for form in FORMS {
+            for (operation, inclusive, segmented) in [
+                (Operation::Sum, false, false),
+                (Operation::Sum, true, true),
+                (Operation::Min, false, true),
+                (Operation::Max, true, false),
+            ] {
+                let options = ScanOptions {
+                    operation,
+                    inclusive,
+                    segmented,
+                    form,
+                };
+                check_scan(gpu, options, &mut random);
+            }
+        }
+    });
+}
+
+#[test]
+fn partitions_are_as_their_twins() {
+    with_gpu(|gpu| {
+        let mut random = Random(52);
+        for form in FORMS {
+            for (keep, numbers) in [(Keep::Flagged, false), (Keep::Flagged, true), (Keep::Split, false)] {
+                let options = PartitionOptions { keep, numbers, form };
+                let kernel = Partition::new(gpu, options).unwrap();
+                for (turn, size) in SIZES.into_iter().enumerate() {
+                    // All, half, and few.
+                    let flags = flags(&mut random, size, [1, 2, 500][turn % 3]);
+                    let elements = if numbers {
+                        (0..size).collect()
+                    } else {
+                        Pattern::Random.words(&mut random, size)
+                    };
+                    let buffers = [words(gpu, "flags", &flags), words(gpu, "elements", &elements)];
+                    let untouched = 0xABCD_EF01;
+                    let output = words(gpu, "output", &vec![untouched; size as usize]);
+                    let flagged = empty(gpu, "flagged", 4);
+                    let scratch = empty(gpu, "scratch", kernel.scratch_bytes(size));
+                    let counts = words(gpu, "count", &[size]);
+                    let bound = PartitionBuffers {
+                        flags: buffers[0].view(),
+                        input: (!numbers).then_some(buffers[1].view()),
+                        output: output.view(),
+                        flagged: flagged.view(),
+                    };
+                    run(gpu, |pass| {
+                        kernel.record(pass, &bound, counted(&counts, size, turn), &scratch)
+                    });
+                    let count = compact(&flags, &elements).len();
+                    let mut expected = match keep {
+                        Keep::Flagged => compact(&flags, &elements),
+                        Keep::Split => split(&flags, &elements),
+                    };
+                    expected.resize(size as usize, untouched);
+                    assert!(read(gpu, &output, size as usize) == expected, "{size}: {options:?}");
+                    assert_eq!(read(gpu, &flagged, 1), [count as u32]);
+                }
+            }
+        }
+    });
+}
+
+/// Radix sort by one split a bit is what the split is for; both must agree with the standard library.
+#[test]
+fn splits_by_bits_sort() {
+    let mut keys = Pattern::Random.words(&mut Random(53), 1000);
+    let mut expected = keys.clone();
+    expected.sort();
+    for bit in 0..32 {
+        let flags: Vec<u32> = keys.iter().map(|key| key >> bit & 1).collect();
+        keys = split(&flags, &keys);
+    }
+    assert_eq!(keys, expected);
+}
+
+#[test]
+fn reductions_of_words_are_as_their_twin() {
+    with_gpu(|gpu| {
+        let mut random = Random(54);
+        for form in FORMS {
+            for operation in [Operation::Sum, Operation::Min, Operation::Max] {
+                let kernel = ReduceWords::new(gpu, operation, form).unwrap();
+                for (turn, size) in SIZES.into_iter().enumerate() {
+                    let values = random.choose(&PATTERNS).words(&mut random, size);
+                    let input = words(gpu, "input", &values);
+                    let result = empty(gpu, "result", 8);
+                    let scratch = empty(gpu, "scratch", kernel.scratch_bytes(size));
+                    let counts = words(gpu, "count", &[size]);
+                    run(gpu, |pass| {
+                        kernel.record(
+                            pass,
+                            input.view(),
+                            result.view(),
+                            counted(&counts, size, turn),
+                            &scratch,
+                        )
+                    });
+                    let expected = reduce_words(&values, operation);
+                    assert_eq!(
+                        gpu.read::<u64>(result.view(), 1).unwrap(),
+                        [expected],
+                        "{size}: {operation:?}"
+                    );
+                }
+            }
+        }
+    });
+}
+
+fn corners(bits: &[u32]) -> [f32; 3] {
+    [0, 1, 2].map(|axis| f32::from_bits(bits[axis]))
+}
+
+#[test]
+fn boxes_are_exact_and_leave_nans_out() {
+    with_gpu(|gpu| {
+        let mut random = Random(55);
+        for form in FORMS {
+            let wide = BoxElements { stride: 8, upper: 4 };
+            for elements in [BoxElements::POINTS, BoxElements::BOXES, wide] {
+                let kernel = ReduceBox::new(gpu, elements, form).unwrap();
+                for (turn, size) in SIZES.into_iter().enumerate() {
+                    let pattern = [Pattern::Floats, Pattern::Random][turn % 2];
+                    let data = pattern.words(&mut random, size * elements.stride);
+                    let input = words(gpu, "input", &data);
+                    let result = empty(gpu, "result", 24);
+                    let scratch = empty(gpu, "scratch", kernel.scratch_bytes(size));
+                    let counts = words(gpu, "count", &[size]);
+                    run(gpu, |pass| {
+                        kernel.record(
+                            pass,
+                            input.view(),
+                            result.view(),
+                            counted(&counts, size, turn / 2),
+                            &scratch,
+                        )
+                    });
+                    let of_data = data.chunks_exact(elements.stride as usize);
+                    let expected = reduce_box(of_data.map(|e| [corners(e), corners(&e[elements.upper as usize..])]));
+                    let bits = expected.as_flattened().iter().map(|value| value.to_bits());
+                    assert!(bits.eq(read(gpu, &result, 6)), "{size}: {elements:?} {expected:?}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn empty_boxes_and_nan_boxes_are_empty() {
+    let (inf, nan) = (f32::INFINITY, f32::NAN);
+    let empty = [[inf; 3], [-inf; 3]];
+    assert_eq!(reduce_box([]), empty);
+    assert_eq!(reduce_box([[[nan; 3]; 2], [[-nan; 3]; 2]]), empty);
+    let point = [nan, -0.0, 2.0];
+    let other = [1.0, 0.0, -inf];
+    let expected = [[1.0, -0.0, -inf], [1.0, 0.0, 2.0]];
+    let found = reduce_box([[point; 2], [other; 2]]);
+    assert_eq!(
+        found.map(|c| c.map(f32::to_bits)),
+        expected.map(|c: [f32; 3]| c.map(f32::to_bits))
+    );
+    // The order of floats is that of their integers.
+    let floats = [-inf, -1.5, -1e-45, -0.0, 0.0, 1e-45, 2.0, inf];
+    assert!(floats.map(|f| ordered_float(f.to_bits())).is_sorted());
+}
+
+#[test]
+fn histograms_are_as_their_twin() {
+    with_gpu(|gpu| {
+        let mut random = Random(56);
+        for (bins, bits) in [(1, 0..1), (256, 8..16), (1000, 3..17), (4096, 0..32)] {
+            let kernel = Histogram::new(gpu, bins, bits.clone()).unwrap();
+            for (turn, size) in SIZES.into_iter().enumerate() {
+                let mut values = random.choose(&PATTERNS).words(&mut random, size);
+                values.iter_mut().step_by(2).for_each(|value| *value &= 0xFFF);
+                let input = words(gpu, "input", &values);
+                let counts = empty(gpu, "counts", 4 * u64::from(kernel.count_words()));
+                let scratch = empty(gpu, "scratch", kernel.scratch_bytes());
+                let sizes = words(gpu, "count", &[size]);
+                run(gpu, |pass| {
+                    pass.fill(counts.view(), 0)?;
+                    pass.barrier(&[transfer_to_compute(&counts)]);
+                    kernel.record(pass, input.view(), counts.view(), counted(&sizes, size, turn), &scratch)
+                });
+                let expected = histogram(&values, bins, bits.clone());
+                assert_eq!(expected.iter().sum::<u32>(), size);
+                assert!(
+                    read(gpu, &counts, bins as usize + 1) == expected,
+                    "{size}: {bins} {bits:?}"
+                );
+            }
+        }
+        assert!(matches!(Histogram::new(gpu, 4097, 0..32), Err(Error::Setting { .. })));
+        assert!(matches!(Histogram::new(gpu, 1, 4..4), Err(Error::Setting { .. })));
+    });
+}
+
+#[test]
+fn gathers_and_scatters_are_as_their_twins() {
+    with_gpu(|gpu| {
+        let mut random = Random(57);
+        for element in [1, 3] {
+            let kernels = [Direction::Gather, Direction::Scatter].map(|d| Permute::new(gpu, d, element).unwrap());
+            for (turn, size) in SIZES.into_iter().enumerate() {
+                // A permutation, some of whose indices are out of range.
+                let mut indices: Vec<u32> = (0..size).collect();
+                for i in (1..indices.len()).rev() {
+                    indices.swap(i, random.below(i + 1));
+                }
+                if size > 4 {
+                    indices[3] = size;
+                    indices[1] = u32::MAX;
+                }
+                let data = Pattern::Random.words(&mut random, size * element);
+                let before = vec![0x5555_5555; data.len()];
+                for (direction, kernel) in kernels.iter().enumerate() {
+                    let index_words = words(gpu, "indices", &indices);
+                    let input = words(gpu, "input", &data);
+                    let output = words(gpu, "output", &before);
+                    let faults = words(gpu, "faults", &[0]);
+                    let scratch = empty(gpu, "scratch", kernel.scratch_bytes());
+                    let counts = words(gpu, "count", &[size]);
+                    let buffers = PermuteBuffers {
+                        indices: index_words.view(),
+                        input: input.view(),
+                        output: output.view(),
+                        faults: faults.view(),
+                        places: size,
+                    };
+                    run(gpu, |pass| {
+                        kernel.record(pass, &buffers, counted(&counts, size, turn), &scratch)
+                    });
+                    let (expected, missed) = if direction == 0 {
+                        gather(&indices, &data, element as usize)
+                    } else {
+                        let mut output = before.clone();
+                        let missed = scatter(&indices, &data, element as usize, &mut output);
+                        (output, missed)
+                    };
+                    assert!(
+                        read(gpu, &output, data.len()) == expected,
+                        "{size} {element} {direction}"
+                    );
+                    assert_eq!(read(gpu, &faults, 1), [missed]);
+                }
+            }
+        }
+    });
+}
