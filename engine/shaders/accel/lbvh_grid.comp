@@ -13,8 +13,10 @@ layout(constant_id = 0) const uint LBVH_AXIS_BITS = 10u;
 layout(set = 0, binding = 0, scalar) restrict buffer LbvhStateBlock { LbvhState lbvh_state; };
 
 void main() {
-    vec3 lower = ordered_floats(lbvh_state.centres_lower);
-    precise vec3 extent = ordered_floats(lbvh_state.centres_upper) - lower;
+    int least[3] = lbvh_state.centres_lower;
+    int greatest[3] = lbvh_state.centres_upper;
+    vec3 lower = ordered_floats(ivec3(least[0], least[1], least[2]));
+    precise vec3 extent = ordered_floats(ivec3(greatest[0], greatest[1], greatest[2])) - lower;
     lbvh_state.grid_lower = lower;
     for (uint axis = 0u; axis < 3u; ++axis) {
         lbvh_state.grid_scale[axis] = cells_per_length(extent[axis], LBVH_AXIS_BITS);

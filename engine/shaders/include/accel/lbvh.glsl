@@ -19,8 +19,8 @@ const uint LBVH_MAX_ASCENT = 96u;
 // What the stages tell each other and the host. The host writes the first two before the build: least and greatest integers.
 struct LbvhState {
     // Of twice the centres, as ordered integers.
-    ivec3 centres_lower;
-    ivec3 centres_upper;
+    int centres_lower[3];
+    int centres_upper[3];
     vec3 grid_lower;
     vec3 grid_scale;
     // Split of the root, and most inner nodes on a way from it.
