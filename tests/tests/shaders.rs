@@ -17,6 +17,12 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("layout_probe.comp", "UnsupportedMatrixStride"),
     // A colour of three numbers right behind a position of two: the scalar layout again.
     ("triangle.vert", "MemberOffset"),
+    ("accel/lbvh_grid.comp", "MemberOffset"),
+    ("accel/lbvh_emit.comp", "MemberOffset"),
+    ("accel/lbvh_refit.comp", "MemberOffset"),
+    ("accel/lbvh_refit_triangles.comp", "MemberOffset"),
+    // Vectors of three numbers one behind the other.
+    ("accel/lbvh_boxes.comp", "ArrayStride"),
     // Texel buffers.
     ("twin_texture.comp", "SampledBuffer"),
     ("scene/records.comp", "SampledBuffer"),
@@ -41,6 +47,8 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("transport/path_shadow_media_alpha.comp", "SampledBuffer"),
     // Comparisons of specialization constants.
     ("twin_random.comp", "SpecConstantOp"),
+    ("accel/lbvh_codes.comp", "SpecConstantOp"),
+    ("accel/lbvh_hierarchy.comp", "SpecConstantOp"),
     ("kernels/partition.comp", "SpecConstantOp"),
     ("kernels/partition_subgroup.comp", "SpecConstantOp"),
     ("kernels/permute.comp", "SpecConstantOp"),

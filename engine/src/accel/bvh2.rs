@@ -9,7 +9,7 @@
 //! one leaf, the others are counted; a hit that the triangle test reports is never culled (see [`BOX_SLACK`]), so traversal returns
 //! exactly what trying all triangles in index order returns.
 
-mod build;
+pub(super) mod build;
 mod traverse;
 
 pub use build::Bvh2Settings;
@@ -122,6 +122,8 @@ struct PackedTriangle {
 /// A binary bounding volume hierarchy over triangles.
 #[derive(Debug, Clone)]
 pub struct Bvh2 {
+    /// What built it.
+    name: &'static str,
     nodes: Vec<Bvh2Node>,
     positions: Vec<[Vec3; 3]>,
     indices: Vec<u32>,
@@ -173,7 +175,7 @@ fn pack(nodes: &[Bvh2Node], positions: &[[Vec3; 3]], indices: &[u32]) -> Vec<[u3
 
 impl RayIndex for Bvh2 {
     fn name(&self) -> &'static str {
-        "bvh2"
+        self.name
     }
 
     fn statistics(&self) -> IndexStatistics {

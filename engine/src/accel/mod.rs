@@ -21,9 +21,15 @@
 //! `transport/path_candidates.glsl`, `path_extend.glsl` and `path_shadow.glsl`, where the names of the index's constants stand.
 
 pub mod bvh2;
+pub mod compact_bvh;
+pub mod complete_bvh;
+pub mod lbvh;
+pub mod morton;
 pub mod offset;
+pub mod optimise;
 pub mod sphere;
 pub mod triangle;
+pub mod vvh;
 
 #[cfg(test)]
 mod test_support;

@@ -305,6 +305,136 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     measured(
+        "clerestory index",
+        part(
+            "PM-I-4",
+            "slabs test of boxes",
+            "Kay and Kajiya 1986",
+            "engine/src/accel/complete_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+                "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-I-5",
+            "points in boxes",
+            "Interactive Manycore Photon Mapping, 2011, §3.2.4.2",
+            "engine/src/accel/complete_bvh.rs",
+            &["engine/src/accel/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order"],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-3",
+            "tree by the voxel volume heuristic",
+            "Interactive Manycore Photon Mapping, 2011, §6.1.1",
+            "engine/src/accel/vvh.rs",
+            &["engine/src/accel/lbvh/builders_tests.rs::sweeps_are_valid_and_beat_the_linear_tree"],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-4",
+            "linear hierarchy by split lists",
+            "Lauterbach et al. 2009",
+            "engine/src/accel/lbvh/split_lists.rs",
+            &[
+                "engine/src/accel/lbvh/builders_tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-5",
+            "linear hierarchy by merging",
+            "Interactive Manycore Photon Mapping, 2011, §6.1.2",
+            "engine/src/accel/lbvh/merge.rs",
+            &[
+                "engine/src/accel/lbvh/builders_tests.rs::the_worked_example_of_the_merge_comes_out_step_by_step",
+                "engine/src/accel/lbvh/builders_tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-6",
+            "automatic leaf size of photon maps",
+            "Interactive Manycore Photon Mapping, 2011, §6.1.3",
+            "engine/src/accel/lbvh/leaf_threshold.rs",
+            &["engine/src/accel/lbvh/leaf_threshold.rs::leaf_sizes_follow_the_cover_of_the_scene"],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-7",
+            "complete nodes and sibling pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.4",
+            "engine/src/accel/complete_bvh.rs",
+            &["engine/src/accel/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes"],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-8",
+            "compact sibling pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.1",
+            "engine/src/accel/compact_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes",
+                "engine/src/accel/compact_bvh/tests.rs::loose_boxes_are_refused",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-9",
+            "point queries on compact pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.3",
+            "engine/src/accel/compact_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
+                "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-10",
+            "ray queries on compact pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.2",
+            "engine/src/accel/compact_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+                "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "PM-MAP-11",
+            "linear hierarchy by clusters",
+            "Pantaleoni and Luebke 2010",
+            "engine/src/accel/lbvh/clustered.rs",
+            &[
+                "engine/src/accel/lbvh/builders_tests.rs::sorting_by_clusters_is_the_stable_sort",
+                "engine/src/accel/lbvh/builders_tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+            ],
+        ),
+    ),
+    measured(
         "clerestory agreement --scene cornell-box,cornell-point",
         part(
             "MET-B1",
@@ -727,6 +857,37 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/scene/gltf/tests/features.rs::text_and_binary_containers_give_the_same_scene",
                 "engine/src/scene/gltf/tests/features.rs::material_extensions_are_carried_over",
                 "engine/src/scene/gltf/tests/malformed.rs::every_truncation_is_an_error",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "CL-LBVH",
+            "linear hierarchy as ray index, on the host and on the device, with refitting",
+            "Apetrei 2014; Karras 2012",
+            "engine/src/accel/lbvh/radix.rs",
+            &[
+                "engine/src/accel/lbvh/tests.rs::trees_are_valid_on_hard_boxes",
+                "engine/src/accel/lbvh/tests.rs::the_order_of_climbing_never_shows",
+                "engine/src/accel/lbvh/tests.rs::hits_are_those_of_the_binned_tree",
+                "engine/src/accel/lbvh/tests.rs::refitted_trees_have_the_hits_of_new_ones",
+                "tests/tests/lbvh.rs::device_builds_are_the_twins_on_soups",
+                "tests/tests/lbvh.rs::device_builds_are_the_twins_on_hard_cases",
+                "tests/tests/lbvh.rs::device_refits_are_the_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory index",
+        part(
+            "CL-TREELETS",
+            "restructuring of trees by treelets",
+            "Karras and Aila 2013; Domingues and Pedrini 2015",
+            "engine/src/accel/optimise.rs",
+            &[
+                "engine/src/accel/lbvh/tests.rs::restructured_trees_are_valid_and_cost_no_more",
+                "engine/src/accel/lbvh/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
             ],
         ),
     ),

@@ -2,6 +2,7 @@
 
 use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::lbvh::{self, LbvhSettings};
 use clerestory::accel::triangle::{intersect_triangle, moller_trumbore, ray_shear};
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
 use glam::{DVec3, Vec3};
@@ -21,10 +22,16 @@ pub struct IndexKind {
 }
 
 /// Every ray index of the engine.
-pub const INDEXES: &[IndexKind] = &[IndexKind {
-    name: "bvh2",
-    build: |triangles| Ok(Box::new(Bvh2::build(triangles, &Bvh2Settings::default())?)),
-}];
+pub const INDEXES: &[IndexKind] = &[
+    IndexKind {
+        name: "bvh2",
+        build: |triangles| Ok(Box::new(Bvh2::build(triangles, &Bvh2Settings::default())?)),
+    },
+    IndexKind {
+        name: "lbvh",
+        build: |triangles| Ok(Box::new(lbvh::build(triangles, &LbvhSettings::default())?)),
+    },
+];
 
 /// Rays to trace among triangles.
 #[derive(Debug, Clone)]

@@ -3,6 +3,7 @@
 mod agreement;
 mod bench;
 mod compare;
+mod index;
 mod info;
 mod list;
 mod progress;
@@ -58,6 +59,7 @@ enum Command {
     Info(info::Arguments),
     Compare(compare::Arguments),
     Scenes(scenes::Arguments),
+    Index(index::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
     Report(report::Arguments),
@@ -108,6 +110,7 @@ fn run(program: &Program) -> Outcome<ExitCode> {
         Command::Info(arguments) => info::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Scenes(arguments) => scenes::run(arguments),
+        Command::Index(arguments) => index::run(arguments),
         Command::List(arguments) => list::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
         Command::Report(arguments) => report::run(arguments),

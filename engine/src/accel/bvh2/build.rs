@@ -39,9 +39,9 @@ impl Default for Bvh2Settings {
 
 /// A triangle on its way into the tree.
 #[derive(Debug, Clone, Copy)]
-struct Reference {
-    bounds: Aabb,
-    index: u32,
+pub(in crate::accel) struct Reference {
+    pub(in crate::accel) bounds: Aabb,
+    pub(in crate::accel) index: u32,
 }
 
 impl Reference {
@@ -96,22 +96,18 @@ fn classify(triangle: &[Vec3; 3], index: u32) -> Usable {
         return Usable::Degenerate;
     }
     Usable::Yes(Reference {
-        bounds: triangle.iter().fold(Aabb::EMPTY, |bounds, v| bounds.with_point(*v)),
+        bounds: bounds_of(triangle),
         index,
     })
 }
 
-pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<Bvh2> {
-    check_range("bvh2.leaf_size", settings.leaf_size, 1, MAX_LEAF_SIZE)?;
-    check_range("bvh2.bins", settings.bins, 2, MAX_BINS as u32)?;
-    if triangles.len() > MAX_TRIANGLES {
-        return Err(Error::LimitExceeded {
-            name: "bvh2 triangles".into(),
-            bytes: triangles.len() as u64,
-            limit_name: "accel::bvh2::MAX_TRIANGLES",
-            limit: MAX_TRIANGLES as u64,
-        });
-    }
+/// Whether rays can meet a triangle: in range, and of an area in f64.
+pub(in crate::accel) fn can_be_met(triangle: &[Vec3; 3]) -> bool {
+    matches!(classify(triangle, 0), Usable::Yes(_))
+}
+
+/// The triangles that rays can meet, in order, and how many were left out.
+pub(in crate::accel) fn usable(triangles: &[[Vec3; 3]]) -> (Vec<Reference>, IndexStatistics) {
     let classified: Vec<Usable> = triangles
         .par_iter()
         .enumerate()
@@ -127,7 +123,14 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
         }
     }
     statistics.triangles = references.len() as u64;
+    (references, statistics)
+}
 
+pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<Bvh2> {
+    check_range("bvh2.leaf_size", settings.leaf_size, 1, MAX_LEAF_SIZE)?;
+    check_range("bvh2.bins", settings.bins, 2, MAX_BINS as u32)?;
+    check_count(triangles.len())?;
+    let (mut references, statistics) = usable(triangles);
     let slots = if references.len() >= 2 {
         let mut slots = vec![EMPTY_SLOT; references.len() - 1];
         build_range(
@@ -145,38 +148,64 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
         Vec::new()
     };
 
-    let mut positions: Vec<[Vec3; 3]> = references.iter().map(|r| triangles[r.index as usize]).collect();
-    let mut indices: Vec<u32> = references.iter().map(|r| r.index).collect();
-    let mut nodes = if slots.is_empty() {
+    let positions: Vec<[Vec3; 3]> = references.iter().map(|r| triangles[r.index as usize]).collect();
+    let indices: Vec<u32> = references.iter().map(|r| r.index).collect();
+    Ok(assemble("bvh2", flatten(&slots), positions, indices, statistics))
+}
+
+/// A hierarchy of finished nodes, the root first with its parent word 0, over the triangles that `statistics` has counted. Fewer than two
+/// triangles have no node; one is made.
+pub(in crate::accel) fn assemble(
+    name: &'static str,
+    mut nodes: Vec<Bvh2Node>,
+    mut positions: Vec<[Vec3; 3]>,
+    mut indices: Vec<u32>,
+    mut statistics: IndexStatistics,
+) -> Bvh2 {
+    if nodes.is_empty() {
         // A point triangle, which no ray meets, keeps the buffers and the root's children from being empty.
-        let bounds = references
-            .first()
-            .map_or(Aabb::EMPTY.with_point(Vec3::ZERO), |r| r.bounds);
+        let bounds = positions.first().map_or(Aabb::EMPTY.with_point(Vec3::ZERO), bounds_of);
+        let sentinel = leaf_word(positions.len() as u32, 1);
         positions.push([bounds.lower; 3]);
         indices.push(NO_HIT);
-        let sentinel = leaf_word(references.len() as u32, 1);
-        vec![Bvh2Node {
+        nodes = vec![Bvh2Node {
             bounds: [bounds, Aabb::EMPTY.with_point(bounds.lower)],
             children: [leaf_word(0, 1), sentinel],
             ..Bvh2Node::zeroed()
-        }]
-    } else {
-        flatten(&slots)
-    };
+        }];
+    }
     measure(&nodes, &mut statistics);
     nodes[0].triangles = (size_of_val(nodes.as_slice()) / QUARTER) as u32;
     let packed = pack(&nodes, &positions, &indices);
     statistics.bytes = size_of_val(packed.as_slice()) as u64;
-    Ok(Bvh2 {
+    Bvh2 {
+        name,
         nodes,
         positions,
         indices,
         packed,
         statistics,
+    }
+}
+
+fn bounds_of(triangle: &[Vec3; 3]) -> Aabb {
+    triangle.iter().fold(Aabb::EMPTY, |bounds, v| bounds.with_point(*v))
+}
+
+/// Refuses more triangles than child words can address.
+pub(in crate::accel) fn check_count(triangles: usize) -> Result<()> {
+    if triangles <= MAX_TRIANGLES {
+        return Ok(());
+    }
+    Err(Error::LimitExceeded {
+        name: "bvh2 triangles".into(),
+        bytes: triangles as u64,
+        limit_name: "accel::bvh2::MAX_TRIANGLES",
+        limit: MAX_TRIANGLES as u64,
     })
 }
 
-fn check_range(name: &str, value: u32, least: u32, most: u32) -> Result<()> {
+pub(in crate::accel) fn check_range(name: &str, value: u32, least: u32, most: u32) -> Result<()> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
@@ -187,7 +216,7 @@ fn check_range(name: &str, value: u32, least: u32, most: u32) -> Result<()> {
     })
 }
 
-fn leaf_word(first: u32, count: u32) -> u32 {
+pub(in crate::accel) fn leaf_word(first: u32, count: u32) -> u32 {
     first << COUNT_BITS | count
 }
 
@@ -427,7 +456,11 @@ fn best_split(references: &[Reference], settings: &Bvh2Settings) -> Option<Split
 /// Nodes in depth-first order, left child first, with parent links.
 fn flatten(slots: &[Slot]) -> Vec<Bvh2Node> {
     let mut nodes: Vec<Bvh2Node> = Vec::new();
-    let mut pending = vec![(0u32, 0u32)];
+    let mut pending = if slots.is_empty() {
+        Vec::new()
+    } else {
+        vec![(0u32, 0u32)]
+    };
     while let Some((slot, parent)) = pending.pop() {
         let index = nodes.len() as u32;
         if index > 0 {
@@ -452,19 +485,23 @@ fn flatten(slots: &[Slot]) -> Vec<Bvh2Node> {
 /// Counts nodes, leaves, depth and the SAH cost.
 fn measure(nodes: &[Bvh2Node], statistics: &mut IndexStatistics) {
     let root = nodes[0].bounds[0].union(nodes[0].bounds[1]).half_area();
-    let mut depths = vec![1u32; nodes.len()];
     let mut cost = root;
-    for (i, node) in nodes.iter().enumerate() {
-        if i > 0 {
-            depths[i] = depths[(node.parent >> 1) as usize] + 1;
-        }
+    let mut max_depth = 0;
+    let mut pending = vec![(0u32, 1u32)];
+    while let Some((node, depth)) = pending.pop() {
+        let node = &nodes[node as usize];
+        max_depth = depth.max(max_depth);
         for (bounds, word) in node.bounds.iter().zip(node.children) {
             let triangles = word & ((1 << COUNT_BITS) - 1);
             cost += bounds.half_area() * f64::from(triangles.max(1));
-            statistics.leaves += u64::from(triangles > 0 && (word >> COUNT_BITS) < statistics.triangles as u32);
+            if triangles == 0 {
+                pending.push((word >> COUNT_BITS, depth + 1));
+            } else {
+                statistics.leaves += u64::from((word >> COUNT_BITS) < statistics.triangles as u32);
+            }
         }
     }
     statistics.nodes = nodes.len() as u64;
-    statistics.max_depth = depths.into_iter().max().unwrap_or(0);
+    statistics.max_depth = max_depth;
     statistics.sah_cost = if root > 0.0 { cost / root } else { 0.0 };
 }

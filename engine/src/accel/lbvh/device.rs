@@ -1,0 +1,454 @@
+//! The linear hierarchy built by the device: bounds, codes, sort, tree, ranks and layout, each a pass of its own with its time.
+//!
+//! Sources: see [`radix`](super::radix) for the tree, [`RadixSort`] for the sort. The stages are `shaders/accel/lbvh_*.comp`.
+//!
+//! Guarantees: the same bytes as [`build`](super::build) of quality [`Fast`](super::BuildQuality::Fast), on every device; no invocation
+//! ever waits for another.
+
+use super::radix::next_skipped;
+use super::ray_index::{LbvhSettings, check_moved, moved_corners};
+use crate::Result;
+use crate::accel::RayIndex;
+use crate::accel::bvh2::build::{assemble, check_count, usable};
+use crate::accel::bvh2::{Bvh2, Bvh2Node, MAX_DEPTH};
+use crate::accel::morton::MORTON_30_AXIS_BITS;
+use crate::gpu::ash::vk;
+use crate::gpu::shaders::accel::{
+    lbvh_boxes, lbvh_codes, lbvh_emit, lbvh_grid, lbvh_hierarchy, lbvh_rank_scan, lbvh_rank_sums, lbvh_ranks,
+    lbvh_refit, lbvh_refit_triangles,
+};
+use crate::gpu::shaders::constants::{LBVH_GROUP_SIZE, LBVH_NODE_WORDS, LBVH_RANK_BLOCKS};
+use crate::gpu::shaders::types::LbvhState;
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings,
+};
+use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
+use glam::Vec3;
+
+/// Quarters of a node and of a triangle in the finished index.
+const NODE_QUARTERS: u64 = 4;
+const TRIANGLE_QUARTERS: u64 = 3;
+
+/// Nodes of an index, corners and indices of its triangles.
+type Parts = (Vec<Bvh2Node>, Vec<[Vec3; 3]>, Vec<u32>);
+
+/// A finished build.
+#[derive(Debug)]
+pub struct LbvhBuild {
+    /// The index, read back.
+    pub index: Bvh2,
+    /// Times of the passes, those of upload and reading back left out.
+    pub timings: Timings,
+    /// Where it is on the device; `None` for fewer than two triangles, which are not worth a build there.
+    pub buffers: Option<LbvhBuffers>,
+}
+
+/// Builds linear hierarchies of one kind on one device.
+#[derive(Debug)]
+pub struct LbvhBuilder {
+    gpu: Gpu,
+    settings: LbvhSettings,
+    sort: RadixSort,
+    boxes: ComputePipeline<lbvh_boxes::Kernel>,
+    grid: ComputePipeline<lbvh_grid::Kernel>,
+    codes: ComputePipeline<lbvh_codes::Kernel>,
+    hierarchy: ComputePipeline<lbvh_hierarchy::Kernel>,
+    rank_sums: ComputePipeline<lbvh_rank_sums::Kernel>,
+    rank_scan: ComputePipeline<lbvh_rank_scan::Kernel>,
+    ranks: ComputePipeline<lbvh_ranks::Kernel>,
+    emit: ComputePipeline<lbvh_emit::Kernel>,
+    refit_triangles: ComputePipeline<lbvh_refit_triangles::Kernel>,
+    refit: ComputePipeline<lbvh_refit::Kernel>,
+}
+
+/// Memory of a build: input, what the stages hand on, and the finished index.
+#[derive(Debug)]
+pub struct LbvhBuffers {
+    count: u32,
+    /// Corners of the triangles, three vectors each, metres; every one can be met by rays.
+    pub corners: Buffer,
+    /// How hits name each triangle.
+    pub indices: Buffer,
+    /// The finished index: nodes, then triangles, as [`RayIndex::texels`](crate::accel::RayIndex::texels) has them.
+    pub quarters: TexelView,
+    boxes: Buffer,
+    state: Buffer,
+    keys: [TexelView; 2],
+    order: [TexelView; 2],
+    sort_scratch: Buffer,
+    nodes: Buffer,
+    mails: Buffer,
+    arrivals: Buffer,
+    kept: Buffer,
+    blocks: Buffer,
+    ranks: Buffer,
+}
+
+impl LbvhBuffers {
+    /// Bytes of everything.
+    pub fn bytes(&self) -> u64 {
+        let texels = [
+            &self.quarters,
+            &self.keys[0],
+            &self.keys[1],
+            &self.order[0],
+            &self.order[1],
+        ];
+        let buffers = [
+            &self.corners,
+            &self.indices,
+            &self.boxes,
+            &self.state,
+            &self.sort_scratch,
+            &self.nodes,
+            &self.mails,
+            &self.arrivals,
+            &self.kept,
+            &self.blocks,
+            &self.ranks,
+        ];
+        let texels = texels.iter().map(|t| t.buffer().bytes());
+        texels.chain(buffers.iter().map(|b| b.bytes())).sum()
+    }
+}
+
+impl LbvhBuilder {
+    /// Makes the pipelines. Of the settings those of restructuring are not used.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for settings out of range, and as [`Gpu::compute_pipeline`].
+    pub fn new(gpu: &Gpu, settings: &LbvhSettings) -> Result<Self> {
+        settings.check()?;
+        let lbvh_axis_bits = settings.axis_bits();
+        let key = if lbvh_axis_bits == MORTON_30_AXIS_BITS {
+            KeyWidth::Bits32
+        } else {
+            KeyWidth::Bits64
+        };
+        let lbvh_fences = gpu.caps().kind != DeviceKind::Cpu;
+        let mut options = RadixSortOptions::new(key, true);
+        options.bits = 0..settings.code_bits;
+        Ok(Self {
+            gpu: gpu.clone(),
+            settings: *settings,
+            sort: RadixSort::new(gpu, options)?,
+            boxes: gpu.compute_pipeline(&Default::default())?,
+            grid: gpu.compute_pipeline(&lbvh_grid::Spec { lbvh_axis_bits })?,
+            codes: gpu.compute_pipeline(&lbvh_codes::Spec { lbvh_axis_bits })?,
+            hierarchy: gpu.compute_pipeline(&lbvh_hierarchy::Spec {
+                lbvh_code_words: key.words(),
+                lbvh_fences,
+            })?,
+            rank_sums: gpu.compute_pipeline(&Default::default())?,
+            rank_scan: gpu.compute_pipeline(&Default::default())?,
+            ranks: gpu.compute_pipeline(&Default::default())?,
+            emit: gpu.compute_pipeline(&Default::default())?,
+            refit_triangles: gpu.compute_pipeline(&Default::default())?,
+            refit: gpu.compute_pipeline(&lbvh_refit::Spec { lbvh_fences })?,
+        })
+    }
+
+    /// Memory for `count` triangles, at least two.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where a buffer is larger than the device binds,
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn buffers(&self, count: u32) -> Result<LbvhBuffers> {
+        let (n, inner) = (u64::from(count), u64::from(count.saturating_sub(1)));
+        let buffer = |name, bytes: u64| {
+            self.gpu
+                .buffer(&BufferDesc::storage(name, bytes.max(4), Category::Index))
+        };
+        let quarters = NODE_QUARTERS * inner + TRIANGLE_QUARTERS * n;
+        Ok(LbvhBuffers {
+            count,
+            corners: buffer("lbvh corners", 36 * n)?,
+            indices: buffer("lbvh indices", 4 * n)?,
+            quarters: self
+                .gpu
+                .storage_texels("lbvh", Category::Index, vk::Format::R32G32B32A32_UINT, quarters)?,
+            boxes: buffer("lbvh boxes", 24 * n)?,
+            state: buffer("lbvh state", size_of::<LbvhState>() as u64)?,
+            keys: [
+                self.sort.keys("lbvh codes", count)?,
+                self.sort.keys("lbvh sorted codes", count)?,
+            ],
+            order: [
+                self.sort.values("lbvh order", count)?,
+                self.sort.values("lbvh sorted order", count)?,
+            ],
+            sort_scratch: buffer("lbvh sort", self.sort.scratch_bytes(count))?,
+            nodes: buffer("lbvh nodes", 4 * u64::from(LBVH_NODE_WORDS) * inner)?,
+            mails: buffer("lbvh mails", 24 * inner)?,
+            arrivals: buffer("lbvh arrivals", 4 * inner)?,
+            kept: buffer("lbvh kept", 4 * inner)?,
+            blocks: buffer("lbvh blocks", 4 * u64::from(LBVH_RANK_BLOCKS))?,
+            ranks: buffer("lbvh ranks", 4 * inner)?,
+        })
+    }
+
+    /// Records a build of the triangles in `corners`, which must be visible to compute shaders.
+    ///
+    /// Passes: `lbvh: boxes`, `lbvh: codes`, `lbvh: sort`, `lbvh: hierarchy`, `lbvh: ranks`, `lbvh: emit`. After it `quarters` has been
+    /// written by compute shaders. The tree may be deeper than rays can go: [`LbvhBuilder::overflow`] says so once it has run.
+    ///
+    /// # Errors
+    /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
+    pub fn record(&self, recorder: &mut Recorder, buffers: &LbvhBuffers) -> Result<()> {
+        let count = buffers.count;
+        recorder.pass("lbvh: boxes", |pass| {
+            let state = LbvhState {
+                centres_lower: [i32::MAX; 3],
+                centres_upper: [i32::MIN; 3],
+                ..LbvhState::default()
+            };
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
+            pass.update(buffers.state.view(), &[state])?;
+            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+            let set = lbvh_boxes::Set0 {
+                lbvh_corners: buffers.corners.view(),
+                lbvh_boxes: buffers.boxes.view(),
+                lbvh_state_block: buffers.state.view(),
+            };
+            let groups = [self.boxes.groups_for(count), 1, 1];
+            pass.dispatch(&self.boxes, &[&set], &lbvh_boxes::Push { count }, groups)?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            Ok(())
+        })?;
+        recorder.pass("lbvh: codes", |pass| {
+            let set = lbvh_grid::Set0 {
+                lbvh_state_block: buffers.state.view(),
+            };
+            pass.dispatch(&self.grid, &[&set], &(), [1, 1, 1])?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            let set = lbvh_codes::Set0 {
+                lbvh_boxes: buffers.boxes.view(),
+                lbvh_state_block: buffers.state.view(),
+                lbvh_codes: buffers.keys[0].buffer().view(),
+                lbvh_order: buffers.order[0].buffer().view(),
+            };
+            let groups = [self.codes.groups_for(count), 1, 1];
+            pass.dispatch(&self.codes, &[&set], &lbvh_codes::Push { count }, groups)?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            Ok(())
+        })?;
+        recorder.pass("lbvh: sort", |pass| {
+            let sides = SortBuffers {
+                keys: [&buffers.keys[0], &buffers.keys[1]],
+                values: Some([&buffers.order[0], &buffers.order[1]]),
+            };
+            self.sort
+                .record(pass, &sides, Count::Host(count), &buffers.sort_scratch)?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
+            Ok(())
+        })?;
+        self.record_tree(recorder, buffers, 0)
+    }
+
+    /// Records the stages after the sort, without the lowest `skipped` bits of the codes.
+    fn record_tree(&self, recorder: &mut Recorder, buffers: &LbvhBuffers, skipped: u32) -> Result<()> {
+        let count = buffers.count;
+        let side = self.sort.side(count);
+        recorder.pass("lbvh: hierarchy", |pass| {
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
+            pass.fill(buffers.arrivals.view(), 0)?;
+            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+            let set = lbvh_hierarchy::Set0 {
+                lbvh_boxes: buffers.boxes.view(),
+                lbvh_codes: buffers.keys[side].buffer().view(),
+                lbvh_order: buffers.order[side].buffer().view(),
+                lbvh_nodes: buffers.nodes.view(),
+                lbvh_mails: buffers.mails.view(),
+                lbvh_arrivals: buffers.arrivals.view(),
+                lbvh_kept: buffers.kept.view(),
+                lbvh_state_block: buffers.state.view(),
+            };
+            let push = lbvh_hierarchy::Push {
+                count,
+                skipped,
+                leaf_size: self.settings.leaf_size,
+            };
+            pass.dispatch(
+                &self.hierarchy,
+                &[&set],
+                &push,
+                [self.hierarchy.groups_for(count), 1, 1],
+            )?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            Ok(())
+        })?;
+        recorder.pass("lbvh: ranks", |pass| {
+            let (kept, blocks) = (buffers.kept.view(), buffers.blocks.view());
+            let groups = [LBVH_RANK_BLOCKS / LBVH_GROUP_SIZE, 1, 1];
+            let nodes = count - 1;
+            let set = lbvh_rank_sums::Set0 {
+                lbvh_kept: kept,
+                lbvh_blocks: blocks,
+            };
+            pass.dispatch(&self.rank_sums, &[&set], &lbvh_rank_sums::Push { count: nodes }, groups)?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            let set = lbvh_rank_scan::Set0 { lbvh_blocks: blocks };
+            pass.dispatch(&self.rank_scan, &[&set], &(), [1, 1, 1])?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            let set = lbvh_ranks::Set0 {
+                lbvh_kept: kept,
+                lbvh_blocks: blocks,
+                lbvh_ranks: buffers.ranks.view(),
+            };
+            pass.dispatch(&self.ranks, &[&set], &lbvh_ranks::Push { count: nodes }, groups)?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            Ok(())
+        })?;
+        recorder.pass("lbvh: emit", |pass| {
+            let set = lbvh_emit::Set0 {
+                lbvh_nodes: buffers.nodes.view(),
+                lbvh_kept: buffers.kept.view(),
+                lbvh_ranks: buffers.ranks.view(),
+                lbvh_order: buffers.order[side].buffer().view(),
+                lbvh_corners: buffers.corners.view(),
+                lbvh_indices: buffers.indices.view(),
+                lbvh_quarters: buffers.quarters.buffer().view(),
+                lbvh_state_block: buffers.state.view(),
+            };
+            let groups = [self.emit.groups_for(count), 1, 1];
+            pass.dispatch(&self.emit, &[&set], &lbvh_emit::Push { count }, groups)?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER));
+            Ok(())
+        })
+    }
+
+    /// Records a refit to the triangles that are now in `corners`, in the order of the build: passes `lbvh: refit triangles` and
+    /// `lbvh: refit boxes`. The tree stays what it was, so it is best where little has moved.
+    ///
+    /// # Errors
+    /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
+    pub fn record_refit(&self, recorder: &mut Recorder, buffers: &LbvhBuffers) -> Result<()> {
+        let count = buffers.count;
+        let order = &buffers.order[self.sort.side(count)];
+        let words = buffers.quarters.buffer().view();
+        recorder.pass("lbvh: refit triangles", |pass| {
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
+            pass.fill(buffers.arrivals.view(), 0)?;
+            let set = lbvh_refit_triangles::Set0 {
+                lbvh_order: order.buffer().view(),
+                lbvh_corners: buffers.corners.view(),
+                lbvh_words: words,
+                lbvh_state_block: buffers.state.view(),
+            };
+            let groups = [self.refit_triangles.groups_for(count), 1, 1];
+            pass.dispatch(
+                &self.refit_triangles,
+                &[&set],
+                &lbvh_refit_triangles::Push { count },
+                groups,
+            )?;
+            pass.memory_barrier(Access::COMPUTE.union(Access::TRANSFER_WRITE), Access::COMPUTE);
+            Ok(())
+        })?;
+        recorder.pass("lbvh: refit boxes", |pass| {
+            let set = lbvh_refit::Set0 {
+                lbvh_words: words,
+                lbvh_arrivals: buffers.arrivals.view(),
+                lbvh_state_block: buffers.state.view(),
+            };
+            pass.dispatch(
+                &self.refit,
+                &[&set],
+                &(),
+                [self.refit.groups_for(2 * (count - 1)), 1, 1],
+            )?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER));
+            Ok(())
+        })
+    }
+
+    /// After a build has run: by how many levels its tree is deeper than rays can go, 0 for none.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn overflow(&self, buffers: &LbvhBuffers) -> Result<u32> {
+        Ok(self.state(buffers)?.height.saturating_sub(MAX_DEPTH))
+    }
+
+    fn state(&self, buffers: &LbvhBuffers) -> Result<LbvhState> {
+        let state = self.gpu.read::<LbvhState>(buffers.state.view(), 1)?;
+        Ok(state.first().copied().unwrap_or_default())
+    }
+
+    /// Builds over `triangles` and reads the index back; hits name triangles by their place in it. The host leaves out what rays cannot
+    /// meet. Also the passes' times; a tree that was too deep is made again with fewer bits, in passes of the same names.
+    ///
+    /// # Errors
+    /// As [`build`](super::build), [`LbvhBuilder::buffers`], and those of a submission.
+    pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<LbvhBuild> {
+        check_count(triangles.len())?;
+        let (references, statistics) = usable(triangles);
+        let indices: Vec<u32> = references.iter().map(|r| r.index).collect();
+        let corners: Vec<[Vec3; 3]> = indices.iter().map(|i| triangles[*i as usize]).collect();
+        if corners.len() < 2 {
+            return Ok(LbvhBuild {
+                index: assemble("lbvh", Vec::new(), corners, indices, statistics),
+                timings: Timings::default(),
+                buffers: None,
+            });
+        }
+        let buffers = self.buffers(corners.len() as u32)?;
+        self.gpu.upload(&buffers.corners, 0, &corners)?;
+        self.gpu.upload(&buffers.indices, 0, &indices)?;
+        let mut recorder = self.gpu.recorder("lbvh")?;
+        self.record(&mut recorder, &buffers)?;
+        let mut timings = recorder.submit()?.wait()?;
+        let mut skipped = 0;
+        let mut state = self.state(&buffers)?;
+        while state.height > MAX_DEPTH && skipped < self.settings.code_bits {
+            skipped = next_skipped(skipped, state.height, MAX_DEPTH, self.settings.code_bits);
+            let mut recorder = self.gpu.recorder("lbvh")?;
+            self.record_tree(&mut recorder, &buffers, skipped)?;
+            timings.passes.extend(recorder.submit()?.wait()?.passes);
+            state = self.state(&buffers)?;
+        }
+        let (nodes, positions, indices) = self.read(&buffers, state.nodes)?;
+        Ok(LbvhBuild {
+            index: assemble("lbvh", nodes, positions, indices, statistics),
+            timings,
+            buffers: Some(buffers),
+        })
+    }
+
+    /// Refits a build to moved triangles, all of those it was made of, and reads it back. Those that were left out stay so, and those that
+    /// have lost their area shrink to points.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for another number of triangles or for one that has moved out of range, and those of a
+    /// submission.
+    pub fn refit(&self, build: &LbvhBuild, triangles: &[[Vec3; 3]]) -> Result<(Bvh2, Timings)> {
+        let Some(buffers) = &build.buffers else {
+            return Ok((super::refit(&build.index, triangles)?, Timings::default()));
+        };
+        check_moved(&build.index, triangles)?;
+        let mut indices = build.index.indices().to_vec();
+        indices.sort_unstable();
+        let corners = moved_corners(&indices, triangles);
+        self.gpu.upload(&buffers.corners, 0, &corners)?;
+        let mut recorder = self.gpu.recorder("lbvh refit")?;
+        self.record_refit(&mut recorder, buffers)?;
+        let timings = recorder.submit()?.wait()?;
+        let (nodes, positions, indices) = self.read(buffers, build.index.nodes().len() as u32)?;
+        let statistics = build.index.statistics();
+        Ok((assemble("lbvh", nodes, positions, indices, statistics), timings))
+    }
+
+    /// The finished index: nodes, corners and indices of triangles.
+    fn read(&self, buffers: &LbvhBuffers, nodes: u32) -> Result<Parts> {
+        let node_quarters = (NODE_QUARTERS * u64::from(nodes)) as usize;
+        let quarters = node_quarters + TRIANGLE_QUARTERS as usize * buffers.count as usize;
+        let words: Vec<[u32; 4]> = self.gpu.read(buffers.quarters.buffer().view(), quarters)?;
+        let mut finished: Vec<Bvh2Node> = bytemuck::cast_slice(&words[..node_quarters]).to_vec();
+        finished.iter_mut().for_each(|node| node.triangles = 0);
+        let triangles: &[[u32; 12]] = bytemuck::cast_slice(&words[node_quarters..]);
+        let corner = |t: &[u32; 12], i: usize| Vec3::from_array([0, 1, 2].map(|axis| f32::from_bits(t[3 * i + axis])));
+        let positions = triangles.iter().map(|t| [0, 1, 2].map(|i| corner(t, i))).collect();
+        let indices = triangles.iter().map(|t| t[9]).collect();
+        Ok((finished, positions, indices))
+    }
+}

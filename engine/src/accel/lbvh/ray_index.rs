@@ -1,0 +1,232 @@
+//! The linear hierarchy as a ray index: over triangles, in the node layout that the path tracer traverses.
+
+use super::radix::{LeafRule, SortedCodes, hierarchy};
+use super::tree::{BoxTree, Child};
+use crate::Result;
+use crate::accel::bvh2::build::{assemble, can_be_met, check_count, check_range, leaf_word, usable};
+use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE};
+use crate::accel::morton::{MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS};
+use crate::accel::optimise::{MAX_TREELET, Restructuring, restructure};
+use crate::accel::{MAX_COORDINATE, RayIndex};
+use bytemuck::Zeroable;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Bits of a child word that hold the number of triangles.
+const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
+
+/// Whether to spend time on the tree after it stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BuildQuality {
+    /// The tree that the codes spell.
+    Fast,
+    /// Restructured by treelets: see [`optimise`](crate::accel::optimise).
+    #[default]
+    High,
+}
+
+/// Settings of the build.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LbvhSettings {
+    /// Bits of a Morton code: 30 or 63. Default 30.
+    pub code_bits: u32,
+    /// Most triangles in a leaf, 1..=8. Default 4.
+    pub leaf_size: u32,
+    /// Default high.
+    pub quality: BuildQuality,
+    /// Leaves of a treelet, 3..=16; high quality only. Default 9.
+    pub treelet: u32,
+    /// Passes of restructuring, 0..=16; high quality only. Default 3.
+    pub rounds: u32,
+}
+
+impl Default for LbvhSettings {
+    fn default() -> Self {
+        Self {
+            code_bits: 3 * MORTON_30_AXIS_BITS,
+            leaf_size: 4,
+            quality: BuildQuality::High,
+            treelet: 9,
+            rounds: 3,
+        }
+    }
+}
+
+impl LbvhSettings {
+    /// Bits an axis.
+    pub(crate) fn axis_bits(&self) -> u32 {
+        self.code_bits / 3
+    }
+
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for what is out of range.
+    pub(crate) fn check(&self) -> Result<()> {
+        if ![MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS].contains(&self.axis_bits()) || !self.code_bits.is_multiple_of(3)
+        {
+            return Err(crate::Error::setting(
+                "lbvh.code_bits",
+                self.code_bits,
+                "is neither 30 nor 63",
+            ));
+        }
+        check_range("lbvh.leaf_size", self.leaf_size, 1, MAX_LEAF_SIZE)?;
+        check_range("lbvh.treelet", self.treelet, 3, MAX_TREELET as u32)?;
+        check_range("lbvh.rounds", self.rounds, 0, 16)
+    }
+}
+
+/// The tree over boxes with at least two of them, as [`build`] makes it for triangles; boxes without negative zeros.
+pub fn hierarchy_of(boxes: &[Aabb], settings: &LbvhSettings) -> BoxTree {
+    let sorted = SortedCodes::of_boxes(boxes, settings.axis_bits());
+    let rule = LeafRule::Area(settings.leaf_size);
+    if settings.quality == BuildQuality::Fast {
+        return hierarchy(boxes, &sorted, rule, MAX_DEPTH);
+    }
+    let tree = hierarchy(boxes, &sorted, LeafRule::Area(1), MAX_DEPTH);
+    let restructuring = Restructuring {
+        treelet: settings.treelet as usize,
+        rounds: settings.rounds,
+        leaves: rule,
+        max_depth: MAX_DEPTH,
+    };
+    restructure(&tree, boxes, &restructuring)
+}
+
+/// Builds over `triangles`; hits name triangles by their place in it. Deterministic whatever the number of threads. The result reports
+/// itself as `lbvh`.
+///
+/// # Errors
+/// [`Error::Setting`](crate::Error::Setting) for settings out of range, [`Error::LimitExceeded`](crate::Error::LimitExceeded) for more than
+/// [`MAX_TRIANGLES`](crate::accel::bvh2::MAX_TRIANGLES).
+pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
+    settings.check()?;
+    check_count(triangles.len())?;
+    let (references, statistics) = usable(triangles);
+    // Adding zero makes both zeros one, whose order devices need not keep.
+    let boxes: Vec<Aabb> = references
+        .iter()
+        .map(|r| Aabb {
+            lower: r.bounds.lower + Vec3::ZERO,
+            upper: r.bounds.upper + Vec3::ZERO,
+        })
+        .collect();
+    let (order, nodes) = if boxes.len() < 2 {
+        ((0..boxes.len() as u32).collect(), Vec::new())
+    } else {
+        let tree = hierarchy_of(&boxes, settings);
+        let nodes = nodes_of(&tree);
+        (tree.order, nodes)
+    };
+    let indices: Vec<u32> = order.iter().map(|place| references[*place as usize].index).collect();
+    let positions = indices.iter().map(|index| triangles[*index as usize]).collect();
+    Ok(assemble("lbvh", nodes, positions, indices, statistics))
+}
+
+/// Refits an index to its triangles where they are now: the tree stays what it was, boxes and corners are new. Triangles that were left
+/// out stay so, and those that have lost their area shrink to points. Best where little has moved, since boxes grow where neighbours part.
+///
+/// # Errors
+/// [`Error::Setting`](crate::Error::Setting) for another number of triangles, or for one that has moved out of range.
+pub fn refit(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
+    check_moved(index, triangles)?;
+    let statistics = index.statistics();
+    let count = statistics.triangles as usize;
+    let indices = index.indices()[..count].to_vec();
+    let positions = moved_corners(&indices, triangles);
+    let mut nodes = if count < 2 { Vec::new() } else { index.nodes().to_vec() };
+    let mut order = Vec::with_capacity(nodes.len());
+    let mut pending: Vec<usize> = (0..nodes.len().min(1)).collect();
+    while let Some(node) = pending.pop() {
+        order.push(node);
+        let inner = nodes[node].children.into_iter().filter(|word| word & COUNT_MASK == 0);
+        pending.extend(inner.map(|word| (word >> COUNT_BITS) as usize));
+    }
+    for node in order.into_iter().rev() {
+        nodes[node].triangles = 0;
+        for side in 0..2 {
+            let word = nodes[node].children[side];
+            let place = (word >> COUNT_BITS) as usize;
+            nodes[node].bounds[side] = match word & COUNT_MASK {
+                0 => nodes[place].bounds[0].union(nodes[place].bounds[1]),
+                count => {
+                    let corners = positions[place..place + count as usize].iter().flatten();
+                    corners.fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner + Vec3::ZERO))
+                }
+            };
+        }
+    }
+    let excluded = crate::accel::IndexStatistics {
+        triangles: statistics.triangles,
+        excluded_range: statistics.excluded_range,
+        excluded_degenerate: statistics.excluded_degenerate,
+        ..Default::default()
+    };
+    Ok(assemble(index.name(), nodes, positions, indices, excluded))
+}
+
+/// Refuses triangles that an index cannot be refitted to.
+pub(super) fn check_moved(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<()> {
+    let statistics = index.statistics();
+    let count = statistics.triangles + statistics.excluded_range + statistics.excluded_degenerate;
+    if triangles.len() as u64 != count {
+        let cause = format!("is not the {count} that the index was built of");
+        return Err(crate::Error::setting("triangles", triangles.len(), cause));
+    }
+    let indices = &index.indices()[..statistics.triangles as usize];
+    let outside = |i: &&u32| {
+        triangles[**i as usize]
+            .iter()
+            .any(|v| !v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
+    };
+    match indices.iter().find(outside) {
+        None => Ok(()),
+        Some(i) => {
+            let corners = format!("{:?}", triangles[*i as usize]);
+            Err(crate::Error::setting(
+                format!("triangles[{i}]"),
+                corners,
+                "has moved out of range",
+            ))
+        }
+    }
+}
+
+/// Corners of some triangles; those without an area become points, which no ray meets.
+pub(super) fn moved_corners(indices: &[u32], triangles: &[[Vec3; 3]]) -> Vec<[Vec3; 3]> {
+    let corners = |i: &u32| {
+        let triangle = triangles[*i as usize];
+        if can_be_met(&triangle) {
+            triangle
+        } else {
+            [triangle[0]; 3]
+        }
+    };
+    indices.par_iter().map(corners).collect()
+}
+
+/// The nodes in the kernels' layout, at the places they have; the root is the first.
+pub(crate) fn nodes_of(tree: &BoxTree) -> Vec<Bvh2Node> {
+    let word = |child| match child {
+        Child::Leaf { first, count } => leaf_word(first, count),
+        Child::Inner(node) => node << COUNT_BITS,
+    };
+    let mut nodes: Vec<Bvh2Node> = tree
+        .nodes
+        .iter()
+        .map(|pair| Bvh2Node {
+            bounds: pair.bounds,
+            children: pair.children.map(word),
+            ..Bvh2Node::zeroed()
+        })
+        .collect();
+    for (i, pair) in tree.nodes.iter().enumerate() {
+        for (side, child) in pair.children.into_iter().enumerate() {
+            if let Child::Inner(child) = child {
+                nodes[child as usize].parent = (i as u32) << 1 | side as u32;
+            }
+        }
+    }
+    nodes
+}

@@ -1,0 +1,238 @@
+//! The device's linear hierarchies and compact traversals against their Rust twins, bit for bit.
+
+use clerestory::accel::bvh2::Aabb;
+use clerestory::accel::compact_bvh::CompactBvh;
+use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
+use clerestory::accel::lbvh::radix::{LeafRule, SortedCodes, hierarchy};
+use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, build, refit};
+use clerestory::accel::{Ray, RayIndex};
+use clerestory::gpu::shaders::accel::{compact_points, compact_rays};
+use clerestory::gpu::shaders::types::{CompactRoot, CompactWork};
+use clerestory::gpu::{Category, DeviceKind, Gpu, transfer_to_compute};
+use clerestory_tests::random::Random;
+use clerestory_tests::with_gpu;
+use glam::Vec3;
+
+fn fast(code_bits: u32, leaf_size: u32) -> LbvhSettings {
+    LbvhSettings {
+        code_bits,
+        leaf_size,
+        quality: BuildQuality::Fast,
+        ..LbvhSettings::default()
+    }
+}
+
+fn soup(random: &mut Random, count: usize, size: f32) -> Vec<[Vec3; 3]> {
+    let triangle = |random: &mut Random| {
+        let centre = 10.0 * random.vector();
+        [0; 3].map(|_| centre + size * random.vector())
+    };
+    (0..count).map(|_| triangle(random)).collect()
+}
+
+/// Builds on the device are those of the host, to the bit.
+fn check(what: &str, builder: &LbvhBuilder, settings: &LbvhSettings, triangles: &[[Vec3; 3]]) {
+    let device = builder.build(triangles).unwrap();
+    let host = build(triangles, settings).unwrap();
+    assert_eq!(device.index.statistics(), host.statistics(), "{what}, {settings:?}");
+    assert!(device.index.texels() == host.texels(), "{what}, {settings:?}");
+}
+
+#[test]
+fn device_builds_are_the_twins_on_soups() {
+    with_gpu(|gpu| {
+        let mut random = Random(71);
+        for settings in [fast(30, 4), fast(63, 8), fast(30, 1)] {
+            let builder = LbvhBuilder::new(gpu, &settings).unwrap();
+            for count in [0, 1, 2, 3, 63, 64, 65, 1000, 30_000] {
+                let mut triangles = soup(&mut random, count, 0.3);
+                if count > 100 {
+                    triangles[7][1].z = f32::NAN;
+                    triangles[8][1] = triangles[8][0];
+                    triangles[9].iter_mut().for_each(|v| v.x = -0.0);
+                    triangles[11] = triangles[10];
+                }
+                check(&format!("soup of {count}"), &builder, &settings, &triangles);
+            }
+        }
+    });
+}
+
+#[test]
+fn device_builds_are_the_twins_on_hard_cases() {
+    with_gpu(|gpu| {
+        let builders = [fast(30, 4), fast(63, 4)].map(|s| (LbvhBuilder::new(gpu, &s).unwrap(), s));
+        let check = |what: &str, triangles: &[[Vec3; 3]]| {
+            for (builder, settings) in &builders {
+                check(what, builder, settings, triangles);
+            }
+        };
+        let cases = clerestory_hard_cases::all();
+        for set in cases.iter().filter_map(|case| case.rays).flat_map(|rays| rays()) {
+            check(&set.what, &set.triangles);
+        }
+        let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        check("identical", &vec![one; 20_000]);
+        // A tower of ever smaller triangles over many equal ones: too deep for all bits of the codes.
+        let mut ladder = vec![one.map(|v| v * 1e-6); 10_000];
+        ladder.extend((0..30).map(|i| one.map(|v| (v * 0.1 + 1.0) * 0.5f32.powi(i))));
+        check("ladder", &ladder);
+    });
+}
+
+#[test]
+fn every_stage_is_named_and_timed() {
+    with_gpu(|gpu| {
+        let builder = LbvhBuilder::new(gpu, &fast(30, 4)).unwrap();
+        let triangles = soup(&mut Random(72), 500, 0.3);
+        let build = builder.build(&triangles).unwrap();
+        let stages = ["boxes", "codes", "sort", "hierarchy", "ranks", "emit"];
+        assert_eq!(build.timings.passes.len(), stages.len());
+        for stage in stages {
+            assert_eq!(build.timings.count(&format!("lbvh: {stage}")), 1, "{stage}");
+        }
+        assert!(build.buffers.unwrap().bytes() > 500 * 100);
+    });
+}
+
+#[test]
+fn device_refits_are_the_twins() {
+    with_gpu(|gpu| {
+        let mut random = Random(73);
+        for (settings, count) in [(fast(30, 4), 5000), (fast(30, 1), 2), (fast(30, 4), 1)] {
+            let builder = LbvhBuilder::new(gpu, &settings).unwrap();
+            let mut triangles = soup(&mut random, count, 0.3);
+            let before = builder.build(&triangles).unwrap();
+            for triangle in &mut triangles {
+                let shift = random.vector() * 0.2;
+                triangle.iter_mut().for_each(|v| *v += shift);
+            }
+            if count > 100 {
+                triangles[40][1] = triangles[40][0];
+            }
+            let (device, _) = builder.refit(&before, &triangles).unwrap();
+            let host = refit(&before.index, &triangles).unwrap();
+            assert!(device.texels() == host.texels(), "{count}");
+            assert!(builder.refit(&before, &triangles[1..]).is_err());
+        }
+    });
+}
+
+/// Order of visits and work of a query, as the kernels report it.
+fn work(visit: impl FnOnce(&mut QueryCounters, &mut dyn FnMut(u32))) -> [u32; 4] {
+    let mut counters = QueryCounters::default();
+    let mut visits = 0u32;
+    visit(&mut counters, &mut |leaf| {
+        visits = (visits ^ leaf).wrapping_mul(0x9E37_79B1)
+    });
+    [
+        visits,
+        counters.leaves as u32,
+        counters.nodes as u32,
+        counters.pushes as u32,
+    ]
+}
+
+/// Runs a kernel that measures queries. Macro, since each shader has types of its own.
+macro_rules! measure {
+    ($shader:ident, $gpu:expr, $bvh:expr, $rays:expr, $leaf_end:expr) => {{
+        let (gpu, bvh, rays): (&Gpu, &CompactBvh, &[Ray]) = ($gpu, $bvh, $rays);
+        let pipeline = gpu.compute_pipeline::<$shader::Kernel>(&Default::default()).unwrap();
+        let pairs = gpu.buffer_with("pairs", Category::Index, &bvh.pairs).unwrap();
+        let queries = gpu.buffer_with("queries", Category::Work, rays).unwrap();
+        let works = gpu
+            .buffer_with("works", Category::Work, &vec![[0u32; 4]; rays.len()])
+            .unwrap();
+        let status = gpu.buffer_with("status", Category::Work, &[0u32]).unwrap();
+        let set = $shader::Set0 {
+            compact_pairs: pairs.view(),
+            compact_queries: queries.view(),
+            compact_works: works.view(),
+            compact_status: status.view(),
+        };
+        let push = $shader::Push {
+            root: CompactRoot {
+                lower: bvh.root.bounds.lower.into(),
+                reference: bvh.root.reference.unwrap_or(u32::MAX),
+                upper: bvh.root.bounds.upper.into(),
+                padding: 0,
+            },
+            count: rays.len() as u32,
+            leaf_end: $leaf_end,
+        };
+        let mut recorder = gpu.recorder("queries").unwrap();
+        recorder
+            .pass("queries", |pass| {
+                pass.barrier(&[transfer_to_compute(&works)]);
+                let groups = [pipeline.groups_for(rays.len() as u32), 1, 1];
+                pass.dispatch(&pipeline, &[&set], &push, groups)
+            })
+            .unwrap();
+        recorder.submit().unwrap().wait().unwrap();
+        assert_eq!(gpu.read::<u32>(status.view(), 1).unwrap(), [0], "stopped by the quota");
+        gpu.read::<CompactWork>(works.view(), rays.len()).unwrap()
+    }};
+}
+
+#[test]
+fn compact_queries_are_the_twins() {
+    with_gpu(|gpu| {
+        let mut random = Random(74);
+        let boxes: Vec<Aabb> = (0..20_000)
+            .map(|i| {
+                let centre = random.vector();
+                let half = random.vector().abs() * if i % 7 == 0 { 0.0 } else { 0.05 };
+                Aabb {
+                    lower: centre - half,
+                    upper: centre + half,
+                }
+            })
+            .collect();
+        let rays: Vec<Ray> = (0..16_384)
+            .map(|i| Ray {
+                origin: random.vector().into(),
+                t_min: 0.0,
+                direction: (if i % 5 == 0 {
+                    Vec3::AXES[i / 5 % 3]
+                } else {
+                    random.direction()
+                })
+                .into(),
+                t_max: if i % 2 == 0 { f32::INFINITY } else { 0.5 },
+            })
+            .collect();
+        for count in [0, 1, 2, 20_000] {
+            let boxes = &boxes[..count];
+            let sorted = SortedCodes::of_boxes(boxes, 10);
+            let tree = hierarchy(boxes, &sorted, LeafRule::Size(5), 64);
+            let compact = CompactBvh::encode(&CompleteBvh::new(&tree).unwrap()).unwrap();
+            let bits = |w: &CompactWork| [w.visits, w.leaves, w.nodes, w.pushes];
+            let points = measure!(compact_points, gpu, &compact, &rays, 0.0);
+            for (ray, got) in rays.iter().zip(&points) {
+                let twin = work(|counters, visit| compact.point_query(ray.origin.into(), counters, visit));
+                assert_eq!(bits(got), twin, "{ray:?}");
+            }
+            for leaf_end in [f32::INFINITY, 0.3] {
+                let traced = measure!(compact_rays, gpu, &compact, &rays, leaf_end);
+                let mut differ = 0;
+                for (ray, got) in rays.iter().zip(&traced) {
+                    let slab = SlabRay::new(ray.origin.into(), ray.direction.into(), ray.t_min, ray.t_max);
+                    let twin = work(|counters, visit| {
+                        compact.ray_query(&slab, counters, |leaf, t_max| {
+                            visit(leaf);
+                            *t_max = t_max.min(leaf_end);
+                        });
+                    });
+                    differ += u32::from(bits(got) != twin);
+                }
+                // Divisions may err by 2.5 ULP elsewhere, which turns the order of a pair where entries are that close.
+                let allowed = if gpu.caps().kind == DeviceKind::Cpu {
+                    0
+                } else {
+                    rays.len() as u32 / 1000
+                };
+                assert!(differ <= allowed, "{differ} rays differ");
+            }
+        }
+    });
+}

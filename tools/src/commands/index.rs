@@ -1,0 +1,250 @@
+//! `clerestory index`: ray indexes side by side, by the time they take to build, their cost and the work of rays in them.
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
+use clerestory::accel::{Ray, RayIndex, TraversalCounters};
+use clerestory::gpu::{PassTiming, Timings};
+use clerestory::scene::Scene;
+use clerestory::{Result, scene};
+use clerestory_tools::machine::median;
+use glam::Vec3;
+
+use crate::failure::{Failure, Outcome};
+use crate::options::DeviceOptions;
+use crate::output::{self, Table};
+
+/// Compares ray indexes: build time, surface area cost, depth, and what rays visit
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  clerestory index
+  clerestory index --scene 'builtin:sphere-flake?level=5' --repeat 9 --json
+
+Build times are medians by wall clock on the host's threads; that of the device is the least time of its passes, whose tree is the host's \
+to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
+rays for every index: half of them leave the camera, half leave surfaces in random directions.")]
+pub struct Arguments {
+    /// A scene; may be given several times
+    #[arg(long = "scene", value_name = "SCENE", default_values = SCENES)]
+    scenes: Vec<String>,
+    /// Builds of each index
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=999))]
+    repeat: u32,
+    /// Rays
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(2..))]
+    rays: u32,
+    /// Prints JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+/// Scenes of a quarter of a million triangles and of fewer.
+const SCENES: [&str; 4] = [
+    "builtin:box-city?n=25000",
+    "builtin:sphere-flake?depth=3&frequency=4",
+    "builtin:materials",
+    "builtin:triangle-soup?n=250000&size=0.01",
+];
+
+/// One index of one scene.
+#[derive(Debug, serde::Serialize)]
+struct Measured {
+    scene: String,
+    index: String,
+    triangles: u64,
+    nodes: u64,
+    depth: u32,
+    seconds: f64,
+    /// Surface area cost, and its ratio to that of the first index.
+    sah_cost: f64,
+    sah_ratio: f64,
+    /// Nodes and triangles a ray, and the ratio to those of the first index.
+    steps: f64,
+    steps_ratio: f64,
+    /// Milliseconds by pass, of builds on the device.
+    stages: Vec<(String, f64)>,
+}
+
+/// Builds an index.
+type Build = fn(&[[Vec3; 3]]) -> Result<Bvh2>;
+
+/// The indexes, the one that others are compared with first.
+const INDEXES: [(&str, Build); 4] = [
+    ("bvh2, binned", |t| Bvh2::build(t, &Bvh2Settings::default())),
+    ("lbvh, fast", |t| lbvh::build(t, &fast(30))),
+    ("lbvh, fast, 63 bits", |t| lbvh::build(t, &fast(63))),
+    ("lbvh, high", |t| lbvh::build(t, &LbvhSettings::default())),
+];
+
+fn fast(code_bits: u32) -> LbvhSettings {
+    LbvhSettings {
+        code_bits,
+        quality: BuildQuality::Fast,
+        ..LbvhSettings::default()
+    }
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let gpu = arguments.device.open()?;
+    let builder = LbvhBuilder::new(&gpu, &fast(30))?;
+    let mut all: Vec<Measured> = Vec::new();
+    for address in &arguments.scenes {
+        let scene = scene::load(address).map_err(Failure::scene)?;
+        let triangles = triangles_of(&scene);
+        let rays = rays_among(&scene, &triangles, arguments.rays);
+        let base = all.len();
+        for (name, build) in INDEXES {
+            let mut measured = measure(&triangles, &rays, build, arguments.repeat)?;
+            (measured.scene, measured.index) = (address.clone(), name.into());
+            if let Some(first) = all.get(base) {
+                measured.sah_ratio = measured.sah_cost / first.sah_cost;
+                measured.steps_ratio = measured.steps / first.steps;
+            }
+            all.push(measured);
+        }
+        let mut device = measure(&triangles, &rays, INDEXES[1].1, 1)?;
+        (device.scene, device.index) = (address.clone(), "lbvh, fast, device".into());
+        (device.sah_ratio, device.steps_ratio) = (device.sah_cost / all[base].sah_cost, device.steps / all[base].steps);
+        let mut best: Option<Timings> = None;
+        for _ in 0..=arguments.repeat {
+            let timings = builder.build(&triangles)?.timings;
+            if best.as_ref().is_none_or(|best| timings.seconds() < best.seconds()) {
+                best = Some(timings);
+            }
+        }
+        let best = best.unwrap_or_default();
+        device.seconds = best.seconds();
+        let stage = |pass: &PassTiming| (pass.name.clone(), pass.nanoseconds.unwrap_or(0) as f64 * 1e-6);
+        device.stages = best.passes.iter().map(stage).collect();
+        all.push(device);
+    }
+    if arguments.json {
+        output::print_json(&serde_json::json!({ "engine_version": env!("CARGO_PKG_VERSION"), "indexes": all }))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let head = [
+        "scene",
+        "index",
+        "triangles",
+        "depth",
+        "ms",
+        "SAH cost",
+        "ratio",
+        "steps/ray",
+        "ratio",
+    ];
+    let mut table = Table::new(&head, &[1]);
+    for one in &all {
+        table.row([
+            one.scene.clone(),
+            one.index.clone(),
+            one.triangles.to_string(),
+            one.depth.to_string(),
+            format!("{:.1}", 1e3 * one.seconds),
+            format!("{:.2}", one.sah_cost),
+            format!("{:.3}", one.sah_ratio),
+            format!("{:.2}", one.steps),
+            format!("{:.3}", one.steps_ratio),
+        ]);
+    }
+    let mut text = table.text();
+    for one in all.iter().filter(|one| !one.stages.is_empty()) {
+        let stages: Vec<String> = one
+            .stages
+            .iter()
+            .map(|(name, ms)| format!("{name} {ms:.2} ms"))
+            .collect();
+        text += &format!("\n{}: {}", one.scene, stages.join(", "));
+    }
+    output::print(&(text + "\n"))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> Result<Measured> {
+    let mut index = build(triangles)?;
+    let mut seconds = Vec::new();
+    for _ in 0..repeat {
+        let begin = Instant::now();
+        index = build(triangles)?;
+        seconds.push(begin.elapsed().as_secs_f64());
+    }
+    let mut counters = TraversalCounters::default();
+    for ray in rays {
+        index.closest_hit_filtered(ray, &mut |_, _| true, &mut counters);
+    }
+    let statistics = index.statistics();
+    Ok(Measured {
+        scene: String::new(),
+        index: String::new(),
+        triangles: statistics.triangles,
+        nodes: statistics.nodes,
+        depth: statistics.max_depth,
+        seconds: median(seconds),
+        sah_cost: statistics.sah_cost,
+        sah_ratio: 1.0,
+        steps: (counters.nodes + counters.triangles) as f64 / rays.len() as f64,
+        steps_ratio: 1.0,
+        stages: Vec::new(),
+    })
+}
+
+/// All instances' triangles in world space.
+fn triangles_of(scene: &Scene) -> Vec<[Vec3; 3]> {
+    let of_instance = |instance: &scene::Instance| {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let place = |i: u32| {
+            instance
+                .transform
+                .transform_point3(mesh.positions[i as usize].as_dvec3())
+                .as_vec3()
+        };
+        mesh.triangles.iter().map(|t| t.map(place)).collect::<Vec<_>>()
+    };
+    scene.instances.iter().flat_map(of_instance).collect()
+}
+
+/// Rays from the middle of the first camera's picture outwards, and from triangles' centres in random directions.
+fn rays_among(scene: &Scene, triangles: &[[Vec3; 3]], count: u32) -> Vec<Ray> {
+    let mut state = 1u64;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / 16_777_216.0
+    };
+    let eye = scene
+        .cameras
+        .first()
+        .map(|camera| camera.transform.translation.as_vec3());
+    (0..count)
+        .map(|i| {
+            let z = 2.0 * random() - 1.0;
+            let (sine, cosine) = (std::f32::consts::TAU * random()).sin_cos();
+            let direction = Vec3::new(cosine * (1.0 - z * z).sqrt(), sine * (1.0 - z * z).sqrt(), z);
+            let centre = |place: f32| {
+                let chosen = (place * triangles.len() as f32) as usize;
+                triangles
+                    .get(chosen.min(triangles.len().saturating_sub(1)))
+                    .map_or(Vec3::ZERO, |t| (t[0] + t[1] + t[2]) / 3.0)
+            };
+            let target = centre(random());
+            let (origin, direction, t_min) = match eye {
+                Some(eye) if i % 2 == 0 => (eye, (target - eye).normalize_or(direction), 0.0),
+                _ => (target, direction, 1e-3),
+            };
+            Ray {
+                origin: origin.into(),
+                t_min,
+                direction: direction.into(),
+                t_max: f32::INFINITY,
+            }
+        })
+        .collect()
+}
