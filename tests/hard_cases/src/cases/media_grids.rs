@@ -74,7 +74,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         let mean = densities.iter().map(|d| f64::from(*d)).sum::<f64>() / densities.len() as f64;
         let sigma = depth / (mean * f64::from(height));
         let painted = easel.paint(&column(densities, height, sigma as f32, 1.0), SMALL, 64)?;
-        judgement.mean(what, &painted, [(-depth).exp(); 3], 1e-4)
+        judgement.mean(what, &painted, [(-depth).exp(); 3], 0.0)
     };
     seen("one cell", &[1.0], 1.0, 1.0)?;
     for (height, word) in [(1e-4, "1e-4 m"), (1.0, "1 m"), (1e4, "1e4 m")] {
@@ -91,6 +91,6 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     furnace.media[0].sigma_s = Vec3::splat(3.0);
     furnace.environment = Some(Environment::uniform(Vec3::ONE));
     let painted = easel.paint(&furnace, SMALL, 64)?;
-    judgement.mean("a scattering layer in a furnace", &painted, [1.0; 3], 1e-5)?;
+    judgement.mean("a scattering layer in a furnace", &painted, [1.0; 3], 0.0)?;
     Ok(judgement)
 }

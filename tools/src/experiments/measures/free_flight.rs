@@ -10,7 +10,7 @@ use clerestory::transport::free_flight::{
     adaptively_marched_free_flight, marched_free_flight, marched_transmittance, ratio_tracked_transmittance,
     tracked_free_flight,
 };
-use clerestory::transport::medium::sample_free_flight;
+use clerestory::transport::medium::{sample_free_flight, transmittance};
 use glam::DVec3;
 
 use super::Context;
@@ -152,6 +152,13 @@ fn transmittances(context: &Context<'_>, samples: u32) -> Table {
                 time.into(),
             ]);
         };
+        if profile.name == PROFILES[0].name {
+            row(&Estimate {
+                name: "analytic".into(),
+                majorant: None,
+                run: &|_, _| transmittance(DVec3::splat(EVEN), T_MAX).x,
+            });
+        }
         for steps in STEPS {
             for (place, word) in [(1.0, "ends"), (0.5, "middles")] {
                 row(&Estimate {
