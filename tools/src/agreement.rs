@@ -1,9 +1,10 @@
-//! Agreement with an independent renderer: converged pictures of [`mitsuba::scenes`] by this engine and by Mitsuba 3, compared within their noise.
+//! Agreement with an independent renderer: converged pictures of [`mitsuba::scenes`] by this engine and by Mitsuba 3, compared within their
+//! noise.
 //!
-//! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and Mitsuba's
-//! rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared by [`film::z_test`]: value by value, by blocks of
-//! 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error:
-//! [`Race`].
+//! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and
+//! Mitsuba's rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared
+//! by [`film::z_test`]: value by value, by blocks of 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the
+//! same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error: [`Race`].
 //! Guarantees: pictures and errors depend on the options and the drivers alone; times are wall-clock and processor seconds, medians.
 //!
 //! [`mitsuba::scenes`]: crate::mitsuba::scenes
@@ -29,9 +30,9 @@ use crate::mitsuba::export;
 use crate::mitsuba::scenes::{ComparedScene, scenes};
 pub use peer::mitsuba_version;
 use peer::{Integrator, Peer, Request, Variant};
-use race::Course;
+use race::RaceSetup;
 pub use race::{Contender, EqualError, Race};
-pub use report::{AgreementReport, Machine, SceneAgreement};
+pub use report::{AgreementReport, Machine, SceneAgreement, Uncompared};
 
 /// What to compare, and how long to work at it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -95,17 +96,51 @@ const BLOCK: u32 = 8;
 /// Radiance difference shown as full white in the difference pictures, in units of its standard deviation.
 const FULL_SCALE_Z: f32 = 5.0;
 
-/// Compares all wanted scenes on a device, until `watch` says to stop, and writes the report after each.
+/// Why a scene was not compared.
+#[derive(Debug)]
+enum Fault {
+    /// Somebody wished to stop.
+    Stopped,
+    /// A picture of Mitsuba's has values that are not finite: the scene's own fault, others can be compared.
+    NotFinite(String),
+    Other(Error),
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
+}
+
+impl Fault {
+    /// As an error about `path`.
+    fn into_error(self, path: &str) -> Error {
+        let cause = match self {
+            Self::Other(error) => return error,
+            Self::NotFinite(cause) => cause,
+            Self::Stopped => "was stopped".into(),
+        };
+        Error::Picture {
+            path: path.into(),
+            cause,
+        }
+    }
+}
+
+/// Compares all wanted scenes on a device, until `watch` says to stop, and writes the report after each. A scene of which Mitsuba makes a
+/// picture that is not finite is noted and left out.
 ///
 /// # Errors
-/// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the exporter and
-/// the files. A picture that disagrees is no error: see [`AgreementReport::passes`].
+/// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the
+/// exporter and the files. A picture that disagrees and one that is not finite are no errors: see [`AgreementReport::passes`]; nor is what
+/// fails after a wish to stop.
 pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Result<AgreementReport> {
     let wanted = selected(options)?;
     let machine = Machine::read(gpu.caps(), &format!("mitsuba {}", mitsuba_version(&options.python)?));
     let mut report = AgreementReport {
         options: options.clone(),
         scenes: Vec::new(),
+        uncompared: Vec::new(),
         machine,
     };
     if let Some(prefix) = options.results.as_ref().filter(|_| options.keep) {
@@ -121,12 +156,28 @@ pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Res
             continue;
         }
         watch.begin(&format!("{}: {}", one.name, one.shows), done, wanted.len());
-        let scene = compare_scene(gpu, one, options)?;
+        let scene = match compare_scene(gpu, one, options, watch) {
+            Ok(scene) => Ok(scene),
+            Err(Fault::NotFinite(cause)) => Err(cause),
+            Err(Fault::Stopped) => break,
+            // A wish to stop may reach what works here by other ways too.
+            Err(Fault::Other(_)) if watch.stopped() => break,
+            Err(Fault::Other(error)) => return Err(error),
+        };
         watch.note(&format!("{}: {}", one.name, one.shows));
-        scene.to_string().lines().for_each(|line| watch.note(line));
         report.scenes.retain(|kept| kept.name != one.name);
-        report.scenes.push(scene);
-        report.scenes.sort_by_key(|scene| place(&scene.name));
+        match scene {
+            Ok(scene) => {
+                scene.to_string().lines().for_each(|line| watch.note(line));
+                report.scenes.push(scene);
+                report.scenes.sort_by_key(|scene| place(&scene.name));
+            }
+            Err(cause) => {
+                watch.note(&format!("  not compared: {cause}"));
+                let name = one.name.to_owned();
+                report.uncompared.push(Uncompared { name, cause });
+            }
+        }
         // Written after every scene, so that a run that is cut short leaves what it has found.
         if let Some(prefix) = &options.results {
             report.write(prefix)?;
@@ -205,12 +256,17 @@ fn settings(options: &AgreementOptions) -> PathTracerSettings {
     }
 }
 
-fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> Result<SceneAgreement> {
+fn compare_scene(
+    gpu: &Gpu,
+    one: &ComparedScene,
+    options: &AgreementOptions,
+    watch: &dyn Watch,
+) -> Result<SceneAgreement, Fault> {
     let folder = options.output.join(one.name);
     let size = [options.size; 2];
     let exported = export(&one.scene, "", size, &folder)?;
     let peer = Peer::new(options, &folder)?;
-    let theirs = peer.render(&Request {
+    let request = Request {
         scene: &exported.scene,
         name: "mitsuba",
         variant: Variant::Auto,
@@ -220,7 +276,8 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
         samples: options.samples_per_pass,
         seed: options.seed,
         each: false,
-    })?;
+    };
+    let theirs = peer.render(&request, watch)?;
 
     let scene = Arc::new(GpuScene::new(gpu, &one.scene)?);
     let camera = one.scene.camera(None).ok_or_else(|| Error::Setting {
@@ -248,17 +305,17 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
 
     let mut race = None;
     if options.timing_rounds > 0 {
-        let course = Course {
+        let setup = RaceSetup {
             gpu,
             scene,
             camera,
-            entries: Integrator::contenders(&one.scene),
+            contenders: Integrator::contenders(&one.scene),
             peer: &peer,
             exported: &exported.scene,
             has_llvm: theirs.variant == Variant::Llvm.name(),
             reference: b,
         };
-        race = race::run(&course, options)?;
+        race = race::run(&setup, options, watch)?;
     }
     Ok(SceneAgreement {
         name: one.name.into(),

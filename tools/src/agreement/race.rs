@@ -18,9 +18,10 @@ use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
 
-use super::AgreementOptions;
 use super::peer::{Integrator, Peer, Request, Variant};
 use super::spread;
+use super::{AgreementOptions, Fault};
+use crate::experiments::watch::Watch;
 use crate::machine::median;
 
 /// This engine's name as a contender.
@@ -198,12 +199,12 @@ impl Turns {
 }
 
 /// What is raced on.
-pub(super) struct Course<'a> {
+pub(super) struct RaceSetup<'a> {
     pub(super) gpu: &'a Gpu,
     pub(super) scene: Arc<GpuScene>,
     pub(super) camera: &'a Camera,
     /// With whom, and how, in Mitsuba.
-    pub(super) entries: &'static [(Integrator, &'static str)],
+    pub(super) contenders: &'static [(Integrator, &'static str)],
     pub(super) peer: &'a Peer<'a>,
     /// The scene as exported.
     pub(super) exported: &'a Path,
@@ -214,7 +215,8 @@ pub(super) struct Course<'a> {
 }
 
 /// Lets all contenders render in turns.
-pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Option<Race>> {
+pub(super) fn run(setup: &RaceSetup<'_>, options: &AgreementOptions, watch: &dyn Watch) -> Result<Option<Race>, Fault> {
+    let go_on = || if watch.stopped() { Err(Fault::Stopped) } else { Ok(()) };
     let size = [options.size; 2];
     let samplers = [(SamplerKind::Sobol, "sobol"), (SamplerKind::Pcg, "pcg")];
     let mut ours = Vec::new();
@@ -223,20 +225,20 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
             sampler,
             ..super::settings(options)
         };
-        let mut tracer = PathTracer::new(course.gpu, course.scene.clone(), course.camera, size, settings)?;
+        let mut tracer = PathTracer::new(setup.gpu, setup.scene.clone(), setup.camera, size, settings)?;
         // The first picture compiles the kernels, as LLVM's does.
         tracer.render(options.timing_samples)?;
         tracer.picture()?;
         ours.push((name, tracer, Turns::default()));
     }
-    let variants: &[Variant] = if course.has_llvm {
+    let variants: &[Variant] = if setup.has_llvm {
         &[Variant::Scalar, Variant::Llvm]
     } else {
         &[Variant::Scalar]
     };
     let mut theirs = Vec::new();
     for variant in variants {
-        for (integrator, sampler) in course.entries {
+        for (integrator, sampler) in setup.contenders {
             theirs.push((*variant, *integrator, *sampler, Turns::default()));
         }
     }
@@ -246,11 +248,13 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
             .wrapping_add(options.passes + 1)
             .wrapping_add(round * (options.timing_pictures + 1));
         for (_, tracer, turns) in &mut ours {
+            go_on()?;
             turns.ours(tracer, first_seed, options)?;
         }
         for (variant, integrator, sampler, turns) in &mut theirs {
-            let mut timed = course.peer.render(&Request {
-                scene: course.exported,
+            go_on()?;
+            let request = Request {
+                scene: setup.exported,
                 name: "timed",
                 variant: *variant,
                 sampler,
@@ -259,7 +263,8 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
                 samples: options.timing_samples,
                 seed: first_seed,
                 each: true,
-            })?;
+            };
+            let mut timed = setup.peer.render(&request, watch)?;
             turns.seconds.append(&mut timed.seconds_each);
             turns.cpu_seconds.push(timed.cpu_seconds_each);
             turns.pictures.append(&mut timed.pictures);
@@ -268,17 +273,17 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
     let paths = f64::from(options.size).powi(2) * f64::from(options.timing_samples);
     let ours = ours
         .into_iter()
-        .map(|(sampler, _, turns)| turns.contender(OURS, sampler, paths, course.reference));
+        .map(|(sampler, _, turns)| turns.contender(OURS, sampler, paths, setup.reference));
     let theirs = theirs.into_iter().map(|(variant, integrator, sampler, turns)| {
         let renderer = match integrator {
             Integrator::Path => variant.name().to_owned(),
             _ => format!("{} {}", variant.name(), integrator.name()),
         };
-        turns.contender(&renderer, sampler, paths, course.reference)
+        turns.contender(&renderer, sampler, paths, setup.reference)
     });
     let contenders: Option<Vec<_>> = ours.chain(theirs).collect();
     let contenders = contenders.ok_or_else(|| Error::Picture {
-        path: course.exported.display().to_string(),
+        path: setup.exported.display().to_string(),
         cause: "the timed pictures have different sizes".into(),
     })?;
     Ok(Race::new(contenders))

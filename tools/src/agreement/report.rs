@@ -110,6 +110,15 @@ impl std::fmt::Display for SceneAgreement {
     }
 }
 
+/// A scene that could not be compared.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Uncompared {
+    /// Its name.
+    pub name: String,
+    /// Why, in words.
+    pub cause: String,
+}
+
 /// All comparisons of a run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementReport {
@@ -119,6 +128,9 @@ pub struct AgreementReport {
     pub options: AgreementOptions,
     /// One entry a scene.
     pub scenes: Vec<SceneAgreement>,
+    /// The scenes of which Mitsuba made a picture that is not finite.
+    #[serde(default)]
+    pub uncompared: Vec<Uncompared>,
 }
 
 impl AgreementReport {
@@ -141,9 +153,15 @@ impl AgreementReport {
         report.map_or_else(Vec::new, |report| report.scenes)
     }
 
-    /// Whether every scene agrees.
+    /// Whether every scene was compared and agrees.
     pub fn passes(&self) -> bool {
-        self.scenes.iter().all(SceneAgreement::passes)
+        self.uncompared.is_empty() && self.scenes.iter().all(SceneAgreement::passes)
+    }
+
+    /// The scenes that were not compared, in a sentence each.
+    pub fn uncompared_lines(&self) -> Vec<String> {
+        let line = |one: &Uncompared| format!("{} was not compared: {}.", one.name, one.cause);
+        self.uncompared.iter().map(line).collect()
     }
 
     /// Writes `prefix.json` and `prefix.md`.
@@ -179,6 +197,9 @@ impl AgreementReport {
             o.size,
             o.passes * o.samples_per_pass
         );
+        for line in self.uncompared_lines() {
+            let _ = writeln!(text, "- {line}");
+        }
         let _ = writeln!(text, "- {}", self.race_method());
         for line in self.race_summary() {
             let _ = writeln!(text, "- {line}");
@@ -262,6 +283,9 @@ impl AgreementReport {
         let (m, o) = (&self.machine, &self.options);
         let agreeing = self.scenes.iter().filter(|scene| scene.passes()).count();
         let _ = writeln!(page, "{agreeing} of {} scenes agree.\n", self.scenes.len());
+        for line in self.uncompared_lines() {
+            let _ = writeln!(page, "- {line}");
+        }
         let _ = writeln!(
             page,
             "- Processor: {}, {} threads. Device: {}, {}. Reference: {}.",
@@ -420,6 +444,7 @@ pub(super) mod tests {
                 mitsuba: "mitsuba 3".into(),
             },
             options: AgreementOptions::default(),
+            uncompared: Vec::new(),
             scenes: vec![scene("raced", Race::new(made_up_race())), scene("not raced", None)],
         }
     }
