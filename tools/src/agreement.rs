@@ -14,6 +14,7 @@ mod peer;
 mod race;
 mod report;
 mod spread;
+mod summary;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,7 +32,10 @@ use crate::mitsuba::scenes::{ComparedScene, scenes};
 pub use peer::mitsuba_version;
 use peer::{Integrator, Peer, Request, Variant};
 use race::RaceSetup;
-pub use race::{Contender, EqualError, Race};
+pub use race::{Contender, EqualError, Lead, Race};
+pub(crate) use report::BIAS_Z_MAX;
+#[cfg(test)]
+pub(crate) use report::tests::made_up;
 pub use report::{AgreementReport, Machine, SceneAgreement, Uncompared};
 
 /// What to compare, and how long to work at it.
@@ -81,7 +85,7 @@ impl Default for AgreementOptions {
             timing_rounds: 3,
             timing_pictures: 2,
             timing_samples: 256,
-            python: std::env::var_os("CLERESTORY_MITSUBA_PYTHON").map_or_else(|| "python3".into(), PathBuf::from),
+            python: std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from),
             output: "out/agreement".into(),
             results: None,
             keep: false,
@@ -89,6 +93,8 @@ impl Default for AgreementOptions {
     }
 }
 
+/// The environment variable that names the Python.
+pub const PYTHON_VARIABLE: &str = "CLERESTORY_MITSUBA_PYTHON";
 /// First bounce of Russian roulette: that of Mitsuba's path integrator with `rr_depth` 5.
 const ROULETTE_START: u32 = 5;
 /// Edge of the blocks whose means are tested too, pixels.
@@ -204,12 +210,13 @@ fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
             cause,
         })
     };
+    // Named as on the command line.
     for (name, value, least) in [
-        ("size", options.size, BLOCK),
-        ("passes", options.passes, 2),
-        ("samples_per_pass", options.samples_per_pass, 1),
-        ("timing_pictures", options.timing_pictures, 2),
-        ("timing_samples", options.timing_samples, 1),
+        ("--size", options.size, BLOCK),
+        ("--passes", options.passes, 2),
+        ("--spp", options.samples_per_pass, 1),
+        ("--timing-pictures", options.timing_pictures, 2),
+        ("--timing-spp", options.timing_samples, 1),
     ] {
         if value < least {
             return refuse(name, value.to_string(), format!("is below {least}"));
@@ -217,22 +224,40 @@ fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
     }
     if !options.size.is_multiple_of(BLOCK) {
         return refuse(
-            "size",
+            "--size",
             options.size.to_string(),
             format!("is not a multiple of {BLOCK}"),
         );
     }
     if options.timing_samples.isqrt().pow(2) != options.timing_samples {
         return refuse(
-            "timing_samples",
+            "--timing-spp",
             options.timing_samples.to_string(),
             "is not a square".into(),
         );
     }
     let pictures = u64::from(options.timing_rounds) * u64::from(options.timing_pictures);
     if options.timing_rounds > 0 && pictures < spread::PICTURES_MIN as u64 {
-        let cause = format!("times {pictures} pictures, below {}", spread::PICTURES_MIN);
-        return refuse("timing_rounds", options.timing_rounds.to_string(), cause);
+        let cause = format!(
+            "times {} pictures are {pictures}, below {}: take more rounds or pictures",
+            options.timing_pictures,
+            spread::PICTURES_MIN
+        );
+        return refuse("--timing-rounds", options.timing_rounds.to_string(), cause);
+    }
+    if options.passes.checked_mul(options.samples_per_pass).is_none() {
+        let cause = format!("times {} samples a pixel are too many", options.samples_per_pass);
+        return refuse("--passes", options.passes.to_string(), cause);
+    }
+    // Every picture has a seed of its own, and so has the one that warms up before each turn.
+    let turns = u64::from(options.timing_rounds).checked_mul(u64::from(options.timing_pictures) + 1);
+    let seeds = turns.and_then(|turns| turns.checked_add(u64::from(options.passes) + 1));
+    if seeds.is_none_or(|seeds| seeds > u64::from(u32::MAX)) {
+        let cause = format!(
+            "times {} pictures, with {} passes, need more seeds than there are",
+            options.timing_pictures, options.passes
+        );
+        return refuse("--timing-rounds", options.timing_rounds.to_string(), cause);
     }
     let all = scenes()?;
     let names: Vec<_> = all.iter().map(|one| one.name).collect();
@@ -305,6 +330,13 @@ fn compare_scene(
 
     let mut race = None;
     if options.timing_rounds > 0 {
+        let has_llvm = theirs.variant == Variant::Llvm.name();
+        if !has_llvm {
+            watch.note(&format!(
+                "{}: Mitsuba's LLVM variant not measured, none found",
+                one.name
+            ));
+        }
         let setup = RaceSetup {
             gpu,
             scene,
@@ -312,7 +344,7 @@ fn compare_scene(
             contenders: Integrator::contenders(&one.scene),
             peer: &peer,
             exported: &exported.scene,
-            has_llvm: theirs.variant == Variant::Llvm.name(),
+            has_llvm,
             reference: b,
         };
         race = race::run(&setup, options, watch)?;
@@ -445,10 +477,37 @@ mod tests {
             timing_rounds: 1,
             ..Default::default()
         }));
+        // Products beyond 32 bits.
+        assert!(refused(AgreementOptions {
+            passes: 1 << 16,
+            samples_per_pass: 1 << 16,
+            ..Default::default()
+        }));
+        for (timing_rounds, timing_pictures) in [(1 << 20, 1 << 20), (u32::MAX, u32::MAX)] {
+            assert!(refused(AgreementOptions {
+                timing_rounds,
+                timing_pictures,
+                ..Default::default()
+            }));
+        }
+        assert!(refused(AgreementOptions {
+            passes: u32::MAX,
+            samples_per_pass: 1,
+            ..Default::default()
+        }));
         assert!(!refused(AgreementOptions {
             timing_rounds: 0,
             ..Default::default()
         }));
         assert!(!refused(AgreementOptions::default()));
+        let few = AgreementOptions {
+            timing_rounds: 1,
+            ..Default::default()
+        };
+        let cause = few.check().unwrap_err().to_string();
+        assert_eq!(
+            cause,
+            "setting --timing-rounds: 1 times 2 pictures are 2, below 3: take more rounds or pictures"
+        );
     }
 }
