@@ -196,10 +196,10 @@ mod tests {
         assert!(tables.iter().all(|table| table.fault().is_none()));
         let text: String = tables.iter().map(Table::markdown).collect();
         for part in [
-            "| raced | nothing | agrees | 100 |",
+            "| raced | nothing | agrees | 100.0 |",
             "with 99.75 % of them accepted",
             "|bias z| above 4.5",
-            "| raced | sobol | 0.5 | 2 | llvm_ad_rgb, independent | 1 | 0.5 |",
+            "| raced | sobol | 0.5000 | 2.000 | llvm_ad_rgb, independent | 1.000 | 0.5000 | 0.03536 |",
             "slower in 1, undecided",
         ] {
             assert!(text.contains(part), "{part} in {text}");
