@@ -391,7 +391,7 @@ fn write_pictures(folder: &Path, ours: &Picture, reference: &Picture) -> Result<
     )
 }
 
-/// z of each value, with the floor of [`z_test`].
+/// z of each value, with the floor of [`z_test`](fn@z_test).
 fn z_values(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> Vec<f64> {
     let z = |i: usize| {
         let [a, a_var, b, b_var] = [a[i], a_var[i], b[i], b_var[i]].map(f64::from);
