@@ -10,6 +10,7 @@ import argparse
 import ctypes.util
 import glob
 import json
+import math
 import os
 import sys
 import time
@@ -32,7 +33,7 @@ def parse_arguments():
     parser.add_argument("--passes", type=int, default=64, help="independent passes, at least 2 (default %(default)s)")
     parser.add_argument("--spp", type=int, default=16, help="samples a pixel in each pass (default %(default)s)")
     parser.add_argument("--sampler", default="independent", choices=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"])
-    parser.add_argument("--seed", type=int, default=0, help="seed of the first pass; pass i takes seed + i")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first pass; pass i takes seed + i, modulo 2^32")
     parser.add_argument("--integrator", choices=["path", "volpath", "volpathmis"], help="in place of the scene's")
     parser.add_argument("--each", action="store_true", help="also writes every pass, to PREFIX.f32")
     parser.add_argument("--max-depth", type=int, default=-1, help="path length limit in edges, -1 for none")
@@ -54,6 +55,11 @@ def set_variant(mitsuba, wanted):
     return wanted
 
 
+def finite_or_null(number):
+    """JSON has no number that is not finite."""
+    return number if math.isfinite(number) else None
+
+
 def main():
     arguments = parse_arguments()
     llvm = find_llvm()
@@ -69,15 +75,14 @@ def main():
     integrator = mitsuba.load_dict({"type": kind, "max_depth": arguments.max_depth, "rr_depth": arguments.rr_depth})
 
     def render(seed):
-        # The conversion waits for the result, so that the clock sees the work.
-        return numpy.array(mitsuba.render(scene, integrator=integrator, spp=arguments.spp, seed=seed), dtype=numpy.float64)
+        # The conversion waits for the result, so that the clock sees the work. Mitsuba's seeds have 32 bits.
+        picture = mitsuba.render(scene, integrator=integrator, spp=arguments.spp, seed=seed & 0xFFFFFFFF)
+        return numpy.array(picture, dtype=numpy.float64)
 
-    # LLVM compiles its kernels in the first pass, which is not counted; the scalar variant has nothing to warm up.
-    first_seconds = None
-    if not variant.startswith("scalar"):
-        start = time.perf_counter()
-        render(arguments.seed + arguments.passes)
-        first_seconds = time.perf_counter() - start
+    # The first pass is not counted: LLVM compiles its kernels in it, and every variant starts threads and touches its memory.
+    start = time.perf_counter()
+    render(arguments.seed + arguments.passes)
+    first_seconds = time.perf_counter() - start
 
     # Welford's update: no cancellation between large sums.
     mean, squares, seconds, each, cpu_start = 0.0, 0.0, [], [], time.process_time()
@@ -125,12 +130,12 @@ def main():
         "seconds_median_pass": sorted(seconds)[len(seconds) // 2],
         "paths_per_second": width * height * arguments.spp * arguments.passes / total,
         "non_finite_values": int(numpy.count_nonzero(~numpy.isfinite(layers))),
-        "mean_radiance": mean.mean(axis=(0, 1)).tolist(),
+        "mean_radiance": [finite_or_null(band) for band in mean.mean(axis=(0, 1)).tolist()],
     }
+    text = json.dumps(report, indent=2, allow_nan=False)
     with open(arguments.prefix + ".json", "w", encoding="utf-8") as file:
-        json.dump(report, file, indent=2)
-        file.write("\n")
-    print(json.dumps(report, indent=2))
+        file.write(text + "\n")
+    print(text)
 
 
 if __name__ == "__main__":

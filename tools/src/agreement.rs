@@ -1,9 +1,10 @@
-//! Agreement with an independent renderer: converged pictures of [`mitsuba::scenes`] by this engine and by Mitsuba 3, compared within their noise.
+//! Agreement with an independent renderer: converged pictures of [`mitsuba::scenes`] by this engine and by Mitsuba 3, compared within their
+//! noise.
 //!
-//! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and Mitsuba's
-//! rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared by [`film::z_test`]: value by value, by blocks of
-//! 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error:
-//! [`Race`].
+//! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and
+//! Mitsuba's rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared
+//! by [`film::z_test`]: value by value, by blocks of 8 × 8 pixels, whose means show eight times smaller differences, and as a whole. In the
+//! same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error: [`Race`].
 //! Guarantees: pictures and errors depend on the options and the drivers alone; times are wall-clock and processor seconds, medians.
 //!
 //! [`mitsuba::scenes`]: crate::mitsuba::scenes
@@ -13,6 +14,7 @@ mod peer;
 mod race;
 mod report;
 mod spread;
+mod summary;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,9 +31,12 @@ use crate::mitsuba::export;
 use crate::mitsuba::scenes::{ComparedScene, scenes};
 pub use peer::mitsuba_version;
 use peer::{Integrator, Peer, Request, Variant};
-use race::Course;
-pub use race::{Contender, EqualError, Race};
-pub use report::{AgreementReport, Machine, SceneAgreement};
+use race::RaceSetup;
+pub use race::{Contender, EqualError, Lead, Race};
+pub(crate) use report::BIAS_Z_MAX;
+#[cfg(test)]
+pub(crate) use report::tests::made_up;
+pub use report::{AgreementReport, Machine, SceneAgreement, Uncompared};
 
 /// What to compare, and how long to work at it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -80,7 +85,7 @@ impl Default for AgreementOptions {
             timing_rounds: 3,
             timing_pictures: 2,
             timing_samples: 256,
-            python: std::env::var_os("CLERESTORY_MITSUBA_PYTHON").map_or_else(|| "python3".into(), PathBuf::from),
+            python: std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from),
             output: "out/agreement".into(),
             results: None,
             keep: false,
@@ -88,6 +93,8 @@ impl Default for AgreementOptions {
     }
 }
 
+/// The environment variable that names the Python.
+pub const PYTHON_VARIABLE: &str = "CLERESTORY_MITSUBA_PYTHON";
 /// First bounce of Russian roulette: that of Mitsuba's path integrator with `rr_depth` 5.
 const ROULETTE_START: u32 = 5;
 /// Edge of the blocks whose means are tested too, pixels.
@@ -95,17 +102,51 @@ const BLOCK: u32 = 8;
 /// Radiance difference shown as full white in the difference pictures, in units of its standard deviation.
 const FULL_SCALE_Z: f32 = 5.0;
 
-/// Compares all wanted scenes on a device, until `watch` says to stop, and writes the report after each.
+/// Why a scene was not compared.
+#[derive(Debug)]
+enum Fault {
+    /// Somebody wished to stop.
+    Stopped,
+    /// A picture of Mitsuba's has values that are not finite: the scene's own fault, others can be compared.
+    NotFinite(String),
+    Other(Error),
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
+}
+
+impl Fault {
+    /// As an error about `path`.
+    fn into_error(self, path: &str) -> Error {
+        let cause = match self {
+            Self::Other(error) => return error,
+            Self::NotFinite(cause) => cause,
+            Self::Stopped => "was stopped".into(),
+        };
+        Error::Picture {
+            path: path.into(),
+            cause,
+        }
+    }
+}
+
+/// Compares all wanted scenes on a device, until `watch` says to stop, and writes the report after each. A scene of which Mitsuba makes a
+/// picture that is not finite is noted and left out.
 ///
 /// # Errors
-/// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the exporter and
-/// the files. A picture that disagrees is no error: see [`AgreementReport::passes`].
+/// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the
+/// exporter and the files. A picture that disagrees and one that is not finite are no errors: see [`AgreementReport::passes`]; nor is what
+/// fails after a wish to stop.
 pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Result<AgreementReport> {
     let wanted = selected(options)?;
     let machine = Machine::read(gpu.caps(), &format!("mitsuba {}", mitsuba_version(&options.python)?));
     let mut report = AgreementReport {
         options: options.clone(),
         scenes: Vec::new(),
+        uncompared: Vec::new(),
         machine,
     };
     if let Some(prefix) = options.results.as_ref().filter(|_| options.keep) {
@@ -121,12 +162,28 @@ pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Res
             continue;
         }
         watch.begin(&format!("{}: {}", one.name, one.shows), done, wanted.len());
-        let scene = compare_scene(gpu, one, options)?;
+        let scene = match compare_scene(gpu, one, options, watch) {
+            Ok(scene) => Ok(scene),
+            Err(Fault::NotFinite(cause)) => Err(cause),
+            Err(Fault::Stopped) => break,
+            // A wish to stop may reach what works here by other ways too.
+            Err(Fault::Other(_)) if watch.stopped() => break,
+            Err(Fault::Other(error)) => return Err(error),
+        };
         watch.note(&format!("{}: {}", one.name, one.shows));
-        scene.to_string().lines().for_each(|line| watch.note(line));
         report.scenes.retain(|kept| kept.name != one.name);
-        report.scenes.push(scene);
-        report.scenes.sort_by_key(|scene| place(&scene.name));
+        match scene {
+            Ok(scene) => {
+                scene.to_string().lines().for_each(|line| watch.note(line));
+                report.scenes.push(scene);
+                report.scenes.sort_by_key(|scene| place(&scene.name));
+            }
+            Err(cause) => {
+                watch.note(&format!("  not compared: {cause}"));
+                let name = one.name.to_owned();
+                report.uncompared.push(Uncompared { name, cause });
+            }
+        }
         // Written after every scene, so that a run that is cut short leaves what it has found.
         if let Some(prefix) = &options.results {
             report.write(prefix)?;
@@ -153,12 +210,13 @@ fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
             cause,
         })
     };
+    // Named as on the command line.
     for (name, value, least) in [
-        ("size", options.size, BLOCK),
-        ("passes", options.passes, 2),
-        ("samples_per_pass", options.samples_per_pass, 1),
-        ("timing_pictures", options.timing_pictures, 2),
-        ("timing_samples", options.timing_samples, 1),
+        ("--size", options.size, BLOCK),
+        ("--passes", options.passes, 2),
+        ("--spp", options.samples_per_pass, 1),
+        ("--timing-pictures", options.timing_pictures, 2),
+        ("--timing-spp", options.timing_samples, 1),
     ] {
         if value < least {
             return refuse(name, value.to_string(), format!("is below {least}"));
@@ -166,22 +224,40 @@ fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
     }
     if !options.size.is_multiple_of(BLOCK) {
         return refuse(
-            "size",
+            "--size",
             options.size.to_string(),
             format!("is not a multiple of {BLOCK}"),
         );
     }
     if options.timing_samples.isqrt().pow(2) != options.timing_samples {
         return refuse(
-            "timing_samples",
+            "--timing-spp",
             options.timing_samples.to_string(),
             "is not a square".into(),
         );
     }
     let pictures = u64::from(options.timing_rounds) * u64::from(options.timing_pictures);
     if options.timing_rounds > 0 && pictures < spread::PICTURES_MIN as u64 {
-        let cause = format!("times {pictures} pictures, below {}", spread::PICTURES_MIN);
-        return refuse("timing_rounds", options.timing_rounds.to_string(), cause);
+        let cause = format!(
+            "times {} pictures are {pictures}, below {}: take more rounds or pictures",
+            options.timing_pictures,
+            spread::PICTURES_MIN
+        );
+        return refuse("--timing-rounds", options.timing_rounds.to_string(), cause);
+    }
+    if options.passes.checked_mul(options.samples_per_pass).is_none() {
+        let cause = format!("times {} samples a pixel are too many", options.samples_per_pass);
+        return refuse("--passes", options.passes.to_string(), cause);
+    }
+    // Every picture has a seed of its own, and so has the one that warms up before each turn.
+    let turns = u64::from(options.timing_rounds).checked_mul(u64::from(options.timing_pictures) + 1);
+    let seeds = turns.and_then(|turns| turns.checked_add(u64::from(options.passes) + 1));
+    if seeds.is_none_or(|seeds| seeds > u64::from(u32::MAX)) {
+        let cause = format!(
+            "times {} pictures, with {} passes, need more seeds than there are",
+            options.timing_pictures, options.passes
+        );
+        return refuse("--timing-rounds", options.timing_rounds.to_string(), cause);
     }
     let all = scenes()?;
     let names: Vec<_> = all.iter().map(|one| one.name).collect();
@@ -205,12 +281,17 @@ fn settings(options: &AgreementOptions) -> PathTracerSettings {
     }
 }
 
-fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> Result<SceneAgreement> {
+fn compare_scene(
+    gpu: &Gpu,
+    one: &ComparedScene,
+    options: &AgreementOptions,
+    watch: &dyn Watch,
+) -> Result<SceneAgreement, Fault> {
     let folder = options.output.join(one.name);
     let size = [options.size; 2];
     let exported = export(&one.scene, "", size, &folder)?;
     let peer = Peer::new(options, &folder)?;
-    let theirs = peer.render(&Request {
+    let request = Request {
         scene: &exported.scene,
         name: "mitsuba",
         variant: Variant::Auto,
@@ -220,7 +301,8 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
         samples: options.samples_per_pass,
         seed: options.seed,
         each: false,
-    })?;
+    };
+    let theirs = peer.render(&request, watch)?;
 
     let scene = Arc::new(GpuScene::new(gpu, &one.scene)?);
     let camera = one.scene.camera(None).ok_or_else(|| Error::Setting {
@@ -248,17 +330,24 @@ fn compare_scene(gpu: &Gpu, one: &ComparedScene, options: &AgreementOptions) -> 
 
     let mut race = None;
     if options.timing_rounds > 0 {
-        let course = Course {
+        let has_llvm = theirs.variant == Variant::Llvm.name();
+        if !has_llvm {
+            watch.note(&format!(
+                "{}: Mitsuba's LLVM variant not measured, none found",
+                one.name
+            ));
+        }
+        let setup = RaceSetup {
             gpu,
             scene,
             camera,
-            entries: Integrator::contenders(&one.scene),
+            contenders: Integrator::contenders(&one.scene),
             peer: &peer,
             exported: &exported.scene,
-            has_llvm: theirs.variant == Variant::Llvm.name(),
+            has_llvm,
             reference: b,
         };
-        race = race::run(&course, options)?;
+        race = race::run(&setup, options, watch)?;
     }
     Ok(SceneAgreement {
         name: one.name.into(),
@@ -302,7 +391,7 @@ fn write_pictures(folder: &Path, ours: &Picture, reference: &Picture) -> Result<
     )
 }
 
-/// z of each value, with the floor of [`z_test`].
+/// z of each value, with the floor of [`z_test`](fn@z_test).
 fn z_values(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> Vec<f64> {
     let z = |i: usize| {
         let [a, a_var, b, b_var] = [a[i], a_var[i], b[i], b_var[i]].map(f64::from);
@@ -388,10 +477,37 @@ mod tests {
             timing_rounds: 1,
             ..Default::default()
         }));
+        // Products beyond 32 bits.
+        assert!(refused(AgreementOptions {
+            passes: 1 << 16,
+            samples_per_pass: 1 << 16,
+            ..Default::default()
+        }));
+        for (timing_rounds, timing_pictures) in [(1 << 20, 1 << 20), (u32::MAX, u32::MAX)] {
+            assert!(refused(AgreementOptions {
+                timing_rounds,
+                timing_pictures,
+                ..Default::default()
+            }));
+        }
+        assert!(refused(AgreementOptions {
+            passes: u32::MAX,
+            samples_per_pass: 1,
+            ..Default::default()
+        }));
         assert!(!refused(AgreementOptions {
             timing_rounds: 0,
             ..Default::default()
         }));
         assert!(!refused(AgreementOptions::default()));
+        let few = AgreementOptions {
+            timing_rounds: 1,
+            ..Default::default()
+        };
+        let cause = few.check().unwrap_err().to_string();
+        assert_eq!(
+            cause,
+            "setting --timing-rounds: 1 times 2 pictures are 2, below 3: take more rounds or pictures"
+        );
     }
 }

@@ -1,13 +1,17 @@
 //! Mitsuba 3 in a process of its own, through `tools/mitsuba/reference.py`, which is part of this program.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread;
+use std::time::Duration;
 
 use clerestory::film::atomic;
 use clerestory::scene::{Medium, Scene};
 use clerestory::{Error, Result};
 
-use super::AgreementOptions;
+use super::{AgreementOptions, Fault};
+use crate::experiments::watch::{Unwatched, Watch};
 
 /// The script that renders with Mitsuba.
 const SCRIPT: &str = include_str!("../../mitsuba/reference.py");
@@ -71,37 +75,41 @@ impl Integrator {
 
     /// The one without bias for converged pictures.
     pub(super) fn of_reference(scene: &Scene) -> Self {
-        match Walk::of(scene) {
-            Walk::Surfaces => Self::Path,
-            Walk::Grey => Self::Volpath,
-            Walk::Coloured => Self::VolpathMisWithoutRoulette,
+        match ExtinctionKind::of(scene) {
+            ExtinctionKind::Surfaces => Self::Path,
+            ExtinctionKind::Grey => Self::Volpath,
+            ExtinctionKind::Coloured => Self::VolpathMisWithoutRoulette,
         }
     }
 
     /// Those that race, each with its samplers.
     pub(super) fn contenders(scene: &Scene) -> &'static [(Self, &'static str)] {
         const SAMPLERS: [&str; 2] = ["independent", "multijitter"];
-        match Walk::of(scene) {
-            Walk::Surfaces => &[(Self::Path, SAMPLERS[0]), (Self::Path, SAMPLERS[1])],
-            Walk::Grey => &[
+        match ExtinctionKind::of(scene) {
+            ExtinctionKind::Surfaces => &[(Self::Path, SAMPLERS[0]), (Self::Path, SAMPLERS[1])],
+            ExtinctionKind::Grey => &[
                 (Self::Volpath, SAMPLERS[0]),
                 (Self::Volpath, SAMPLERS[1]),
                 (Self::VolpathMis, SAMPLERS[1]),
             ],
-            Walk::Coloured => &[(Self::VolpathMis, SAMPLERS[0]), (Self::VolpathMis, SAMPLERS[1])],
+            ExtinctionKind::Coloured => &[
+                (Self::VolpathMis, SAMPLERS[0]),
+                (Self::VolpathMis, SAMPLERS[1]),
+                (Self::Volpath, SAMPLERS[1]),
+            ],
         }
     }
 }
 
-/// What paths meet in a scene.
-enum Walk {
+/// What paths meet in a scene: whether media, and with what extinction.
+enum ExtinctionKind {
     Surfaces,
     /// Media whose bands have one extinction.
     Grey,
     Coloured,
 }
 
-impl Walk {
+impl ExtinctionKind {
     fn of(scene: &Scene) -> Self {
         // Extinction is a sum of two coefficients, rounded band by band.
         const ROUNDING: f32 = 1e-6;
@@ -171,12 +179,6 @@ impl Answer {
     /// Reads and checks it.
     fn parse(text: &str) -> Result<Self, String> {
         let answer: Self = serde_json::from_str(text).map_err(|cause| cause.to_string())?;
-        if answer.non_finite_values > 0 {
-            return Err(format!(
-                "Mitsuba's picture has {} values that are not finite",
-                answer.non_finite_values
-            ));
-        }
         if answer.passes == 0 || answer.seconds_each.len() != answer.passes {
             return Err(format!(
                 "{} times for {} passes",
@@ -200,21 +202,64 @@ impl Answer {
     }
 }
 
-/// Runs Python and returns what it printed.
-fn run(python: &Path, command: &mut Command) -> Result<String> {
+/// How often a running Python is looked at.
+const POLL: Duration = Duration::from_millis(20);
+
+/// Runs Python and returns what it printed; [`Fault::Stopped`] when `watch` says to stop before it ends, which ends it.
+fn run(python: &Path, command: &mut Command, watch: &dyn Watch) -> Result<String, Fault> {
     let failed = |cause: String| Error::setting("python", python.display(), cause);
-    let output = command
-        .output()
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    // In the terminal's group Ctrl-C would reach it too, and its death would look like a failure.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    let mut child = command
+        .spawn()
         .map_err(|cause| failed(format!("cannot be run: {cause}")))?;
-    if output.status.success() {
-        return Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned());
+    // Read beside it: a full pipe would block it for ever.
+    let printed = read_beside(child.stdout.take());
+    let complaint = read_beside(child.stderr.take());
+    let status = wait(&mut child, watch).map_err(|cause| failed(format!("cannot be waited for: {cause}")))?;
+    let Some(status) = status else {
+        return Err(Fault::Stopped);
+    };
+    let text = |reader: thread::JoinHandle<Vec<u8>>| {
+        let bytes = reader.join().unwrap_or_default();
+        String::from_utf8_lossy(&bytes).trim().to_owned()
+    };
+    if status.success() {
+        return Ok(text(printed));
     }
-    let text = String::from_utf8_lossy(&output.stderr);
-    let last = text.trim().lines().last().unwrap_or("no message");
-    Err(failed(format!(
-        "did not run Mitsuba 3 ({}): {last}; see tools/mitsuba/README.md",
-        output.status
-    )))
+    let text = text(complaint);
+    let last = text.lines().last().unwrap_or("no message");
+    let cause = format!("did not run Mitsuba 3 ({status}): {last}; see tools/mitsuba/README.md");
+    Err(failed(cause).into())
+}
+
+/// Waits for the end; `None` when it was ended because `watch` says to stop.
+fn wait(child: &mut Child, watch: &dyn Watch) -> std::io::Result<Option<ExitStatus>> {
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if watch.stopped() {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        thread::sleep(POLL);
+    }
+}
+
+/// Reads to the end in a thread of its own; what was read before an error counts.
+fn read_beside(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
+    thread::spawn(move || {
+        let mut bytes = Vec::new();
+        let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
+        bytes
+    })
 }
 
 /// The version of Mitsuba that a Python has.
@@ -222,7 +267,8 @@ fn run(python: &Path, command: &mut Command) -> Result<String> {
 /// # Errors
 /// [`Error::Setting`] when it cannot be run or has no Mitsuba.
 pub fn mitsuba_version(python: &Path) -> Result<String> {
-    run(python, Command::new(python).args(["-c", PROBE]))
+    let version = run(python, Command::new(python).args(["-c", PROBE]), &Unwatched);
+    version.map_err(|fault| fault.into_error("python"))
 }
 
 impl<'a> Peer<'a> {
@@ -239,7 +285,7 @@ impl<'a> Peer<'a> {
     }
 
     /// Renders and waits.
-    pub(super) fn render(&self, request: &Request<'_>) -> Result<Rendered> {
+    pub(super) fn render(&self, request: &Request<'_>, watch: &dyn Watch) -> Result<Rendered, Fault> {
         let prefix = self.folder.join(request.name);
         let mut command = Command::new(self.python);
         command
@@ -253,7 +299,7 @@ impl<'a> Peer<'a> {
             .args(["--spp", &request.samples.to_string()])
             .args(["--seed", &request.seed.to_string()])
             .args(request.each.then_some("--each"));
-        run(self.python, &mut command)?;
+        run(self.python, &mut command, watch)?;
         let read = |suffix: &str| {
             let path = prefix.with_extension(suffix);
             let bytes = std::fs::read(&path).map_err(|cause| Error::io(&path, cause))?;
@@ -261,6 +307,15 @@ impl<'a> Peer<'a> {
         };
         let (bytes, path) = read("json")?;
         let answer = Answer::parse(&String::from_utf8_lossy(&bytes)).map_err(|cause| Error::Picture { path, cause })?;
+        if answer.non_finite_values > 0 {
+            return Err(Fault::NotFinite(format!(
+                "Mitsuba's picture by {} {} with {} samples has {} values that are not finite",
+                answer.variant,
+                request.integrator.name(),
+                request.sampler,
+                answer.non_finite_values
+            )));
+        }
         let mut pictures = Vec::new();
         if request.each {
             let (bytes, path) = read("f32")?;
@@ -318,7 +373,7 @@ mod tests {
             (2, 2, 1.5)
         );
         assert!(Answer::parse(&text(3, 0)).unwrap_err().contains("2 times for 3 passes"));
-        assert!(Answer::parse(&text(2, 7)).unwrap_err().contains("7 values"));
+        assert_eq!(Answer::parse(&text(2, 7)).unwrap().non_finite_values, 7);
         assert!(Answer::parse("{}").unwrap_err().contains("variant"));
     }
 
@@ -343,5 +398,37 @@ mod tests {
     fn a_python_that_is_not_there_is_an_error() {
         let refused = mitsuba_version(Path::new("no/such/python")).unwrap_err().to_string();
         assert!(refused.contains("cannot be run"), "{refused}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_wish_to_stop_ends_the_child() {
+        /// Wishes to stop from the first question on.
+        struct Stopping;
+        impl Watch for Stopping {
+            fn begin(&self, _what: &str, _done: usize, _all: usize) {}
+            fn step(&self, _progress: clerestory::render::Progress) {}
+            fn note(&self, _line: &str) {}
+            fn stopped(&self) -> bool {
+                true
+            }
+        }
+        let shell = Path::new("sh");
+        // The child would outlive every other test.
+        let stopped = run(shell, Command::new(shell).args(["-c", "exec sleep 600"]), &Stopping);
+        assert!(matches!(stopped, Err(Fault::Stopped)), "{stopped:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_a_child_prints_and_how_it_fails_is_read() {
+        let shell = Path::new("sh");
+        let run = |script: &str| run(shell, Command::new(shell).args(["-c", script]), &Unwatched);
+        assert_eq!(run("echo 3.9.1").unwrap(), "3.9.1");
+        // More than a pipe holds.
+        assert_eq!(run("head -c 300000 /dev/zero | tr '\\0' x").unwrap().len(), 300_000);
+        let failed = run("echo first >&2; echo last >&2; exit 3").unwrap_err();
+        let failed = failed.into_error("sh").to_string();
+        assert!(failed.contains("exit status: 3): last;"), "{failed}");
     }
 }

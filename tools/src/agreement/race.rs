@@ -4,8 +4,10 @@
 //! over the same weights for all, so no reference's noise is in it; that the renderers agree in expectation is for the z-test to show.
 //! A Monte Carlo picture of n samples takes time in proportion to n and has an error in proportion to 1/n, so a contender with s seconds
 //! and error m a picture reaches an error e in s · m / e seconds. The one assumption is MSE ∝ 1/n between the timed picture and e: it
-//! is exact for independent samples and holds near the timed picture for stratified ones. To use it least, e is the error of this engine's
-//! best picture, and all contenders take the same number of samples.
+//! is exact for independent samples and holds near the timed picture for stratified ones, whose error may fall faster: then it is in this
+//! engine's favour where Mitsuba's timed picture has the larger error (fewer samples than assumed would do), and in Mitsuba's where it has
+//! the smaller one. To use it least, e is the error of this engine's best picture, and all contenders take the same number of samples.
+//! The standard error of a ratio has two parts of each side, in quadrature: the relative MSE's, and the seconds' by their spread between rounds.
 //! Guarantees: pictures and errors depend on the options and the drivers alone; times are medians over all pictures.
 
 use std::path::Path;
@@ -18,15 +20,16 @@ use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
 
-use super::AgreementOptions;
 use super::peer::{Integrator, Peer, Request, Variant};
 use super::spread;
+use super::{AgreementOptions, Fault};
+use crate::experiments::watch::Watch;
 use crate::machine::median;
 
 /// This engine's name as a contender.
 const OURS: &str = "clerestory";
-/// Mitsuba's scalar variant.
-const SCALAR: &str = "scalar_rgb";
+/// Standard error of a median over that of a mean, of many values that are normal: √(π/2).
+const MEDIAN_OVER_MEAN: f64 = 1.253_314_137_315_5;
 
 /// A renderer with a sampler, and what its pictures take.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -39,6 +42,10 @@ pub struct Contender {
     pub pictures: usize,
     /// Seconds of wall clock a picture, median.
     pub seconds: f64,
+    /// Its standard error, by the spread of the rounds' medians, or of the pictures where there is one round; `None` in reports of earlier
+    /// versions.
+    #[serde(default)]
+    pub seconds_error: Option<f64>,
     /// Processor seconds of all threads a picture, median of the rounds; `None` where the system does not say.
     pub cpu_seconds: Option<f64>,
     /// Camera paths a second of wall clock.
@@ -65,13 +72,30 @@ impl Contender {
         self.cpu_seconds.map(|seconds| seconds * self.relative_mse / error)
     }
 
-    fn is_ours(&self) -> bool {
+    /// Whether it is this engine.
+    pub(super) fn is_ours(&self) -> bool {
         self.renderer == OURS
     }
 
-    /// Relative standard error of the seconds to an error, by that of the relative MSE alone.
+    /// Mitsuba's variant, without its integrator.
+    pub(super) fn variant(&self) -> &str {
+        self.renderer
+            .split_once(' ')
+            .map_or(&*self.renderer, |(variant, _)| variant)
+    }
+
+    /// Integrator, where there is a choice, and sampler.
+    pub(super) fn way(&self) -> String {
+        let integrator = self.renderer.split_once(' ').map(|(_, integrator)| integrator);
+        integrator.map_or(self.sampler.clone(), |integrator| {
+            format!("{integrator} {}", self.sampler)
+        })
+    }
+
+    /// Relative standard error of the seconds to an error, by that of the relative MSE and, where it is known, that of the seconds.
     fn uncertainty(&self) -> f64 {
-        self.relative_mse_error / self.relative_mse
+        let seconds_error = self.seconds_error.unwrap_or(0.0);
+        (self.relative_mse_error / self.relative_mse).hypot(seconds_error / self.seconds)
     }
 }
 
@@ -90,10 +114,38 @@ pub struct EqualError {
     pub their_seconds: f64,
     /// Their seconds over ours: above 1 this engine is faster.
     pub ratio: f64,
-    /// Standard error of the ratio by the errors' own uncertainty; that of the times is not in it.
+    /// Standard error of the ratio, by those of the relative MSEs and of the seconds.
     pub ratio_error: f64,
     /// Their processor seconds over ours.
     pub cpu_ratio: Option<f64>,
+}
+
+/// Who reaches the error first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lead {
+    /// This engine.
+    Faster,
+    /// Mitsuba.
+    Slower,
+    /// The ratio is 1 within [`EqualError::STANDARD_ERRORS`].
+    Undecided,
+}
+
+impl EqualError {
+    /// Standard errors of the ratio that a lead must exceed.
+    pub const STANDARD_ERRORS: f64 = 2.0;
+
+    /// Who is first. By the ratio's logarithm, so that neither side is the favoured one.
+    pub fn lead(&self) -> Lead {
+        let (lead, margin) = (self.ratio.ln(), Self::STANDARD_ERRORS * self.ratio_error / self.ratio);
+        if lead > margin {
+            Lead::Faster
+        } else if -lead > margin {
+            Lead::Slower
+        } else {
+            Lead::Undecided
+        }
+    }
 }
 
 /// All contenders on one scene.
@@ -141,12 +193,26 @@ impl Race {
             }
         };
         let against_best = against(best(&|one| !one.is_ours())?);
-        let against_scalar = against(best(&|one| one.renderer.starts_with(SCALAR))?);
+        let against_scalar = against(best(&|one| one.variant() == Variant::Scalar.name())?);
         Some(Self {
             contenders,
             against_best,
             against_scalar,
         })
+    }
+
+    /// Whether Mitsuba's LLVM variant took part.
+    pub fn has_llvm(&self) -> bool {
+        self.contenders.iter().any(|one| one.variant() == Variant::Llvm.name())
+    }
+
+    /// Mitsuba's best in words, which say where its LLVM variant was not measured.
+    pub fn their_best(&self) -> String {
+        let name = self.pair(&self.against_best)[1].name();
+        if self.has_llvm() {
+            return name;
+        }
+        format!("{name} (LLVM variant not measured)")
     }
 
     /// The two of a comparison, ours first.
@@ -158,20 +224,35 @@ impl Race {
 /// What the turns of one contender gave.
 #[derive(Default)]
 struct Turns {
-    seconds: Vec<f64>,
+    /// Of each turn's pictures.
+    seconds: Vec<Vec<f64>>,
     cpu_seconds: Vec<f64>,
     pictures: Vec<Vec<f32>>,
+}
+
+/// Standard error of the median of all turns' seconds. Pictures of one turn share its disturbances, so turns count, where there are several.
+fn seconds_error(turns: &[Vec<f64>]) -> f64 {
+    let values = match turns {
+        [one] => one.clone(),
+        several => several.iter().cloned().map(median).collect(),
+    };
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    MEDIAN_OVER_MEAN * (squares / (count - 1.0) / count).sqrt()
 }
 
 impl Turns {
     fn contender(self, renderer: &str, sampler: &str, paths: f64, reference: &[f32]) -> Option<Contender> {
         let spread = spread::measure(&self.pictures, reference)?;
-        let seconds = median(self.seconds);
+        let seconds_error = seconds_error(&self.seconds);
+        let seconds = median(self.seconds.concat());
         Some(Contender {
             renderer: renderer.into(),
             sampler: sampler.into(),
             pictures: self.pictures.len(),
             seconds,
+            seconds_error: Some(seconds_error),
             cpu_seconds: Some(median(self.cpu_seconds)).filter(|seconds| seconds.is_finite()),
             paths_per_second: paths / seconds,
             relative_mse: spread.relative_mse,
@@ -182,14 +263,16 @@ impl Turns {
     /// One more turn of this engine. A picture counts from clearing the film until its values are in the host's memory.
     fn ours(&mut self, tracer: &mut PathTracer, first_seed: u32, options: &AgreementOptions) -> Result<()> {
         let processor = cpu_seconds();
+        let mut seconds = Vec::new();
         for index in 0..options.timing_pictures {
             let clock = Instant::now();
             tracer.restart(first_seed.wrapping_add(index))?;
             tracer.render(options.timing_samples)?;
             let (picture, _) = tracer.picture()?;
-            self.seconds.push(clock.elapsed().as_secs_f64());
+            seconds.push(clock.elapsed().as_secs_f64());
             self.pictures.push(picture.main_layer()?.values().to_vec());
         }
+        self.seconds.push(seconds);
         let spent = processor.zip(cpu_seconds()).map(|(before, after)| after - before);
         self.cpu_seconds
             .extend(spent.map(|spent| spent / f64::from(options.timing_pictures)));
@@ -198,12 +281,12 @@ impl Turns {
 }
 
 /// What is raced on.
-pub(super) struct Course<'a> {
+pub(super) struct RaceSetup<'a> {
     pub(super) gpu: &'a Gpu,
     pub(super) scene: Arc<GpuScene>,
     pub(super) camera: &'a Camera,
     /// With whom, and how, in Mitsuba.
-    pub(super) entries: &'static [(Integrator, &'static str)],
+    pub(super) contenders: &'static [(Integrator, &'static str)],
     pub(super) peer: &'a Peer<'a>,
     /// The scene as exported.
     pub(super) exported: &'a Path,
@@ -214,7 +297,8 @@ pub(super) struct Course<'a> {
 }
 
 /// Lets all contenders render in turns.
-pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Option<Race>> {
+pub(super) fn run(setup: &RaceSetup<'_>, options: &AgreementOptions, watch: &dyn Watch) -> Result<Option<Race>, Fault> {
+    let go_on = || if watch.stopped() { Err(Fault::Stopped) } else { Ok(()) };
     let size = [options.size; 2];
     let samplers = [(SamplerKind::Sobol, "sobol"), (SamplerKind::Pcg, "pcg")];
     let mut ours = Vec::new();
@@ -223,20 +307,20 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
             sampler,
             ..super::settings(options)
         };
-        let mut tracer = PathTracer::new(course.gpu, course.scene.clone(), course.camera, size, settings)?;
+        let mut tracer = PathTracer::new(setup.gpu, setup.scene.clone(), setup.camera, size, settings)?;
         // The first picture compiles the kernels, as LLVM's does.
         tracer.render(options.timing_samples)?;
         tracer.picture()?;
         ours.push((name, tracer, Turns::default()));
     }
-    let variants: &[Variant] = if course.has_llvm {
+    let variants: &[Variant] = if setup.has_llvm {
         &[Variant::Scalar, Variant::Llvm]
     } else {
         &[Variant::Scalar]
     };
     let mut theirs = Vec::new();
     for variant in variants {
-        for (integrator, sampler) in course.entries {
+        for (integrator, sampler) in setup.contenders {
             theirs.push((*variant, *integrator, *sampler, Turns::default()));
         }
     }
@@ -246,11 +330,13 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
             .wrapping_add(options.passes + 1)
             .wrapping_add(round * (options.timing_pictures + 1));
         for (_, tracer, turns) in &mut ours {
+            go_on()?;
             turns.ours(tracer, first_seed, options)?;
         }
         for (variant, integrator, sampler, turns) in &mut theirs {
-            let mut timed = course.peer.render(&Request {
-                scene: course.exported,
+            go_on()?;
+            let request = Request {
+                scene: setup.exported,
                 name: "timed",
                 variant: *variant,
                 sampler,
@@ -259,26 +345,27 @@ pub(super) fn run(course: &Course<'_>, options: &AgreementOptions) -> Result<Opt
                 samples: options.timing_samples,
                 seed: first_seed,
                 each: true,
-            })?;
-            turns.seconds.append(&mut timed.seconds_each);
+            };
+            let timed = setup.peer.render(&request, watch)?;
+            turns.seconds.push(timed.seconds_each);
             turns.cpu_seconds.push(timed.cpu_seconds_each);
-            turns.pictures.append(&mut timed.pictures);
+            turns.pictures.extend(timed.pictures);
         }
     }
     let paths = f64::from(options.size).powi(2) * f64::from(options.timing_samples);
     let ours = ours
         .into_iter()
-        .map(|(sampler, _, turns)| turns.contender(OURS, sampler, paths, course.reference));
+        .map(|(sampler, _, turns)| turns.contender(OURS, sampler, paths, setup.reference));
     let theirs = theirs.into_iter().map(|(variant, integrator, sampler, turns)| {
         let renderer = match integrator {
             Integrator::Path => variant.name().to_owned(),
             _ => format!("{} {}", variant.name(), integrator.name()),
         };
-        turns.contender(&renderer, sampler, paths, course.reference)
+        turns.contender(&renderer, sampler, paths, setup.reference)
     });
     let contenders: Option<Vec<_>> = ours.chain(theirs).collect();
     let contenders = contenders.ok_or_else(|| Error::Picture {
-        path: course.exported.display().to_string(),
+        path: setup.exported.display().to_string(),
         cause: "the timed pictures have different sizes".into(),
     })?;
     Ok(Race::new(contenders))
@@ -307,6 +394,7 @@ pub(super) mod tests {
             sampler: sampler.into(),
             pictures: 6,
             seconds,
+            seconds_error: Some(0.04 * seconds),
             cpu_seconds: Some(2.0 * seconds),
             paths_per_second: 1e6 / seconds,
             relative_mse,
@@ -333,7 +421,8 @@ pub(super) mod tests {
         assert_eq!((best.ours, best.theirs, race.against_scalar.theirs), (0, 4, 2));
         assert_eq!((best.error, best.our_seconds, best.their_seconds), (0.5, 2.0, 1.0));
         assert_eq!((best.ratio, best.cpu_ratio), (0.5, Some(0.5)));
-        assert!((best.ratio_error - 0.5 * 0.03 * 2.0f64.sqrt()).abs() < 1e-15);
+        // 3 % of the errors and 4 % of the seconds are 5 % on either side.
+        assert!((best.ratio_error - 0.5 * 0.05 * 2.0f64.sqrt()).abs() < 1e-15);
         assert_eq!(race.against_scalar.ratio, 3.0);
         assert_eq!(race.pair(&best)[1].sampler, "independent");
     }
@@ -345,15 +434,45 @@ pub(super) mod tests {
         assert_eq!(Race::new(all[2..].to_vec()), None);
         let without_llvm = Race::new(all[..4].to_vec()).unwrap();
         assert_eq!(without_llvm.against_best, without_llvm.against_scalar);
+        assert!(!without_llvm.has_llvm() && without_llvm.their_best().contains("not measured"));
         let mut silent = all;
         silent[3].relative_mse = 0.0;
         assert_eq!(Race::new(silent), None);
     }
 
     #[test]
+    fn a_lead_within_two_standard_errors_is_undecided_either_way() {
+        let lead = |ratio: f64, relative_error: f64| {
+            let best = Race::new(made_up_race()).unwrap().against_best;
+            let ratio_error = relative_error * ratio;
+            EqualError {
+                ratio,
+                ratio_error,
+                ..best
+            }
+            .lead()
+        };
+        // ln 1.25 = 0.223.
+        assert_eq!(lead(1.25, 0.11), Lead::Faster);
+        assert_eq!(lead(1.25, 0.12), Lead::Undecided);
+        assert_eq!(lead(0.8, 0.11), Lead::Slower);
+        assert_eq!(lead(0.8, 0.12), Lead::Undecided);
+        assert_eq!(lead(1.25, f64::NAN), Lead::Undecided);
+    }
+
+    #[test]
+    fn the_spread_of_seconds_is_that_between_turns() {
+        // Medians 1, 2, 3: deviation 1; the spread within a turn does not matter.
+        let turns = [vec![0.0, 2.0], vec![2.0, 2.0], vec![3.0]];
+        let expected = (std::f64::consts::FRAC_PI_2 / 3.0).sqrt();
+        assert!((seconds_error(&turns) - expected).abs() < 1e-13);
+        assert!((seconds_error(&[vec![1.0, 3.0, 2.0]]) - expected).abs() < 1e-13);
+    }
+
+    #[test]
     fn turns_become_a_contender_by_medians_and_spread() {
         let turns = |pictures| Turns {
-            seconds: vec![3.0, 1.0, 2.0],
+            seconds: vec![vec![3.0, 1.0, 2.0]],
             cpu_seconds: vec![],
             pictures,
         };

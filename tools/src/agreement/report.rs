@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
+use clerestory::film::z_test::ACCEPTED_FRACTION;
 use clerestory::film::{ZTest, atomic};
 use clerestory::gpu::Caps;
 use clerestory::{Error, Result};
@@ -91,7 +91,7 @@ impl SceneAgreement {
 }
 
 /// |z| of a whole picture's bias that chance reaches once in about 100 pictures when the three channels of a pixel vary as one: √3 · 2.58.
-const BIAS_Z_MAX: f64 = 4.5;
+pub(crate) const BIAS_Z_MAX: f64 = 4.5;
 
 impl std::fmt::Display for SceneAgreement {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -110,6 +110,15 @@ impl std::fmt::Display for SceneAgreement {
     }
 }
 
+/// A scene that could not be compared.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Uncompared {
+    /// Its name.
+    pub name: String,
+    /// Why, in words.
+    pub cause: String,
+}
+
 /// All comparisons of a run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementReport {
@@ -119,6 +128,9 @@ pub struct AgreementReport {
     pub options: AgreementOptions,
     /// One entry a scene.
     pub scenes: Vec<SceneAgreement>,
+    /// The scenes of which Mitsuba made a picture that is not finite.
+    #[serde(default)]
+    pub uncompared: Vec<Uncompared>,
 }
 
 impl AgreementReport {
@@ -141,9 +153,15 @@ impl AgreementReport {
         report.map_or_else(Vec::new, |report| report.scenes)
     }
 
-    /// Whether every scene agrees.
+    /// Whether every scene was compared and agrees.
     pub fn passes(&self) -> bool {
-        self.scenes.iter().all(SceneAgreement::passes)
+        self.uncompared.is_empty() && self.scenes.iter().all(SceneAgreement::passes)
+    }
+
+    /// The scenes that were not compared, in a sentence each.
+    pub fn uncompared_lines(&self) -> Vec<String> {
+        let line = |one: &Uncompared| format!("{} was not compared: {}.", one.name, one.cause);
+        self.uncompared.iter().map(line).collect()
     }
 
     /// Writes `prefix.json` and `prefix.md`.
@@ -179,6 +197,9 @@ impl AgreementReport {
             o.size,
             o.passes * o.samples_per_pass
         );
+        for line in self.uncompared_lines() {
+            let _ = writeln!(text, "- {line}");
+        }
         let _ = writeln!(text, "- {}", self.race_method());
         for line in self.race_summary() {
             let _ = writeln!(text, "- {line}");
@@ -205,7 +226,7 @@ impl AgreementReport {
                         ours.sampler,
                         millions(ours),
                         ours.relative_mse,
-                        theirs.name(),
+                        race.their_best(),
                         millions(theirs),
                         theirs.relative_mse,
                         ratio(&race.against_best),
@@ -217,51 +238,15 @@ impl AgreementReport {
         text
     }
 
-    /// How times to equal error were measured, in a paragraph.
-    pub fn race_method(&self) -> String {
-        let o = &self.options;
-        format!(
-            "Time to equal error: every renderer takes turns with each of its samplers (here `sobol` and `pcg`; Mitsuba's `scalar_rgb` and `llvm_ad_rgb` with \
-             `independent` and `multijitter`), {} independent pictures each of {1} × {1} pixels × {2} samples. Relative MSE is that of one such picture, by \
-             the variance between them over the squares of one converged picture + {3}; paths a second are of wall clock, medians. A contender's \
-             seconds to an error are its seconds a picture × its relative MSE / that error, which takes the MSE to fall as 1/samples \
-             around these pictures. Compared are the samplers and variants of either side that are there first. Ratios are Mitsuba's seconds over \
-             ours, above 1 this engine is faster, ± their standard error by that of the errors; in brackets the ratio of processor \
-             seconds, which other work on the machine changes less.",
-            o.timing_rounds * o.timing_pictures,
-            o.size,
-            o.timing_samples,
-            RELATIVE_MSE_OFFSET,
-        )
-    }
-
-    /// In how many scenes this engine is first, and the mean ratios; nothing when nothing was timed.
-    pub fn race_summary(&self) -> Vec<String> {
-        let races: Vec<&Race> = self.scenes.iter().filter_map(|scene| scene.race.as_ref()).collect();
-        let line = |whom: &str, of: fn(&Race) -> &EqualError| {
-            let ratios: Vec<f64> = races.iter().map(|race| of(race).ratio).collect();
-            let first = ratios.iter().filter(|ratio| **ratio > 1.0).count();
-            let mean = (ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64).exp();
-            format!(
-                "Against {whom} this engine is faster to equal error in {first} of {} scenes; geometric mean of the ratios {mean:.2}.",
-                ratios.len()
-            )
-        };
-        if races.is_empty() {
-            return Vec::new();
-        }
-        vec![
-            line("Mitsuba's best", |race| &race.against_best),
-            line("its scalar variant", |race| &race.against_scalar),
-        ]
-    }
-
     /// The report as a page.
     pub fn to_markdown(&self) -> String {
         let mut page = String::from("# Agreement with Mitsuba 3\n\n");
         let (m, o) = (&self.machine, &self.options);
         let agreeing = self.scenes.iter().filter(|scene| scene.passes()).count();
         let _ = writeln!(page, "{agreeing} of {} scenes agree.\n", self.scenes.len());
+        for line in self.uncompared_lines() {
+            let _ = writeln!(page, "- {line}");
+        }
         let _ = writeln!(
             page,
             "- Processor: {}, {} threads. Device: {}, {}. Reference: {}.",
@@ -279,15 +264,21 @@ impl AgreementReport {
             let _ = writeln!(
                 page,
                 "- z-test of every value (pixel × channel), α = {} for the whole picture with Šidák's correction: a value is accepted with p ≥ {:.2e}. A picture \
-                 agrees when at least 99.75 % of its values are accepted. The means of its blocks of 8 × 8 pixels are tested alike (p ≥ {:.2e}): they \
+                 agrees when at least {} % of its values are accepted. The means of its blocks of 8 × 8 pixels are tested alike (p ≥ {:.2e}): they \
                  show eight times smaller differences, and one picture in 100 has a rejected block by chance.",
-                first.values.alpha, first.values.threshold, first.blocks.threshold
+                first.values.alpha,
+                first.values.threshold,
+                ACCEPTED_FRACTION * 100.0,
+                first.blocks.threshold
             );
         }
-        page.push_str(
+        let _ = writeln!(
+            page,
             "- mean z² is 1 for pictures that differ by noise alone. Bias is that of the whole picture, with its z; values of one pixel are \
-             not independent, so |z| up to about 4.5 is no evidence.\n\n## Agreement\n\n\
-             | scene | what it tests | values accepted | worst z | blocks accepted | worst z | mean z² | of blocks | bias | bias z | relative MSE | |\n\
+             not independent, so |z| up to about {BIAS_Z_MAX} is no evidence.\n\n## Agreement\n"
+        );
+        page.push_str(
+            "| scene | what it tests | values accepted | worst z | blocks accepted | worst z | mean z² | of blocks | bias | bias z | relative MSE | |\n\
              |---|---|---|---|---|---|---|---|---|---|---|---|\n",
         );
         for s in &self.scenes {
@@ -324,16 +315,19 @@ impl AgreementReport {
     fn write_races(&self, page: &mut String) {
         let races = || self.scenes.iter().filter_map(|s| s.race.as_ref().map(|race| (s, race)));
         page.push_str(
-            "\n| scene | relative MSE to reach | our seconds | Mitsuba's | ratio to best | ratio to scalar |\n|---|---:|---:|---:|---:|---:|\n",
+            "\n| scene | relative MSE to reach | our seconds | Mitsuba's best | its seconds | ratio to best | ratio to scalar |\n\
+             |---|---:|---:|---|---:|---:|---:|\n",
+
         );
         for (s, race) in races() {
             let best = &race.against_best;
             let _ = writeln!(
                 page,
-                "| {} | {:.2e} | {:.3} | {:.3} | {} | {} |",
+                "| {} | {:.2e} | {:.3} | {} | {:.3} | {} | {} |",
                 s.name,
                 best.error,
                 best.our_seconds,
+                race.their_best(),
                 best.their_seconds,
                 ratio(best),
                 ratio(&race.against_scalar),
@@ -388,14 +382,14 @@ fn ratio(of: &EqualError) -> String {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use clerestory::film::z_test;
 
     use super::super::race::tests::made_up_race;
     use super::*;
 
     /// Two scenes that nobody has rendered, one without times.
-    fn made_up() -> AgreementReport {
+    pub(crate) fn made_up() -> AgreementReport {
         let values = z_test(&[1.0], &[1.0], &[1.0], &[1.0], 0.01).unwrap();
         let scene = |name: &str, race| SceneAgreement {
             name: name.into(),
@@ -420,6 +414,7 @@ pub(super) mod tests {
                 mitsuba: "mitsuba 3".into(),
             },
             options: AgreementOptions::default(),
+            uncompared: Vec::new(),
             scenes: vec![scene("raced", Race::new(made_up_race())), scene("not raced", None)],
         }
     }
@@ -429,17 +424,11 @@ pub(super) mod tests {
         let text = made_up().to_results_block();
         assert!(
             text.contains(
-                "| raced | agrees | -0.100 % | sobol | 0.500 | 5.00e-1 | llvm_ad_rgb, independent | 2.000 | 1.00e0 | 0.50 ± 0.02 (0.50) | 3.00 ± 0.13 (3.00) |"
+                "| raced | agrees | -0.100 % | sobol | 0.500 | 5.00e-1 | llvm_ad_rgb, independent | 2.000 | 1.00e0 | 0.50 ± 0.04 (0.50) | 3.00 ± 0.21 (3.00) |"
             ),
             "{text}"
         );
         assert!(text.contains("| not raced | agrees | -0.100 % | – |"), "{text}");
-        assert!(
-            text.contains(
-                "best this engine is faster to equal error in 0 of 1 scenes; geometric mean of the ratios 0.50"
-            )
-        );
-        assert!(text.contains("variant this engine is faster to equal error in 1 of 1 scenes"));
         let columns: Vec<usize> = text
             .lines()
             .filter(|line| line.starts_with('|'))
@@ -451,7 +440,10 @@ pub(super) mod tests {
     #[test]
     fn the_page_has_every_contender() {
         let text = made_up().to_markdown();
-        assert!(text.contains("| raced | 5.00e-1 | 2.000 | 1.000 | 0.50"), "{text}");
+        assert!(
+            text.contains("| raced | 5.00e-1 | 2.000 | llvm_ad_rgb, independent | 1.000 | 0.50"),
+            "{text}"
+        );
         for contender in [
             "clerestory, sobol",
             "clerestory, pcg",
@@ -460,7 +452,38 @@ pub(super) mod tests {
         ] {
             assert_eq!(text.matches(contender).count(), 3, "{contender}");
         }
+        let thresholds = ["at least 99.75 % of its values", "|z| up to about 4.5 is"];
+        assert!(thresholds.iter().all(|one| text.contains(one)), "{text}");
         assert!(text.contains("| 2.000 (4.000) | 3.800 (7.600) |"), "{text}");
+    }
+
+    #[test]
+    fn a_scene_that_was_not_compared_is_named_and_no_pass() {
+        let mut report = made_up();
+        assert!(report.passes());
+        report.uncompared.push(Uncompared {
+            name: "broken".into(),
+            cause: "7 values are not finite".into(),
+        });
+        assert!(!report.passes());
+        let line = "- broken was not compared: 7 values are not finite.\n";
+        assert!(report.to_markdown().contains(line) && report.to_results_block().contains(line));
+    }
+
+    #[test]
+    fn reports_without_the_newer_fields_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let (report, prefix) = (made_up(), folder.path().join("report"));
+        let mut json = serde_json::to_value(&report).unwrap();
+        json.as_object_mut().unwrap().remove("uncompared").unwrap();
+        for contender in json["scenes"][0]["race"]["contenders"].as_array_mut().unwrap() {
+            contender.as_object_mut().unwrap().remove("seconds_error").unwrap();
+        }
+        std::fs::write(prefix.with_extension("json"), json.to_string()).unwrap();
+        let kept = AgreementReport::kept(&prefix, &report.machine, &report.options);
+        assert_eq!(kept.len(), 2);
+        let race = kept[0].race.as_ref().unwrap();
+        assert!(race.contenders.iter().all(|one| one.seconds_error.is_none()));
     }
 
     #[test]

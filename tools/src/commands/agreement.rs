@@ -135,9 +135,14 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if report.passes() {
         return Ok(ExitCode::SUCCESS);
     }
+    let differ = report.scenes.iter().any(|scene| !scene.passes());
     Err(Failure {
-        code: Code::Differ,
-        message: "the renderers differ beyond their noise".into(),
+        code: if differ { Code::Differ } else { Code::Run },
+        message: if differ {
+            "the renderers differ beyond their noise".into()
+        } else {
+            report.uncompared_lines().join(" ")
+        },
         hint: None,
     })
 }
