@@ -30,7 +30,8 @@ const PATH_TRACER: &[&str] = &[
     "tests/tests/media/homogeneous.rs::rays_past_a_source_have_the_exact_multiple_scattering",
     "tests/tests/media/slab.rs::reflectance_and_transmittance_are_those_of_the_tables",
     "tests/tests/media/mechanics.rs::parts_of_everything_sum_to_the_whole",
-    "tests/tests/hard_cases.rs::techniques_take_every_case_as_documented",
+    "tests/tests/hard_cases.rs::techniques_take_every_second_case_as_documented",
+    "tests/tests/hard_cases.rs::techniques_take_the_cases_between_as_documented",
     "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
 ];
 const TRANSPORT_EQUATION: &[&str] = &[
