@@ -157,6 +157,9 @@ pub struct Race {
     pub against_best: EqualError,
     /// Our best against the best sampler of Mitsuba's scalar variant.
     pub against_scalar: EqualError,
+    /// Who was left out for pictures with values that are not finite, in words.
+    #[serde(default)]
+    pub left_out: Vec<String>,
 }
 
 impl Race {
@@ -198,6 +201,7 @@ impl Race {
             contenders,
             against_best,
             against_scalar,
+            left_out: Vec::new(),
         })
     }
 
@@ -324,6 +328,7 @@ pub(super) fn run(setup: &RaceSetup<'_>, options: &AgreementOptions, watch: &dyn
             theirs.push((*variant, *integrator, *sampler, Turns::default()));
         }
     }
+    let mut left_out = Vec::new();
     for round in 0..options.timing_rounds {
         // Past the converged pictures' seeds; one more a turn for the picture that compiles.
         let first_seed = (options.seed)
@@ -333,24 +338,33 @@ pub(super) fn run(setup: &RaceSetup<'_>, options: &AgreementOptions, watch: &dyn
             go_on()?;
             turns.ours(tracer, first_seed, options)?;
         }
-        for (variant, integrator, sampler, turns) in &mut theirs {
+        let mut still_in = Vec::new();
+        for (variant, integrator, sampler, mut turns) in theirs {
             go_on()?;
             let request = Request {
                 scene: setup.exported,
                 name: "timed",
-                variant: *variant,
+                variant,
                 sampler,
-                integrator: *integrator,
+                integrator,
                 passes: options.timing_pictures,
                 samples: options.timing_samples,
                 seed: first_seed,
                 each: true,
             };
-            let timed = setup.peer.render(&request, watch)?;
-            turns.seconds.push(timed.seconds_each);
-            turns.cpu_seconds.push(timed.cpu_seconds_each);
-            turns.pictures.extend(timed.pictures);
+            match setup.peer.render(&request, watch) {
+                Ok(timed) => {
+                    turns.seconds.push(timed.seconds_each);
+                    turns.cpu_seconds.push(timed.cpu_seconds_each);
+                    turns.pictures.extend(timed.pictures);
+                    still_in.push((variant, integrator, sampler, turns));
+                }
+                // There is no error to reach for a picture with holes.
+                Err(Fault::NotFinite(cause)) => left_out.push(cause),
+                Err(other) => return Err(other),
+            }
         }
+        theirs = still_in;
     }
     let paths = f64::from(options.size).powi(2) * f64::from(options.timing_samples);
     let ours = ours
@@ -368,7 +382,8 @@ pub(super) fn run(setup: &RaceSetup<'_>, options: &AgreementOptions, watch: &dyn
         path: setup.exported.display().to_string(),
         cause: "the timed pictures have different sizes".into(),
     })?;
-    Ok(Race::new(contenders))
+    let race = Race::new(contenders);
+    Ok(race.map(|race| Race { left_out, ..race }))
 }
 
 /// Processor seconds of this process so far, all threads; `None` where the system does not say.

@@ -81,6 +81,10 @@ impl AgreementReport {
                 of(without_llvm)
             ));
         }
+        for scene in &self.scenes {
+            let left_out = scene.race.iter().flat_map(|race| &race.left_out);
+            lines.extend(left_out.map(|cause| format!("{}: left out, {cause}.", scene.name)));
+        }
         let knows_seconds = |race: &Race| race.contenders.iter().all(|one| one.seconds_error.is_some());
         let without_spread = races.iter().filter(|race| !knows_seconds(race)).count();
         if without_spread > 0 {
