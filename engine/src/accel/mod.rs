@@ -23,6 +23,7 @@
 pub mod bvh2;
 pub mod compact_bvh;
 pub mod complete_bvh;
+mod kind;
 pub mod lbvh;
 pub mod morton;
 pub mod offset;
@@ -33,6 +34,8 @@ pub mod vvh;
 
 #[cfg(test)]
 mod test_support;
+
+pub use kind::{IndexKind, IndexReport};
 
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
