@@ -125,7 +125,12 @@ fn both_models_trace_every_ray_once_and_find_what_the_twin_finds() {
             count: true,
             ..TraceSettings::persistent(gpu.caps())
         };
-        check(gpu, "linear hierarchy", &triangles, &lbvh, &all, &settings);
+        let untuned = check(gpu, "linear hierarchy", &triangles, &lbvh, &all, &settings);
+        let mut tracer = RayTracer::new(gpu, &lbvh, &settings).unwrap();
+        let groups = tracer.tune(&all[..500]).unwrap();
+        assert!(groups.is_some_and(u32::is_power_of_two), "{groups:?}");
+        let tuned = tracer.trace(&all).unwrap();
+        assert_eq!((&tuned.hits, tuned.work), (&untuned.hits, untuned.work));
     });
 }
 

@@ -51,15 +51,16 @@ pub struct PersistentThreads {
 }
 
 impl PersistentThreads {
-    /// What suits a device before anything is measured: batches of a subgroup; on software devices two workgroups for each thread of the
-    /// host, and quotas below [`SOFTWARE_LOOP_CAP`].
+    /// What suits a device before anything is measured: batches of a subgroup; on software devices batches of four, two workgroups for each
+    /// thread of the host, and quotas below [`SOFTWARE_LOOP_CAP`].
     pub fn on(caps: &Caps) -> Self {
         let software = caps.kind == DeviceKind::Cpu;
         let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
         Self {
             groups: if software { 2 * threads.min(512) } else { 1024 },
-            batch: group_size(caps),
-            fetches: if software { 64 } else { 4096 },
+            // Software devices run each barrier lane by lane: fewer fetches are fewer barriers.
+            batch: group_size(caps) * if software { 4 } else { 1 },
+            fetches: if software { 16 } else { 4096 },
         }
     }
 }

@@ -28,7 +28,7 @@ const SCENES: [&str; 4] = [
 ];
 
 /// Pixels across and down, repeats, scenes.
-const FULL: (u32, usize, usize) = (384, 7, SCENES.len());
+const FULL: (u32, usize, usize) = (384, 15, SCENES.len());
 const SMOKE: (u32, usize, usize) = (24, 1, 1);
 
 /// One way to deal out rays, ready to run.
@@ -89,14 +89,17 @@ fn diffuse_rays(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
 /// The forms, those with a queue tuned to the rays.
 fn forms(gpu: &Gpu, index: &Bvh2, rays: &[Ray]) -> Result<Vec<Form>> {
     let threads = PersistentThreads::on(gpu.caps());
-    let persistent = |batch: u32| TraceSettings {
-        execution: Execution::Persistent(PersistentThreads {
-            batch: batch * threads.batch,
-            // The quota of rays stays what it is.
-            fetches: threads.fetches / batch,
-            ..threads
-        }),
-        ..TraceSettings::persistent(gpu.caps())
+    let persistent = |subgroups: u32| {
+        let batch = subgroups * gpu.caps().subgroup_size.max(1);
+        TraceSettings {
+            execution: Execution::Persistent(PersistentThreads {
+                batch,
+                // A workgroup's quota of rays stays what it is.
+                fetches: (threads.fetches * threads.batch / batch).max(1),
+                ..threads
+            }),
+            ..TraceSettings::persistent(gpu.caps())
+        }
     };
     let mut forms = Vec::new();
     for (name, settings) in [
@@ -169,11 +172,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                     form.seconds.push(if on_device > 0.0 { on_device } else { wall });
                 }
             }
-            let mut first: Option<(f64, Vec<Hit>)> = None;
+            let mut first: Option<(Vec<f64>, Vec<Hit>)> = None;
             for form in &forms {
                 let traced = count(&gpu, &index, rays, form)?;
                 let seconds = median(form.seconds.clone());
-                let (base, expected) = first.get_or_insert_with(|| (seconds, traced.hits.clone()));
+                let (base, expected) = first.get_or_insert_with(|| (form.seconds.clone(), traced.hits.clone()));
+                // Runs of one repeat lie side by side in time, so that other work on the machine slows both.
+                let ratio = median(base.iter().zip(&form.seconds).map(|(a, b)| a / b).collect());
                 let differ = traced.hits.iter().zip(&*expected).filter(|(a, b)| bits(a) != bits(b));
                 let per_ray = |work: u64| work as f64 / rays.len().max(1) as f64;
                 table.row([
@@ -182,7 +187,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                     form.name.clone().into(),
                     (differ.count() as u64).into(),
                     (rays.len() as f64 / seconds * 1e-6).into(),
-                    (*base / seconds).into(),
+                    ratio.into(),
                     per_ray(traced.work.nodes).into(),
                     per_ray(traced.work.triangles).into(),
                     form.tracer
@@ -197,7 +202,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         }
     }
     table.note(
-        "Rates by GPU timestamps, median of repeats in turn; the ratio is to one thread a ray of the same rays. Workgroups are the fastest power \
+        "Rates by GPU timestamps, median of repeats in turn; the ratio is the median of those to one thread a ray in the same repeat. Workgroups are the fastest power \
          of two. Rays stopped by their quota go on in another round, which fetches all batches again.",
     );
     table.note(
