@@ -18,9 +18,10 @@ use glam::Vec3;
 /// As text, by [`FromStr`] and [`Display`](fmt::Display), it is one of [`IndexKind::NAMES`] with default settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IndexKind {
-    /// Binary hierarchy by the binned surface area heuristic: the slower build, the faster rays.
+    /// Binary hierarchy by the binned surface area heuristic.
     Bvh2(Bvh2Settings),
-    /// Linear hierarchy along the Morton curve; its quality says whether treelets are restructured afterwards.
+    /// Linear hierarchy along the Morton curve: the shortest build and the slowest rays, unless its quality asks for treelets to be
+    /// restructured afterwards.
     Lbvh(LbvhSettings),
 }
 
