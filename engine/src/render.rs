@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use crate::accel::IndexStatistics;
+use crate::accel::{IndexKind, IndexReport};
 use crate::film::picture::{Metadata, NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
 use crate::scene::{Camera, Note, Scene, SceneProfile};
@@ -119,7 +119,7 @@ pub struct FrameReport {
     /// Device memory in use.
     pub memory: MemoryReport,
     /// The ray index.
-    pub index: IndexStatistics,
+    pub index: IndexReport,
     /// What the scene needs.
     pub profile: SceneProfile,
     /// What was left out, and why.
@@ -168,8 +168,16 @@ impl Renderer {
     /// # Errors
     /// [`Error::Scene`], [`Error::LimitExceeded`], [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+        Self::with_index(gpu, scene, &IndexKind::default())
+    }
+
+    /// As [`Renderer::new`], with the ray index of the host's choice. It changes times, not pictures: see [`IndexKind`].
+    ///
+    /// # Errors
+    /// As [`Renderer::new`], and [`Error::Setting`] for settings of the index that are out of range.
+    pub fn with_index(gpu: &Gpu, scene: &Scene, index: &IndexKind) -> Result<Self> {
         let start = Instant::now();
-        let gpu_scene = Arc::new(GpuScene::new(gpu, scene)?);
+        let gpu_scene = Arc::new(GpuScene::with_index(gpu, scene, index)?);
         let upload_seconds = start.elapsed().as_secs_f64();
         // Only names and cameras are needed from here on; the geometry lives on the device.
         let scene = Scene {
@@ -413,7 +421,7 @@ impl Rendering {
                 .map(|(name, count)| ((*name).to_owned(), *count))
                 .collect(),
             memory: self.renderer.gpu.memory_report(),
-            index: self.renderer.gpu_scene.index_statistics(),
+            index: self.renderer.gpu_scene.index_report(),
             profile: self.renderer.gpu_scene.profile().clone(),
             skipped: self.technique.skipped(),
             pipelines: self.technique.pipelines(),

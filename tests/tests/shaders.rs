@@ -36,6 +36,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("kernels/radix_scatter_serial.comp", "SampledBuffer"),
     ("accel/trace_any.comp", "SampledBuffer"),
     ("accel/trace_closest.comp", "SampledBuffer"),
+    ("accel/trace_closest_queue.comp", "SampledBuffer"),
     ("transport/path_extend.comp", "SampledBuffer"),
     ("transport/path_extend_alpha.comp", "SampledBuffer"),
     ("transport/path_shadow.comp", "SampledBuffer"),

@@ -105,15 +105,17 @@ fn memory(report: &FrameReport) -> String {
 }
 
 fn rest(report: &FrameReport) -> String {
-    let index = &report.index;
+    let index = &report.index.statistics;
     let mut text = format!(
-        "index: {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.1}, {}\n",
+        "index: {}, {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.1}, {}, built in {:.1} ms\n",
+        report.index.kind,
         index.triangles,
         index.nodes,
         index.leaves,
         index.max_depth,
         index.sah_cost,
-        output::bytes(index.bytes)
+        output::bytes(index.bytes),
+        report.index.build_ms
     );
     let excluded = index.excluded_range + index.excluded_degenerate;
     if excluded > 0 {

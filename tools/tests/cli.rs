@@ -137,16 +137,22 @@ fn settings_reach_the_technique_and_the_reference_is_measured() -> Tested {
         &["-o", text(&reference), "--settings", &from_file],
     )?;
     let report = json(&output.stdout)?;
+    assert_eq!(report["index"]["kind"], "bvh2");
     assert_eq!(report["path_set"], "direct");
     assert_eq!(report["settings"]["roulette_start"], 7);
 
     // The same picture again, at the reference's size, as a PNG alone.
     let png = folder.path().join("only.png");
     let output = with(
-        &["--tone", "neutral"],
+        &["--tone", "neutral", "--index", "lbvh-high"],
         &["-o", text(&png), "--reference", text(&reference)],
     )?;
     let report = json(&output.stdout)?;
+    // Another index, and no other picture.
+    assert_eq!(report["index"]["kind"], "lbvh-high");
+    for key in ["nodes", "leaves", "max_depth", "sah_cost", "build_ms"] {
+        assert!(report["index"][key].as_f64().is_some_and(|value| value > 0.0), "{key}");
+    }
     assert_eq!(report["size"], serde_json::json!([32, 32]));
     assert_eq!(report["error"]["mse"], 0.0);
     assert!(png.exists() && png.with_extension("json").exists() && !png.with_extension("exr").exists());
@@ -306,6 +312,11 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     render(&["--reference", "no-such.exr"], 1, &["no-such.exr"])?;
     refuse(&["render", "--size", "0x4"], 2, &["WIDTHxHEIGHT"])?;
     refuse(&["render", "--spp", "0"], 2, &["--spp"])?;
+    refuse(
+        &["render", "--index", "kd"],
+        2,
+        &["kd", "there is: bvh2, lbvh, lbvh-high"],
+    )?;
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;
     refuse(&["scenes", "nothing"], 2, &["ring"])?;
     refuse(&["info", "builtin:nothing"], 3, &["cornell-box"])?;

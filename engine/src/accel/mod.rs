@@ -17,22 +17,26 @@
 //!
 //! both of which return its constant `…_FINISHED`, or where to go on when the quota has stopped the ray; `resume` is `…_START` at first and
 //! `hit` is `no_hit(ray.t_max)`. With `CLERESTORY_CANDIDATE_FILTER` defined they ask `accept_candidate` before a hit counts, and the
-//! constant `…_RESUMES` leaves the bookkeeping out where rays never stop. The kernels that include it are `accel/trace.glsl` and
+//! constant `…_RESUMES` leaves the bookkeeping out where rays never stop. The kernels that include it are `accel/trace_ray.glsl` and
 //! `transport/path_candidates.glsl`, `path_extend.glsl` and `path_shadow.glsl`, where the names of the index's constants stand.
 
 pub mod bvh2;
 pub mod compact_bvh;
 pub mod complete_bvh;
+mod kind;
 pub mod lbvh;
 pub mod morton;
 pub mod offset;
 pub mod optimise;
 pub mod sphere;
+pub mod trace;
 pub mod triangle;
 pub mod vvh;
 
 #[cfg(test)]
 mod test_support;
+
+pub use kind::{IndexKind, IndexReport};
 
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};

@@ -440,6 +440,34 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory report persistent-threads",
+        part(
+            "PM-X-1",
+            "closest hits of a buffer of rays: one thread a ray",
+            "Aila and Laine 2009",
+            "engine/src/accel/trace.rs",
+            &[
+                "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+                "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
+                "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report persistent-threads",
+        part(
+            "PM-X-2",
+            "closest hits of a buffer of rays: persistent threads on a queue with quotas",
+            "Aila and Laine 2009; Interactive Manycore Photon Mapping, 2011, §2.2.3.4",
+            "engine/src/accel/trace.rs",
+            &[
+                "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+                "tests/tests/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
+                "tests/tests/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
+            ],
+        ),
+    ),
+    measured(
         "clerestory agreement --scene cornell-box,cornell-point",
         part(
             "MET-B1",

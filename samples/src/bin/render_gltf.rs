@@ -90,6 +90,6 @@ fn print(report: &FrameReport) {
     println!(
         "{rays} rays, {} samples that were not finite, {:.1} MB of index",
         report.non_finite_samples.total(),
-        report.index.bytes as f64 * 1e-6
+        report.index.statistics.bytes as f64 * 1e-6
     );
 }

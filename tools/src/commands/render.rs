@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use clerestory::Error;
+use clerestory::accel::IndexKind;
 use clerestory::film::picture::{ALBEDO, DEPTH, NORMAL, SAMPLES, VARIANCE};
 use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
 use clerestory::plan::Goal;
@@ -90,6 +91,9 @@ pub struct Arguments {
     /// Sequence of random numbers; by default as the settings say, else sobol
     #[arg(long, value_enum)]
     sampler: Option<Sampler>,
+    /// Index of the rays: bvh2 by binned SAH, lbvh along the Morton curve (least build, slower rays), lbvh-high restructured. The picture is the same
+    #[arg(long, value_name = "bvh2|lbvh|lbvh-high", default_value_t, value_parser = parse_index)]
+    index: IndexKind,
     /// The technique's settings as JSON, or @FILE that holds them
     #[arg(long, value_name = "JSON|@FILE")]
     settings: Option<String>,
@@ -193,10 +197,19 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn parse_path_set(text: &str) -> Result<PathSet, String> {
-    text.parse().map_err(|error: Error| match error {
+    text.parse().map_err(without_name)
+}
+
+fn parse_index(text: &str) -> Result<IndexKind, String> {
+    text.parse().map_err(without_name)
+}
+
+/// The error in words, without the setting's name, which is the option's.
+fn without_name(error: Error) -> String {
+    match error {
         Error::Setting { value, cause, .. } => format!("{value} {cause}"),
         other => other.to_string(),
-    })
+    }
 }
 
 /// Runs the command.
@@ -212,7 +225,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
     let interruptible = Interruptible::start()?;
-    let renderer = Renderer::new(&gpu, &scene)?;
+    let renderer = Renderer::with_index(&gpu, &scene, &arguments.index)?;
     let goal = Goal {
         error: arguments.error,
         time: arguments.time,

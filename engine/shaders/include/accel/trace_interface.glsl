@@ -1,13 +1,11 @@
 // What the trace kernels share: rays in, hits out, and where stopped rays go on (set 0).
 //
-// The host zeroes `trace_resume` and `trace_status` and dispatches groups of 64 until `trace_status.unfinished` stays zero, zeroing
+// The host zeroes `trace_resume` and `trace_status` and dispatches until `trace_status.unfinished` stays zero, zeroing
 // `trace_status` in between; finished rays return at once. Larger ray counts than one dispatch takes go in parts by `first_ray`.
 #ifndef CLERESTORY_ACCEL_TRACE_INTERFACE_GLSL
 #define CLERESTORY_ACCEL_TRACE_INTERFACE_GLSL
 
 #include "accel/ray.glsl"
-
-layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer TraceRays {
     Ray trace_rays[];

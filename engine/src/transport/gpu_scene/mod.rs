@@ -21,8 +21,7 @@ use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
 use crate::Result;
-use crate::accel::bvh2::{Bvh2, Bvh2Settings};
-use crate::accel::{IndexStatistics, RayIndex};
+use crate::accel::{IndexKind, IndexReport, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::sets::{Bvh2Set, MediaSet, SceneSet};
 use crate::gpu::shaders::types::SceneMaterial;
@@ -34,7 +33,7 @@ use crate::scene::{Material, Scene, SceneProfile};
 pub struct GpuScene {
     profile: SceneProfile,
     bsdf: BsdfFeatures,
-    statistics: IndexStatistics,
+    index_report: IndexReport,
     bounds: [Vec3; 2],
     light_kinds: LightKinds,
     index: TexelView,
@@ -68,18 +67,26 @@ struct SceneBuffers {
 }
 
 impl GpuScene {
-    /// Checks the scene, builds its index on the host's threads and uploads everything.
+    /// Checks the scene, builds its index by the binned surface area heuristic on the host's threads and uploads everything.
     ///
     /// # Errors
     /// [`Error::Scene`](crate::Error::Scene) for a scene that does not pass [`Scene::check`],
     /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for one that does not fit the device.
     pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+        Self::with_index(gpu, scene, &IndexKind::default())
+    }
+
+    /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it.
+    ///
+    /// # Errors
+    /// As [`GpuScene::new`], and [`Error::Setting`](crate::Error::Setting) for settings of the index that are out of range.
+    pub fn with_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind) -> Result<Self> {
         scene.check()?;
         let profile = SceneProfile::of(scene);
         let mut geometry = Geometry::flatten(scene, &profile)?;
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
-        let bvh = Bvh2::build(&geometry.corners(), &Bvh2Settings::default())?;
+        let (bvh, index_report) = kind.build_timed(&geometry.corners())?;
         let index = gpu.texels_with(bvh.name(), Category::Index, vk::Format::R32G32B32A32_UINT, bvh.texels())?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
@@ -103,7 +110,7 @@ impl GpuScene {
         Ok(Self {
             profile,
             bsdf,
-            statistics: bvh.statistics(),
+            index_report,
             bounds,
             light_kinds: lights.kinds(),
             index,
@@ -124,7 +131,12 @@ impl GpuScene {
 
     /// Size and quality of its ray index.
     pub fn index_statistics(&self) -> IndexStatistics {
-        self.statistics
+        self.index_report.statistics
+    }
+
+    /// Which ray index it has and how long its build took, with size and quality.
+    pub fn index_report(&self) -> IndexReport {
+        self.index_report
     }
 
     /// Least and greatest corner, world space, metres.

@@ -13,6 +13,7 @@ mod inputs;
 mod mitsuba;
 mod multiple_scattering;
 mod path_sets;
+mod persistent_threads;
 mod phase_functions;
 mod picture_formats;
 mod pictures;
@@ -82,6 +83,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("mitsuba", mitsuba::measure),
     on_host("multiple-scattering", multiple_scattering::measure),
     on_device("path-sets", path_sets::measure),
+    on_device("persistent-threads", persistent_threads::measure),
     on_host("phase-functions", phase_functions::measure),
     on_host("picture-formats", picture_formats::measure),
     on_host("ray-offsets", ray_offsets::measure),

@@ -1,0 +1,159 @@
+//! Which ray index a scene is uploaded with: its name on command lines and in reports, its settings, and the build.
+//!
+//! The choice changes how long the build and the rays take, and nothing in a picture: every index reports the same hits, ties included
+//! (see [`accel`](super)).
+
+use std::fmt;
+use std::str::FromStr;
+use std::time::Instant;
+
+use super::IndexStatistics;
+use super::bvh2::{Bvh2, Bvh2Settings};
+use super::lbvh::{self, BuildQuality, LbvhSettings};
+use crate::{Error, Result};
+use glam::Vec3;
+
+/// A ray index that the path tracer can traverse, with the settings of its build. The binned surface area heuristic by default.
+///
+/// As text, by [`FromStr`] and [`Display`](fmt::Display), it is one of [`IndexKind::NAMES`] with default settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum IndexKind {
+    /// Binary hierarchy by the binned surface area heuristic.
+    Bvh2(Bvh2Settings),
+    /// Linear hierarchy along the Morton curve: the shortest build and the slowest rays, unless its quality asks for treelets to be
+    /// restructured afterwards.
+    Lbvh(LbvhSettings),
+}
+
+impl Default for IndexKind {
+    fn default() -> Self {
+        Self::Bvh2(Bvh2Settings::default())
+    }
+}
+
+impl IndexKind {
+    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, and the same with restructured treelets.
+    pub const NAMES: [&'static str; 3] = ["bvh2", "lbvh", "lbvh-high"];
+
+    /// The linear hierarchy with default settings.
+    pub fn lbvh(quality: BuildQuality) -> Self {
+        Self::Lbvh(LbvhSettings {
+            quality,
+            ..LbvhSettings::default()
+        })
+    }
+
+    /// One of [`IndexKind::NAMES`].
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Bvh2(_) => "bvh2",
+            Self::Lbvh(settings) => match settings.quality {
+                BuildQuality::Fast => "lbvh",
+                BuildQuality::High => "lbvh-high",
+            },
+        }
+    }
+
+    /// Builds over `triangles` on the host's threads; hits name triangles by their place in it. Deterministic whatever the number of
+    /// threads.
+    ///
+    /// # Errors
+    /// As [`Bvh2::build`] and [`lbvh::build`].
+    pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
+        match self {
+            Self::Bvh2(settings) => Bvh2::build(triangles, settings),
+            Self::Lbvh(settings) => lbvh::build(triangles, settings),
+        }
+    }
+
+    /// Builds, and says how long that took.
+    pub(crate) fn build_timed(&self, triangles: &[[Vec3; 3]]) -> Result<(Bvh2, IndexReport)> {
+        use super::RayIndex;
+        let begin = Instant::now();
+        let index = self.build(triangles)?;
+        let report = IndexReport {
+            kind: self.name(),
+            build_ms: 1e3 * begin.elapsed().as_secs_f64(),
+            statistics: index.statistics(),
+        };
+        Ok((index, report))
+    }
+}
+
+impl fmt::Display for IndexKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for IndexKind {
+    type Err = Error;
+
+    /// # Errors
+    /// [`Error::Setting`] that lists the names, for one that is not among them.
+    fn from_str(name: &str) -> Result<Self> {
+        [
+            Self::default(),
+            Self::lbvh(BuildQuality::Fast),
+            Self::lbvh(BuildQuality::High),
+        ]
+        .into_iter()
+        .find(|kind| kind.name() == name)
+        .ok_or_else(|| {
+            let known = Self::NAMES.join(", ");
+            Error::setting("index", name, format!("is not known; there is: {known}"))
+        })
+    }
+}
+
+/// The ray index of a scene, as frame reports have it.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct IndexReport {
+    /// One of [`IndexKind::NAMES`].
+    pub kind: &'static str,
+    /// Wall-clock milliseconds of its build.
+    pub build_ms: f64,
+    /// Size and quality.
+    #[serde(flatten)]
+    pub statistics: IndexStatistics,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::RayIndex;
+
+    #[test]
+    fn names_are_read_as_they_are_written() {
+        for name in IndexKind::NAMES {
+            assert_eq!(name.parse::<IndexKind>().unwrap().to_string(), name);
+        }
+        assert_eq!(IndexKind::default().name(), IndexKind::NAMES[0]);
+        for unknown in ["", "BVH2", "lbvh-fast", "bvh2 "] {
+            let message = unknown.parse::<IndexKind>().unwrap_err().to_string();
+            assert!(message.contains("bvh2, lbvh, lbvh-high"), "{message}");
+        }
+    }
+
+    #[test]
+    fn kinds_build_what_they_name_and_report_it_in_one_object() {
+        let triangles: Vec<[Vec3; 3]> = (0..40u8)
+            .map(|i| {
+                let corner = Vec3::new(f32::from(i % 7), f32::from(i % 5), f32::from(i));
+                [corner, corner + Vec3::X, corner + Vec3::Y]
+            })
+            .collect();
+        for (name, builder) in IndexKind::NAMES.into_iter().zip(["bvh2", "lbvh", "lbvh"]) {
+            let (index, report) = name.parse::<IndexKind>().unwrap().build_timed(&triangles).unwrap();
+            assert_eq!(index.name(), builder);
+            assert_eq!(report.statistics, index.statistics());
+            assert!(report.build_ms > 0.0);
+            let json = serde_json::to_value(report).unwrap();
+            assert_eq!(json["kind"], name);
+            assert_eq!(json["triangles"], 40);
+            assert_eq!(json["leaves"], index.statistics().leaves);
+        }
+        let wrong = IndexKind::Bvh2(Bvh2Settings { leaf_size: 0, bins: 16 });
+        assert!(matches!(wrong.build(&triangles), Err(Error::Setting { .. })));
+    }
+}

@@ -1,0 +1,93 @@
+//! A picture does not depend on the ray index: every index reports the hit of least distance, of equal ones the triangle of least index,
+//! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included.
+
+use clerestory::accel::IndexKind;
+use clerestory::accel::bvh2::Bvh2Settings;
+use clerestory::film::picture::{NORMAL, VARIANCE};
+use clerestory::gpu::Gpu;
+use clerestory::render::{RenderOptions, Rendered, Renderer};
+use clerestory::scene::{Instance, Scene};
+use clerestory::{Error, Result};
+use clerestory_tests::render::builtin;
+use clerestory_tests::with_gpu;
+
+fn render(gpu: &Gpu, scene: &Scene, index: &IndexKind) -> Result<Rendered> {
+    let mut rendering = Renderer::with_index(gpu, scene, index)?.start(&RenderOptions {
+        size: [40, 32],
+        spp: 3,
+        seed: 5,
+        aovs: true,
+        ..RenderOptions::default()
+    })?;
+    while rendering.step()?.is_some() {}
+    rendering.finish()
+}
+
+fn bits(rendered: &Rendered) -> Vec<u32> {
+    ["radiance", VARIANCE, NORMAL]
+        .iter()
+        .filter_map(|name| rendered.picture.layer(name))
+        .flat_map(|layer| layer.values().iter().map(|value| value.to_bits()))
+        .collect()
+}
+
+/// The Cornell box with every instance twice in the same place: each hit is a tie, between surfaces of two colours.
+fn doubled() -> Scene {
+    let mut scene = builtin("builtin:cornell-box");
+    let count = scene.materials.len() as u32;
+    let twins: Vec<Instance> = scene
+        .instances
+        .iter()
+        .map(|instance| {
+            let mut mesh = scene.meshes[instance.mesh as usize].clone();
+            mesh.material = mesh.material.map(|material| (material + 1) % count);
+            scene.meshes.push(mesh);
+            Instance {
+                mesh: scene.meshes.len() as u32 - 1,
+                ..instance.clone()
+            }
+        })
+        .collect();
+    scene.instances.extend(twins);
+    scene
+}
+
+#[test]
+fn pictures_are_the_same_to_the_bit_with_every_index() {
+    with_gpu(|gpu| {
+        let city = builtin("builtin:box-city?n=60");
+        let glass = builtin("builtin:cornell-box?sphere=glass");
+        for (what, scene) in [("city", &city), ("glass sphere", &glass), ("doubled", &doubled())] {
+            let mut first: Option<(Vec<u32>, f64)> = None;
+            for name in IndexKind::NAMES {
+                let rendered = render(gpu, scene, &name.parse().unwrap()).unwrap();
+                let index = rendered.report.index;
+                assert_eq!(index.kind, name);
+                assert!(
+                    index.build_ms > 0.0 && index.statistics.leaves > 0 && index.statistics.sah_cost > 0.0,
+                    "{index:?}"
+                );
+                let bits = bits(&rendered);
+                assert!(
+                    bits.iter().filter(|b| **b != 0).count() > bits.len() / 4,
+                    "{what}: empty"
+                );
+                let (truth, sah_cost) = first.get_or_insert_with(|| (bits.clone(), index.statistics.sah_cost));
+                assert!(*truth == bits, "{what}: the picture differs with {name}");
+                assert!(
+                    name == IndexKind::NAMES[0] || *sah_cost != index.statistics.sah_cost,
+                    "{what}: {name} is the same tree"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn settings_of_the_index_that_are_out_of_range_are_refused() {
+    with_gpu(|gpu| {
+        let index = IndexKind::Bvh2(Bvh2Settings { leaf_size: 9, bins: 16 });
+        let refused = Renderer::with_index(gpu, &builtin("builtin:cornell-box"), &index);
+        assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
+    });
+}
