@@ -10,6 +10,7 @@ use clerestory::accel::{Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::{PassTiming, Timings};
 use clerestory::scene::Scene;
 use clerestory::{Result, scene};
+use clerestory_tools::geometry;
 use clerestory_tools::machine::median;
 use glam::Vec3;
 
@@ -97,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let mut all: Vec<Measured> = Vec::new();
     for address in &arguments.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
-        let triangles = triangles_of(&scene);
+        let triangles = geometry::triangles(&scene);
         let rays = rays_among(&scene, &triangles, arguments.rays);
         let base = all.len();
         for (name, build) in INDEXES {
@@ -193,21 +194,6 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
         steps_ratio: 1.0,
         stages: Vec::new(),
     })
-}
-
-/// All instances' triangles in world space.
-fn triangles_of(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let of_instance = |instance: &scene::Instance| {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let place = |i: u32| {
-            instance
-                .transform
-                .transform_point3(mesh.positions[i as usize].as_dvec3())
-                .as_vec3()
-        };
-        mesh.triangles.iter().map(|t| t.map(place)).collect::<Vec<_>>()
-    };
-    scene.instances.iter().flat_map(of_instance).collect()
 }
 
 /// Rays from the middle of the first camera's picture outwards, and from triangles' centres in random directions.
