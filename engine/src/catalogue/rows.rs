@@ -104,7 +104,7 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     measured(
-        "clerestory bench",
+        "clerestory index --peers",
         part(
             "BG-14",
             "ray index: binary BVH by binned surface-area heuristic",
@@ -170,7 +170,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory bench --sort",
+        "clerestory bench --sort --peers",
         part(
             "PM-B-4",
             "radix sort of 32- and 64-bit keys, with or without values",
@@ -305,7 +305,7 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-rays",
         part(
             "PM-I-4",
             "slabs test of boxes",
@@ -318,7 +318,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-I-5",
             "points in boxes",
@@ -328,7 +328,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-quality",
         part(
             "PM-MAP-3",
             "tree by the voxel volume heuristic",
@@ -338,7 +338,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-construction merge-example",
         part(
             "PM-MAP-4",
             "linear hierarchy by split lists",
@@ -350,7 +350,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-construction map-quality merge-example",
         part(
             "PM-MAP-5",
             "linear hierarchy by merging",
@@ -363,7 +363,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report leaf-sizes",
         part(
             "PM-MAP-6",
             "automatic leaf size of photon maps",
@@ -373,7 +373,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-MAP-7",
             "complete nodes and sibling pairs",
@@ -383,7 +383,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-MAP-8",
             "compact sibling pairs",
@@ -396,7 +396,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-MAP-9",
             "point queries on compact pairs",
@@ -409,7 +409,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-rays",
         part(
             "PM-MAP-10",
             "ray queries on compact pairs",
@@ -422,7 +422,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-construction",
         part(
             "PM-MAP-11",
             "linear hierarchy by clusters",

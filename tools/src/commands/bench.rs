@@ -21,7 +21,7 @@ use crate::output::{self, Table};
 Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
-  clerestory bench --sort --peers --out out/sort
+  clerestory bench --sort --peers --folder out/sort
 
 One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to the last; figures move with \
 the load of the machine, so compare ratios of runs made together. `clerestory report` measures errors too.")]
@@ -46,7 +46,7 @@ pub struct Arguments {
     peers: bool,
     /// Writes the rates of --sort as JSON, CSV and plots (SVG) into this folder too
     #[arg(long, value_name = "FOLDER", requires = "sort")]
-    out: Option<PathBuf>,
+    folder: Option<PathBuf>,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -152,7 +152,7 @@ fn run_sort(gpu: Gpu, arguments: &Arguments) -> Outcome<ExitCode> {
         "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "processor": machine::processor(),
         "threads": machine::threads(), "load": machine::load(), "repeat": arguments.repeat, "sorts": rates,
     });
-    if let Some(folder) = &arguments.out {
+    if let Some(folder) = &arguments.folder {
         sort_rates::write(folder, &rates, &document)?;
     }
     if arguments.json {

@@ -14,6 +14,7 @@ use clerestory_tools::geometry;
 use clerestory_tools::machine::median;
 use glam::Vec3;
 
+use super::index_peers;
 use crate::failure::{Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output::{self, Table};
@@ -23,7 +24,8 @@ use crate::output::{self, Table};
 #[command(after_help = "\
 Examples:
   clerestory index
-  clerestory index --scene 'builtin:sphere-flake?level=5' --repeat 9 --json
+  clerestory index --scene 'builtin:sphere-flake?depth=4' --repeat 9 --json
+  clerestory index --peers --rays 262144
 
 Build times are medians by wall clock on the host's threads; that of the device is the least time of its passes, whose tree is the host's \
 to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
@@ -38,6 +40,9 @@ pub struct Arguments {
     /// Rays
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(2..))]
     rays: u32,
+    /// Instead: builds, and rays a second of the device's kernels, beside the crate obvhs on the processor
+    #[arg(long)]
+    peers: bool,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -94,6 +99,9 @@ fn fast(code_bits: u32) -> LbvhSettings {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
+    if arguments.peers {
+        return index_peers::run(gpu, &arguments.scenes, arguments.rays, arguments.repeat, arguments.json);
+    }
     let builder = LbvhBuilder::new(&gpu, &fast(30))?;
     let mut all: Vec<Measured> = Vec::new();
     for address in &arguments.scenes {

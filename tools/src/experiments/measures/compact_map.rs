@@ -106,7 +106,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     table.note(
         "Linear hierarchy over synthetic kernels: spheres about the second and third hits of 2¹⁷ photons (2⁹ in a quick look), as many about a \
          point as in the source's Table 5.1. Counts are exact and the same on every machine; bytes are of nodes and stack, not of kernels. \
-         The source's byte changes are what its own counts give: it prints −71.4 % for one scene, which is that scene's stack column.",
+         The source's byte changes are what its own counts give: it prints −71.4 % for one scene, which is that scene's stack column. Fewer \
+         nodes hold a point here, since round kernels of one size overlap less than long ones; in the passage the camera stands in the room \
+         that few photons reach.",
     );
     table.note(
         "Speed is of the query alone on one thread of a processor, whose cache takes the bytes that the source's GPU had to fetch, and holds \

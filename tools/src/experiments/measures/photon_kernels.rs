@@ -17,12 +17,12 @@ use clerestory::accel::lbvh::tree::BoxTree;
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
 use clerestory::accel::vvh::{Heuristic, sweep_tree};
 use clerestory::accel::{Hit, Ray, RayIndex};
-use clerestory::scene::{Camera, Projection, Scene};
+use clerestory::scene::{Camera, Scene};
 use clerestory::{Error, Result, scene};
-use glam::{DVec3, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 
 use super::inputs::Random;
-use crate::geometry::{area, triangles_with_materials};
+use crate::geometry::{self, area, triangles_with_materials};
 
 /// Probability that a diffuse surface scatters a photon.
 const SURVIVAL: f64 = 0.7;
@@ -172,18 +172,7 @@ impl Surfaces {
 
     /// Origin and unit direction of rays through the middles of a picture's pixels, row by row.
     pub fn camera_rays(&self, size: u32) -> Result<Vec<(Vec3, Vec3)>> {
-        let Projection::Perspective { fov_y } = self.camera.projection else {
-            return Err(Error::setting("camera", &self.camera.name, "is not in perspective"));
-        };
-        let half = (0.5 * f64::from(fov_y)).tan();
-        let to_plane = |i: u32| half * ((2 * i + 1) as f64 / f64::from(size) - 1.0);
-        let transform = &self.camera.transform;
-        let origin = transform.translation.as_vec3();
-        let pixels = (0..size).flat_map(|y| (0..size).map(move |x| (x, y)));
-        let direction = |(x, y)| transform.transform_vector3(DVec3::new(to_plane(x), -to_plane(y), -1.0));
-        Ok(pixels
-            .map(|pixel| (origin, direction(pixel).normalize().as_vec3()))
-            .collect())
+        geometry::camera_rays(&self.camera, size)
     }
 
     /// The first surface on a ray's way that is no mirror, and all meetings before it.
