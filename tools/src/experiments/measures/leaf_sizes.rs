@@ -161,9 +161,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     sweep.note(
         "Beside them frames a second of the source's Table 6.1 over their best in the sweep, its automatic size in the row of share 1/16, \
-         which its own sizes need. A frame holds rays and shading too, so the source's curves are flatter. On a processor a node costs \
-         more than a kernel, whose test is a few instructions in a row, while evaluating one of the source's takes as long as a node or longer: \
-         by time the best sizes here are greater than the source's, by counts they are its sizes. Where the camera looks, the number of \
+         which its own sizes need. A frame holds rays and shading too, so the source's curves are flatter. By counts the best sizes \
+         here are the source's; by time they are greater, since on a processor a node costs more than a kernel of these, whose test is a few \
+         instructions in a row. Where the camera looks, the number of \
          kernels that count differs from the scene's mean. Times move with the load of the machine, counts do not.",
     );
     Ok(vec![sweep])
