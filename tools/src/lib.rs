@@ -2,6 +2,7 @@
 
 pub mod agreement;
 pub mod experiments;
+pub mod geometry;
 pub mod machine;
 pub mod mitsuba;
 pub mod page;

@@ -105,7 +105,7 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     measured(
-        "clerestory bench",
+        "clerestory index --peers",
         part(
             "BG-14",
             "ray index: binary BVH by binned surface-area heuristic",
@@ -171,7 +171,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory bench --sort",
+        "clerestory bench --sort --peers",
         part(
             "PM-B-4",
             "radix sort of 32- and 64-bit keys, with or without values",
@@ -310,7 +310,7 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-rays",
         part(
             "PM-I-4",
             "slabs test of boxes",
@@ -323,7 +323,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-I-5",
             "points in boxes",
@@ -333,7 +333,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-quality",
         part(
             "PM-MAP-3",
             "tree by the voxel volume heuristic",
@@ -343,7 +343,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-construction merge-example",
         part(
             "PM-MAP-4",
             "linear hierarchy by split lists",
@@ -355,7 +355,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-construction map-quality merge-example",
         part(
             "PM-MAP-5",
             "linear hierarchy by merging",
@@ -368,7 +368,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report leaf-sizes",
         part(
             "PM-MAP-6",
             "automatic leaf size of photon maps",
@@ -378,7 +378,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-MAP-7",
             "complete nodes and sibling pairs",
@@ -388,7 +388,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-MAP-8",
             "compact sibling pairs",
@@ -401,7 +401,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-map",
         part(
             "PM-MAP-9",
             "point queries on compact pairs",
@@ -414,7 +414,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report compact-rays",
         part(
             "PM-MAP-10",
             "ray queries on compact pairs",
@@ -427,7 +427,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory index",
+        "clerestory report map-construction",
         part(
             "PM-MAP-11",
             "linear hierarchy by clusters",

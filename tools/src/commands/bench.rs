@@ -1,5 +1,6 @@
 //! `clerestory bench`: paths and rays per second, medians of repeated runs with their spread.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -7,7 +8,7 @@ use clap::Args;
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Result, scene};
-use clerestory_tools::machine::median;
+use clerestory_tools::machine::{self, median};
 
 use super::{check_validation, sort_rates};
 use crate::failure::{Failure, Outcome};
@@ -20,6 +21,7 @@ use crate::output::{self, Table};
 Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
+  clerestory bench --sort --peers --folder out/sort
 
 One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to the last; figures move with \
 the load of the machine, so compare ratios of runs made together. `clerestory report` measures errors too.")]
@@ -39,6 +41,12 @@ pub struct Arguments {
     /// Measures keys per second of the radix sort beside the standard library's instead
     #[arg(long)]
     sort: bool,
+    /// Adds the sorts of the crates rdst and radsort to --sort
+    #[arg(long, requires = "sort")]
+    peers: bool,
+    /// Writes the rates of --sort as JSON, CSV and plots (SVG) into this folder too
+    #[arg(long, value_name = "FOLDER", requires = "sort")]
+    folder: Option<PathBuf>,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -136,21 +144,29 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
 }
 
 fn run_sort(gpu: Gpu, arguments: &Arguments) -> Outcome<ExitCode> {
-    let rates = sort_rates::measure(&gpu, arguments.repeat)?;
+    let rates = sort_rates::measure(&gpu, arguments.repeat, arguments.peers)?;
     let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
     drop(gpu);
     check_validation(&log)?;
+    let document = serde_json::json!({
+        "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "processor": machine::processor(),
+        "threads": machine::threads(), "load": machine::load(), "repeat": arguments.repeat, "sorts": rates,
+    });
+    if let Some(folder) = &arguments.folder {
+        sort_rates::write(folder, &rates, &document)?;
+    }
     if arguments.json {
-        output::print_json(&serde_json::json!({
-            "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "sorts": rates,
-        }))?;
+        output::print_json(&document)?;
         return Ok(ExitCode::SUCCESS);
     }
     let head = output::one_line(&format!(
-        "{}, driver {}; random 32-bit keys a second, medians of {} runs",
-        caps.device, caps.driver, arguments.repeat
+        "{}, driver {}; random 32-bit keys a second, medians of {} runs in turns, load {}",
+        caps.device,
+        caps.driver,
+        arguments.repeat,
+        machine::load().unwrap_or_else(|| "unknown".into())
     ));
-    output::print(&format!("{head}\n{}", sort_rates::table(&rates)))?;
+    output::print(&format!("{head}\n{}", sort_rates::tables(&rates)))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -10,9 +10,11 @@ use clerestory::accel::{Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::{PassTiming, Timings};
 use clerestory::scene::Scene;
 use clerestory::{Result, scene};
+use clerestory_tools::geometry;
 use clerestory_tools::machine::median;
 use glam::Vec3;
 
+use super::index_peers;
 use crate::failure::{Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output::{self, Table};
@@ -22,7 +24,8 @@ use crate::output::{self, Table};
 #[command(after_help = "\
 Examples:
   clerestory index
-  clerestory index --scene 'builtin:sphere-flake?level=5' --repeat 9 --json
+  clerestory index --scene 'builtin:sphere-flake?depth=4' --repeat 9 --json
+  clerestory index --peers --rays 262144
 
 Build times are medians by wall clock on the host's threads; that of the device is the least time of its passes, whose tree is the host's \
 to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
@@ -37,6 +40,9 @@ pub struct Arguments {
     /// Rays
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(2..))]
     rays: u32,
+    /// Instead: builds, and rays a second of the device's kernels, beside the crate obvhs on the processor
+    #[arg(long)]
+    peers: bool,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -93,11 +99,14 @@ fn fast(code_bits: u32) -> LbvhSettings {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
+    if arguments.peers {
+        return index_peers::run(gpu, &arguments.scenes, arguments.rays, arguments.repeat, arguments.json);
+    }
     let builder = LbvhBuilder::new(&gpu, &fast(30))?;
     let mut all: Vec<Measured> = Vec::new();
     for address in &arguments.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
-        let triangles = triangles_of(&scene);
+        let triangles = geometry::triangles(&scene);
         let rays = rays_among(&scene, &triangles, arguments.rays);
         let base = all.len();
         for (name, build) in INDEXES {
@@ -193,21 +202,6 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
         steps_ratio: 1.0,
         stages: Vec::new(),
     })
-}
-
-/// All instances' triangles in world space.
-fn triangles_of(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let of_instance = |instance: &scene::Instance| {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let place = |i: u32| {
-            instance
-                .transform
-                .transform_point3(mesh.positions[i as usize].as_dvec3())
-                .as_vec3()
-        };
-        mesh.triangles.iter().map(|t| t.map(place)).collect::<Vec<_>>()
-    };
-    scene.instances.iter().flat_map(of_instance).collect()
 }
 
 /// Rays from the middle of the first camera's picture outwards, and from triangles' centres in random directions.

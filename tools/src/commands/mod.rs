@@ -4,6 +4,7 @@ mod agreement;
 mod bench;
 mod compare;
 mod index;
+mod index_peers;
 mod info;
 mod list;
 mod progress;

@@ -1,37 +1,179 @@
-//! `clerestory bench --sort`: keys per second of the radix sort beside the standard library's sorts, in the same run.
+//! `clerestory bench --sort`: keys per second of the radix sort beside sorts on the processor, in the same run.
+//!
+//! Peers: the standard library's sorts, and with `--peers` those of the crates rdst (all threads, or one) and radsort. Every sorter sorts
+//! the same random keys; sorters take turns, and medians count.
 
+use std::path::Path;
 use std::time::Instant;
 
-use clerestory::Result;
+use clerestory::film::atomic;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
+use clerestory::{Error, Result};
+use clerestory_tools::experiments::plot::{self, Curve, PlotPoint, Words};
+use clerestory_tools::experiments::table::Table as Sheet;
 use clerestory_tools::machine::median;
+use rdst::{RadixKey, RadixSort as _};
 
+use crate::failure::Outcome;
 use crate::output::{self, Table};
 
 /// Sizes as powers of two.
 const SIZES: [u32; 8] = [10, 12, 14, 16, 18, 20, 22, 24];
 
-/// Keys per second of one size, medians.
-#[derive(Debug, serde::Serialize)]
-pub struct SortRates {
-    /// Number of keys.
-    keys: u32,
-    /// 32-bit keys by the kernel: by wall clock from submission to the end of waiting.
-    kernel: f64,
-    /// `sort_unstable` of the standard library.
-    std_unstable: f64,
-    /// `sort` of the standard library.
-    std_stable: f64,
-    /// Keys with values by the kernel.
-    kernel_pairs: f64,
-    /// `sort_by_key` of pairs.
-    std_pairs: f64,
+/// What is sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Load {
+    /// 32-bit keys.
+    Keys,
+    /// 32-bit keys, each with a 32-bit value.
+    Pairs,
 }
 
-/// Measures all sizes; one run before the measured ones compiles the kernels.
-pub fn measure(gpu: &Gpu, repeat: u32) -> Result<Vec<SortRates>> {
-    SIZES.map(|size| rates(gpu, 1 << size, repeat)).into_iter().collect()
+impl Load {
+    const ALL: [Self; 2] = [Self::Keys, Self::Pairs];
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Keys => "keys",
+            Self::Pairs => "pairs",
+        }
+    }
+}
+
+/// The rate of one sorter at one size.
+#[derive(Debug, serde::Serialize)]
+pub struct Rate {
+    load: Load,
+    sorter: &'static str,
+    /// Number of keys.
+    keys: u32,
+    /// Median, by wall clock; on the device from submission to the end of waiting.
+    keys_per_second: f64,
+    /// Least and greatest.
+    range: [f64; 2],
+}
+
+/// A key with its value, for sorters of structs.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    key: u32,
+    value: u32,
+}
+
+impl RadixKey for Pair {
+    const LEVELS: usize = size_of::<u32>();
+
+    fn get_level(&self, level: usize) -> u8 {
+        self.key.to_le_bytes()[level]
+    }
+}
+
+/// A sort that gives the seconds it took.
+struct Sorter<'a> {
+    name: &'static str,
+    run: Box<dyn FnMut() -> Result<f64> + 'a>,
+}
+
+impl<'a> Sorter<'a> {
+    fn of<T: Clone>(name: &'static str, data: &'a [T], sort: impl Fn(&mut [T]) + 'a) -> Self {
+        let run = move || {
+            let mut data = data.to_vec();
+            let start = Instant::now();
+            sort(&mut data);
+            let seconds = start.elapsed().as_secs_f64();
+            std::hint::black_box(data);
+            Ok(seconds)
+        };
+        Self {
+            name,
+            run: Box::new(run),
+        }
+    }
+}
+
+/// Measures all sizes; one run before the measured ones compiles the kernels and warms caches.
+pub fn measure(gpu: &Gpu, repeat: u32, with_peers: bool) -> Result<Vec<Rate>> {
+    let mut rates = Vec::new();
+    for size in SIZES {
+        let keys = random_keys(1 << size);
+        let pairs: Vec<Pair> = keys
+            .iter()
+            .zip(0..)
+            .map(|(key, value)| Pair { key: *key, value })
+            .collect();
+        for load in Load::ALL {
+            let mut sorters = match load {
+                Load::Keys => of_keys(&keys, with_peers),
+                Load::Pairs => of_pairs(&pairs, with_peers),
+            };
+            sorters.insert(0, by_kernel(gpu, &keys, load)?);
+            rates.extend(rates_of(sorters, load, 1 << size, repeat)?);
+        }
+    }
+    Ok(rates)
+}
+
+fn rates_of(mut sorters: Vec<Sorter<'_>>, load: Load, keys: u32, repeat: u32) -> Result<Vec<Rate>> {
+    let mut rates = vec![Vec::new(); sorters.len()];
+    for round in 0..=repeat {
+        for (sorter, rates) in sorters.iter_mut().zip(&mut rates) {
+            let seconds = (sorter.run)()?;
+            if round > 0 {
+                rates.push(f64::from(keys) / seconds);
+            }
+        }
+    }
+    let rate = |(sorter, rates): (&Sorter<'_>, Vec<f64>)| Rate {
+        load,
+        sorter: sorter.name,
+        keys,
+        range: [
+            rates.iter().copied().fold(f64::INFINITY, f64::min),
+            rates.iter().copied().fold(0.0, f64::max),
+        ],
+        keys_per_second: median(rates),
+    };
+    Ok(sorters.iter().zip(rates).map(rate).collect())
+}
+
+fn of_keys(keys: &[u32], with_peers: bool) -> Vec<Sorter<'_>> {
+    let mut sorters = vec![
+        Sorter::of("std unstable", keys, <[u32]>::sort_unstable),
+        Sorter::of("std stable", keys, <[u32]>::sort),
+    ];
+    if with_peers {
+        sorters.extend([
+            Sorter::of("rdst", keys, |keys| keys.radix_sort_unstable()),
+            Sorter::of("rdst, one thread", keys, |keys| {
+                keys.radix_sort_builder().with_single_threaded_tuner().sort();
+            }),
+            Sorter::of("radsort", keys, radsort::sort),
+        ]);
+    }
+    sorters
+}
+
+fn of_pairs(pairs: &[Pair], with_peers: bool) -> Vec<Sorter<'_>> {
+    let mut sorters = vec![Sorter::of("std stable", pairs, |pairs| {
+        pairs.sort_by_key(|pair| pair.key);
+    })];
+    if with_peers {
+        sorters.extend([
+            Sorter::of("std unstable", pairs, |pairs| {
+                pairs.sort_unstable_by_key(|pair| (pair.key, pair.value));
+            }),
+            Sorter::of("rdst", pairs, |pairs| pairs.radix_sort_unstable()),
+            Sorter::of("rdst, one thread", pairs, |pairs| {
+                pairs.radix_sort_builder().with_single_threaded_tuner().sort();
+            }),
+            Sorter::of("radsort", pairs, |pairs| {
+                radsort::sort_by_key(pairs, |pair| pair.key);
+            }),
+        ]);
+    }
+    sorters
 }
 
 /// Keys of a SplitMix64 stream.
@@ -47,32 +189,9 @@ fn random_keys(count: u32) -> Vec<u32> {
         .collect()
 }
 
-fn rates(gpu: &Gpu, count: u32, repeat: u32) -> Result<SortRates> {
-    let keys = random_keys(count);
-    let pairs: Vec<(u32, u32)> = keys.iter().copied().zip(0..).collect();
-    let rate = |seconds: Vec<f64>| f64::from(count) / median(seconds);
-    let of_std = |sort: &dyn Fn() -> f64| rate((0..repeat).map(|_| sort()).collect());
-    Ok(SortRates {
-        keys: count,
-        kernel: rate(by_kernel(gpu, &keys, false, repeat)?),
-        std_unstable: of_std(&|| timed(&keys, <[u32]>::sort_unstable)),
-        std_stable: of_std(&|| timed(&keys, <[u32]>::sort)),
-        kernel_pairs: rate(by_kernel(gpu, &keys, true, repeat)?),
-        std_pairs: of_std(&|| timed(&pairs, |pairs| pairs.sort_by_key(|pair| pair.0))),
-    })
-}
-
-fn timed<T: Clone>(data: &[T], sort: impl Fn(&mut [T])) -> f64 {
-    let mut data = data.to_vec();
-    let start = Instant::now();
-    sort(&mut data);
-    let seconds = start.elapsed().as_secs_f64();
-    std::hint::black_box(data);
-    seconds
-}
-
-fn by_kernel(gpu: &Gpu, keys: &[u32], values: bool, repeat: u32) -> Result<Vec<f64>> {
+fn by_kernel<'a>(gpu: &'a Gpu, keys: &'a [u32], load: Load) -> Result<Sorter<'a>> {
     let count = keys.len() as u32;
+    let values = load == Load::Pairs;
     let sort = RadixSort::new(gpu, RadixSortOptions::new(KeyWidth::Bits32, values))?;
     let sides = [sort.keys("keys", count)?, sort.keys("other keys", count)?];
     let values_of = [sort.values("values", count)?, sort.values("other values", count)?];
@@ -81,43 +200,142 @@ fn by_kernel(gpu: &Gpu, keys: &[u32], values: bool, repeat: u32) -> Result<Vec<f
         sort.scratch_bytes(count),
         Category::Work,
     ))?;
-    let buffers = SortBuffers {
-        keys: [&sides[0], &sides[1]],
-        values: values.then_some([&values_of[0], &values_of[1]]),
-    };
-    let mut seconds = Vec::new();
-    for _ in 0..=repeat {
+    let run = move || {
+        let buffers = SortBuffers {
+            keys: [&sides[0], &sides[1]],
+            values: values.then_some([&values_of[0], &values_of[1]]),
+        };
         gpu.upload(sides[0].buffer(), 0, keys)?;
         let mut recorder = gpu.recorder("sort")?;
         recorder.pass("sort", |pass| sort.record(pass, &buffers, Count::Host(count), &scratch))?;
         let start = Instant::now();
         recorder.submit()?.wait()?;
-        seconds.push(start.elapsed().as_secs_f64());
-    }
-    Ok(seconds.split_off(1))
+        Ok(start.elapsed().as_secs_f64())
+    };
+    Ok(Sorter {
+        name: "kernel",
+        run: Box::new(run),
+    })
 }
 
-/// The rates as a table.
-pub fn table(rates: &[SortRates]) -> String {
-    let head = [
-        "keys",
-        "kernel",
-        "std unstable",
-        "std stable",
-        "kernel, pairs",
-        "std, pairs",
-    ];
-    let mut table = Table::new(&head, &[]);
-    for row in rates {
-        let rates = [
-            row.kernel,
-            row.std_unstable,
-            row.std_stable,
-            row.kernel_pairs,
-            row.std_pairs,
-        ];
-        let [a, b, c, d, e] = rates.map(output::metric);
-        table.row([row.keys.to_string(), a, b, c, d, e]);
+/// Sorters of a load in their order.
+fn sorters(rates: &[Rate], load: Load) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = Vec::new();
+    for rate in rates.iter().filter(|rate| rate.load == load) {
+        if !names.contains(&rate.sorter) {
+            names.push(rate.sorter);
+        }
     }
-    table.text()
+    names
+}
+
+/// The rates as tables, one for keys and one for pairs.
+pub fn tables(rates: &[Rate]) -> String {
+    let mut text = String::new();
+    for load in Load::ALL {
+        let names = sorters(rates, load);
+        let mut head = vec![load.word()];
+        head.extend(&names);
+        let mut table = Table::new(&head, &[]);
+        for size in SIZES.map(|size| 1 << size) {
+            let of_size = |rate: &&Rate| rate.load == load && rate.keys == size;
+            let cells = rates
+                .iter()
+                .filter(of_size)
+                .map(|rate| output::metric(rate.keys_per_second));
+            table.row([size.to_string()].into_iter().chain(cells));
+        }
+        text += &format!("{}\n", table.text());
+    }
+    text
+}
+
+/// Writes `sort.json`, `sort.csv` and for each load a plot into a folder.
+pub fn write(folder: &Path, rates: &[Rate], head: &serde_json::Value) -> Outcome {
+    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+    let save = |name: &str, text: String| atomic::write(&folder.join(name), text.as_bytes());
+    save("sort.json", output::json_text("sort.json", head)?)?;
+    let mut sheet = Sheet::new(
+        "rates",
+        &[
+            "load",
+            "sorter",
+            "keys",
+            "keys/s, median",
+            "keys/s, least",
+            "keys/s, greatest",
+        ],
+    );
+    for rate in rates {
+        sheet.row([
+            rate.load.word().into(),
+            rate.sorter.into(),
+            u64::from(rate.keys).into(),
+            rate.keys_per_second.into(),
+            rate.range[0].into(),
+            rate.range[1].into(),
+        ]);
+    }
+    save("sort.csv", sheet.csv())?;
+    for load in Load::ALL {
+        let curve = |name: &&'static str| Curve {
+            name: (*name).into(),
+            points: rates
+                .iter()
+                .filter(|rate| rate.load == load && rate.sorter == *name)
+                .map(|rate| PlotPoint {
+                    x: rate.keys.into(),
+                    y: rate.keys_per_second,
+                    y_range: rate.range,
+                    ringed: false,
+                })
+                .collect(),
+        };
+        let curves: Vec<Curve> = sorters(rates, load).iter().map(curve).collect();
+        let words = Words {
+            title: &format!("Sorting random 32-bit {}", load.word()),
+            x: load.word(),
+            y: &format!("{}/s", load.word()),
+        };
+        if let Some(svg) = plot::log_log_of_rates(words, &curves)? {
+            save(&format!("sort-{}.svg", load.word()), svg)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_sorters_sort() {
+        let keys = random_keys(5000);
+        let mut sorted = keys.clone();
+        sorted.sort_unstable();
+        let pairs: Vec<Pair> = keys
+            .iter()
+            .zip(0..)
+            .map(|(key, value)| Pair { key: *key, value })
+            .collect();
+        let mut by_rdst = pairs.clone();
+        by_rdst.radix_sort_unstable();
+        assert!(by_rdst.iter().map(|pair| pair.key).eq(sorted.iter().copied()));
+        let rates: Vec<Rate> = [
+            (of_keys(&keys, true), Load::Keys),
+            (of_pairs(&pairs, true), Load::Pairs),
+        ]
+        .into_iter()
+        .flat_map(|(sorters, load)| rates_of(sorters, load, 1024, 1).unwrap())
+        .collect();
+        assert_eq!(sorters(&rates, Load::Keys).len(), 5);
+        assert_eq!(sorters(&rates, Load::Pairs).len(), 5);
+        assert!(rates.iter().all(|rate| rate.keys_per_second > 0.0));
+        assert!(tables(&rates).contains("radsort"));
+        let folder = tempfile::tempdir().unwrap();
+        assert!(write(folder.path(), &rates, &serde_json::json!({})).is_ok());
+        for name in ["sort.json", "sort.csv", "sort-keys.svg", "sort-pairs.svg"] {
+            assert!(folder.path().join(name).is_file(), "{name}");
+        }
+    }
 }

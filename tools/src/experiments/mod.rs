@@ -46,6 +46,8 @@ pub struct Experiment {
     pub about: String,
     /// Ids of the catalogue's rows that it measures.
     pub systems: Vec<String>,
+    /// Another name that it is found by: its number in the document that the comparison comes from.
+    pub alias: Option<String>,
     measure: Option<String>,
     sweep: Option<Sweep>,
 }
@@ -87,7 +89,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-/// The experiment of that name, or the one that a file `….toml` describes.
+/// The experiment of that name or alias, in letters of either case, or the one that a file `….toml` describes.
 ///
 /// # Errors
 /// [`Error::Setting`] when there is none, or when its file is not sound; [`Error::Io`] when a named file cannot be read.
@@ -98,17 +100,29 @@ pub fn find(name: &str) -> Result<Experiment> {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         return parse(&stem, &text);
     }
-    let (name, text) = FILES
-        .iter()
-        .find(|(known, _)| known.eq_ignore_ascii_case(name))
-        .ok_or_else(|| {
-            let known: Vec<_> = names().collect();
-            Error::setting(
-                "experiment",
-                name,
-                format!("is not known; there is: {}", known.join(", ")),
-            )
-        })?;
+    let by_alias = || {
+        let mut all = FILES.iter().filter_map(|(known, text)| parse(known, text).ok());
+        all.find(|experiment| {
+            experiment
+                .alias
+                .as_ref()
+                .is_some_and(|alias| alias.eq_ignore_ascii_case(name))
+        })
+    };
+    let named = FILES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
+    if named.is_none()
+        && let Some(experiment) = by_alias()
+    {
+        return Ok(experiment);
+    }
+    let (name, text) = named.ok_or_else(|| {
+        let known: Vec<_> = names().collect();
+        Error::setting(
+            "experiment",
+            name,
+            format!("is not known; there is: {}", known.join(", ")),
+        )
+    })?;
     parse(name, text)
 }
 
@@ -142,6 +156,9 @@ mod tests {
             assert!((2..=3).contains(&sentences) && about.ends_with('.'), "{name}: {about}");
             assert!(!about.contains(['\n', '\\']), "{name}: {about}");
             assert!(about.starts_with(experiment.about_in_short()) && experiment.about_in_short().ends_with('.'));
+            if let Some(alias) = &experiment.alias {
+                assert_eq!(find(&alias.to_lowercase()).unwrap().name, name, "{alias}");
+            }
             for id in &experiment.systems {
                 assert!(
                     clerestory::catalogue::all().iter().any(|row| row.id == id),

@@ -72,6 +72,18 @@ const LEGEND_LINE: i32 = 28;
 /// # Errors
 /// [`Error::Io`] when it cannot be drawn.
 pub fn log_log(words: Words<'_>, curves: &[Curve]) -> Result<Option<String>> {
+    of(words, curves, true)
+}
+
+/// As [`log_log`] of rates, which grow with their number: without the guide, and the legend at the bottom.
+///
+/// # Errors
+/// As [`log_log`].
+pub fn log_log_of_rates(words: Words<'_>, curves: &[Curve]) -> Result<Option<String>> {
+    of(words, curves, false)
+}
+
+fn of(words: Words<'_>, curves: &[Curve], of_errors: bool) -> Result<Option<String>> {
     let drawn = |point: &&PlotPoint| point.x > 0.0 && point.y > 0.0 && point.x.is_finite() && point.y.is_finite();
     let curves: Vec<Curve> = curves
         .iter()
@@ -87,7 +99,8 @@ pub fn log_log(words: Words<'_>, curves: &[Curve]) -> Result<Option<String>> {
         return Ok(None);
     };
     let mut svg = String::new();
-    draw(&mut svg, words, &curves, x, y).map_err(|cause| Error::io(words.title, std::io::Error::other(cause)))?;
+    draw(&mut svg, words, &curves, x, y, of_errors)
+        .map_err(|cause| Error::io(words.title, std::io::Error::other(cause)))?;
     Ok(Some(svg))
 }
 
@@ -213,6 +226,7 @@ fn draw(
     curves: &[Curve],
     x: (f64, f64),
     y: (f64, f64),
+    of_errors: bool,
 ) -> std::result::Result<(), String> {
     let failed = |cause: &dyn std::fmt::Display| cause.to_string();
     let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
@@ -240,7 +254,7 @@ fn draw(
         .draw()
         .map_err(|e| failed(&e))?;
     // Through the last point of the first curve, where fixed costs weigh least; cut off where it leaves the plot.
-    if let Some(last) = curves.iter().find_map(|curve| curve.points.last()) {
+    if of_errors && let Some(last) = curves.iter().find_map(|curve| curve.points.last()) {
         let height = |at: f64| last.y * (at / last.x).powf(GUIDE_SLOPE);
         let start = x.0.max(last.x * (y.1 / last.y).powf(1.0 / GUIDE_SLOPE));
         let end = x.1.min(last.x * (y.0 / last.y).powf(1.0 / GUIDE_SLOPE));
@@ -290,7 +304,11 @@ fn draw(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(if of_errors {
+            SeriesLabelPosition::UpperRight
+        } else {
+            SeriesLabelPosition::LowerRight
+        })
         .legend_area_size(LEGEND_LINE + 8)
         .label_font((FONT, 13))
         .background_style(WHITE.mix(0.85))

@@ -146,9 +146,11 @@ fn list() -> Outcome<ExitCode> {
     let mut text = String::new();
     for name in experiments::names() {
         let experiment = experiments::find(name)?;
+        let alias = experiment.alias.as_ref().map(|alias| format!(", also {alias}"));
         text += &format!(
-            "{} ({})\n  {}\n  {}\n",
+            "{}{} ({})\n  {}\n  {}\n",
             output::bold(&experiment.name),
+            alias.unwrap_or_default(),
             experiment.systems.join(", "),
             experiment.title,
             experiment.about_in_short()

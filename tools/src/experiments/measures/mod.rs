@@ -5,16 +5,23 @@ mod alpha;
 mod automatic_choice;
 mod barriers;
 mod clock;
+mod compact_map;
+mod compact_rays;
 mod coupled_reflection;
 mod energy;
 mod errors;
 mod free_flight;
 mod inputs;
+mod leaf_sizes;
+mod map_construction;
+mod map_quality;
+mod merge_example;
 mod mitsuba;
 mod multiple_scattering;
 mod path_sets;
 mod persistent_threads;
 mod phase_functions;
+mod photon_kernels;
 mod picture_formats;
 mod pictures;
 mod ray_offsets;
@@ -78,8 +85,14 @@ pub const MEASURES: &[Measure] = &[
     on_device("alpha", alpha::measure),
     on_device("automatic-choice", automatic_choice::measure),
     on_device("barriers", barriers::measure),
+    on_host("compact-map", compact_map::measure),
+    on_host("compact-rays", compact_rays::measure),
     on_host("coupled-reflection", coupled_reflection::measure),
     on_host("free-flight", free_flight::measure),
+    on_host("leaf-sizes", leaf_sizes::measure),
+    on_device("map-construction", map_construction::measure),
+    on_host("map-quality", map_quality::measure),
+    on_host("merge-example", merge_example::measure),
     on_device("mitsuba", mitsuba::measure),
     on_host("multiple-scattering", multiple_scattering::measure),
     on_device("path-sets", path_sets::measure),
