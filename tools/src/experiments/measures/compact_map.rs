@@ -11,7 +11,7 @@ use clerestory::accel::lbvh::leaf_threshold::automatic_leaf_size;
 use super::Context;
 use super::clock::nanoseconds;
 use super::map_quality::SOURCE_SHARE;
-use super::photon_kernels::{CASES, Kernels, Map, Surfaces, Work, amounts};
+use super::photon_kernels::{Map, Prepared, Work, prepared};
 use crate::experiments::table::{Cell, Table};
 
 /// Nodes a query, change of stack entries, bytes of complete nodes, change of bytes, change of frames a second; changes in per cent.
@@ -23,8 +23,6 @@ const DOCUMENT: [(&str, [f64; 5]); 3] = [
 
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (photons, side) = amounts(context.smoke);
-    let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
     let mut table = Table::new(
         "Point queries of compact pairs beside those of complete nodes",
         &[
@@ -47,14 +45,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "source: speed (%)",
         ],
     );
-    for (done, case) in cases.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, cases.len());
-        let surfaces = Surfaces::load(case.scene)?;
-        let kernels = Kernels::trace(&surfaces, case.light, photons, case.cover);
-        let points = surfaces.seen(side)?;
+    for prepared in prepared(context) {
+        let Prepared {
+            case,
+            surfaces,
+            kernels,
+            points,
+        } = prepared?;
         let leaf_size = automatic_leaf_size(kernels.areas(), surfaces.area, SOURCE_SHARE);
         let map = Map::new(&kernels, &kernels.linear(leaf_size))?;
         let decoded = map.compact.decode();
@@ -62,13 +59,18 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let lost = reached.filter(|(complete, compact)| complete != compact).count() as u64;
         let (mut complete, mut compact, mut different) = (Work::default(), Work::default(), 0_u64);
         for point in &points {
-            let (mut a, mut b) = (Work::default(), Work::default());
-            map.gather_complete(*point, &mut a);
-            map.gather_compact(*point, &mut b);
-            let same = (a.tests, a.contributions, a.tree.leaves) == (b.tests, b.contributions, b.tree.leaves);
-            different += u64::from(!same);
+            let before = [complete, compact];
             map.gather_complete(*point, &mut complete);
             map.gather_compact(*point, &mut compact);
+            let answer = |after: Work, before: Work| {
+                let leaves = after.tree.leaves - before.tree.leaves;
+                (
+                    after.tests - before.tests,
+                    after.contributions - before.contributions,
+                    leaves,
+                )
+            };
+            different += u64::from(answer(complete, before[0]) != answer(compact, before[1]));
         }
         let time = |gather: fn(&Map, glam::Vec3, &mut Work)| {
             nanoseconds(context.smoke, &points, |point| {

@@ -10,7 +10,7 @@ use clerestory::accel::lbvh::leaf_threshold::{LEAF_SHARE, automatic_leaf_size};
 use glam::Vec3;
 
 use super::Context;
-use super::photon_kernels::{CASES, Kernels, Map, Surfaces, Work, amounts};
+use super::photon_kernels::{Kernels, Map, Prepared, Work, prepared};
 use crate::experiments::table::Table;
 use crate::machine::median;
 
@@ -58,9 +58,7 @@ pub fn query_times(maps: &[Map], points: &[Vec3], repeats: usize, gather: fn(&Ma
 
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (photons, side) = amounts(context.smoke);
     let sizes = if context.smoke { &SIZES[..3] } else { &SIZES[..] };
-    let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
     let mut sweep = Table::new(
         "Queries of photon maps by leaf size",
         &[
@@ -78,14 +76,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         ],
     );
     let (mut worst, mut sum, mut sets) = ([f64::INFINITY; 2], [0.0; 2], 0_u32);
-    for (done, case) in cases.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, cases.len());
-        let surfaces = Surfaces::load(case.scene)?;
-        let kernels = Kernels::trace(&surfaces, case.light, photons, case.cover);
-        let points = surfaces.seen(side)?;
+    for prepared in prepared(context) {
+        let Prepared {
+            case,
+            surfaces,
+            kernels,
+            points,
+        } = prepared?;
         let automatic = |share| automatic_leaf_size(kernels.areas(), surfaces.area, share);
         let mut wanted: Vec<(u32, &str)> = sizes.iter().map(|size| (*size, "sweep")).collect();
         wanted.extend([

@@ -7,7 +7,7 @@ use clerestory::accel::lbvh::leaf_threshold::automatic_leaf_size;
 
 use super::Context;
 use super::leaf_sizes::query_times;
-use super::photon_kernels::{CASES, Kernels, Map, Surfaces, Work, amounts};
+use super::photon_kernels::{Map, Prepared, Work, prepared};
 use crate::experiments::table::{Cell, Table};
 
 /// The share of a point's kernels in a leaf that the source's leaf sizes need.
@@ -23,8 +23,6 @@ const DOCUMENT: [(&str, [f64; 5]); 3] = [
 
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (photons, side) = amounts(context.smoke);
-    let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
     let mut table = Table::new(
         "Queries of the linear hierarchy beside those of the volume heuristic",
         &[
@@ -48,14 +46,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     let mut sums = [0.0; 3];
     let mut rows = 0;
-    for (done, case) in cases.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, cases.len());
-        let surfaces = Surfaces::load(case.scene)?;
-        let kernels = Kernels::trace(&surfaces, case.light, photons, case.cover);
-        let points = surfaces.seen(side)?;
+    for prepared in prepared(context) {
+        let Prepared {
+            case,
+            surfaces,
+            kernels,
+            points,
+        } = prepared?;
         let leaf_size = automatic_leaf_size(kernels.areas(), surfaces.area, SOURCE_SHARE);
         let trees = [kernels.by_volume(leaf_size), kernels.linear(leaf_size)];
         let maps = trees.iter().map(|tree| Map::new(&kernels, tree));

@@ -10,13 +10,14 @@ use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::trace::{Execution, PersistentThreads, RayTracer, TraceSettings, Traced};
 use clerestory::accel::{Hit, Ray};
 use clerestory::gpu::Gpu;
-use clerestory::scene::{Camera, Projection, Scene};
+use clerestory::scene::{Camera, Projection};
 use clerestory::{Result, scene};
 use glam::{DVec3, Vec3};
 
 use super::Context;
 use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::geometry;
 use crate::machine::median;
 
 /// The trivial scene first.
@@ -36,19 +37,6 @@ struct Form {
     name: String,
     tracer: RayTracer,
     seconds: Vec<f64>,
-}
-
-fn triangles_of(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let mut all = Vec::new();
-    for instance in &scene.instances {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let place = |i: u32| {
-            let position = mesh.positions[i as usize].as_dvec3();
-            instance.transform.transform_point3(position).as_vec3()
-        };
-        all.extend(mesh.triangles.iter().map(|t| t.map(place)));
-    }
-    all
 }
 
 fn ray(origin: Vec3, direction: DVec3, t_min: f32) -> Ray {
@@ -155,7 +143,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     for address in &SCENES[..scenes] {
         let scene = scene::load(address)?;
-        let index = Bvh2::build(&triangles_of(&scene), &Bvh2Settings::default())?;
+        let index = Bvh2::build(&geometry::triangles(&scene), &Bvh2Settings::default())?;
         let primary = primary_rays(scene.require_camera(None)?, side);
         let hits = RayTracer::new(&gpu, &index, &TraceSettings::thread_a_ray())?
             .trace(&primary)?

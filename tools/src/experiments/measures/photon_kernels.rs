@@ -21,6 +21,7 @@ use clerestory::scene::{Camera, Scene};
 use clerestory::{Error, Result, scene};
 use glam::{Vec3, Vec4};
 
+use super::Context;
 use super::inputs::Random;
 use crate::geometry::{self, area, triangles_with_materials};
 
@@ -46,7 +47,7 @@ pub struct Case {
 }
 
 /// Scenes of the size and number of triangles of the source's, with its numbers of contributions (Table 5.1), and two more.
-pub const CASES: [Case; 5] = [
+pub static CASES: [Case; 5] = [
     Case {
         scene: "builtin:box-room?source=point",
         light: Vec3::new(3.0, 2.5, 3.0),
@@ -338,9 +339,34 @@ impl Map {
     }
 }
 
-/// Photons that experiments send out, and pixels on a side of their camera.
-pub fn amounts(smoke: bool) -> (u32, u32) {
-    if smoke { (1 << 9, 8) } else { (1 << 17, 96) }
+/// A case with its photons and what its camera sees.
+pub struct Prepared {
+    /// The case.
+    pub case: &'static Case,
+    /// Its scene.
+    pub surfaces: Surfaces,
+    /// Kernels of the photons.
+    pub kernels: Kernels,
+    /// Points to query at.
+    pub points: Vec<Vec3>,
+}
+
+/// The cases that a measure takes, each made when its turn comes, until the measure is stopped.
+pub fn prepared<'a>(context: &'a Context<'_>) -> impl Iterator<Item = Result<Prepared>> + 'a {
+    // Photons sent out, and pixels on a side of the camera.
+    let (photons, side) = if context.smoke { (1 << 9, 8) } else { (1 << 17, 96) };
+    let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
+    let going_on = cases.iter().enumerate().take_while(|_| !context.watch.stopped());
+    going_on.map(move |(done, case)| {
+        context.watch.begin(case.name(), done, cases.len());
+        let surfaces = Surfaces::load(case.scene)?;
+        Ok(Prepared {
+            case,
+            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover),
+            points: surfaces.seen(side)?,
+            surfaces,
+        })
+    })
 }
 
 #[cfg(test)]
