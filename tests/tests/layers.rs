@@ -119,6 +119,28 @@ fn the_recorder_catches_a_missing_barrier_between_dispatches() {
     assert!(matches!(result, Err(Error::MissingBarrier { .. })), "{result:?}");
 }
 
+/// The second copy reads and writes the buffer that the first has read.
+#[test]
+#[cfg(debug_assertions)]
+fn the_recorder_remembers_earlier_reads_when_a_command_reads_and_writes() {
+    let gpu = validated(Validation::Off);
+    let buffer = |name| gpu.buffer(&BufferDesc::storage(name, 64, Category::Work)).unwrap();
+    let (words, other) = (buffer("words"), buffer("other"));
+    let record = |barrier: bool| {
+        let mut recorder = gpu.recorder("copies")?;
+        recorder.pass("read, then move", |pass| {
+            pass.copy(words.slice(32, 32), other.view())?;
+            if barrier {
+                pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
+            }
+            pass.copy(words.slice(0, 32), words.slice(32, 32))
+        })
+    };
+    record(true).unwrap();
+    let result = record(false);
+    assert!(matches!(result, Err(Error::MissingBarrier { .. })), "{result:?}");
+}
+
 #[test]
 #[cfg(debug_assertions)]
 fn the_recorder_catches_a_dispatch_that_reads_by_texels_what_it_writes() {

@@ -17,7 +17,9 @@ struct Pending {
     write: Option<Use>,
     /// The uses that the last write has been made visible to.
     visible_to: Access,
-    /// Reads since the last write, under the name of the last; a later write must wait for them.
+    /// Reads since the last write by commands before the one in `reads`, under the name of the last of these.
+    earlier_reads: Option<Use>,
+    /// Reads since the last write by the last command that did; a later write must wait for all.
     reads: Option<Use>,
 }
 
@@ -59,7 +61,8 @@ impl Tracker {
         {
             return Err(missing(write));
         }
-        if let Some(read) = pending.reads.as_ref().filter(|read| writes && read.command != command) {
+        let mut reads = pending.reads.iter().chain(&pending.earlier_reads);
+        if let Some(read) = reads.find(|read| writes && read.command != command) {
             return Err(missing(read));
         }
         let used = |access| {
@@ -73,11 +76,21 @@ impl Tracker {
             *pending = Pending {
                 write: used(access),
                 visible_to: Access::NONE,
+                earlier_reads: None,
                 reads: None,
             };
         } else {
-            let earlier = pending.reads.as_ref().map_or(Access::NONE, |read| read.access);
-            pending.reads = used(earlier | access);
+            match &mut pending.reads {
+                Some(read) if read.command == command => read.access = read.access | access,
+                reads => {
+                    if let Some(mut read) = reads.take() {
+                        let earlier = pending.earlier_reads.as_ref().map_or(Access::NONE, |read| read.access);
+                        read.access = read.access | earlier;
+                        pending.earlier_reads = Some(read);
+                    }
+                    *reads = used(access);
+                }
+            }
         }
         Ok(())
     }
@@ -104,11 +117,11 @@ impl Pending {
                 self.visible_to = self.visible_to | to;
             }
         }
-        if let Some(reads) = &mut self.reads {
-            reads.access = reads.access.without_stages_of(from);
-            if reads.access.is_empty() {
-                self.reads = None;
-            }
+        for pending in [&mut self.earlier_reads, &mut self.reads] {
+            pending.take_if(|reads| {
+                reads.access = reads.access.without_stages_of(from);
+                reads.access.is_empty()
+            });
         }
     }
 }
