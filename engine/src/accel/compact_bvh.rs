@@ -10,7 +10,8 @@
 
 use super::bvh2::Aabb;
 use super::complete_bvh::{
-    CompleteBvh, INDEX_BITS, LEAF_BIT, NO_PLANE, QueryCounters, RayPair, RootDescriptor, SlabRay, holds_inside, met,
+    CompleteBvh, INDEX_BITS, LEAF_BIT, NO_PLANE, POINT_STACK_ENTRY_BYTES, QueryCounters, RayPair, RootDescriptor,
+    STACK_SIZE, SlabRay, holds_inside, met,
 };
 use super::lbvh::tree::TreeFault;
 use bytemuck::{Pod, Zeroable};
@@ -18,9 +19,6 @@ use glam::Vec3;
 
 /// Bytes of a pair.
 pub const COMPACT_PAIR_BYTES: u64 = size_of::<CompactPair>() as u64;
-
-/// Bytes of a stack entry of a point query.
-const POINT_ENTRY_BYTES: u64 = 4;
 
 /// Bytes of a stack entry of a ray query: reference and span.
 const RAY_ENTRY_BYTES: u64 = 12;
@@ -153,7 +151,8 @@ impl CompactBvh {
     /// Visits the leaves whose boxes hold a point in their interior; of two children it goes on with the right one and keeps the left.
     pub fn point_query(&self, point: Vec3, counters: &mut QueryCounters, mut visit: impl FnMut(u32)) {
         let mut next = self.root.reference.filter(|_| holds_inside(&self.root.bounds, point));
-        let mut stack = Vec::new();
+        let mut stack = [0; STACK_SIZE];
+        let mut top = 0;
         while let Some(reference) = next {
             next = None;
             if reference & LEAF_BIT != 0 {
@@ -165,9 +164,10 @@ impl CompactBvh {
                 counters.bytes += COMPACT_PAIR_BYTES;
                 let (inside, [left, right]) = (pair.point_children(point), pair.references());
                 if inside == 3 {
-                    stack.push(left);
+                    stack[top] = left;
+                    top += 1;
                     counters.pushes += 1;
-                    counters.bytes += POINT_ENTRY_BYTES;
+                    counters.bytes += POINT_STACK_ENTRY_BYTES;
                 }
                 next = match inside {
                     0 => None,
@@ -175,7 +175,10 @@ impl CompactBvh {
                     _ => Some(right),
                 };
             }
-            next = next.or_else(|| stack.pop());
+            if next.is_none() && top > 0 {
+                top -= 1;
+                next = Some(stack[top]);
+            }
         }
     }
 
@@ -185,7 +188,8 @@ impl CompactBvh {
         let [t_min, mut t_max] = ray.ends();
         let span = ray.span(&self.root.bounds, [t_min, t_max]);
         let mut next = self.root.reference.filter(|_| met(span)).map(|root| (root, span));
-        let mut stack: Vec<(u32, [f32; 2])> = Vec::new();
+        let mut stack = [(0, [0.0; 2]); STACK_SIZE];
+        let mut top = 0;
         let everywhere = Aabb {
             lower: Vec3::splat(-NO_PLANE),
             upper: Vec3::splat(NO_PLANE),
@@ -207,17 +211,17 @@ impl CompactBvh {
                     if met(spans[side])
                         && let Some(other) = next.replace((references[side], spans[side]))
                     {
-                        stack.push(other);
+                        stack[top] = other;
+                        top += 1;
                         counters.pushes += 1;
                         counters.bytes += RAY_ENTRY_BYTES;
                     }
                 }
             }
-            while next.is_none() {
-                let Some(entry) = stack.pop() else {
-                    return;
-                };
-                next = (entry.1[0] <= t_max).then_some(entry);
+            while next.is_none() && top > 0 {
+                top -= 1;
+                let (reference, span) = stack[top];
+                next = met([span[0], t_max]).then_some((reference, span));
             }
         }
     }

@@ -25,6 +25,9 @@ pub const STACK_SIZE: usize = constants::COMPACT_STACK_SIZE as usize;
 /// Bytes of a complete node.
 pub const COMPLETE_NODE_BYTES: u64 = size_of::<CompleteNode>() as u64;
 
+/// Bytes of a stack entry of a point query: a node's index.
+pub const POINT_STACK_ENTRY_BYTES: u64 = 4;
+
 /// Bytes of a stack entry of a ray query: reference and entry distance.
 pub const RAY_STACK_ENTRY_BYTES: u64 = 8;
 
@@ -79,8 +82,10 @@ pub struct QueryCounters {
 pub struct CompleteBvh {
     /// Where queries begin.
     pub root: RootDescriptor,
-    /// Sibling pairs.
+    /// Sibling pairs, for ray queries.
     pub pairs: Vec<RayPair>,
+    /// The same nodes for point queries, two a pair.
+    pub nodes: Vec<CompleteNode>,
     /// Primitive of each record.
     pub order: Vec<u32>,
     /// Whether a record ends its leaf.
@@ -129,7 +134,7 @@ impl CompleteBvh {
             }
         };
         let nodes = tree.preorder().map(|(node, _)| &tree.nodes[node as usize]);
-        let pairs = nodes
+        let pairs: Vec<RayPair> = nodes
             .map(|node| RayPair {
                 bounds: node.bounds.map(without_negative_zero),
                 references: node.children.map(&mut reference),
@@ -139,50 +144,51 @@ impl CompleteBvh {
             bounds: without_negative_zero(tree.bounds),
             reference: (!tree.order.is_empty()).then(|| reference(tree.root)),
         };
-        Ok(Self {
-            root,
-            pairs,
-            order: tree.order.clone(),
-            ends,
-        })
-    }
-
-    /// The nodes of 32 bytes, two a pair.
-    pub fn nodes(&self) -> Vec<CompleteNode> {
         let node = |bounds: Aabb, reference| CompleteNode {
             lower: bounds.lower,
             reference,
             upper: bounds.upper,
             padding: 0,
         };
-        self.pairs
-            .iter()
-            .flat_map(|pair| [0, 1].map(|i| node(pair.bounds[i], pair.references[i])))
-            .collect()
+        let of_pair = |pair: &RayPair| [0, 1].map(|i| node(pair.bounds[i], pair.references[i]));
+        Ok(Self {
+            root,
+            nodes: pairs.iter().flat_map(of_pair).collect(),
+            pairs,
+            order: tree.order.clone(),
+            ends,
+        })
     }
 
-    /// Visits the leaves whose boxes hold a point in their interior: a stack of nodes, each tested when it is taken.
+    /// Visits the leaves whose boxes hold a point in their interior: a stack of nodes, each fetched and tested when it is taken.
     pub fn point_query(&self, point: Vec3, counters: &mut QueryCounters, mut visit: impl FnMut(u32)) {
-        let Some(root) = self.root.reference else {
-            return;
-        };
-        let mut stack = vec![(root, self.root.bounds)];
-        while let Some((reference, bounds)) = stack.pop() {
-            if !holds_inside(&bounds, point) {
-                continue;
-            }
+        let mut next = self.root.reference.filter(|_| holds_inside(&self.root.bounds, point));
+        let mut stack = [0; STACK_SIZE];
+        let mut top = 0;
+        while let Some(reference) = next {
             if reference & LEAF_BIT != 0 {
                 counters.leaves += 1;
                 visit(reference ^ LEAF_BIT);
-                continue;
+            } else {
+                for node in [2 * reference, 2 * reference + 1] {
+                    stack[top] = node;
+                    top += 1;
+                }
+                counters.pushes += 2;
+                counters.bytes += 2 * POINT_STACK_ENTRY_BYTES;
             }
-            let pair = &self.pairs[reference as usize];
-            for side in 0..2 {
-                stack.push((pair.references[side], pair.bounds[side]));
+            next = None;
+            while next.is_none() && top > 0 {
+                top -= 1;
+                let node = &self.nodes[stack[top] as usize];
+                counters.nodes += 1;
+                counters.bytes += COMPLETE_NODE_BYTES;
+                let bounds = Aabb {
+                    lower: node.lower,
+                    upper: node.upper,
+                };
+                next = holds_inside(&bounds, point).then_some(node.reference);
             }
-            counters.nodes += 2;
-            counters.pushes += 2;
-            counters.bytes += 2 * (COMPLETE_NODE_BYTES + size_of::<u32>() as u64);
         }
     }
 
@@ -194,7 +200,8 @@ impl CompleteBvh {
             return;
         };
         let span = ray.span(&self.root.bounds, [ray.t_min, t_max]);
-        let mut stack = Vec::new();
+        let mut stack = [(0, 0.0); STACK_SIZE];
+        let mut top = 0;
         let mut next = met(span).then_some(root);
         while let Some(reference) = next {
             next = None;
@@ -211,17 +218,17 @@ impl CompleteBvh {
                     if met(spans[side])
                         && let Some(other) = next.replace(pair.references[side])
                     {
-                        stack.push((other, spans[1 - side][0]));
+                        stack[top] = (other, spans[1 - side][0]);
+                        top += 1;
                         counters.pushes += 1;
                         counters.bytes += RAY_STACK_ENTRY_BYTES;
                     }
                 }
             }
-            while next.is_none() {
-                let Some((reference, entry)) = stack.pop() else {
-                    return;
-                };
-                next = (entry <= t_max).then_some(reference);
+            while next.is_none() && top > 0 {
+                top -= 1;
+                let (reference, entry) = stack[top];
+                next = met([entry, t_max]).then_some(reference);
             }
         }
     }
@@ -243,7 +250,8 @@ pub fn holds_inside(bounds: &Aabb, point: Vec3) -> bool {
 /// Direction components below this are decided by the origin's place between the planes.
 pub const PARALLEL_COMPONENT: f32 = constants::COMPACT_PARALLEL_COMPONENT;
 
-/// What a span's end is widened by when it is compared, relative: rounding of both distances, so that flat boxes are met.
+/// What a span's end is widened by when it is compared, relative: rounding of both distances, so that flat boxes are met. On the host three
+/// units in the last place would do; devices may divide 2½ units less exactly.
 pub const SPAN_SLACK: f32 = constants::COMPACT_SPAN_SLACK;
 
 /// Beyond every plane; products with the largest reciprocal, 1 / [`PARALLEL_COMPONENT`], stay finite.

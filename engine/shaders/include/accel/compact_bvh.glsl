@@ -17,8 +17,8 @@ const uint COMPACT_NOTHING = 0xFFFFFFFFu;
 const uint COMPACT_STACK_SIZE = 96u;
 const float COMPACT_PARALLEL_COMPONENT = 1.0e-20;
 const float COMPACT_NO_PLANE = 1.0e17;
-// Three units in the last place.
-const float COMPACT_SPAN_SLACK = 3.0 / 8388608.0;
+// Units in the last place: each of two distances is a rounded difference times a reciprocal of up to 2.5.
+const float COMPACT_SPAN_SLACK = 8.0 / 8388608.0;
 
 layout(constant_id = 110) const uint COMPACT_QUOTA = 32768u;
 
@@ -135,7 +135,7 @@ bool compact_ray_query(CompactRoot root, vec3 origin, vec3 direction, float t_mi
             next = COMPACT_NOTHING;
             while (top > 0u && next == COMPACT_NOTHING) {
                 span = spans[--top];
-                next = span.x <= t_max ? stack[top] : COMPACT_NOTHING;
+                next = compact_met(vec2(span.x, t_max)) ? stack[top] : COMPACT_NOTHING;
             }
         }
     }
