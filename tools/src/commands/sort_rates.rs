@@ -324,8 +324,8 @@ pub fn write(folder: &Path, rates: &[Rate], head: &serde_json::Value) -> Outcome
         let curves: Vec<Curve> = sorters(rates, load).iter().map(curve).collect();
         let words = Words {
             title: &format!("Sorting random 32-bit {}", load.word()),
-            x: load.word(),
-            y: &format!("{}/s", load.word()),
+            x: &format!("number of {}", load.word()),
+            y: &format!("{}/s, median, least to greatest", load.word()),
         };
         if let Some(svg) = plot::log_log_of_rates(words, &curves)? {
             save(&format!("sort-{}.svg", load.word()), svg)?;
