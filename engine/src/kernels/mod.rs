@@ -11,6 +11,8 @@
 mod histogram;
 mod partition;
 mod permute;
+mod radix_plan;
+mod radix_small;
 mod radix_sort;
 mod reduce;
 mod scan;

@@ -2,22 +2,21 @@
 //!
 //! Least-significant-digit first; each digit takes three stages (counts by team, prefix sums of the counts, scatter), after Satish, Harris
 //! and Garland, "Designing efficient sorting algorithms for manycore GPUs" (IPDPS 2009), section 4. In the serial form a team is an
-//! invocation that walks its block with counters of its own and digits as wide as private memory allows; in the subgroup form a team is a
-//! workgroup, and subgroups rank equal digits by ballots (Ashkiani and others, "GPU multisplit", PPoPP 2016).
+//! invocation that walks its block with counters of its own; in the subgroup form a team is a workgroup, and subgroups rank equal digits by
+//! ballots (Ashkiani and others, "GPU multisplit", PPoPP 2016). Few keys are one workgroup's work in one dispatch.
 //!
 //! Guarantees: stable in either order; the same bits on every device and in every form; equal to [`radix_sort`], its twin. Keys are
 //! unsigned: those of other types want an order-preserving map first. Only the bits of [`RadixSortOptions::bits`] are compared.
 
 use std::ops::Range;
 
-use super::stream::{self, Count, Form, Prepare, SERIAL_QUOTA, Shape, Stream};
+use super::radix_plan::{Plan, Tuning};
+use super::radix_small::SmallSort;
+use super::stream::{self, Count, Form, Prepare};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::kernels::{
-    radix_count_serial, radix_count_subgroup, radix_scan, radix_scatter_serial, radix_scatter_subgroup,
-};
-use crate::gpu::shaders::sets::{RadixSerialSet, RadixSubgroupSet};
+use crate::gpu::shaders::kernels::radix_scan;
 use crate::gpu::shaders::types::StreamPlan;
-use crate::gpu::{Buffer, Caps, Category, ComputePipeline, DeviceKind, Gpu, Pass, TexelView};
+use crate::gpu::{Buffer, Category, Gpu, Pass, TexelView};
 use crate::{Error, Result};
 
 /// Width of keys.
@@ -61,7 +60,8 @@ pub struct RadixSortOptions {
     pub order: Order,
     /// The bits of keys that are compared, counted from the lowest; fewer bits take fewer passes.
     pub bits: Range<u32>,
-    /// What teams are; [`Form::Shared`] is the serial form here.
+    /// What teams are. [`Form::Auto`] sorts up to some 2,000 keys, as shared memory allows, by one workgroup in one dispatch.
+    /// [`Form::Shared`] does so too, and is the serial form for more.
     pub form: Form,
 }
 
@@ -100,89 +100,10 @@ pub struct RadixSort {
     gpu: Gpu,
     options: RadixSortOptions,
     prepare: Prepare,
-    /// With narrow digits for few keys, and with wide ones for many.
+    /// For few keys, where the form and the device allow it.
+    small: Option<SmallSort>,
+    /// For few keys, and for many.
     plans: [Plan; 2],
-}
-
-/// Pipelines for one width of digits.
-#[derive(Debug)]
-struct Plan {
-    /// The most keys that it is for.
-    up_to: u32,
-    shape: Shape,
-    digit_bits: u32,
-    scan_groups: u32,
-    scan: ComputePipeline<radix_scan::Kernel>,
-    kernels: Kernels,
-}
-
-#[derive(Debug)]
-enum Kernels {
-    Serial {
-        count: ComputePipeline<radix_count_serial::Kernel>,
-        scatter: ComputePipeline<radix_scatter_serial::Kernel>,
-    },
-    Subgroup {
-        count: ComputePipeline<radix_count_subgroup::Kernel>,
-        scatter: ComputePipeline<radix_scatter_subgroup::Kernel>,
-    },
-}
-
-/// The digits of a form, by measurement.
-#[derive(Debug, Clone, Copy)]
-struct Tuning {
-    up_to: u32,
-    digit_bits: u32,
-    shape: Shape,
-    lanes: u32,
-}
-
-/// Keys that a lane of the subgroup form holds at once.
-const KEYS_A_LANE: u32 = 8;
-/// Subgroups that have a row of counters each in the subgroup form.
-const SUBGROUP_ROWS: u32 = 16;
-
-impl Tuning {
-    fn of(caps: &Caps, form: Form) -> [Self; 2] {
-        if form == Form::Subgroup {
-            // Subgroups may turn out smaller than the device's size: at least 8 lanes where that is 8 or more.
-            let lanes = SUBGROUP_ROWS * caps.subgroup_size.min(8);
-            let tile = lanes * KEYS_A_LANE;
-            let tuning = Self {
-                up_to: u32::MAX,
-                digit_bits: 8,
-                shape: Shape {
-                    tile,
-                    quota: u32::MAX / tile * tile,
-                    teams_a_group: 1,
-                    teams: 1024,
-                },
-                lanes,
-            };
-            return [tuning; 2];
-        }
-        let serial = |up_to, digit_bits, tile, teams: u32, lanes| Self {
-            up_to,
-            digit_bits,
-            shape: Shape {
-                tile,
-                quota: SERIAL_QUOTA * 4,
-                teams_a_group: lanes,
-                teams,
-            },
-            lanes,
-        };
-        if caps.kind == DeviceKind::Cpu {
-            let lanes = caps.subgroup_size.max(1);
-            let teams = stream::serial_groups() * lanes;
-            [
-                serial(1 << 16, 8, 128, teams, lanes),
-                serial(u32::MAX, 11, 2048, teams, lanes),
-            ]
-        } else {
-            [serial(u32::MAX, 4, 64, 1 << 14, 64); 2]
-        }
-    }
 }
 
 impl RadixSort {
@@ -202,6 +123,10 @@ impl RadixSort {
             Form::Subgroup => Form::Subgroup,
             _ => Form::Serial,
         };
+        let small = match options.form {
+            Form::Auto | Form::Shared => SmallSort::new(gpu, &options)?,
+            Form::Serial | Form::Subgroup => None,
+        };
         let [few, many] = Tuning::of(gpu.caps(), form);
         let plans = [
             Plan::new(gpu, &options, form, few)?,
@@ -211,6 +136,7 @@ impl RadixSort {
             gpu: gpu.clone(),
             options,
             prepare: Prepare::new(gpu)?,
+            small,
             plans,
         })
     }
@@ -241,16 +167,31 @@ impl RadixSort {
         self.gpu.storage_texels(name, Category::Work, format, words.div_ceil(4))
     }
 
-    /// Bytes of scratch memory for up to `capacity` keys.
+    /// Bytes of scratch memory for up to `capacity` keys, and for any fewer.
     pub fn scratch_bytes(&self, capacity: u32) -> u64 {
-        let plan = self.plan(capacity);
-        let bins = 1u64 << plan.digit_bits;
-        stream::scratch_bytes(bins * (1 + u64::from(plan.shape.max_teams(capacity))))
+        if self.small(capacity).is_some() {
+            return stream::scratch_bytes(0);
+        }
+        let [few, many] = &self.plans;
+        let of_few = few.counters(capacity.min(few.up_to));
+        stream::scratch_bytes(if capacity <= few.up_to {
+            of_few
+        } else {
+            of_few.max(many.counters(capacity))
+        })
     }
 
     /// The side of the buffers that holds the result of a sort of up to `capacity` keys.
     pub fn side(&self, capacity: u32) -> usize {
-        self.plan(capacity).digits(&self.options.bits).len() % 2
+        match self.small(capacity) {
+            Some(_) => 1,
+            None => self.plan(capacity).digits(&self.options.bits).len() % 2,
+        }
+    }
+
+    /// Keys that are sorted in one dispatch at most, where the capacity is no larger; 0 where none are.
+    pub fn one_dispatch_up_to(&self) -> u32 {
+        self.small.as_ref().map_or(0, SmallSort::up_to)
     }
 
     /// Records a sort of side 0 and returns the side that holds the result. With a count on the device, both depend on the capacity only.
@@ -270,6 +211,10 @@ impl RadixSort {
         if matches!(count, Count::Host(0)) {
             return Ok(self.side(0));
         }
+        if let Some(small) = self.small(capacity) {
+            small.record(pass, &self.options, buffers, count, scratch)?;
+            return Ok(1);
+        }
         let plan = self.plan(capacity);
         let stream = self.prepare.begin(pass, &plan.shape, count, scratch)?;
         let digits = plan.digits(&self.options.bits);
@@ -282,6 +227,10 @@ impl RadixSort {
             plan.record(pass, &stream, buffers, index % 2, self.push(stream.plan, digit))?;
         }
         Ok(digits.len() % 2)
+    }
+
+    fn small(&self, capacity: u32) -> Option<&SmallSort> {
+        self.small.as_ref().filter(|small| capacity <= small.up_to())
     }
 
     fn plan(&self, capacity: u32) -> &Plan {
@@ -315,151 +264,6 @@ impl RadixSort {
                 Order::Ascending => 0,
                 Order::Descending => mask,
             },
-        }
-    }
-}
-
-impl Plan {
-    fn new(gpu: &Gpu, options: &RadixSortOptions, form: Form, tuning: Tuning) -> Result<Self> {
-        // Digits of equal width need the fewest counters for their number.
-        let count = (options.bits.len() as u32).div_ceil(tuning.digit_bits);
-        let digit_bits = (options.bits.len() as u32).div_ceil(count);
-        let (lanes, key_words, has_values) = (tuning.lanes, options.key.words(), options.values);
-        let (serial, bins) = (form == Form::Serial, 1 << digit_bits);
-        let kernels = if serial {
-            Kernels::Serial {
-                count: gpu.compute_pipeline(&radix_count_serial::Spec {
-                    local_size_x: lanes,
-                    bins,
-                    key_words,
-                    has_values,
-                })?,
-                scatter: gpu.compute_pipeline(&radix_scatter_serial::Spec {
-                    local_size_x: lanes,
-                    bins,
-                    key_words,
-                    has_values,
-                })?,
-            }
-        } else {
-            Kernels::Subgroup {
-                count: gpu.compute_pipeline(&radix_count_subgroup::Spec {
-                    local_size_x: lanes,
-                    bins,
-                    key_words,
-                    has_values,
-                })?,
-                scatter: gpu.compute_pipeline(&radix_scatter_subgroup::Spec {
-                    local_size_x: lanes,
-                    bins,
-                    key_words,
-                    has_values,
-                    keys_a_lane: KEYS_A_LANE,
-                    max_subgroups: SUBGROUP_ROWS,
-                })?,
-            }
-        };
-        let scan = gpu.compute_pipeline(&radix_scan::Spec {
-            local_size_x: lanes,
-            bins,
-            serial,
-            ..Default::default()
-        })?;
-        Ok(Self {
-            up_to: tuning.up_to,
-            shape: tuning.shape,
-            digit_bits,
-            scan_groups: bins.div_ceil(if serial { lanes } else { 1 }),
-            scan,
-            kernels,
-        })
-    }
-
-    /// The bits of each digit, the lowest first.
-    fn digits(&self, bits: &Range<u32>) -> Vec<Range<u32>> {
-        let starts = bits.clone().step_by(self.digit_bits as usize);
-        starts
-            .map(|start| start..(start + self.digit_bits).min(bits.end))
-            .collect()
-    }
-
-    /// The three stages of one digit.
-    fn record(
-        &self,
-        pass: &mut Pass<'_>,
-        stream: &Stream<'_>,
-        buffers: &SortBuffers<'_>,
-        from: usize,
-        push: radix_scan::Push,
-    ) -> Result<()> {
-        let (from, to) = (from, 1 - from);
-        // Kernels without values have the bindings nevertheless.
-        let values = buffers.values.unwrap_or(buffers.keys);
-        let serial_set = RadixSerialSet {
-            stream_scratch: stream.scratch.view(),
-            radix_keys_in: buffers.keys[from],
-            radix_keys_out: buffers.keys[to].buffer().view(),
-            radix_values_in: values[from],
-            radix_values_out: values[to].buffer().view(),
-        };
-        let subgroup_set = RadixSubgroupSet {
-            stream_scratch: stream.scratch.view(),
-            radix_keys_from: buffers.keys[from].buffer().view(),
-            radix_keys_to: buffers.keys[to].buffer().view(),
-            radix_values_from: values[from].buffer().view(),
-            radix_values_to: values[to].buffer().view(),
-        };
-        let radix_scan::Push {
-            plan,
-            shift,
-            mask,
-            flip,
-        } = push;
-        match &self.kernels {
-            Kernels::Serial { count, .. } => {
-                let push = radix_count_serial::Push {
-                    plan,
-                    shift,
-                    mask,
-                    flip,
-                };
-                stream.dispatch(pass, count, &serial_set, &push)?;
-            }
-            Kernels::Subgroup { count, .. } => {
-                let push = radix_count_subgroup::Push {
-                    plan,
-                    shift,
-                    mask,
-                    flip,
-                };
-                stream.dispatch(pass, count, &subgroup_set, &push)?;
-            }
-        }
-        stream.between_stages(pass, &[]);
-        let set = radix_scan::Set0 {
-            stream_scratch: stream.scratch.view(),
-        };
-        pass.dispatch(&self.scan, &[&set], &push, [self.scan_groups, 1, 1])?;
-        stream.between_stages(pass, &[]);
-        match &self.kernels {
-            Kernels::Serial { scatter, .. } => {
-                let push = radix_scatter_serial::Push {
-                    plan,
-                    shift,
-                    mask,
-                    flip,
-                };
-                stream.dispatch(pass, scatter, &serial_set, &push)
-            }
-            Kernels::Subgroup { scatter, .. } => {
-                let push = radix_scatter_subgroup::Push {
-                    plan,
-                    shift,
-                    mask,
-                    flip,
-                };
-                stream.dispatch(pass, scatter, &subgroup_set, &push)
-            }
         }
     }
 }

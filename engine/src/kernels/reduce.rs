@@ -5,10 +5,60 @@
 //! [`reduce_box`], the twins, on every device and in every form.
 
 use super::stream::{self, Count, Form, Operation, Prepare, Teams};
+use crate::gpu::interface::{BindingSet, ComputeShader};
 use crate::gpu::shaders::constants::{FLOAT_INFINITY_BITS, FLOAT_SIGN_BIT};
 use crate::gpu::shaders::kernels::{reduce_box as box_kernel, reduce_words as words_kernel};
+use crate::gpu::shaders::types::StreamPlan;
 use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass};
 use crate::{Error, Result};
+
+/// A reduction of the stream by teams, then of what they found by one workgroup.
+#[derive(Debug)]
+struct Stages<K> {
+    /// For errors.
+    kernel: &'static str,
+    teams: Teams,
+    prepare: Prepare,
+    /// Over the stream, then over the parts.
+    pipelines: [ComputePipeline<K>; 2],
+    /// Of what is found.
+    result_words: u64,
+}
+
+/// What a reduction goes between.
+struct Ends<'a> {
+    input: BufferView<'a>,
+    input_words: u64,
+    result: BufferView<'a>,
+}
+
+impl<K: ComputeShader> Stages<K> {
+    fn scratch_bytes(&self, capacity: u32) -> u64 {
+        stream::scratch_bytes(self.result_words * u64::from(self.teams.shape.max_teams(capacity)))
+    }
+
+    fn record(
+        &self,
+        pass: &mut Pass<'_>,
+        ends: &Ends<'_>,
+        count: Count<'_>,
+        scratch: &Buffer,
+        set: &dyn BindingSet<'_>,
+        push: impl Fn(StreamPlan) -> K::Push,
+    ) -> Result<()> {
+        let capacity = count.capacity();
+        stream::check_count(self.kernel, capacity)?;
+        stream::check_words(ends.input, ends.input_words)?;
+        stream::check_words(ends.result, self.result_words)?;
+        stream::check_size(scratch, self.scratch_bytes(capacity))?;
+        let stream = self.prepare.begin(pass, &self.teams.shape, count, scratch)?;
+        let push = push(stream.plan);
+        stream.dispatch(pass, &self.pipelines[0], set, &push)?;
+        // Both stages have the binding.
+        stream.between_stages(pass, &[ends.result.buffer]);
+        pass.dispatch(&self.pipelines[1], &[set], &push, [1, 1, 1])
+    }
+}
 
 /// The sum, minimum or maximum of words.
 ///
@@ -16,10 +66,7 @@ use crate::{Error, Result};
 /// scratch memory must have ended. After it the result has been written, and the scratch memory read and written, by compute shaders.
 #[derive(Debug)]
 pub struct ReduceWords {
-    teams: Teams,
-    prepare: Prepare,
-    /// Over the stream, then over the parts.
-    stages: [ComputePipeline<words_kernel::Kernel>; 2],
+    stages: Stages<words_kernel::Kernel>,
 }
 
 impl ReduceWords {
@@ -38,15 +85,19 @@ impl ReduceWords {
             })
         };
         Ok(Self {
-            teams,
-            prepare: Prepare::new(gpu)?,
-            stages: [stage(false)?, stage(true)?],
+            stages: Stages {
+                kernel: "reduce",
+                teams,
+                prepare: Prepare::new(gpu)?,
+                pipelines: [stage(false)?, stage(true)?],
+                result_words: 2,
+            },
         })
     }
 
     /// Bytes of scratch memory for up to `capacity` words.
     pub fn scratch_bytes(&self, capacity: u32) -> u64 {
-        stream::scratch_bytes(2 * u64::from(self.teams.shape.max_teams(capacity)))
+        self.stages.scratch_bytes(capacity)
     }
 
     /// Records a reduction of `input` to `result`: two words, the low one of the 64-bit result first.
@@ -61,22 +112,18 @@ impl ReduceWords {
         count: Count<'_>,
         scratch: &Buffer,
     ) -> Result<()> {
-        let capacity = count.capacity();
-        stream::check_count("reduce", capacity)?;
-        stream::check_words(input, capacity.into())?;
-        stream::check_words(result, 2)?;
-        stream::check_size(scratch, self.scratch_bytes(capacity))?;
-        let stream = self.prepare.begin(pass, &self.teams.shape, count, scratch)?;
+        let ends = Ends {
+            input,
+            input_words: count.capacity().into(),
+            result,
+        };
         let set = words_kernel::Set0 {
             stream_scratch: scratch.view(),
             reduce_words: input,
             reduce_result: result,
         };
-        let push = words_kernel::Push { plan: stream.plan };
-        stream.dispatch(pass, &self.stages[0], &set, &push)?;
-        // Both stages have the binding.
-        stream.between_stages(pass, &[result.buffer]);
-        pass.dispatch(&self.stages[1], &[&set], &push, [1, 1, 1])
+        self.stages
+            .record(pass, &ends, count, scratch, &set, |plan| words_kernel::Push { plan })
     }
 }
 
@@ -103,10 +150,7 @@ impl BoxElements {
 #[derive(Debug)]
 pub struct ReduceBox {
     elements: BoxElements,
-    teams: Teams,
-    prepare: Prepare,
-    /// Over the stream, then over the parts.
-    stages: [ComputePipeline<box_kernel::Kernel>; 2],
+    stages: Stages<box_kernel::Kernel>,
 }
 
 impl ReduceBox {
@@ -138,15 +182,19 @@ impl ReduceBox {
         };
         Ok(Self {
             elements,
-            teams,
-            prepare: Prepare::new(gpu)?,
-            stages: [stage(false)?, stage(true)?],
+            stages: Stages {
+                kernel: "reduce box",
+                teams,
+                prepare: Prepare::new(gpu)?,
+                pipelines: [stage(false)?, stage(true)?],
+                result_words: 6,
+            },
         })
     }
 
     /// Bytes of scratch memory for up to `capacity` elements.
     pub fn scratch_bytes(&self, capacity: u32) -> u64 {
-        stream::scratch_bytes(6 * u64::from(self.teams.shape.max_teams(capacity)))
+        self.stages.scratch_bytes(capacity)
     }
 
     /// Records a reduction of `input` to `result`: six floats, the lower corner first.
@@ -161,22 +209,18 @@ impl ReduceBox {
         count: Count<'_>,
         scratch: &Buffer,
     ) -> Result<()> {
-        let capacity = count.capacity();
-        stream::check_count("reduce box", capacity)?;
-        stream::check_words(input, u64::from(capacity) * u64::from(self.elements.stride))?;
-        stream::check_words(result, 6)?;
-        stream::check_size(scratch, self.scratch_bytes(capacity))?;
-        let stream = self.prepare.begin(pass, &self.teams.shape, count, scratch)?;
+        let ends = Ends {
+            input,
+            input_words: u64::from(count.capacity()) * u64::from(self.elements.stride),
+            result,
+        };
         let set = box_kernel::Set0 {
             stream_scratch: scratch.view(),
             reduce_elements: input,
             reduce_box: result,
         };
-        let push = box_kernel::Push { plan: stream.plan };
-        stream.dispatch(pass, &self.stages[0], &set, &push)?;
-        // Both stages have the binding.
-        stream.between_stages(pass, &[result.buffer]);
-        pass.dispatch(&self.stages[1], &[&set], &push, [1, 1, 1])
+        self.stages
+            .record(pass, &ends, count, scratch, &set, |plan| box_kernel::Push { plan })
     }
 }
 

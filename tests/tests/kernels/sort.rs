@@ -10,7 +10,7 @@ use clerestory::kernels::{
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
 
-use super::{PATTERNS, Pattern, SIZES, empty, run, words};
+use super::{FORMS, PATTERNS, Pattern, SIZES, empty, run, words};
 
 /// What the standard library makes of keys with their indices, and only these bits.
 fn expected(keys: &[u64], bits: &Range<u32>, order: Order) -> (Vec<u64>, Vec<u32>) {
@@ -99,7 +99,7 @@ fn check(gpu: &Gpu, sort: &RadixSort, keys: &[u64], on_device: bool, what: &str)
 fn every_size_and_pattern_is_as_by_std() {
     with_gpu(|gpu| {
         let mut random = Random(41);
-        for form in [Form::Serial, Form::Subgroup] {
+        for form in FORMS {
             for (key, values) in [(KeyWidth::Bits32, true), (KeyWidth::Bits64, false)] {
                 let options = RadixSortOptions {
                     form,
@@ -120,6 +120,87 @@ fn every_size_and_pattern_is_as_by_std() {
     });
 }
 
+/// Barriers and shader invocations of a sort of so many keys.
+fn barriers_and_invocations(gpu: &Gpu, sort: &RadixSort, count: Count<'_>) -> (u32, u64) {
+    let capacity = count.capacity();
+    let sides = ["keys", "other keys"].map(|name| sort.keys(name, capacity).unwrap());
+    let scratch = empty(gpu, "scratch", sort.scratch_bytes(capacity));
+    let buffers = SortBuffers {
+        keys: [&sides[0], &sides[1]],
+        values: None,
+    };
+    let mut recorder = gpu.recorder("counted").unwrap();
+    recorder.count_invocations();
+    recorder
+        .pass("sort", |pass| sort.record(pass, &buffers, count, &scratch))
+        .unwrap();
+    let timings = recorder.submit().unwrap().wait().unwrap();
+    (
+        timings.passes[0].barriers,
+        timings.passes[0].invocations.expect("pipeline statistics"),
+    )
+}
+
+#[test]
+fn few_keys_take_one_dispatch() {
+    with_gpu(|gpu| {
+        let lanes_at_most = u64::from(gpu.caps().max_workgroup_invocations.min(256));
+        let sort = RadixSort::new(gpu, RadixSortOptions::new(KeyWidth::Bits32, false)).unwrap();
+        let limit = sort.one_dispatch_up_to();
+        assert!((256..=2048).contains(&limit), "{limit}");
+        let counts = words(gpu, "count", &[1]);
+        let on_device = Count::Device {
+            view: counts.view(),
+            capacity: limit,
+        };
+        for count in [Count::Host(1), Count::Host(limit), on_device] {
+            let (barriers, invocations) = barriers_and_invocations(gpu, &sort, count);
+            assert!(
+                barriers == 0 && invocations <= lanes_at_most,
+                "{barriers} {invocations}"
+            );
+        }
+        // More keys take three dispatches for each of four or eight digits, and a barrier between any two.
+        for count in [limit + 1, 200_000] {
+            let (barriers, _) = barriers_and_invocations(gpu, &sort, Count::Host(count));
+            assert!([11, 23].contains(&barriers), "{count}: {barriers}");
+        }
+        for form in [Form::Serial, Form::Subgroup] {
+            let options = RadixSortOptions {
+                form,
+                ..RadixSortOptions::new(KeyWidth::Bits32, false)
+            };
+            assert_eq!(RadixSort::new(gpu, options).unwrap().one_dispatch_up_to(), 0);
+        }
+    });
+}
+
+#[test]
+fn sorts_about_the_limit_of_one_dispatch_are_as_by_std() {
+    with_gpu(|gpu| {
+        let mut random = Random(49);
+        for (key, values, order) in [
+            (KeyWidth::Bits32, false, Order::Descending),
+            (KeyWidth::Bits32, true, Order::Ascending),
+            (KeyWidth::Bits64, false, Order::Ascending),
+            (KeyWidth::Bits64, true, Order::Descending),
+        ] {
+            let options = RadixSortOptions {
+                order,
+                ..RadixSortOptions::new(key, values)
+            };
+            let sort = RadixSort::new(gpu, options).unwrap();
+            let limit = sort.one_dispatch_up_to();
+            for (i, size) in [limit - 1, limit, limit + 1].into_iter().enumerate() {
+                for pattern in PATTERNS {
+                    let keys = random_keys(&mut random, pattern, key, size);
+                    check(gpu, &sort, &keys, i % 2 == 1, &format!("{pattern:?}"));
+                }
+            }
+        }
+    });
+}
+
 #[test]
 fn bits_and_orders_are_those_asked_for() {
     with_gpu(|gpu| {
@@ -131,7 +212,7 @@ fn bits_and_orders_are_those_asked_for() {
             (KeyWidth::Bits64, 25..41, Order::Descending),
             (KeyWidth::Bits64, 0..63, Order::Ascending),
         ];
-        for form in [Form::Serial, Form::Subgroup] {
+        for form in FORMS {
             for (key, bits, order) in kinds.clone() {
                 let options = RadixSortOptions {
                     key,
@@ -156,7 +237,7 @@ fn many_keys_take_the_other_plan() {
         let mut random = Random(43);
         for (key, values) in [(KeyWidth::Bits32, false), (KeyWidth::Bits64, true)] {
             let sort = RadixSort::new(gpu, RadixSortOptions::new(key, values)).unwrap();
-            for size in [(1 << 16) - 1, 1 << 16, (1 << 16) + 1, (1 << 20) + 3] {
+            for size in [(1 << 17) - 1, 1 << 17, (1 << 17) + 1, (1 << 20) + 3] {
                 let keys = random_keys(&mut random, Pattern::Random, key, size);
                 check(gpu, &sort, &keys, size % 2 == 1, "random");
             }

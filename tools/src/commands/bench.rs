@@ -9,6 +9,7 @@ use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Result, scene};
 use clerestory_tools::machine::{self, median};
+use clerestory_tools::page::Block;
 
 use super::{check_validation, sort_rates};
 use crate::failure::{Failure, Outcome};
@@ -21,7 +22,7 @@ use crate::output::{self, Table};
 Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
-  clerestory bench --sort --peers --folder out/sort
+  clerestory bench --sort --peers --folder out/sort --page RESULTS.md
 
 One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to the last; figures move with \
 the load of the machine, so compare ratios of runs made together. `clerestory report` measures errors too.")]
@@ -47,6 +48,9 @@ pub struct Arguments {
     /// Writes the rates of --sort as JSON, CSV and plots (SVG) into this folder too
     #[arg(long, value_name = "FOLDER", requires = "sort")]
     folder: Option<PathBuf>,
+    /// Writes the rates of --sort into a marked part of this page too; the rest of it stays
+    #[arg(long, value_name = "FILE.md", requires = "sort")]
+    page: Option<PathBuf>,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -143,29 +147,44 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// The part of a page that holds the rates of sorts.
+const SORT_BLOCK: Block = Block {
+    name: "sorted keys a second",
+    command: "clerestory bench --sort --peers",
+};
+
 fn run_sort(gpu: Gpu, arguments: &Arguments) -> Outcome<ExitCode> {
+    let load = || machine::load().unwrap_or_else(|| "unknown".into());
+    let load_before = load();
     let rates = sort_rates::measure(&gpu, arguments.repeat, arguments.peers)?;
+    let load_after = load();
     let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
     drop(gpu);
     check_validation(&log)?;
     let document = serde_json::json!({
         "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "processor": machine::processor(),
-        "threads": machine::threads(), "load": machine::load(), "repeat": arguments.repeat, "sorts": rates,
+        "threads": machine::threads(), "load_before": load_before, "load_after": load_after, "repeat": arguments.repeat, "sorts": rates,
     });
     if let Some(folder) = &arguments.folder {
         sort_rates::write(folder, &rates, &document)?;
+    }
+    let head = output::one_line(&format!(
+        "{}, driver {}; {}, {} threads; random 32-bit keys a second, medians of {} runs in turns (least … greatest), load average \
+         {load_before} before and {load_after} after",
+        caps.device,
+        caps.driver,
+        machine::processor(),
+        machine::threads(),
+        arguments.repeat,
+    ));
+    if let Some(page) = &arguments.page {
+        SORT_BLOCK.write(page, &format!("{head}.\n\n{}", sort_rates::markdown(&rates)))?;
+        output::note(&format!("wrote {}", page.display()));
     }
     if arguments.json {
         output::print_json(&document)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let head = output::one_line(&format!(
-        "{}, driver {}; random 32-bit keys a second, medians of {} runs in turns, load {}",
-        caps.device,
-        caps.driver,
-        arguments.repeat,
-        machine::load().unwrap_or_else(|| "unknown".into())
-    ));
     output::print(&format!("{head}\n{}", sort_rates::tables(&rates)))?;
     Ok(ExitCode::SUCCESS)
 }

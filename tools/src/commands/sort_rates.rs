@@ -9,10 +9,12 @@ use std::time::Instant;
 use clerestory::film::atomic;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
+use clerestory::transport::random::pcg3d;
 use clerestory::{Error, Result};
 use clerestory_tools::experiments::plot::{self, Curve, PlotPoint, Words};
 use clerestory_tools::experiments::table::Table as Sheet;
 use clerestory_tools::machine::median;
+use glam::UVec3;
 use rdst::{RadixKey, RadixSort as _};
 
 use crate::failure::Outcome;
@@ -176,17 +178,9 @@ fn of_pairs(pairs: &[Pair], with_peers: bool) -> Vec<Sorter<'_>> {
     sorters
 }
 
-/// Keys of a SplitMix64 stream.
+/// Hashes of their places.
 fn random_keys(count: u32) -> Vec<u32> {
-    let mut state = 0u64;
-    (0..count)
-        .map(|_| {
-            state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            let z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            ((z ^ (z >> 31)) >> 32) as u32
-        })
-        .collect()
+    (0..count).map(|place| pcg3d(UVec3::new(place, 0, 0)).x).collect()
 }
 
 fn by_kernel<'a>(gpu: &'a Gpu, keys: &'a [u32], load: Load) -> Result<Sorter<'a>> {
@@ -229,23 +223,59 @@ fn sorters(rates: &[Rate], load: Load) -> Vec<&'static str> {
     names
 }
 
+/// Heads and rows of a load's table, a sorter a column.
+fn cells(rates: &[Rate], load: Load, cell: impl Fn(&Rate) -> String) -> Vec<Vec<String>> {
+    let names = sorters(rates, load);
+    let mut rows = vec![
+        [load.word()]
+            .iter()
+            .chain(&names)
+            .map(|name| (*name).to_owned())
+            .collect(),
+    ];
+    for size in SIZES {
+        let of_size = rates.iter().filter(|rate| rate.load == load && rate.keys == 1 << size);
+        let row: Vec<String> = of_size.map(&cell).collect();
+        if !row.is_empty() {
+            rows.push([(1u32 << size).to_string()].into_iter().chain(row).collect());
+        }
+    }
+    rows
+}
+
 /// The rates as tables, one for keys and one for pairs.
 pub fn tables(rates: &[Rate]) -> String {
     let mut text = String::new();
     for load in Load::ALL {
-        let names = sorters(rates, load);
-        let mut head = vec![load.word()];
-        head.extend(&names);
-        let mut table = Table::new(&head, &[]);
-        for size in SIZES.map(|size| 1 << size) {
-            let of_size = |rate: &&Rate| rate.load == load && rate.keys == size;
-            let cells = rates
-                .iter()
-                .filter(of_size)
-                .map(|rate| output::metric(rate.keys_per_second));
-            table.row([size.to_string()].into_iter().chain(cells));
+        let rows = cells(rates, load, |rate| output::metric(rate.keys_per_second));
+        let heads: Vec<&str> = rows[0].iter().map(String::as_str).collect();
+        let mut table = Table::new(&heads, &[]);
+        for row in &rows[1..] {
+            table.row(row.clone());
         }
         text += &format!("{}\n", table.text());
+    }
+    text
+}
+
+/// The rates with their spread as Markdown tables, in millions a second.
+pub fn markdown(rates: &[Rate]) -> String {
+    let millions = |rate: f64| {
+        let digits = usize::from(rate < 99.95e6);
+        format!("{:.digits$}", rate * 1e-6)
+    };
+    let mut text = String::new();
+    for load in Load::ALL {
+        let mut rows = cells(rates, load, |rate| {
+            let [least, greatest] = rate.range.map(millions);
+            format!("{} ({least} … {greatest})", millions(rate.keys_per_second))
+        });
+        rows.insert(1, vec!["---:".into(); rows[0].len()]);
+        text += &format!("Millions of 32-bit {} a second:\n\n", load.word());
+        for row in rows {
+            text += &format!("| {} |\n", row.join(" | "));
+        }
+        text += "\n";
     }
     text
 }
@@ -294,8 +324,8 @@ pub fn write(folder: &Path, rates: &[Rate], head: &serde_json::Value) -> Outcome
         let curves: Vec<Curve> = sorters(rates, load).iter().map(curve).collect();
         let words = Words {
             title: &format!("Sorting random 32-bit {}", load.word()),
-            x: load.word(),
-            y: &format!("{}/s", load.word()),
+            x: &format!("number of {}", load.word()),
+            y: &format!("{}/s, median, least to greatest", load.word()),
         };
         if let Some(svg) = plot::log_log_of_rates(words, &curves)? {
             save(&format!("sort-{}.svg", load.word()), svg)?;
@@ -332,6 +362,11 @@ mod tests {
         assert_eq!(sorters(&rates, Load::Pairs).len(), 5);
         assert!(rates.iter().all(|rate| rate.keys_per_second > 0.0));
         assert!(tables(&rates).contains("radsort"));
+        let page = markdown(&rates);
+        assert!(
+            page.contains("| keys | std unstable |") && page.contains("| 1024 | "),
+            "{page}"
+        );
         let folder = tempfile::tempdir().unwrap();
         assert!(write(folder.path(), &rates, &serde_json::json!({})).is_ok());
         for name in ["sort.json", "sort.csv", "sort-keys.svg", "sort-pairs.svg"] {

@@ -62,6 +62,8 @@ const GUIDE_DASH: (u32, u32) = (3, 5);
 const GUIDE_SLOPE: f64 = -0.5;
 /// Room around the points, as a factor.
 const MARGIN: f64 = 1.35;
+/// Room for the legend below rates, as a factor.
+const LEGEND_ROOM: f64 = 4.0;
 const MARKER: i32 = 4;
 const SHAPES: usize = 6;
 const RING: i32 = 8;
@@ -95,9 +97,12 @@ fn of(words: Words<'_>, curves: &[Curve], of_errors: bool) -> Result<Option<Stri
         .collect();
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let heights = || points().flat_map(|point| [point.y, point.y_range[0], point.y_range[1]]);
-    let (Some(x), Some(y)) = (span(points().map(|point| point.x)), span(heights())) else {
+    let (Some(x), Some(mut y)) = (span(points().map(|point| point.x)), span(heights())) else {
         return Ok(None);
     };
+    if !of_errors {
+        y.0 /= LEGEND_ROOM;
+    }
     let mut svg = String::new();
     draw(&mut svg, words, &curves, x, y, of_errors)
         .map_err(|cause| Error::io(words.title, std::io::Error::other(cause)))?;

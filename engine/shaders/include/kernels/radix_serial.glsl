@@ -9,9 +9,9 @@
 // descriptor set 0: RadixSerialSet
 
 layout(set = 0, binding = 1) uniform utextureBuffer radix_keys_in;
-layout(set = 0, binding = 2, scalar) restrict writeonly buffer RadixKeysOut { uint radix_keys_out[]; };
+layout(set = 0, binding = 2, scalar) restrict buffer RadixKeysOut { uint radix_keys_out[]; };
 layout(set = 0, binding = 3) uniform utextureBuffer radix_values_in;
-layout(set = 0, binding = 4, scalar) restrict writeonly buffer RadixValuesOut { uint radix_values_out[]; };
+layout(set = 0, binding = 4, scalar) restrict buffer RadixValuesOut { uint radix_values_out[]; };
 
 // Keys that are read together.
 const uint KEYS_A_READ = 4u;
