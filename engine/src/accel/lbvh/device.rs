@@ -8,10 +8,12 @@
 use super::radix::next_skipped;
 use super::ray_index::{LbvhSettings, check_moved, moved_corners};
 use crate::Result;
-use crate::accel::RayIndex;
-use crate::accel::bvh2::build::{assemble, check_count, usable};
-use crate::accel::bvh2::{Bvh2, Bvh2Node, MAX_DEPTH};
+use crate::accel::bvh2::build::{Met, check_count};
+use crate::accel::bvh2::layout::Layout;
+use crate::accel::bvh2::{Bvh2, MAX_DEPTH};
 use crate::accel::morton::MORTON_30_AXIS_BITS;
+use crate::accel::stages::Stopwatch;
+use crate::accel::{BuildStages, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::{
     lbvh_boxes, lbvh_codes, lbvh_emit, lbvh_grid, lbvh_hierarchy, lbvh_rank_scan, lbvh_rank_sums, lbvh_ranks,
@@ -28,9 +30,6 @@ use glam::Vec3;
 /// Quarters of a node and of a triangle in the finished index.
 const NODE_QUARTERS: u64 = 4;
 const TRIANGLE_QUARTERS: u64 = 3;
-
-/// Nodes of an index, corners and indices of its triangles.
-type Parts = (Vec<Bvh2Node>, Vec<[Vec3; 3]>, Vec<u32>);
 
 /// A finished build.
 #[derive(Debug)]
@@ -382,12 +381,13 @@ impl LbvhBuilder {
     /// As [`build`](super::build), [`LbvhBuilder::buffers`], and those of a submission.
     pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<LbvhBuild> {
         check_count(triangles.len())?;
-        let (references, statistics) = usable(triangles);
-        let indices: Vec<u32> = references.iter().map(|r| r.index).collect();
-        let corners: Vec<[Vec3; 3]> = indices.iter().map(|i| triangles[*i as usize]).collect();
+        let met = Met::among(triangles);
+        let corners = met.map(|triangle, _| *triangle);
+        let indices = met.map(|_, index| index);
         if corners.len() < 2 {
+            let layout = Layout::of(&[], corners.len(), |place| met.triangle(place as u32));
             return Ok(LbvhBuild {
-                index: assemble("lbvh", Vec::new(), corners, indices, statistics),
+                index: layout.finish("lbvh", met.statistics, BuildStages::default(), Stopwatch::start()),
                 timings: Timings::default(),
                 buffers: None,
             });
@@ -407,9 +407,8 @@ impl LbvhBuilder {
             timings.passes.extend(recorder.submit()?.wait()?.passes);
             state = self.state(&buffers)?;
         }
-        let (nodes, positions, indices) = self.read(&buffers, state.nodes)?;
         Ok(LbvhBuild {
-            index: assemble("lbvh", nodes, positions, indices, statistics),
+            index: self.read(&buffers, state.nodes, met.statistics)?,
             timings,
             buffers: Some(buffers),
         })
@@ -426,29 +425,23 @@ impl LbvhBuilder {
             return Ok((super::refit(&build.index, triangles)?, Timings::default()));
         };
         check_moved(&build.index, triangles)?;
-        let mut indices = build.index.indices().to_vec();
+        let mut indices: Vec<u32> = build.index.triangles().iter().map(|t| t.index).collect();
         indices.sort_unstable();
         let corners = moved_corners(&indices, triangles);
         self.gpu.upload(&buffers.corners, 0, &corners)?;
         let mut recorder = self.gpu.recorder("lbvh refit")?;
         self.record_refit(&mut recorder, buffers)?;
         let timings = recorder.submit()?.wait()?;
-        let (nodes, positions, indices) = self.read(buffers, build.index.nodes().len() as u32)?;
         let statistics = build.index.statistics();
-        Ok((assemble("lbvh", nodes, positions, indices, statistics), timings))
+        let nodes = build.index.nodes().len() as u32;
+        Ok((self.read(buffers, nodes, statistics)?, timings))
     }
 
-    /// The finished index: nodes, corners and indices of triangles.
-    fn read(&self, buffers: &LbvhBuffers, nodes: u32) -> Result<Parts> {
-        let node_quarters = (NODE_QUARTERS * u64::from(nodes)) as usize;
-        let quarters = node_quarters + TRIANGLE_QUARTERS as usize * buffers.count as usize;
-        let words: Vec<[u32; 4]> = self.gpu.read(buffers.quarters.buffer().view(), quarters)?;
-        let mut finished: Vec<Bvh2Node> = bytemuck::cast_slice(&words[..node_quarters]).to_vec();
-        finished.iter_mut().for_each(|node| node.triangles = 0);
-        let triangles: &[[u32; 12]] = bytemuck::cast_slice(&words[node_quarters..]);
-        let corner = |t: &[u32; 12], i: usize| Vec3::from_array([0, 1, 2].map(|axis| f32::from_bits(t[3 * i + axis])));
-        let positions = triangles.iter().map(|t| [0, 1, 2].map(|i| corner(t, i))).collect();
-        let indices = triangles.iter().map(|t| t[9]).collect();
-        Ok((finished, positions, indices))
+    /// The finished index, of whose triangles `statistics` has the counts.
+    fn read(&self, buffers: &LbvhBuffers, nodes: u32, statistics: IndexStatistics) -> Result<Bvh2> {
+        let quarters = NODE_QUARTERS * u64::from(nodes) + TRIANGLE_QUARTERS * u64::from(buffers.count);
+        let quarters = self.gpu.read(buffers.quarters.buffer().view(), quarters as usize)?;
+        let layout = Layout::filled(quarters, nodes as usize);
+        Ok(layout.finish("lbvh", statistics, BuildStages::default(), Stopwatch::start()))
     }
 }

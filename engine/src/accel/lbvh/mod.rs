@@ -13,6 +13,7 @@ pub mod leaf_threshold;
 pub mod merge;
 pub mod radix;
 mod ray_index;
+mod sort;
 pub mod split_lists;
 pub mod tree;
 
