@@ -4,7 +4,7 @@
 // An invocation walks along its run and joins what lies lower than the level after it: of two neighbouring ranges the one whose codes
 // differ in the lower bit is joined first (C. Apetrei, "Fast and Simple Agglomerative LBVH Construction", 2014). What it leaves on the way
 // up finds its sibling in memory, so there is no stack; nodes that reach into another run are left to lbvh_climb. Long runs make most of
-// the tree without atomic operations, and keep all lanes busy until they end; runs of one place leave everything to the climb.
+// the tree without atomic operations; runs of one place leave everything to the climb.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

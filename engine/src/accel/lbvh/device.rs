@@ -24,8 +24,7 @@ use crate::gpu::{Access, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, 
 use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, Scan, ScanBuffers, ScanOptions, SortBuffers};
 use glam::Vec3;
 
-/// Places that an invocation walks along. On devices whose lanes share one instruction stream over few cores, long runs save atomic
-/// operations and idle lanes; others want many invocations.
+/// Places that an invocation walks along. Long runs save atomic operations; devices of many lanes want many invocations.
 const CPU_RUN: u32 = 32;
 const GPU_RUN: u32 = 4;
 
@@ -63,8 +62,8 @@ pub struct LbvhBuilder {
 pub struct ResidentLbvh {
     /// What rays traverse, as [`RayIndex::texels`](crate::accel::RayIndex::texels) has it, with room behind it.
     pub quarters: TexelView,
-    /// Size and quality. The surface area cost is summed by the device in f32, which is within 64 units of roundoff of the f64 sum; the
-    /// bytes are those of the room.
+    /// Size and quality. The surface area cost is summed by the device in f32, which errs by three units of roundoff a level at
+    /// most; the bytes are those of the room.
     pub statistics: IndexStatistics,
     /// Times of the stages.
     pub stages: BuildStages,
