@@ -81,12 +81,60 @@ fn device_builds_are_the_twins_on_hard_cases() {
 }
 
 #[test]
+fn a_million_identical_centres_give_the_hosts_tree() {
+    with_gpu(|gpu| {
+        let settings = fast(30, 4);
+        let builder = LbvhBuilder::new(gpu, &settings).unwrap();
+        check(
+            "identical",
+            &builder,
+            &settings,
+            &vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 1_000_000],
+        );
+    });
+}
+
+#[test]
+fn an_index_that_stays_on_the_device_knows_its_size_and_cost() {
+    with_gpu(|gpu| {
+        let builder = LbvhBuilder::new(gpu, &fast(30, 4)).unwrap();
+        for count in [0, 1, 2, 3, 5000] {
+            let mut triangles = soup(&mut Random(75), count, 0.3);
+            if count > 100 {
+                triangles[7][1].z = f32::NAN;
+                triangles[8][1] = triangles[8][0];
+            }
+            let host = build(&triangles, &fast(30, 4)).unwrap();
+            let resident = builder.build_resident(&triangles).unwrap();
+            assert_eq!(resident.is_some(), count >= 2);
+            let Some(resident) = resident else { continue };
+            let (device, host_size) = (resident.statistics, host.statistics());
+            // Sums of positive terms, one a level, each within three units of roundoff.
+            let bound = 3.0 * f64::from(host_size.max_depth + 1) / f64::from(1 << 24);
+            let error = device.sah_cost / host_size.sah_cost - 1.0;
+            assert!(error.abs() <= bound, "{count}: {error:e} of {bound:e}");
+            assert!(device.bytes >= host_size.bytes);
+            let counts = clerestory::accel::IndexStatistics {
+                sah_cost: host_size.sah_cost,
+                bytes: host_size.bytes,
+                ..device
+            };
+            assert_eq!(counts, host_size);
+            assert!(resident.stages.hierarchy > 0.0 && resident.stages.layout > 0.0);
+            let texels = host.texels();
+            let there: Vec<[u32; 4]> = gpu.read(resident.quarters.buffer().view(), texels.len()).unwrap();
+            assert!(there == texels, "{count}");
+        }
+    });
+}
+
+#[test]
 fn every_stage_is_named_and_timed() {
     with_gpu(|gpu| {
         let builder = LbvhBuilder::new(gpu, &fast(30, 4)).unwrap();
         let triangles = soup(&mut Random(72), 500, 0.3);
         let build = builder.build(&triangles).unwrap();
-        let stages = ["boxes", "codes", "sort", "hierarchy", "ranks", "emit"];
+        let stages = ["boxes", "codes", "sort", "hierarchy", "climb", "ranks", "emit"];
         assert_eq!(build.timings.passes.len(), stages.len());
         for stage in stages {
             assert_eq!(build.timings.count(&format!("lbvh: {stage}")), 1, "{stage}");

@@ -117,6 +117,14 @@ fn rest(report: &FrameReport) -> String {
         output::bytes(index.bytes),
         report.index.build_ms
     );
+    let stages = report.index.stages.named().into_iter().filter(|(_, ms)| *ms > 0.0);
+    let stages: Vec<String> = stages.map(|(name, ms)| format!("{name} {ms:.1}")).collect();
+    if !stages.is_empty() {
+        let _ = writeln!(text, "       ms of it: {}", stages.join(", "));
+    }
+    if let Some(cause) = report.index.host_because {
+        let _ = writeln!(text, "       built on the host: {cause}");
+    }
     let excluded = index.excluded_range + index.excluded_degenerate;
     if excluded > 0 {
         // Writing to a string cannot fail.

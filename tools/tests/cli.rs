@@ -144,12 +144,17 @@ fn settings_reach_the_technique_and_the_reference_is_measured() -> Tested {
     // The same picture again, at the reference's size, as a PNG alone.
     let png = folder.path().join("only.png");
     let output = with(
-        &["--tone", "neutral", "--index", "lbvh-high"],
+        &["--tone", "neutral", "--index", "lbvh-device"],
         &["-o", text(&png), "--reference", text(&reference)],
     )?;
     let report = json(&output.stdout)?;
     // Another index, and no other picture.
-    assert_eq!(report["index"]["kind"], "lbvh-high");
+    assert_eq!(report["index"]["kind"], "lbvh-device");
+    assert!(
+        report["index"]["stages"]["hierarchy"]
+            .as_f64()
+            .is_some_and(|ms| ms > 0.0)
+    );
     for key in ["nodes", "leaves", "max_depth", "sah_cost", "build_ms"] {
         assert!(report["index"][key].as_f64().is_some_and(|value| value > 0.0), "{key}");
     }

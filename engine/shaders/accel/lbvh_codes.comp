@@ -10,7 +10,7 @@ layout(local_size_x = LBVH_GROUP_SIZE) in;
 
 layout(constant_id = 0) const uint LBVH_AXIS_BITS = 10u;
 
-layout(set = 0, binding = 0, scalar) restrict readonly buffer LbvhBoxes { LbvhBox lbvh_boxes[]; };
+layout(set = 0, binding = 0) uniform utextureBuffer lbvh_boxes;
 layout(set = 0, binding = 1, scalar) restrict readonly buffer LbvhStateBlock { LbvhState lbvh_state; };
 // One word a code of 30 bits, two of 63 with the low one first.
 layout(set = 0, binding = 2, scalar) restrict writeonly buffer LbvhCodes { uint lbvh_codes[]; };
@@ -23,8 +23,9 @@ void main() {
     if (place >= lbvh_push.count) {
         return;
     }
-    LbvhBox box = lbvh_boxes[place];
-    precise vec3 doubled = ordered_floats(box.lower) + ordered_floats(box.upper);
+    ivec4 low = ivec4(texelFetch(lbvh_boxes, int(LBVH_BOX_QUARTERS * place)));
+    ivec2 high = ivec2(texelFetch(lbvh_boxes, int(LBVH_BOX_QUARTERS * place + 1u)).xy);
+    precise vec3 doubled = ordered_floats(low.xyz) + ordered_floats(ivec3(low.w, high));
     uvec3 cell = morton_cell(doubled, lbvh_state.grid_lower, lbvh_state.grid_scale, LBVH_AXIS_BITS);
     if (LBVH_AXIS_BITS == MORTON_30_AXIS_BITS) {
         lbvh_codes[place] = morton_30(cell);

@@ -8,33 +8,37 @@
 
 layout(local_size_x = LBVH_GROUP_SIZE) in;
 
-const uint LBVH_NODE_QUARTERS = 4u;
-const uint LBVH_TRIANGLE_QUARTERS = 3u;
-
-layout(set = 0, binding = 0, scalar) restrict readonly buffer LbvhNodes { int lbvh_nodes[]; };
-layout(set = 0, binding = 1, scalar) restrict readonly buffer LbvhKept { uint lbvh_kept[]; };
+layout(set = 0, binding = 0) uniform utextureBuffer lbvh_nodes;
+layout(set = 0, binding = 1) uniform utextureBuffer lbvh_kept;
 // Nodes that stay before each.
-layout(set = 0, binding = 2, scalar) restrict readonly buffer LbvhRanks { uint lbvh_ranks[]; };
-layout(set = 0, binding = 3, scalar) restrict readonly buffer LbvhOrder { uint lbvh_order[]; };
+layout(set = 0, binding = 2) uniform utextureBuffer lbvh_ranks;
+layout(set = 0, binding = 3) uniform utextureBuffer lbvh_order;
 layout(set = 0, binding = 4, scalar) restrict readonly buffer LbvhCorners { vec3 lbvh_corners[]; };
 // Index of each triangle as hits name it.
 layout(set = 0, binding = 5, scalar) restrict readonly buffer LbvhIndices { uint lbvh_indices[]; };
-layout(set = 0, binding = 6, scalar) restrict writeonly buffer LbvhQuarters { uvec4 lbvh_quarters[]; };
+layout(set = 0, binding = 6, scalar) restrict writeonly buffer LbvhWords { uint lbvh_words[]; };
 layout(set = 0, binding = 7, scalar) restrict buffer LbvhStateBlock { LbvhState lbvh_state; };
 
 layout(push_constant, scalar) uniform LbvhEmitPush { uint count; } lbvh_push;
 
-uint lbvh_target(uint split, uint root) {
-    return split == root ? 0u : lbvh_ranks[split] + (split < root ? 1u : 0u);
+uint lbvh_rank(uint split) { return texelFetch(lbvh_ranks, int(split)).x; }
+
+uint lbvh_target(uint split, uint root) { return split == root ? 0u : lbvh_rank(split) + (split < root ? 1u : 0u); }
+
+void lbvh_store(uint at, uvec3 v) {
+    lbvh_words[at] = v.x;
+    lbvh_words[at + 1u] = v.y;
+    lbvh_words[at + 2u] = v.z;
 }
 
-uint lbvh_child(uint word, uint root) {
-    return (word & LBVH_COUNT_MASK) != 0u ? word : lbvh_target(word >> LBVH_COUNT_BITS, root) << LBVH_COUNT_BITS;
-}
-
-uvec3 lbvh_corner(uint node, uint word) {
-    uint at = LBVH_NODE_WORDS * node + word;
-    return floatBitsToUint(ordered_floats(ivec3(lbvh_nodes[at], lbvh_nodes[at + 1u], lbvh_nodes[at + 2u])));
+// The child's word, and in an inner child the parent's.
+void lbvh_store_child(uint to, uint side, uint word, uint root) {
+    bool is_leaf = (word & LBVH_COUNT_MASK) != 0u;
+    uint child = is_leaf ? 0u : lbvh_target(word >> LBVH_COUNT_BITS, root);
+    lbvh_words[LBVH_BVH2_NODE_WORDS * to + 12u + side] = is_leaf ? word : child << LBVH_COUNT_BITS;
+    if (!is_leaf) {
+        lbvh_words[LBVH_BVH2_NODE_WORDS * child + 14u] = to << 1 | side;
+    }
 }
 
 void main() {
@@ -44,30 +48,31 @@ void main() {
         return;
     }
     uint root = lbvh_state.root;
-    uint nodes = lbvh_ranks[count - 2u] + lbvh_kept[count - 2u];
-    uint primitive = lbvh_order[place];
-    uvec3 a = floatBitsToUint(lbvh_corners[3u * primitive]);
-    uvec3 b = floatBitsToUint(lbvh_corners[3u * primitive + 1u]);
-    uvec3 c = floatBitsToUint(lbvh_corners[3u * primitive + 2u]);
-    uint triangle = LBVH_NODE_QUARTERS * nodes + LBVH_TRIANGLE_QUARTERS * place;
-    lbvh_quarters[triangle] = uvec4(a, b.x);
-    lbvh_quarters[triangle + 1u] = uvec4(b.yz, c.xy);
-    lbvh_quarters[triangle + 2u] = uvec4(c.z, lbvh_indices[primitive], 0u, 0u);
-    if (place + 1u < count && lbvh_kept[place] != 0u) {
-        uint at = LBVH_NODE_QUARTERS * lbvh_target(place, root);
-        uvec3 lower0 = lbvh_corner(place, 0u);
-        uvec3 upper0 = lbvh_corner(place, 3u);
-        uvec3 lower1 = lbvh_corner(place, 6u);
-        uvec3 upper1 = lbvh_corner(place, 9u);
-        uint words = LBVH_NODE_WORDS * place + 12u;
-        uint parent = uint(lbvh_nodes[words + 2u]);
+    uint nodes = lbvh_rank(count - 2u) + texelFetch(lbvh_kept, int(count - 2u)).x;
+    uint primitive = texelFetch(lbvh_order, int(place >> 2))[place & 3u];
+    uint triangle = LBVH_BVH2_NODE_WORDS * nodes + LBVH_BVH2_TRIANGLE_WORDS * place;
+    for (uint corner = 0u; corner < 3u; ++corner) {
+        lbvh_store(triangle + 3u * corner, floatBitsToUint(lbvh_corners[3u * primitive + corner]));
+    }
+    lbvh_store(triangle + 9u, uvec3(lbvh_indices[primitive], 0u, 0u));
+    if (place + 1u < count && texelFetch(lbvh_kept, int(place)).x != 0u) {
+        uint to = lbvh_target(place, root);
+        uint at = LBVH_BVH2_NODE_WORDS * to;
+        ivec4 a = ivec4(texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place)));
+        ivec4 b = ivec4(texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place + 1u)));
+        ivec4 c = ivec4(texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place + 2u)));
+        uvec2 words = texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place + 3u)).xy;
+        lbvh_store(at, floatBitsToUint(ordered_floats(a.xyz)));
+        lbvh_store(at + 3u, floatBitsToUint(ordered_floats(ivec3(a.w, b.xy))));
+        lbvh_store(at + 6u, floatBitsToUint(ordered_floats(ivec3(b.zw, c.x))));
+        lbvh_store(at + 9u, floatBitsToUint(ordered_floats(c.yzw)));
+        lbvh_store_child(to, 0u, words.x, root);
+        lbvh_store_child(to, 1u, words.y, root);
         bool is_root = place == root;
-        lbvh_quarters[at] = uvec4(lower0, upper0.x);
-        lbvh_quarters[at + 1u] = uvec4(upper0.yz, lower1.xy);
-        lbvh_quarters[at + 2u] = uvec4(lower1.z, upper1);
-        lbvh_quarters[at + 3u] = uvec4(lbvh_child(uint(lbvh_nodes[words]), root), lbvh_child(uint(lbvh_nodes[words + 1u]), root),
-                                       is_root ? 0u : lbvh_target(parent >> 1, root) << 1 | (parent & 1u),
-                                       is_root ? LBVH_NODE_QUARTERS * nodes : 0u);
+        if (is_root) {
+            lbvh_words[at + 14u] = 0u;
+        }
+        lbvh_words[at + 15u] = is_root ? LBVH_NODE_QUARTERS * nodes : 0u;
     }
     if (place == 0u) {
         lbvh_state.nodes = nodes;

@@ -1,143 +1,109 @@
-// Fourth stage of the linear hierarchy: the tree of the sorted codes with its boxes, costs and leaves in one ascent; twin of
+// Fourth stage of the linear hierarchy: the nodes below runs of neighbouring places, with their boxes, costs and leaves; twin of
 // clerestory::accel::lbvh::radix.
 //
-// Each invocation climbs from a leaf. At a node the first to arrive leaves what it brings and ends, the second goes on: nobody waits, so
-// nothing is asked of the scheduler, and which of both it is does not show in the tree (Karras 2012; the choice of the parent by the
-// neighbouring differences is Apetrei's, 2014). A node is named by the last place of its left child. The host fills `lbvh_arrivals` with
-// zero.
+// An invocation walks along its run and joins what lies lower than the level after it: of two neighbouring ranges the one whose codes
+// differ in the lower bit is joined first (C. Apetrei, "Fast and Simple Agglomerative LBVH Construction", 2014). What it leaves on the way
+// up finds its sibling in memory, so there is no stack; nodes that reach into another run are left to lbvh_climb. Long runs make most of
+// the tree without atomic operations; runs of one place leave everything to the climb.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
-#include "accel/lbvh.glsl"
-#include "accel/lbvh_fence.glsl"
+#include "accel/lbvh_subtree.glsl"
 
 layout(local_size_x = LBVH_GROUP_SIZE) in;
 
 layout(constant_id = 0) const uint LBVH_CODE_WORDS = 1u;
+// Places of a run.
+layout(constant_id = 2) const uint LBVH_RUN = 1u;
 
-// What a child tells its parent besides its box.
-struct LbvhMail {
-    float cost;
-    uint height;
-    // First place of a left child, last of a right one.
-    uint end;
-};
+layout(set = 0, binding = 5) uniform utextureBuffer lbvh_boxes;
+// Sorted; four words a texel.
+layout(set = 0, binding = 6) uniform utextureBuffer lbvh_codes;
+layout(set = 0, binding = 7) uniform utextureBuffer lbvh_order;
 
-layout(set = 0, binding = 0, scalar) restrict readonly buffer LbvhBoxes { LbvhBox lbvh_boxes[]; };
-layout(set = 0, binding = 1, scalar) restrict readonly buffer LbvhCodes { uint lbvh_codes[]; };
-layout(set = 0, binding = 2, scalar) restrict readonly buffer LbvhOrder { uint lbvh_order[]; };
-layout(set = 0, binding = 3, scalar) restrict coherent buffer LbvhNodes { int lbvh_nodes[]; };
-layout(set = 0, binding = 4, scalar) restrict coherent buffer LbvhMails { LbvhMail lbvh_mails[]; };
-layout(set = 0, binding = 5, scalar) restrict coherent buffer LbvhArrivals { uint lbvh_arrivals[]; };
-// 1 for nodes that stay, 0 for those inside of leaves.
-layout(set = 0, binding = 6, scalar) restrict coherent buffer LbvhKept { uint lbvh_kept[]; };
-layout(set = 0, binding = 7, scalar) restrict buffer LbvhStateBlock { LbvhState lbvh_state; };
-
-layout(push_constant, scalar) uniform LbvhHierarchyPush {
-    uint count;
-    // Lowest bits of the codes that do not count.
-    uint skipped;
-    uint leaf_size;
-} lbvh_push;
-
-// How a code differs from the next, the highest word last: codes without the skipped bits, then places.
-uvec3 lbvh_difference(uint place) {
-    uvec2 difference = uvec2(lbvh_codes[LBVH_CODE_WORDS * place] ^ lbvh_codes[LBVH_CODE_WORDS * (place + 1u)], 0u);
+uvec2 lbvh_code(uint place) {
+    uvec4 four = texelFetch(lbvh_codes, int(place * LBVH_CODE_WORDS >> 2));
     if (LBVH_CODE_WORDS == 2u) {
-        difference.y = lbvh_codes[2u * place + 1u] ^ lbvh_codes[2u * place + 3u];
+        return (place & 1u) == 0u ? four.xy : four.zw;
     }
+    return uvec2(four[place & 3u], 0u);
+}
+
+// How far up two neighbouring codes differ: bits without the skipped ones, and below them those of the places.
+uint lbvh_level(uint place, uvec2 code, uvec2 next) {
     uint skipped = lbvh_push.skipped;
-    if (skipped >= 32u) {
-        difference = uvec2(difference.y & (skipped >= 64u ? 0u : 0xFFFFFFFFu << (skipped - 32u)), 0u).yx;
-    } else {
-        difference.x &= 0xFFFFFFFFu << skipped;
-    }
-    return uvec3(place ^ (place + 1u), difference);
+    uvec2 difference = code ^ next;
+    difference.x &= skipped >= 32u ? 0u : 0xFFFFFFFFu << skipped;
+    difference.y &= skipped >= 64u ? 0u : (skipped > 32u ? 0xFFFFFFFFu << (skipped - 32u) : 0xFFFFFFFFu);
+    uint code_level = difference.y != 0u ? 64u + uint(findMSB(difference.y)) : 32u + uint(findMSB(difference.x));
+    return (difference.x | difference.y) != 0u ? code_level : uint(findMSB(place ^ (place + 1u)));
 }
 
-bool lbvh_less(uvec3 a, uvec3 b) {
-    return a.z != b.z ? a.z < b.z : (a.y != b.y ? a.y < b.y : a.x < b.x);
+// The box of the primitive at a place, as a leaf between two levels.
+LbvhSubtree lbvh_leaf(uint place, uint left_level, uint right_level) {
+    uint primitive = texelFetch(lbvh_order, int(place >> 2))[place & 3u];
+    ivec4 low = ivec4(texelFetch(lbvh_boxes, int(LBVH_BOX_QUARTERS * primitive)));
+    ivec2 high = ivec2(texelFetch(lbvh_boxes, int(LBVH_BOX_QUARTERS * primitive + 1u)).xy);
+    LbvhBox box = LbvhBox(low.xyz, ivec3(low.w, high));
+    return LbvhSubtree(box, lbvh_half_area(box), 0u, place, place, left_level, right_level);
 }
 
-void lbvh_store_box(uint word, LbvhBox box) {
-    lbvh_nodes[word] = box.lower.x;
-    lbvh_nodes[word + 1u] = box.lower.y;
-    lbvh_nodes[word + 2u] = box.lower.z;
-    lbvh_nodes[word + 3u] = box.upper.x;
-    lbvh_nodes[word + 4u] = box.upper.y;
-    lbvh_nodes[word + 5u] = box.upper.z;
-}
-
-LbvhBox lbvh_load_box(uint word) {
-    return LbvhBox(ivec3(lbvh_nodes[word], lbvh_nodes[word + 1u], lbvh_nodes[word + 2u]),
-                   ivec3(lbvh_nodes[word + 3u], lbvh_nodes[word + 4u], lbvh_nodes[word + 5u]));
-}
-
-void lbvh_drop(uint node, uint last) {
-    if (node < last) {
-        lbvh_kept[node] = 0u;
-    }
-}
+void lbvh_wait(uint run, uint waiting, uint node) { lbvh_pending[lbvh_push.runs * (1u + waiting) + run] = node; }
 
 void main() {
-    uint first = gl_GlobalInvocationID.x;
-    if (first >= lbvh_push.count) {
+    uint run = gl_GlobalInvocationID.x;
+    uint begin = run * LBVH_RUN;
+    uint count = lbvh_push.count;
+    if (begin >= count) {
         return;
     }
-    uint end = lbvh_push.count - 1u;
-    uint last = first;
-    LbvhBox box = lbvh_boxes[lbvh_order[first]];
-    float cost = lbvh_half_area(box);
-    uint height = 0u;
-    uint word = first << LBVH_COUNT_BITS | 1u;
-    bool climbing = true;
-    for (uint i = 0u; climbing && i < LBVH_MAX_ASCENT; ++i) {
-        bool is_left = first == 0u || (last != end && lbvh_less(lbvh_difference(last), lbvh_difference(first - 1u)));
-        uint parent = is_left ? last : first - 1u;
-        uint side = is_left ? 0u : 1u;
-        uint node = LBVH_NODE_WORDS * parent;
-        lbvh_store_box(node + 6u * side, box);
-        lbvh_nodes[node + 12u + side] = int(word);
-        lbvh_mails[2u * parent + side] = LbvhMail(cost, height, is_left ? first : last);
-        if ((word & LBVH_COUNT_MASK) == 0u) {
-            lbvh_nodes[LBVH_NODE_WORDS * (word >> LBVH_COUNT_BITS) + 14u] = int(parent << 1 | side);
-        }
-        lbvh_fence();
-        climbing = atomicAdd(lbvh_arrivals[parent], 1u) != 0u;
-        lbvh_fence();
-        // The first to arrive ends here.
-        if (climbing) {
-            box = lbvh_union(box, lbvh_load_box(node + 6u * (1u - side)));
-            LbvhMail sibling = lbvh_mails[2u * parent + 1u - side];
-            first = is_left ? first : sibling.end;
-            last = is_left ? sibling.end : last;
-            float area = lbvh_half_area(box);
-            uint count = last - first + 1u;
-            precise float split_cost = area + (cost + sibling.cost);
-            precise float leaf_cost = area * float(count);
-            bool is_root = count == lbvh_push.count;
-            bool is_leaf = !is_root && count <= lbvh_push.leaf_size && leaf_cost <= split_cost;
-            height = is_leaf ? 0u : max(height, sibling.height) + 1u;
-            cost = is_leaf ? leaf_cost : split_cost;
-            word = is_leaf ? first << LBVH_COUNT_BITS | count : parent << LBVH_COUNT_BITS;
-            lbvh_kept[parent] = is_leaf ? 0u : 1u;
-            // What a leaf holds stays not: one node less than it has primitives, which are eight at most.
-            if (is_leaf) {
-                lbvh_drop(first, last);
-                lbvh_drop(first + 1u, last);
-                lbvh_drop(first + 2u, last);
-                lbvh_drop(first + 3u, last);
-                lbvh_drop(first + 4u, last);
-                lbvh_drop(first + 5u, last);
-                lbvh_drop(first + 6u, last);
+    uint end = min(begin + LBVH_RUN, count);
+    // What begins before this has a parent that reaches into another run.
+    uint low = begin;
+    uint waiting = 0u;
+    uvec2 code = lbvh_code(begin);
+    uvec2 next = lbvh_code(begin + 1u);
+    uint level = begin == 0u ? LBVH_NO_LEVEL : lbvh_level(begin - 1u, lbvh_code(begin - 1u), code);
+    LbvhSubtree own = lbvh_leaf(begin, level, begin + 1u == count ? LBVH_NO_LEVEL : lbvh_level(begin, code, next));
+    uint slot = 0u;
+    bool going = true;
+    for (uint i = 0u; going && i < 2u * LBVH_RUN; ++i) {
+        bool is_left = own.right_level < own.left_level;
+        uint node = is_left ? own.last : own.first - 1u;
+        bool joins = !is_left && own.first > low;
+        if (lbvh_is_root(own)) {
+            low = count;
+            going = false;
+        } else {
+            lbvh_store_child(node, is_left ? 0u : 1u, own, slot);
+            if (joins) {
+                own = lbvh_join(lbvh_load_child(node, 0u), own, node);
+                slot = node;
+            } else {
+                lbvh_store_mail(node, is_left ? 0u : 1u, own);
+                uint place = own.last + 1u;
+                if (!is_left) {
+                    lbvh_wait(run, waiting, node);
+                    ++waiting;
+                    low = place;
+                }
+                going = place < end;
+                if (going) {
+                    code = next;
+                    next = lbvh_code(place + 1u);
+                    level = own.right_level;
+                    own = lbvh_leaf(place, level, place + 1u == count ? LBVH_NO_LEVEL : lbvh_level(place, code, next));
+                }
             }
-            if (is_root) {
-                lbvh_nodes[node + 14u] = 0;
-                lbvh_state.root = parent;
-                lbvh_state.height = height;
-            }
-            climbing = !is_root;
         }
     }
+    // Left children whose siblings are not in this run, from the last to the first.
+    uint at = end;
+    for (uint i = 0u; at > low && i < LBVH_RUN; ++i) {
+        lbvh_wait(run, waiting, at - 1u);
+        ++waiting;
+        at = lbvh_mails[2u * (at - 1u)].end;
+    }
+    lbvh_pending[run] = waiting;
 }

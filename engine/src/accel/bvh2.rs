@@ -10,12 +10,13 @@
 //! exactly what trying all triangles in index order returns.
 
 pub(super) mod build;
+pub(super) mod layout;
 mod traverse;
 
 pub use build::Bvh2Settings;
 pub use traverse::{FINISHED, Traversal};
 
-use super::{CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
+use super::{BuildStages, CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
 use crate::Result;
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
@@ -53,8 +54,11 @@ pub const BOX_SLACK: f32 = constants::BVH2_BOX_SLACK;
 /// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).
 pub const MIN_RELATIVE_COMPONENT: f32 = constants::BVH2_MIN_RELATIVE_COMPONENT;
 
-/// Bytes of a quarter of a node, the unit in which kernels read.
-const QUARTER: usize = 16;
+/// Quarters of a node, the unit in which kernels read.
+pub(super) const NODE_QUARTERS: usize = size_of::<Bvh2Node>() / size_of::<[u32; 4]>();
+
+/// Quarters of a triangle.
+pub(super) const TRIANGLE_QUARTERS: usize = size_of::<Bvh2Triangle>() / size_of::<[u32; 4]>();
 
 /// An axis-aligned box.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -113,23 +117,37 @@ pub struct Bvh2Node {
 /// A triangle as the kernels read it (48 bytes).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-struct PackedTriangle {
-    positions: [Vec3; 3],
-    index: u32,
-    reserved: [u32; 2],
+pub struct Bvh2Triangle {
+    /// Vertices, metres.
+    pub corners: [Vec3; 3],
+    /// How hits name it.
+    pub index: u32,
+    /// Zero.
+    pub reserved: [u32; 2],
+}
+
+impl Bvh2Triangle {
+    pub(super) fn new(corners: [Vec3; 3], index: u32) -> Self {
+        Self {
+            corners,
+            index,
+            reserved: [0; 2],
+        }
+    }
 }
 
 /// A binary bounding volume hierarchy over triangles.
+///
+/// Nodes and triangles are one array, nodes first, which is what the kernels read: an iteration of theirs reads three quarters from one
+/// address, whatever it is about to test. On devices that load lane by lane (software ones) that is most of the traversal's time.
 #[derive(Debug, Clone)]
 pub struct Bvh2 {
     /// What built it.
     name: &'static str,
-    nodes: Vec<Bvh2Node>,
-    positions: Vec<[Vec3; 3]>,
-    indices: Vec<u32>,
-    /// Nodes and triangles as the kernels read them, in quarters of a node.
-    packed: Vec<[u32; 4]>,
+    quarters: Vec<[u32; 4]>,
+    nodes: usize,
     statistics: IndexStatistics,
+    stages: BuildStages,
 }
 
 impl Bvh2 {
@@ -144,33 +162,18 @@ impl Bvh2 {
 
     /// Inner nodes; the root is the first.
     pub fn nodes(&self) -> &[Bvh2Node] {
-        &self.nodes
+        bytemuck::cast_slice(&self.quarters[..NODE_QUARTERS * self.nodes])
     }
 
     /// Triangles in leaf order.
-    pub fn positions(&self) -> &[[Vec3; 3]] {
-        &self.positions
+    pub fn triangles(&self) -> &[Bvh2Triangle] {
+        bytemuck::cast_slice(&self.quarters[NODE_QUARTERS * self.nodes..])
     }
 
-    /// Original index of each triangle in leaf order.
-    pub fn indices(&self) -> &[u32] {
-        &self.indices
+    /// Times of the stages that built it; all zero where they are not known.
+    pub fn stages(&self) -> BuildStages {
+        self.stages
     }
-}
-
-/// One buffer for both, nodes first: an iteration of the kernels reads three quarters from one address, whatever it is about to test. On devices that
-/// load lane by lane (software ones) that is most of the traversal's time.
-fn pack(nodes: &[Bvh2Node], positions: &[[Vec3; 3]], indices: &[u32]) -> Vec<[u32; 4]> {
-    let mut packed: Vec<[u32; 4]> = bytemuck::cast_slice(nodes).to_vec();
-    for (&positions, &index) in positions.iter().zip(indices) {
-        let triangle = PackedTriangle {
-            positions,
-            index,
-            reserved: [0; 2],
-        };
-        packed.extend_from_slice(bytemuck::cast_slice(&[triangle]));
-    }
-    packed
 }
 
 impl RayIndex for Bvh2 {
@@ -183,7 +186,7 @@ impl RayIndex for Bvh2 {
     }
 
     fn texels(&self) -> &[[u32; 4]] {
-        &self.packed
+        &self.quarters
     }
 
     fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit {

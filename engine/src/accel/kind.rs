@@ -7,9 +7,11 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Instant;
 
-use super::IndexStatistics;
 use super::bvh2::{Bvh2, Bvh2Settings};
-use super::lbvh::{self, BuildQuality, LbvhSettings};
+use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
+use super::{BuildStages, IndexStatistics, RayIndex};
+use crate::gpu::ash::vk;
+use crate::gpu::{Category, Gpu, TexelView};
 use crate::{Error, Result};
 use glam::Vec3;
 
@@ -23,6 +25,8 @@ pub enum IndexKind {
     /// Linear hierarchy along the Morton curve: the shortest build and the slowest rays, unless its quality asks for treelets to be
     /// restructured afterwards.
     Lbvh(LbvhSettings),
+    /// The same, built by the device where a scene is uploaded, and left there. Of the settings those of restructuring are not used.
+    LbvhOnDevice(LbvhSettings),
 }
 
 impl Default for IndexKind {
@@ -32,8 +36,9 @@ impl Default for IndexKind {
 }
 
 impl IndexKind {
-    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, and the same with restructured treelets.
-    pub const NAMES: [&'static str; 3] = ["bvh2", "lbvh", "lbvh-high"];
+    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same with restructured treelets, and the former
+    /// built by the device.
+    pub const NAMES: [&'static str; 4] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device"];
 
     /// The linear hierarchy with default settings.
     pub fn lbvh(quality: BuildQuality) -> Self {
@@ -51,11 +56,12 @@ impl IndexKind {
                 BuildQuality::Fast => "lbvh",
                 BuildQuality::High => "lbvh-high",
             },
+            Self::LbvhOnDevice(_) => "lbvh-device",
         }
     }
 
-    /// Builds over `triangles` on the host's threads; hits name triangles by their place in it. Deterministic whatever the number of
-    /// threads.
+    /// Builds over `triangles` on the host's threads, also what the device would build: the tree is the same. Hits name triangles by their
+    /// place in it. Deterministic whatever the number of threads.
     ///
     /// # Errors
     /// As [`Bvh2::build`] and [`lbvh::build`].
@@ -63,17 +69,60 @@ impl IndexKind {
         match self {
             Self::Bvh2(settings) => Bvh2::build(triangles, settings),
             Self::Lbvh(settings) => lbvh::build(triangles, settings),
+            Self::LbvhOnDevice(settings) => {
+                let settings = LbvhSettings {
+                    quality: BuildQuality::Fast,
+                    ..*settings
+                };
+                lbvh::build(triangles, &settings)
+            }
         }
     }
 
-    /// Builds, and says how long that took.
-    pub(crate) fn build_timed(&self, triangles: &[[Vec3; 3]]) -> Result<(Bvh2, IndexReport)> {
-        use super::RayIndex;
+    /// Builds, where the kind says and the device can, and says how long that took.
+    ///
+    /// # Errors
+    /// As [`IndexKind::build`], and those of uploads and of submissions; [`Error::LimitExceeded`] for an index that the device cannot bind.
+    pub fn build_for(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<(TexelView, IndexReport)> {
+        let mut fallback = None;
+        if let Self::LbvhOnDevice(settings) = self {
+            let builder = LbvhBuilder::new(gpu, settings)?;
+            let begin = Instant::now();
+            match builder.build_resident(triangles) {
+                Ok(Some(built)) => {
+                    let report = IndexReport {
+                        kind: self.name(),
+                        build_ms: 1e3 * begin.elapsed().as_secs_f64(),
+                        stages: built.stages,
+                        host_because: None,
+                        statistics: built.statistics,
+                    };
+                    return Ok((built.quarters, report));
+                }
+                Ok(None) => fallback = Some("fewer than two triangles that rays can meet"),
+                // What the build needs is more than what remains of it.
+                Err(Error::LimitExceeded { .. }) => {
+                    fallback = Some("more triangles than the device can bind while it builds")
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let (index, report) = self.build_timed(triangles)?;
+        let format = vk::Format::R32G32B32A32_UINT;
+        let quarters = gpu.texels_with(index.name(), Category::Index, format, index.texels())?;
+        let host_because = fallback;
+        Ok((quarters, IndexReport { host_because, ..report }))
+    }
+
+    /// Builds on the host, and says how long that took.
+    fn build_timed(&self, triangles: &[[Vec3; 3]]) -> Result<(Bvh2, IndexReport)> {
         let begin = Instant::now();
         let index = self.build(triangles)?;
         let report = IndexReport {
             kind: self.name(),
             build_ms: 1e3 * begin.elapsed().as_secs_f64(),
+            stages: index.stages(),
+            host_because: None,
             statistics: index.statistics(),
         };
         Ok((index, report))
@@ -96,6 +145,7 @@ impl FromStr for IndexKind {
             Self::default(),
             Self::lbvh(BuildQuality::Fast),
             Self::lbvh(BuildQuality::High),
+            Self::LbvhOnDevice(LbvhSettings::default()),
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
@@ -111,8 +161,14 @@ impl FromStr for IndexKind {
 pub struct IndexReport {
     /// One of [`IndexKind::NAMES`].
     pub kind: &'static str,
-    /// Wall-clock milliseconds of its build.
+    /// Wall-clock milliseconds of its build, without the upload of what the host has built. A device's first build has the time in which
+    /// the driver compiles its kernels.
     pub build_ms: f64,
+    /// Where these went.
+    pub stages: BuildStages,
+    /// Why the host has built what the device was to build.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub host_because: Option<&'static str>,
     /// Size and quality.
     #[serde(flatten)]
     pub statistics: IndexStatistics,
@@ -121,7 +177,6 @@ pub struct IndexReport {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::RayIndex;
 
     #[test]
     fn names_are_read_as_they_are_written() {
@@ -143,11 +198,11 @@ mod tests {
                 [corner, corner + Vec3::X, corner + Vec3::Y]
             })
             .collect();
-        for (name, builder) in IndexKind::NAMES.into_iter().zip(["bvh2", "lbvh", "lbvh"]) {
+        for (name, builder) in IndexKind::NAMES.into_iter().zip(["bvh2", "lbvh", "lbvh", "lbvh"]) {
             let (index, report) = name.parse::<IndexKind>().unwrap().build_timed(&triangles).unwrap();
             assert_eq!(index.name(), builder);
             assert_eq!(report.statistics, index.statistics());
-            assert!(report.build_ms > 0.0);
+            assert!(report.build_ms > 0.0 && report.stages.total() <= report.build_ms);
             let json = serde_json::to_value(report).unwrap();
             assert_eq!(json["kind"], name);
             assert_eq!(json["triangles"], 40);

@@ -29,6 +29,7 @@ pub mod morton;
 pub mod offset;
 pub mod optimise;
 pub mod sphere;
+mod stages;
 pub mod trace;
 pub mod triangle;
 pub mod vvh;
@@ -37,6 +38,7 @@ pub mod vvh;
 mod test_support;
 
 pub use kind::{IndexKind, IndexReport};
+pub use stages::BuildStages;
 
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};

@@ -11,7 +11,6 @@ use clerestory::gpu::{PassTiming, Timings};
 use clerestory::scene::Scene;
 use clerestory::{Result, scene};
 use clerestory_tools::geometry;
-use clerestory_tools::machine::median;
 use glam::Vec3;
 
 use super::index_peers;
@@ -27,8 +26,8 @@ Examples:
   clerestory index --scene 'builtin:sphere-flake?depth=4' --repeat 9 --json
   clerestory index --peers --rays 262144
 
-Build times are medians by wall clock on the host's threads; that of the device is the least time of its passes, whose tree is the host's \
-to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
+Build times are medians by wall clock on the host's threads, by stage those of the median build; that of the device is the least time of \
+its passes, whose tree is the host's to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
 rays for every index: half of them leave the camera, half leave surfaces in random directions.")]
 pub struct Arguments {
     /// A scene; may be given several times
@@ -73,7 +72,7 @@ struct Measured {
     /// Nodes and triangles a ray, and the ratio to those of the first index.
     steps: f64,
     steps_ratio: f64,
-    /// Milliseconds by pass, of builds on the device.
+    /// Milliseconds by stage, on the device by pass.
     stages: Vec<(String, f64)>,
 }
 
@@ -164,13 +163,13 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         ]);
     }
     let mut text = table.text();
-    for one in all.iter().filter(|one| !one.stages.is_empty()) {
+    for one in &all {
         let stages: Vec<String> = one
             .stages
             .iter()
             .map(|(name, ms)| format!("{name} {ms:.2} ms"))
             .collect();
-        text += &format!("\n{}: {}", one.scene, stages.join(", "));
+        text += &format!("\n{}, {}: {}", one.scene, one.index, stages.join(", "));
     }
     output::print(&(text + "\n"))?;
     Ok(ExitCode::SUCCESS)
@@ -178,12 +177,15 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
 
 fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> Result<Measured> {
     let mut index = build(triangles)?;
-    let mut seconds = Vec::new();
+    let mut builds = Vec::new();
     for _ in 0..repeat {
         let begin = Instant::now();
         index = build(triangles)?;
-        seconds.push(begin.elapsed().as_secs_f64());
+        builds.push((begin.elapsed().as_secs_f64(), index.stages()));
     }
+    builds.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (seconds, stages) = builds.get(builds.len() / 2).copied().unwrap_or_default();
+    let stages = stages.named().into_iter().filter(|(_, ms)| *ms > 0.0);
     let mut counters = TraversalCounters::default();
     for ray in rays {
         index.closest_hit_filtered(ray, &mut |_, _| true, &mut counters);
@@ -195,12 +197,12 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
         triangles: statistics.triangles,
         nodes: statistics.nodes,
         depth: statistics.max_depth,
-        seconds: median(seconds),
+        seconds,
         sah_cost: statistics.sah_cost,
         sah_ratio: 1.0,
         steps: (counters.nodes + counters.triangles) as f64 / rays.len() as f64,
         steps_ratio: 1.0,
-        stages: Vec::new(),
+        stages: stages.map(|(name, ms)| (name.to_owned(), ms)).collect(),
     })
 }
 

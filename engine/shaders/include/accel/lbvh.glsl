@@ -6,8 +6,12 @@
 #define CLERESTORY_ACCEL_LBVH_GLSL
 
 const uint LBVH_GROUP_SIZE = 64u;
-// Words of a node between the stages: boxes of both children, their words, the parent's.
-const uint LBVH_NODE_WORDS = 15u;
+// Triangles whose boxes an invocation makes: the more, the fewer atomic operations.
+const uint LBVH_BOXES_EACH = 16u;
+// Quarters of a node between the stages: boxes of both children, their words, two that are unused.
+const uint LBVH_NODE_QUARTERS = 4u;
+// Quarters of a primitive's box, of which two words are unused.
+const uint LBVH_BOX_QUARTERS = 2u;
 // Words of a node and of a triangle where rays traverse them.
 const uint LBVH_BVH2_NODE_WORDS = 16u;
 const uint LBVH_BVH2_TRIANGLE_WORDS = 12u;
@@ -28,6 +32,9 @@ struct LbvhState {
     uint height;
     // Inner nodes written.
     uint nodes;
+    // Expected node visits and triangle tests (surface area heuristic, unit costs) times half the area of the root's box, and that area.
+    float cost;
+    float area;
     uint padding;
 };
 

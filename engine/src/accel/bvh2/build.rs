@@ -5,8 +5,10 @@
 //! depth-first pass. Depth: a range of n references is halved at the median as soon as ⌈log₂ n⌉ inner nodes are all that the depth bound
 //! leaves below it.
 
-use super::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, MAX_TRIANGLES, QUARTER, pack};
-use crate::accel::{IndexStatistics, MAX_COORDINATE, NO_HIT};
+use super::layout::Layout;
+use super::{Aabb, Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, MAX_TRIANGLES};
+use crate::accel::stages::Stopwatch;
+use crate::accel::{BuildStages, IndexStatistics, MAX_COORDINATE};
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use glam::Vec3;
@@ -39,9 +41,9 @@ impl Default for Bvh2Settings {
 
 /// A triangle on its way into the tree.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::accel) struct Reference {
-    pub(in crate::accel) bounds: Aabb,
-    pub(in crate::accel) index: u32,
+struct Reference {
+    bounds: Aabb,
+    index: u32,
 }
 
 impl Reference {
@@ -78,12 +80,12 @@ struct Range<'a> {
 }
 
 enum Usable {
-    Yes(Reference),
+    Yes,
     OutOfRange,
     Degenerate,
 }
 
-fn classify(triangle: &[Vec3; 3], index: u32) -> Usable {
+fn classify(triangle: &[Vec3; 3]) -> Usable {
     // NaN fails the comparison.
     if !triangle
         .iter()
@@ -95,42 +97,83 @@ fn classify(triangle: &[Vec3; 3], index: u32) -> Usable {
     if (b - a).cross(c - a) == glam::DVec3::ZERO {
         return Usable::Degenerate;
     }
-    Usable::Yes(Reference {
-        bounds: bounds_of(triangle),
-        index,
-    })
+    Usable::Yes
 }
 
 /// Whether rays can meet a triangle: in range, and of an area in f64.
 pub(in crate::accel) fn can_be_met(triangle: &[Vec3; 3]) -> bool {
-    matches!(classify(triangle, 0), Usable::Yes(_))
+    matches!(classify(triangle), Usable::Yes)
 }
 
-/// The triangles that rays can meet, in order, and how many were left out.
-pub(in crate::accel) fn usable(triangles: &[[Vec3; 3]]) -> (Vec<Reference>, IndexStatistics) {
-    let classified: Vec<Usable> = triangles
-        .par_iter()
-        .enumerate()
-        .map(|(i, t)| classify(t, i as u32))
-        .collect();
-    let mut statistics = IndexStatistics::default();
-    let mut references = Vec::with_capacity(triangles.len());
-    for usable in classified {
-        match usable {
-            Usable::Yes(reference) => references.push(reference),
-            Usable::OutOfRange => statistics.excluded_range += 1,
-            Usable::Degenerate => statistics.excluded_degenerate += 1,
+/// The triangles that rays can meet, in order.
+pub(in crate::accel) struct Met<'a> {
+    triangles: &'a [[Vec3; 3]],
+    /// Their indices; `None` when that is every one.
+    indices: Option<Vec<u32>>,
+    /// How many there are and how many were left out.
+    pub(in crate::accel) statistics: IndexStatistics,
+}
+
+impl<'a> Met<'a> {
+    pub(in crate::accel) fn among(triangles: &'a [[Vec3; 3]]) -> Self {
+        let count = |[range, degenerate]: [u64; 2], triangle| match classify(triangle) {
+            Usable::Yes => [range, degenerate],
+            Usable::OutOfRange => [range + 1, degenerate],
+            Usable::Degenerate => [range, degenerate + 1],
+        };
+        let [excluded_range, excluded_degenerate] = triangles
+            .par_iter()
+            .fold(|| [0; 2], count)
+            .reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        let excluded = excluded_range + excluded_degenerate;
+        let met = |i: &u32| can_be_met(&triangles[*i as usize]);
+        Self {
+            triangles,
+            indices: (excluded > 0).then(|| (0..triangles.len() as u32).into_par_iter().filter(met).collect()),
+            statistics: IndexStatistics {
+                triangles: triangles.len() as u64 - excluded,
+                excluded_range,
+                excluded_degenerate,
+                ..IndexStatistics::default()
+            },
         }
     }
-    statistics.triangles = references.len() as u64;
-    (references, statistics)
+
+    /// Index of the triangle at a place.
+    pub(in crate::accel) fn index(&self, place: u32) -> u32 {
+        self.indices.as_ref().map_or(place, |indices| indices[place as usize])
+    }
+
+    /// The triangle at a place, as the kernels read it.
+    pub(in crate::accel) fn triangle(&self, place: u32) -> Bvh2Triangle {
+        let index = self.index(place);
+        Bvh2Triangle::new(self.triangles[index as usize], index)
+    }
+
+    /// Something of each, given its corners and its index.
+    pub(in crate::accel) fn map<T: Send>(&self, of: impl Fn(&[Vec3; 3], u32) -> T + Sync) -> Vec<T> {
+        let at = |i: u32| of(&self.triangles[i as usize], i);
+        match &self.indices {
+            None => (0..self.triangles.len() as u32).into_par_iter().map(at).collect(),
+            Some(indices) => indices.par_iter().map(|i| at(*i)).collect(),
+        }
+    }
 }
 
 pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<Bvh2> {
     check_range("bvh2.leaf_size", settings.leaf_size, 1, MAX_LEAF_SIZE)?;
     check_range("bvh2.bins", settings.bins, 2, MAX_BINS as u32)?;
     check_count(triangles.len())?;
-    let (mut references, statistics) = usable(triangles);
+    let mut watch = Stopwatch::start();
+    let met = Met::among(triangles);
+    let mut references = met.map(|triangle, index| Reference {
+        bounds: bounds_of(triangle),
+        index,
+    });
+    let mut stages = BuildStages {
+        triangles: watch.lap(),
+        ..BuildStages::default()
+    };
     let slots = if references.len() >= 2 {
         let mut slots = vec![EMPTY_SLOT; references.len() - 1];
         build_range(
@@ -147,48 +190,17 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
     } else {
         Vec::new()
     };
-
-    let positions: Vec<[Vec3; 3]> = references.iter().map(|r| triangles[r.index as usize]).collect();
-    let indices: Vec<u32> = references.iter().map(|r| r.index).collect();
-    Ok(assemble("bvh2", flatten(&slots), positions, indices, statistics))
+    stages.hierarchy = watch.lap();
+    let triangle = |place: usize| {
+        let index = references[place].index;
+        Bvh2Triangle::new(triangles[index as usize], index)
+    };
+    let layout = Layout::of(&flatten(&slots), references.len(), triangle);
+    stages.layout = watch.lap();
+    Ok(layout.finish("bvh2", met.statistics, stages, watch))
 }
 
-/// A hierarchy of finished nodes, the root first with its parent word 0, over the triangles that `statistics` has counted. Fewer than two
-/// triangles have no node; one is made.
-pub(in crate::accel) fn assemble(
-    name: &'static str,
-    mut nodes: Vec<Bvh2Node>,
-    mut positions: Vec<[Vec3; 3]>,
-    mut indices: Vec<u32>,
-    mut statistics: IndexStatistics,
-) -> Bvh2 {
-    if nodes.is_empty() {
-        // A point triangle, which no ray meets, keeps the buffers and the root's children from being empty.
-        let bounds = positions.first().map_or(Aabb::EMPTY.with_point(Vec3::ZERO), bounds_of);
-        let sentinel = leaf_word(positions.len() as u32, 1);
-        positions.push([bounds.lower; 3]);
-        indices.push(NO_HIT);
-        nodes = vec![Bvh2Node {
-            bounds: [bounds, Aabb::EMPTY.with_point(bounds.lower)],
-            children: [leaf_word(0, 1), sentinel],
-            ..Bvh2Node::zeroed()
-        }];
-    }
-    measure(&nodes, &mut statistics);
-    nodes[0].triangles = (size_of_val(nodes.as_slice()) / QUARTER) as u32;
-    let packed = pack(&nodes, &positions, &indices);
-    statistics.bytes = size_of_val(packed.as_slice()) as u64;
-    Bvh2 {
-        name,
-        nodes,
-        positions,
-        indices,
-        packed,
-        statistics,
-    }
-}
-
-fn bounds_of(triangle: &[Vec3; 3]) -> Aabb {
+pub(in crate::accel) fn bounds_of(triangle: &[Vec3; 3]) -> Aabb {
     triangle.iter().fold(Aabb::EMPTY, |bounds, v| bounds.with_point(*v))
 }
 
@@ -480,28 +492,4 @@ fn flatten(slots: &[Slot]) -> Vec<Bvh2Node> {
         }
     }
     nodes
-}
-
-/// Counts nodes, leaves, depth and the SAH cost.
-fn measure(nodes: &[Bvh2Node], statistics: &mut IndexStatistics) {
-    let root = nodes[0].bounds[0].union(nodes[0].bounds[1]).half_area();
-    let mut cost = root;
-    let mut max_depth = 0;
-    let mut pending = vec![(0u32, 1u32)];
-    while let Some((node, depth)) = pending.pop() {
-        let node = &nodes[node as usize];
-        max_depth = depth.max(max_depth);
-        for (bounds, word) in node.bounds.iter().zip(node.children) {
-            let triangles = word & ((1 << COUNT_BITS) - 1);
-            cost += bounds.half_area() * f64::from(triangles.max(1));
-            if triangles == 0 {
-                pending.push((word >> COUNT_BITS, depth + 1));
-            } else {
-                statistics.leaves += u64::from((word >> COUNT_BITS) < statistics.triangles as u32);
-            }
-        }
-    }
-    statistics.nodes = nodes.len() as u64;
-    statistics.max_depth = max_depth;
-    statistics.sah_cost = if root > 0.0 { cost / root } else { 0.0 };
 }

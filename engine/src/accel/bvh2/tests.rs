@@ -143,7 +143,7 @@ fn hard_rays(random: &mut Random, triangles: &[[Vec3; 3]], count: usize) -> Vec<
 
 fn usable(triangles: &[[Vec3; 3]], bvh: &Bvh2) -> Vec<bool> {
     let mut usable = vec![false; triangles.len()];
-    for &i in bvh.indices().iter().filter(|&&i| i != NO_HIT) {
+    for i in bvh.triangles().iter().map(|t| t.index).filter(|i| *i != NO_HIT) {
         assert!(
             !std::mem::replace(&mut usable[i as usize], true),
             "triangle {i} is in two places"
@@ -276,14 +276,14 @@ fn tree_is_well_formed() {
                     }
                     next += count as usize;
                     assert!(count <= leaf_size);
-                    let exact = bvh.positions()[index..index + count as usize]
+                    let exact = bvh.triangles()[index..index + count as usize]
                         .iter()
-                        .flatten()
+                        .flat_map(|t| t.corners.iter())
                         .fold(Aabb::EMPTY, |b, v| b.with_point(*v));
                     assert_eq!(exact, bounds, "{name}");
                 }
             }
-            assert!(next == bvh.positions().len() || triangles.is_empty(), "{name}");
+            assert!(next == bvh.triangles().len() || triangles.is_empty(), "{name}");
         }
     }
     let invalid = hard_scenes()

@@ -6,7 +6,7 @@
 //! sibling that comes after the walk in the order, which rebuilds the stack, less what the hit so far has culled. Nothing is lost, and nothing
 //! is tested twice.
 
-use super::{BOX_SLACK, Bvh2, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
+use super::{BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
 use crate::accel::{CandidateFilter, Hit, Ray, TraversalCounters};
 use crate::gpu::shaders::constants;
@@ -44,7 +44,7 @@ impl BoxTest {
             let size = if d.abs() > least { d.abs() } else { least };
             (if d < 0.0 { -1.0 } else { 1.0 }) / size
         }));
-        let [a, b] = bvh.nodes[0].bounds;
+        let [a, b] = bvh.nodes()[0].bounds;
         let root = a.union(b);
         let reach = (root.lower - origin).abs().max((root.upper - origin).abs());
         Self {
@@ -103,6 +103,7 @@ impl Traversal {
         }
         let shear = ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction));
         let boxes = BoxTest::new(bvh, ray);
+        let (nodes, triangles) = (bvh.nodes(), bvh.triangles());
         let mut stack = [FINISHED; MAX_DEPTH as usize + 1];
         let mut top = 0;
         let (mut trail, mut replay) = trail_to(bvh, self.resume);
@@ -112,7 +113,7 @@ impl Traversal {
             iterations += 1;
             if word & COUNT_MASK == 0 {
                 counters.nodes += 1;
-                let node = &bvh.nodes[(word >> COUNT_BITS) as usize];
+                let node = &nodes[(word >> COUNT_BITS) as usize];
                 let [(near0, far0), (near1, far1)] = node.bounds.map(|b| boxes.span(b.lower, b.upper));
                 let (enter0, enter1) = (near0.max(ray.t_min), near1.max(ray.t_min));
                 let first = u32::from(enter1 < enter0);
@@ -136,7 +137,7 @@ impl Traversal {
             } else {
                 counters.triangles += 1;
                 let first = word >> COUNT_BITS;
-                if self.test(bvh, &shear, first as usize, ray.t_min, filter) && self.any {
+                if self.test(&triangles[first as usize], &shear, ray.t_min, filter) && self.any {
                     word = FINISHED;
                     continue;
                 }
@@ -157,11 +158,11 @@ impl Traversal {
     }
 
     /// Tests one triangle; true when it is the best hit now.
-    fn test(&mut self, bvh: &Bvh2, shear: &RayShear, slot: usize, t_min: f32, filter: CandidateFilter<'_>) -> bool {
-        let Some(candidate) = intersect_triangle(shear, &bvh.positions[slot], t_min, self.hit.t) else {
+    fn test(&mut self, tested: &Bvh2Triangle, shear: &RayShear, t_min: f32, filter: CandidateFilter<'_>) -> bool {
+        let Some(candidate) = intersect_triangle(shear, &tested.corners, t_min, self.hit.t) else {
             return false;
         };
-        let triangle = bvh.indices[slot];
+        let triangle = tested.index;
         let barycentrics = [candidate.u, candidate.v];
         let better = candidate.t < self.hit.t || triangle < self.hit.triangle;
         if !better || !filter(triangle, barycentrics) {
@@ -181,7 +182,7 @@ fn trail_to(bvh: &Bvh2, word: u32) -> (u32, u32) {
     let mut node = word >> COUNT_BITS;
     let (mut trail, mut length) = (0, 0);
     while node != 0 {
-        let parent = bvh.nodes[node as usize].parent;
+        let parent = bvh.nodes()[node as usize].parent;
         trail = trail << 1 | (parent & 1);
         length += 1;
         node = parent >> 1;

@@ -5,32 +5,28 @@
 //! Guarantees: the same bytes as [`build`](super::build) of quality [`Fast`](super::BuildQuality::Fast), on every device; no invocation
 //! ever waits for another.
 
+use super::device_buffers::LbvhBuffers;
 use super::radix::next_skipped;
 use super::ray_index::{LbvhSettings, check_moved, moved_corners};
 use crate::Result;
-use crate::accel::RayIndex;
-use crate::accel::bvh2::build::{assemble, check_count, usable};
-use crate::accel::bvh2::{Bvh2, Bvh2Node, MAX_DEPTH};
+use crate::accel::bvh2::build::{Met, check_count};
+use crate::accel::bvh2::layout::Layout;
+use crate::accel::bvh2::{Bvh2, MAX_DEPTH, NODE_QUARTERS, TRIANGLE_QUARTERS};
 use crate::accel::morton::MORTON_30_AXIS_BITS;
-use crate::gpu::ash::vk;
+use crate::accel::stages::Stopwatch;
+use crate::accel::{BuildStages, IndexStatistics, RayIndex};
 use crate::gpu::shaders::accel::{
-    lbvh_boxes, lbvh_codes, lbvh_emit, lbvh_grid, lbvh_hierarchy, lbvh_rank_scan, lbvh_rank_sums, lbvh_ranks,
-    lbvh_refit, lbvh_refit_triangles,
+    lbvh_boxes, lbvh_climb, lbvh_codes, lbvh_emit, lbvh_grid, lbvh_hierarchy, lbvh_refit, lbvh_refit_triangles,
 };
-use crate::gpu::shaders::constants::{LBVH_GROUP_SIZE, LBVH_NODE_WORDS, LBVH_RANK_BLOCKS};
+use crate::gpu::shaders::constants::{LBVH_BOXES_EACH, LBVH_GROUP_SIZE};
 use crate::gpu::shaders::types::LbvhState;
-use crate::gpu::{
-    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings,
-};
-use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
+use crate::gpu::{Access, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings};
+use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, Scan, ScanBuffers, ScanOptions, SortBuffers};
 use glam::Vec3;
 
-/// Quarters of a node and of a triangle in the finished index.
-const NODE_QUARTERS: u64 = 4;
-const TRIANGLE_QUARTERS: u64 = 3;
-
-/// Nodes of an index, corners and indices of its triangles.
-type Parts = (Vec<Bvh2Node>, Vec<[Vec3; 3]>, Vec<u32>);
+/// Places that an invocation walks along. Long runs save atomic operations; devices of many lanes want many invocations.
+const CPU_RUN: u32 = 32;
+const GPU_RUN: u32 = 4;
 
 /// A finished build.
 #[derive(Debug)]
@@ -52,64 +48,32 @@ pub struct LbvhBuilder {
     boxes: ComputePipeline<lbvh_boxes::Kernel>,
     grid: ComputePipeline<lbvh_grid::Kernel>,
     codes: ComputePipeline<lbvh_codes::Kernel>,
+    run: u32,
     hierarchy: ComputePipeline<lbvh_hierarchy::Kernel>,
-    rank_sums: ComputePipeline<lbvh_rank_sums::Kernel>,
-    rank_scan: ComputePipeline<lbvh_rank_scan::Kernel>,
-    ranks: ComputePipeline<lbvh_ranks::Kernel>,
+    climb: ComputePipeline<lbvh_climb::Kernel>,
+    ranks: Scan,
     emit: ComputePipeline<lbvh_emit::Kernel>,
     refit_triangles: ComputePipeline<lbvh_refit_triangles::Kernel>,
     refit: ComputePipeline<lbvh_refit::Kernel>,
 }
 
-/// Memory of a build: input, what the stages hand on, and the finished index.
+/// A finished build that stays where it is.
 #[derive(Debug)]
-pub struct LbvhBuffers {
-    count: u32,
-    /// Corners of the triangles, three vectors each, metres; every one can be met by rays.
-    pub corners: Buffer,
-    /// How hits name each triangle.
-    pub indices: Buffer,
-    /// The finished index: nodes, then triangles, as [`RayIndex::texels`](crate::accel::RayIndex::texels) has them.
+pub struct ResidentLbvh {
+    /// What rays traverse, as [`RayIndex::texels`](crate::accel::RayIndex::texels) has it, with room behind it.
     pub quarters: TexelView,
-    boxes: Buffer,
-    state: Buffer,
-    keys: [TexelView; 2],
-    order: [TexelView; 2],
-    sort_scratch: Buffer,
-    nodes: Buffer,
-    mails: Buffer,
-    arrivals: Buffer,
-    kept: Buffer,
-    blocks: Buffer,
-    ranks: Buffer,
+    /// Size and quality. The surface area cost is summed by the device in f32, which errs by three units of roundoff a level at
+    /// most; the bytes are those of the room.
+    pub statistics: IndexStatistics,
+    /// Times of the stages.
+    pub stages: BuildStages,
 }
 
-impl LbvhBuffers {
-    /// Bytes of everything.
-    pub fn bytes(&self) -> u64 {
-        let texels = [
-            &self.quarters,
-            &self.keys[0],
-            &self.keys[1],
-            &self.order[0],
-            &self.order[1],
-        ];
-        let buffers = [
-            &self.corners,
-            &self.indices,
-            &self.boxes,
-            &self.state,
-            &self.sort_scratch,
-            &self.nodes,
-            &self.mails,
-            &self.arrivals,
-            &self.kept,
-            &self.blocks,
-            &self.ranks,
-        ];
-        let texels = texels.iter().map(|t| t.buffer().bytes());
-        texels.chain(buffers.iter().map(|b| b.bytes())).sum()
-    }
+/// What a build leaves on the device.
+struct Ran {
+    buffers: LbvhBuffers,
+    state: LbvhState,
+    timings: Timings,
 }
 
 impl LbvhBuilder {
@@ -125,7 +89,9 @@ impl LbvhBuilder {
         } else {
             KeyWidth::Bits64
         };
-        let lbvh_fences = gpu.caps().kind != DeviceKind::Cpu;
+        let is_cpu = gpu.caps().kind == DeviceKind::Cpu;
+        let lbvh_fences = !is_cpu;
+        let run = if is_cpu { CPU_RUN } else { GPU_RUN };
         let mut options = RadixSortOptions::new(key, true);
         options.bits = 0..settings.code_bits;
         Ok(Self {
@@ -135,13 +101,13 @@ impl LbvhBuilder {
             boxes: gpu.compute_pipeline(&Default::default())?,
             grid: gpu.compute_pipeline(&lbvh_grid::Spec { lbvh_axis_bits })?,
             codes: gpu.compute_pipeline(&lbvh_codes::Spec { lbvh_axis_bits })?,
+            run,
             hierarchy: gpu.compute_pipeline(&lbvh_hierarchy::Spec {
                 lbvh_code_words: key.words(),
-                lbvh_fences,
+                lbvh_run: run,
             })?,
-            rank_sums: gpu.compute_pipeline(&Default::default())?,
-            rank_scan: gpu.compute_pipeline(&Default::default())?,
-            ranks: gpu.compute_pipeline(&Default::default())?,
+            climb: gpu.compute_pipeline(&lbvh_climb::Spec { lbvh_fences })?,
+            ranks: Scan::new(gpu, ScanOptions::default())?,
             emit: gpu.compute_pipeline(&Default::default())?,
             refit_triangles: gpu.compute_pipeline(&Default::default())?,
             refit: gpu.compute_pipeline(&lbvh_refit::Spec { lbvh_fences })?,
@@ -154,42 +120,12 @@ impl LbvhBuilder {
     /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where a buffer is larger than the device binds,
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn buffers(&self, count: u32) -> Result<LbvhBuffers> {
-        let (n, inner) = (u64::from(count), u64::from(count.saturating_sub(1)));
-        let buffer = |name, bytes: u64| {
-            self.gpu
-                .buffer(&BufferDesc::storage(name, bytes.max(4), Category::Index))
-        };
-        let quarters = NODE_QUARTERS * inner + TRIANGLE_QUARTERS * n;
-        Ok(LbvhBuffers {
-            count,
-            corners: buffer("lbvh corners", 36 * n)?,
-            indices: buffer("lbvh indices", 4 * n)?,
-            quarters: self
-                .gpu
-                .storage_texels("lbvh", Category::Index, vk::Format::R32G32B32A32_UINT, quarters)?,
-            boxes: buffer("lbvh boxes", 24 * n)?,
-            state: buffer("lbvh state", size_of::<LbvhState>() as u64)?,
-            keys: [
-                self.sort.keys("lbvh codes", count)?,
-                self.sort.keys("lbvh sorted codes", count)?,
-            ],
-            order: [
-                self.sort.values("lbvh order", count)?,
-                self.sort.values("lbvh sorted order", count)?,
-            ],
-            sort_scratch: buffer("lbvh sort", self.sort.scratch_bytes(count))?,
-            nodes: buffer("lbvh nodes", 4 * u64::from(LBVH_NODE_WORDS) * inner)?,
-            mails: buffer("lbvh mails", 24 * inner)?,
-            arrivals: buffer("lbvh arrivals", 4 * inner)?,
-            kept: buffer("lbvh kept", 4 * inner)?,
-            blocks: buffer("lbvh blocks", 4 * u64::from(LBVH_RANK_BLOCKS))?,
-            ranks: buffer("lbvh ranks", 4 * inner)?,
-        })
+        LbvhBuffers::new(&self.gpu, &self.sort, &self.ranks, self.run, count)
     }
 
     /// Records a build of the triangles in `corners`, which must be visible to compute shaders.
     ///
-    /// Passes: `lbvh: boxes`, `lbvh: codes`, `lbvh: sort`, `lbvh: hierarchy`, `lbvh: ranks`, `lbvh: emit`. After it `quarters` has been
+    /// Passes: `lbvh: boxes`, `lbvh: codes`, `lbvh: sort`, `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks`, `lbvh: emit`. After it `quarters` has been
     /// written by compute shaders. The tree may be deeper than rays can go: [`LbvhBuilder::overflow`] says so once it has run.
     ///
     /// # Errors
@@ -207,10 +143,10 @@ impl LbvhBuilder {
             pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             let set = lbvh_boxes::Set0 {
                 lbvh_corners: buffers.corners.view(),
-                lbvh_boxes: buffers.boxes.view(),
+                lbvh_boxes: buffers.boxes.buffer().view(),
                 lbvh_state_block: buffers.state.view(),
             };
-            let groups = [self.boxes.groups_for(count), 1, 1];
+            let groups = [count.div_ceil(LBVH_GROUP_SIZE * LBVH_BOXES_EACH), 1, 1];
             pass.dispatch(&self.boxes, &[&set], &lbvh_boxes::Push { count }, groups)?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             Ok(())
@@ -222,7 +158,7 @@ impl LbvhBuilder {
             pass.dispatch(&self.grid, &[&set], &(), [1, 1, 1])?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             let set = lbvh_codes::Set0 {
-                lbvh_boxes: buffers.boxes.view(),
+                lbvh_boxes: &buffers.boxes,
                 lbvh_state_block: buffers.state.view(),
                 lbvh_codes: buffers.keys[0].buffer().view(),
                 lbvh_order: buffers.order[0].buffer().view(),
@@ -249,65 +185,70 @@ impl LbvhBuilder {
     fn record_tree(&self, recorder: &mut Recorder, buffers: &LbvhBuffers, skipped: u32) -> Result<()> {
         let count = buffers.count;
         let side = self.sort.side(count);
+        let runs = count.div_ceil(self.run);
         recorder.pass("lbvh: hierarchy", |pass| {
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
             pass.fill(buffers.arrivals.view(), 0)?;
-            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             let set = lbvh_hierarchy::Set0 {
-                lbvh_boxes: buffers.boxes.view(),
-                lbvh_codes: buffers.keys[side].buffer().view(),
-                lbvh_order: buffers.order[side].buffer().view(),
-                lbvh_nodes: buffers.nodes.view(),
+                lbvh_nodes: buffers.nodes.buffer().view(),
                 lbvh_mails: buffers.mails.view(),
-                lbvh_arrivals: buffers.arrivals.view(),
-                lbvh_kept: buffers.kept.view(),
+                lbvh_kept: buffers.kept.buffer().view(),
                 lbvh_state_block: buffers.state.view(),
+                lbvh_pending: buffers.pending.view(),
+                lbvh_boxes: &buffers.boxes,
+                lbvh_codes: &buffers.keys[side],
+                lbvh_order: &buffers.order[side],
             };
             let push = lbvh_hierarchy::Push {
                 count,
+                runs,
                 skipped,
                 leaf_size: self.settings.leaf_size,
             };
-            pass.dispatch(
-                &self.hierarchy,
-                &[&set],
-                &push,
-                [self.hierarchy.groups_for(count), 1, 1],
-            )?;
+            pass.dispatch(&self.hierarchy, &[&set], &push, [self.hierarchy.groups_for(runs), 1, 1])?;
+            pass.memory_barrier(Access::COMPUTE.union(Access::TRANSFER_WRITE), Access::COMPUTE);
+            Ok(())
+        })?;
+        recorder.pass("lbvh: climb", |pass| {
+            let set = lbvh_climb::Set0 {
+                lbvh_nodes: buffers.nodes.buffer().view(),
+                lbvh_mails: buffers.mails.view(),
+                lbvh_kept: buffers.kept.buffer().view(),
+                lbvh_state_block: buffers.state.view(),
+                lbvh_pending: buffers.pending.view(),
+                lbvh_arrivals: buffers.arrivals.view(),
+            };
+            let push = lbvh_climb::Push {
+                count,
+                runs,
+                skipped,
+                leaf_size: self.settings.leaf_size,
+            };
+            let groups = [self.climb.groups_for(runs * self.run), 1, 1];
+            pass.dispatch(&self.climb, &[&set], &push, groups)?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             Ok(())
         })?;
         recorder.pass("lbvh: ranks", |pass| {
-            let (kept, blocks) = (buffers.kept.view(), buffers.blocks.view());
-            let groups = [LBVH_RANK_BLOCKS / LBVH_GROUP_SIZE, 1, 1];
-            let nodes = count - 1;
-            let set = lbvh_rank_sums::Set0 {
-                lbvh_kept: kept,
-                lbvh_blocks: blocks,
+            let words = ScanBuffers {
+                input: buffers.kept.buffer().view(),
+                heads: None,
+                output: buffers.ranks.buffer().view(),
             };
-            pass.dispatch(&self.rank_sums, &[&set], &lbvh_rank_sums::Push { count: nodes }, groups)?;
-            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
-            let set = lbvh_rank_scan::Set0 { lbvh_blocks: blocks };
-            pass.dispatch(&self.rank_scan, &[&set], &(), [1, 1, 1])?;
-            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
-            let set = lbvh_ranks::Set0 {
-                lbvh_kept: kept,
-                lbvh_blocks: blocks,
-                lbvh_ranks: buffers.ranks.view(),
-            };
-            pass.dispatch(&self.ranks, &[&set], &lbvh_ranks::Push { count: nodes }, groups)?;
+            self.ranks
+                .record(pass, &words, Count::Host(count - 1), &buffers.scan_scratch)?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             Ok(())
         })?;
         recorder.pass("lbvh: emit", |pass| {
             let set = lbvh_emit::Set0 {
-                lbvh_nodes: buffers.nodes.view(),
-                lbvh_kept: buffers.kept.view(),
-                lbvh_ranks: buffers.ranks.view(),
-                lbvh_order: buffers.order[side].buffer().view(),
+                lbvh_nodes: &buffers.nodes,
+                lbvh_kept: &buffers.kept,
+                lbvh_ranks: &buffers.ranks,
+                lbvh_order: &buffers.order[side],
                 lbvh_corners: buffers.corners.view(),
                 lbvh_indices: buffers.indices.view(),
-                lbvh_quarters: buffers.quarters.buffer().view(),
+                lbvh_words: buffers.quarters.buffer().view(),
                 lbvh_state_block: buffers.state.view(),
             };
             let groups = [self.emit.groups_for(count), 1, 1];
@@ -375,26 +316,12 @@ impl LbvhBuilder {
         Ok(state.first().copied().unwrap_or_default())
     }
 
-    /// Builds over `triangles` and reads the index back; hits name triangles by their place in it. The host leaves out what rays cannot
-    /// meet. Also the passes' times; a tree that was too deep is made again with fewer bits, in passes of the same names.
-    ///
-    /// # Errors
-    /// As [`build`](super::build), [`LbvhBuilder::buffers`], and those of a submission.
-    pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<LbvhBuild> {
-        check_count(triangles.len())?;
-        let (references, statistics) = usable(triangles);
-        let indices: Vec<u32> = references.iter().map(|r| r.index).collect();
-        let corners: Vec<[Vec3; 3]> = indices.iter().map(|i| triangles[*i as usize]).collect();
-        if corners.len() < 2 {
-            return Ok(LbvhBuild {
-                index: assemble("lbvh", Vec::new(), corners, indices, statistics),
-                timings: Timings::default(),
-                buffers: None,
-            });
-        }
+    /// Builds over triangles that rays can meet, at least two; a tree that was too deep is made again with fewer bits, in passes of the
+    /// same names.
+    fn run(&self, corners: &[[Vec3; 3]], indices: &[u32]) -> Result<Ran> {
         let buffers = self.buffers(corners.len() as u32)?;
-        self.gpu.upload(&buffers.corners, 0, &corners)?;
-        self.gpu.upload(&buffers.indices, 0, &indices)?;
+        self.gpu.upload(&buffers.corners, 0, corners)?;
+        self.gpu.upload(&buffers.indices, 0, indices)?;
         let mut recorder = self.gpu.recorder("lbvh")?;
         self.record(&mut recorder, &buffers)?;
         let mut timings = recorder.submit()?.wait()?;
@@ -407,12 +334,80 @@ impl LbvhBuilder {
             timings.passes.extend(recorder.submit()?.wait()?.passes);
             state = self.state(&buffers)?;
         }
-        let (nodes, positions, indices) = self.read(&buffers, state.nodes)?;
-        Ok(LbvhBuild {
-            index: assemble("lbvh", nodes, positions, indices, statistics),
+        Ok(Ran {
+            buffers,
+            state,
             timings,
-            buffers: Some(buffers),
         })
+    }
+
+    /// Builds over `triangles` and reads the index back; hits name triangles by their place in it. The host leaves out what rays cannot
+    /// meet. Also the passes' times; a tree that was too deep is made again with fewer bits, in passes of the same names.
+    ///
+    /// # Errors
+    /// As [`build`](super::build), [`LbvhBuilder::buffers`], and those of a submission.
+    pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<LbvhBuild> {
+        check_count(triangles.len())?;
+        let met = Met::among(triangles);
+        let corners = met.map(|triangle, _| *triangle);
+        if corners.len() < 2 {
+            let layout = Layout::of(&[], corners.len(), |place| met.triangle(place as u32));
+            return Ok(LbvhBuild {
+                index: layout.finish("lbvh", met.statistics, BuildStages::default(), Stopwatch::start()),
+                timings: Timings::default(),
+                buffers: None,
+            });
+        }
+        let ran = self.run(&corners, &met.map(|_, index| index))?;
+        Ok(LbvhBuild {
+            index: self.read(&ran.buffers, ran.state.nodes, met.statistics)?,
+            timings: ran.timings,
+            buffers: Some(ran.buffers),
+        })
+    }
+
+    /// As [`LbvhBuilder::build`], but leaves the index on the device and reads back no more than what it says of itself; `None` for fewer
+    /// than two triangles that rays can meet.
+    ///
+    /// # Errors
+    /// As [`LbvhBuilder::build`].
+    pub fn build_resident(&self, triangles: &[[Vec3; 3]]) -> Result<Option<ResidentLbvh>> {
+        check_count(triangles.len())?;
+        let mut watch = Stopwatch::start();
+        let met = Met::among(triangles);
+        let corners = met.map(|triangle, _| *triangle);
+        if corners.len() < 2 {
+            return Ok(None);
+        }
+        let on_host = watch.lap();
+        let ran = self.run(&corners, &met.map(|_, index| index))?;
+        let mut stages = stages_of(&ran.timings);
+        stages.transfer = (watch.lap() - stages.total()).max(0.0);
+        stages.triangles += on_host;
+        let LbvhState {
+            nodes,
+            height,
+            cost,
+            area,
+            ..
+        } = ran.state;
+        let statistics = IndexStatistics {
+            nodes: nodes.into(),
+            leaves: u64::from(nodes) + 1,
+            max_depth: height,
+            sah_cost: if area > 0.0 {
+                f64::from(cost) / f64::from(area)
+            } else {
+                0.0
+            },
+            bytes: ran.buffers.quarters.buffer().bytes(),
+            ..met.statistics
+        };
+        Ok(Some(ResidentLbvh {
+            quarters: ran.buffers.quarters,
+            statistics,
+            stages,
+        }))
     }
 
     /// Refits a build to moved triangles, all of those it was made of, and reads it back. Those that were left out stay so, and those that
@@ -426,29 +421,39 @@ impl LbvhBuilder {
             return Ok((super::refit(&build.index, triangles)?, Timings::default()));
         };
         check_moved(&build.index, triangles)?;
-        let mut indices = build.index.indices().to_vec();
+        let mut indices: Vec<u32> = build.index.triangles().iter().map(|t| t.index).collect();
         indices.sort_unstable();
         let corners = moved_corners(&indices, triangles);
         self.gpu.upload(&buffers.corners, 0, &corners)?;
         let mut recorder = self.gpu.recorder("lbvh refit")?;
         self.record_refit(&mut recorder, buffers)?;
         let timings = recorder.submit()?.wait()?;
-        let (nodes, positions, indices) = self.read(buffers, build.index.nodes().len() as u32)?;
         let statistics = build.index.statistics();
-        Ok((assemble("lbvh", nodes, positions, indices, statistics), timings))
+        let nodes = build.index.nodes().len() as u32;
+        Ok((self.read(buffers, nodes, statistics)?, timings))
     }
 
-    /// The finished index: nodes, corners and indices of triangles.
-    fn read(&self, buffers: &LbvhBuffers, nodes: u32) -> Result<Parts> {
-        let node_quarters = (NODE_QUARTERS * u64::from(nodes)) as usize;
-        let quarters = node_quarters + TRIANGLE_QUARTERS as usize * buffers.count as usize;
-        let words: Vec<[u32; 4]> = self.gpu.read(buffers.quarters.buffer().view(), quarters)?;
-        let mut finished: Vec<Bvh2Node> = bytemuck::cast_slice(&words[..node_quarters]).to_vec();
-        finished.iter_mut().for_each(|node| node.triangles = 0);
-        let triangles: &[[u32; 12]] = bytemuck::cast_slice(&words[node_quarters..]);
-        let corner = |t: &[u32; 12], i: usize| Vec3::from_array([0, 1, 2].map(|axis| f32::from_bits(t[3 * i + axis])));
-        let positions = triangles.iter().map(|t| [0, 1, 2].map(|i| corner(t, i))).collect();
-        let indices = triangles.iter().map(|t| t[9]).collect();
-        Ok((finished, positions, indices))
+    /// The finished index, of whose triangles `statistics` has the counts.
+    fn read(&self, buffers: &LbvhBuffers, nodes: u32, statistics: IndexStatistics) -> Result<Bvh2> {
+        let quarters = NODE_QUARTERS * nodes as usize + TRIANGLE_QUARTERS * buffers.count as usize;
+        let quarters = self.gpu.read(buffers.quarters.buffer().view(), quarters)?;
+        let layout = Layout::filled(quarters, nodes as usize);
+        Ok(layout.finish("lbvh", statistics, BuildStages::default(), Stopwatch::start()))
     }
+}
+
+/// Milliseconds of the passes by stage.
+fn stages_of(timings: &Timings) -> BuildStages {
+    let mut stages = BuildStages::default();
+    for pass in &timings.passes {
+        let stage = match pass.name.as_str() {
+            "lbvh: boxes" => &mut stages.triangles,
+            "lbvh: codes" => &mut stages.codes,
+            "lbvh: sort" => &mut stages.sort,
+            "lbvh: hierarchy" | "lbvh: climb" => &mut stages.hierarchy,
+            _ => &mut stages.layout,
+        };
+        *stage += 1e-6 * pass.nanoseconds.unwrap_or(0) as f64;
+    }
+    stages
 }

@@ -9,14 +9,17 @@
 
 pub mod clustered;
 mod device;
+mod device_buffers;
 pub mod leaf_threshold;
 pub mod merge;
 pub mod radix;
 mod ray_index;
+mod sort;
 pub mod split_lists;
 pub mod tree;
 
-pub use device::{LbvhBuffers, LbvhBuild, LbvhBuilder};
+pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
+pub use device_buffers::LbvhBuffers;
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};
 
 #[cfg(test)]

@@ -1,13 +1,15 @@
 //! The linear hierarchy as a ray index: over triangles, in the node layout that the path tracer traverses.
 
-use super::radix::{LeafRule, SortedCodes, hierarchy};
+use super::radix::{Codes, LeafRule, SortedCodes, Splits, hierarchy};
 use super::tree::{BoxTree, Child};
 use crate::Result;
-use crate::accel::bvh2::build::{assemble, can_be_met, check_count, check_range, leaf_word, usable};
-use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE};
+use crate::accel::bvh2::build::{Met, bounds_of, can_be_met, check_count, check_range, leaf_word};
+use crate::accel::bvh2::layout::{Layout, fill_triangles};
+use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE};
 use crate::accel::morton::{MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS};
 use crate::accel::optimise::{MAX_TREELET, Restructuring, restructure};
-use crate::accel::{MAX_COORDINATE, RayIndex};
+use crate::accel::stages::Stopwatch;
+use crate::accel::{BuildStages, MAX_COORDINATE, RayIndex};
 use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -85,13 +87,17 @@ pub fn hierarchy_of(boxes: &[Aabb], settings: &LbvhSettings) -> BoxTree {
         return hierarchy(boxes, &sorted, rule, MAX_DEPTH);
     }
     let tree = hierarchy(boxes, &sorted, LeafRule::Area(1), MAX_DEPTH);
+    restructured(&tree, boxes, settings)
+}
+
+fn restructured(tree: &BoxTree, boxes: &[Aabb], settings: &LbvhSettings) -> BoxTree {
     let restructuring = Restructuring {
         treelet: settings.treelet as usize,
         rounds: settings.rounds,
-        leaves: rule,
+        leaves: LeafRule::Area(settings.leaf_size),
         max_depth: MAX_DEPTH,
     };
-    restructure(&tree, boxes, &restructuring)
+    restructure(tree, boxes, &restructuring)
 }
 
 /// Builds over `triangles`; hits name triangles by their place in it. Deterministic whatever the number of threads. The result reports
@@ -103,25 +109,49 @@ pub fn hierarchy_of(boxes: &[Aabb], settings: &LbvhSettings) -> BoxTree {
 pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
     settings.check()?;
     check_count(triangles.len())?;
-    let (references, statistics) = usable(triangles);
+    let mut watch = Stopwatch::start();
+    let mut stages = BuildStages::default();
+    let met = Met::among(triangles);
     // Adding zero makes both zeros one, whose order devices need not keep.
-    let boxes: Vec<Aabb> = references
-        .iter()
-        .map(|r| Aabb {
-            lower: r.bounds.lower + Vec3::ZERO,
-            upper: r.bounds.upper + Vec3::ZERO,
-        })
-        .collect();
-    let (order, nodes) = if boxes.len() < 2 {
-        ((0..boxes.len() as u32).collect(), Vec::new())
-    } else {
-        let tree = hierarchy_of(&boxes, settings);
-        let nodes = nodes_of(&tree);
-        (tree.order, nodes)
+    let boxes: Vec<Aabb> = met.map(|triangle, _| {
+        let bounds = bounds_of(triangle);
+        Aabb {
+            lower: bounds.lower + Vec3::ZERO,
+            upper: bounds.upper + Vec3::ZERO,
+        }
+    });
+    stages.triangles = watch.lap();
+    if boxes.len() < 2 {
+        let layout = Layout::of(&[], boxes.len(), |place| met.triangle(place as u32));
+        return Ok(layout.finish("lbvh", met.statistics, stages, watch));
+    }
+    let codes = Codes::of_boxes(&boxes, settings.axis_bits());
+    stages.codes = watch.lap();
+    let sorted = codes.sorted();
+    stages.sort = watch.lap();
+    let layout = match settings.quality {
+        BuildQuality::Fast => {
+            let splits = Splits::build(&boxes, &sorted, LeafRule::Area(settings.leaf_size), MAX_DEPTH);
+            stages.hierarchy = watch.lap();
+            let nodes = splits.as_ref().map_or(0, Splits::nodes);
+            let mut layout = Layout::new(nodes, boxes.len());
+            let (nodes, places) = layout.parts();
+            rayon::join(
+                || splits.iter().for_each(|splits| splits.emit_nodes(nodes)),
+                || fill_triangles(places, |place| met.triangle(sorted.order[place])),
+            );
+            layout
+        }
+        BuildQuality::High => {
+            let tree = hierarchy(&boxes, &sorted, LeafRule::Area(1), MAX_DEPTH);
+            stages.hierarchy = watch.lap();
+            let tree = restructured(&tree, &boxes, settings);
+            stages.restructure = watch.lap();
+            Layout::of(&nodes_of(&tree), boxes.len(), |place| met.triangle(tree.order[place]))
+        }
     };
-    let indices: Vec<u32> = order.iter().map(|place| references[*place as usize].index).collect();
-    let positions = indices.iter().map(|index| triangles[*index as usize]).collect();
-    Ok(assemble("lbvh", nodes, positions, indices, statistics))
+    stages.layout = watch.lap();
+    Ok(layout.finish("lbvh", met.statistics, stages, watch))
 }
 
 /// Refits an index to its triangles where they are now: the tree stays what it was, boxes and corners are new. Triangles that were left
@@ -133,7 +163,7 @@ pub fn refit(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
     check_moved(index, triangles)?;
     let statistics = index.statistics();
     let count = statistics.triangles as usize;
-    let indices = index.indices()[..count].to_vec();
+    let indices: Vec<u32> = index.triangles()[..count].iter().map(|t| t.index).collect();
     let positions = moved_corners(&indices, triangles);
     let mut nodes = if count < 2 { Vec::new() } else { index.nodes().to_vec() };
     let mut order = Vec::with_capacity(nodes.len());
@@ -163,7 +193,9 @@ pub fn refit(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
         excluded_degenerate: statistics.excluded_degenerate,
         ..Default::default()
     };
-    Ok(assemble(index.name(), nodes, positions, indices, excluded))
+    let triangle = |place: usize| Bvh2Triangle::new(positions[place], indices[place]);
+    let layout = Layout::of(&nodes, count, triangle);
+    Ok(layout.finish(index.name(), excluded, BuildStages::default(), Stopwatch::start()))
 }
 
 /// Refuses triangles that an index cannot be refitted to.
@@ -174,16 +206,16 @@ pub(super) fn check_moved(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<()> {
         let cause = format!("is not the {count} that the index was built of");
         return Err(crate::Error::setting("triangles", triangles.len(), cause));
     }
-    let indices = &index.indices()[..statistics.triangles as usize];
-    let outside = |i: &&u32| {
-        triangles[**i as usize]
+    let met = &index.triangles()[..statistics.triangles as usize];
+    let outside = |i: &u32| {
+        triangles[*i as usize]
             .iter()
             .any(|v| !v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
     };
-    match indices.iter().find(outside) {
+    match met.iter().map(|t| t.index).find(outside) {
         None => Ok(()),
         Some(i) => {
-            let corners = format!("{:?}", triangles[*i as usize]);
+            let corners = format!("{:?}", triangles[i as usize]);
             Err(crate::Error::setting(
                 format!("triangles[{i}]"),
                 corners,

@@ -21,7 +21,7 @@ use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
 use crate::Result;
-use crate::accel::{IndexKind, IndexReport, IndexStatistics, RayIndex};
+use crate::accel::{IndexKind, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::sets::{Bvh2Set, MediaSet, SceneSet};
 use crate::gpu::shaders::types::SceneMaterial;
@@ -86,8 +86,7 @@ impl GpuScene {
         let mut geometry = Geometry::flatten(scene, &profile)?;
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
-        let (bvh, index_report) = kind.build_timed(&geometry.corners())?;
-        let index = gpu.texels_with(bvh.name(), Category::Index, vk::Format::R32G32B32A32_UINT, bvh.texels())?;
+        let (index, index_report) = kind.build_for(gpu, &geometry.corners())?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
         let placed = materials

@@ -1,0 +1,41 @@
+// Fifth stage of the linear hierarchy: the nodes that reach into several runs.
+//
+// An invocation arrives at a node for one of its children. The first to arrive ends, the second joins both and goes on to the parent:
+// nobody waits, so nothing is asked of the scheduler, and which of both it is does not show in the tree (T. Karras, "Maximizing
+// Parallelism in the Construction of BVHs, Octrees, and k-d Trees", 2012). The host fills `lbvh_arrivals` with zero.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "accel/lbvh_subtree.glsl"
+#include "accel/lbvh_fence.glsl"
+
+layout(local_size_x = LBVH_GROUP_SIZE) in;
+
+layout(set = 0, binding = 5, scalar) restrict coherent buffer LbvhArrivals { uint lbvh_arrivals[]; };
+
+void main() {
+    uint turn = gl_GlobalInvocationID.x / lbvh_push.runs;
+    uint run = gl_GlobalInvocationID.x - turn * lbvh_push.runs;
+    if (turn >= lbvh_pending[run]) {
+        return;
+    }
+    uint node = lbvh_pending[lbvh_push.runs * (1u + turn) + run];
+    bool climbing = true;
+    for (uint i = 0u; climbing && i < LBVH_MAX_ASCENT; ++i) {
+        lbvh_fence();
+        climbing = atomicAdd(lbvh_arrivals[node], 1u) != 0u;
+        lbvh_fence();
+        if (climbing) {
+            LbvhSubtree own = lbvh_join(lbvh_load_child(node, 0u), lbvh_load_child(node, 1u), node);
+            climbing = !lbvh_is_root(own);
+            if (climbing) {
+                bool is_left = own.right_level < own.left_level;
+                uint slot = node;
+                node = is_left ? own.last : own.first - 1u;
+                lbvh_store_child(node, is_left ? 0u : 1u, own, slot);
+                lbvh_store_mail(node, is_left ? 0u : 1u, own);
+            }
+        }
+    }
+}
