@@ -20,8 +20,8 @@ use glam::Vec3;
 pub enum IndexKind {
     /// Binary hierarchy by the binned surface area heuristic.
     Bvh2(Bvh2Settings),
-    /// Linear hierarchy along the Morton curve: the shortest build and the slowest rays, unless its quality asks for treelets to be
-    /// restructured afterwards.
+    /// Linear hierarchy along the Morton curve: the shortest build and the slowest rays, unless its quality asks for the tree to be
+    /// optimised afterwards.
     Lbvh(LbvhSettings),
 }
 
@@ -32,7 +32,7 @@ impl Default for IndexKind {
 }
 
 impl IndexKind {
-    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, and the same with restructured treelets.
+    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, and the same, optimised.
     pub const NAMES: [&'static str; 3] = ["bvh2", "lbvh", "lbvh-high"];
 
     /// The linear hierarchy with default settings.

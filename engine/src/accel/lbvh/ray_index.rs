@@ -6,7 +6,7 @@ use crate::Result;
 use crate::accel::bvh2::build::{assemble, can_be_met, check_count, check_range, leaf_word, usable};
 use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Node, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE};
 use crate::accel::morton::{MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS};
-use crate::accel::optimise::{MAX_TREELET, Restructuring, restructure};
+use crate::accel::optimise::{MAX_TREELET, Optimisation, optimise};
 use crate::accel::{MAX_COORDINATE, RayIndex};
 use bytemuck::Zeroable;
 use glam::Vec3;
@@ -15,13 +15,19 @@ use rayon::prelude::*;
 /// Bits of a child word that hold the number of triangles.
 const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
 
+/// Most passes of an optimisation that settings may ask for.
+const MAX_ROUNDS: u32 = 16;
+
+/// Most triangles in a kept subtree that settings may ask for.
+const MAX_MINI_TREE: u32 = 256;
+
 /// Whether to spend time on the tree after it stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BuildQuality {
     /// The tree that the codes spell.
     Fast,
-    /// Restructured by treelets: see [`optimise`](crate::accel::optimise).
+    /// Optimised: see [`optimise`](crate::accel::optimise).
     #[default]
     High,
 }
@@ -36,10 +42,14 @@ pub struct LbvhSettings {
     pub leaf_size: u32,
     /// Default high.
     pub quality: BuildQuality,
-    /// Leaves of a treelet, 3..=16; high quality only. Default 9.
+    /// Leaves of a treelet, 3..=16; high quality only. Default 5.
     pub treelet: u32,
-    /// Passes of restructuring, 0..=16; high quality only. Default 3.
+    /// Passes of treelets, 0..=16; high quality only. Default 1.
     pub rounds: u32,
+    /// Most triangles in a subtree that is kept when what is above is built anew, 0..=256, 0 to leave that out; high quality only. Default 32.
+    pub mini_tree: u32,
+    /// Rounds of reinsertion, 0..=16; high quality only. Default 0.
+    pub reinsertions: u32,
 }
 
 impl Default for LbvhSettings {
@@ -48,8 +58,10 @@ impl Default for LbvhSettings {
             code_bits: 3 * MORTON_30_AXIS_BITS,
             leaf_size: 4,
             quality: BuildQuality::High,
-            treelet: 9,
-            rounds: 3,
+            treelet: 5,
+            rounds: 1,
+            mini_tree: 32,
+            reinsertions: 0,
         }
     }
 }
@@ -73,7 +85,9 @@ impl LbvhSettings {
         }
         check_range("lbvh.leaf_size", self.leaf_size, 1, MAX_LEAF_SIZE)?;
         check_range("lbvh.treelet", self.treelet, 3, MAX_TREELET as u32)?;
-        check_range("lbvh.rounds", self.rounds, 0, 16)
+        check_range("lbvh.rounds", self.rounds, 0, MAX_ROUNDS)?;
+        check_range("lbvh.mini_tree", self.mini_tree, 0, MAX_MINI_TREE)?;
+        check_range("lbvh.reinsertions", self.reinsertions, 0, MAX_ROUNDS)
     }
 }
 
@@ -85,13 +99,15 @@ pub fn hierarchy_of(boxes: &[Aabb], settings: &LbvhSettings) -> BoxTree {
         return hierarchy(boxes, &sorted, rule, MAX_DEPTH);
     }
     let tree = hierarchy(boxes, &sorted, LeafRule::Area(1), MAX_DEPTH);
-    let restructuring = Restructuring {
+    let optimisation = Optimisation {
         treelet: settings.treelet as usize,
         rounds: settings.rounds,
+        mini_tree: settings.mini_tree,
+        reinsertions: settings.reinsertions,
         leaves: rule,
         max_depth: MAX_DEPTH,
     };
-    restructure(&tree, boxes, &restructuring)
+    optimise(&tree, boxes, &optimisation)
 }
 
 /// Builds over `triangles`; hits name triangles by their place in it. Deterministic whatever the number of threads. The result reports
