@@ -20,7 +20,7 @@ pub use treelets::MAX_TREELET;
 use super::bvh2::Aabb;
 use super::lbvh::radix::{LeafRule, half_area};
 use super::lbvh::tree::{BoxTree, Child, EMPTY_NODE, PairNode};
-use leaves::{expected_cost, with_leaves};
+use leaves::{choose, with_leaves};
 
 /// How much to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,21 +41,24 @@ pub struct Optimisation {
 
 /// Optimises a tree, each of whose leaves holds one primitive, and makes its leaves. Nodes come in depth-first order.
 pub fn optimise(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisation) -> BoxTree {
-    let leaves = settings.leaves;
-    let mut best = treelets::restructure(tree, boxes, settings);
+    let (mut best, given_cost) = treelets::restructure(tree, boxes, settings);
+    let mut leaves = None;
     if settings.mini_tree > 0 {
         let rebuilt = mini_trees::rebuild(&best, settings.mini_tree, settings.max_depth);
-        if expected_cost(&rebuilt, leaves) <= expected_cost(tree, leaves) {
-            best = rebuilt;
+        let chosen = choose(&rebuilt, settings.leaves);
+        if chosen.cost <= given_cost {
+            (best, leaves) = (rebuilt, Some(chosen));
         }
     }
+    let mut leaves = leaves.unwrap_or_else(|| choose(&best, settings.leaves));
     if settings.reinsertions > 0 {
         let moved = reinsertion::reinsert(&best, settings.reinsertions, settings.max_depth);
-        if expected_cost(&moved, leaves) <= expected_cost(&best, leaves) {
-            best = moved;
+        let chosen = choose(&moved, settings.leaves);
+        if chosen.cost <= leaves.cost {
+            (best, leaves) = (moved, chosen);
         }
     }
-    with_leaves(&best, leaves)
+    with_leaves(&best, &leaves)
 }
 
 #[cfg(test)]

@@ -6,36 +6,30 @@
 use super::{BoxTree, Child, EMPTY_NODE, LeafRule, PairNode, half_area};
 
 /// What becomes of every inner node.
-struct Choice {
+pub(super) struct Leaves {
     /// Primitives below.
     counts: Vec<u32>,
     is_leaf: Vec<bool>,
-    /// Sum over what remains of half area, times primitives in leaves; without the root's own area.
-    cost: f64,
+    /// Expected node visits and primitive tests, times half the root's area, in f32. Trees over the same primitives compare by it.
+    pub(super) cost: f32,
 }
 
 /// Chooses leaves in a tree each of whose leaves holds one primitive.
-fn choose(tree: &BoxTree, rule: LeafRule) -> Choice {
+pub(super) fn choose(tree: &BoxTree, rule: LeafRule) -> Leaves {
     let order: Vec<u32> = tree.preorder().map(|(node, _)| node).collect();
     let nodes = tree.nodes.len();
     let (mut counts, mut is_leaf) = (vec![0; nodes], vec![false; nodes]);
     let mut costs = vec![0.0f32; nodes];
-    let mut exact = vec![0.0f64; nodes];
     for &node in order.iter().rev() {
         let pair = &tree.nodes[node as usize];
-        let (mut count, mut cost, mut below) = (0, 0.0, 0.0);
+        let (mut count, mut cost) = (0, 0.0);
         for (bounds, child) in pair.bounds.iter().zip(pair.children) {
-            let (child_count, child_cost, child_below) = match child {
-                Child::Leaf { count, .. } => (count, half_area(bounds) * count as f32, 0.0),
-                Child::Inner(i) => (counts[i as usize], costs[i as usize], exact[i as usize]),
-            };
-            let weight = match child {
-                Child::Inner(i) if !is_leaf[i as usize] => 1,
-                _ => child_count,
+            let (child_count, child_cost) = match child {
+                Child::Leaf { count, .. } => (count, half_area(bounds) * count as f32),
+                Child::Inner(i) => (counts[i as usize], costs[i as usize]),
             };
             count += child_count;
             cost += child_cost;
-            below += bounds.half_area() * f64::from(weight) + child_below;
         }
         let area = half_area(&pair.bounds[0].union(pair.bounds[1]));
         let (split_cost, leaf_cost) = (area + cost, area * count as f32);
@@ -43,24 +37,16 @@ fn choose(tree: &BoxTree, rule: LeafRule) -> Choice {
         let node = node as usize;
         (counts[node], is_leaf[node]) = (count, leaf);
         costs[node] = if leaf { leaf_cost } else { split_cost };
-        exact[node] = if leaf { 0.0 } else { below };
     }
     let cost = match tree.root {
-        Child::Inner(root) => exact[root as usize],
-        Child::Leaf { .. } => 0.0,
+        Child::Inner(root) => costs[root as usize],
+        Child::Leaf { count, .. } => half_area(&tree.bounds) * count as f32,
     };
-    Choice { counts, is_leaf, cost }
+    Leaves { counts, is_leaf, cost }
 }
 
-/// Expected node visits and primitive tests below the root once leaves are made, times half the root's area. Trees over the same
-/// primitives compare by it.
-pub(super) fn expected_cost(tree: &BoxTree, rule: LeafRule) -> f64 {
-    choose(tree, rule).cost
-}
-
-/// The tree with its leaves, nodes and primitives in depth-first order.
-pub(super) fn with_leaves(tree: &BoxTree, rule: LeafRule) -> BoxTree {
-    let choice = choose(tree, rule);
+/// The tree with the leaves that were chosen in it, nodes and primitives in depth-first order.
+pub(super) fn with_leaves(tree: &BoxTree, leaves: &Leaves) -> BoxTree {
     let mut order = Vec::with_capacity(tree.order.len());
     let mut nodes: Vec<PairNode> = Vec::with_capacity(tree.nodes.len());
     let mut root = tree.root;
@@ -68,7 +54,7 @@ pub(super) fn with_leaves(tree: &BoxTree, rule: LeafRule) -> BoxTree {
     let mut gathered = Vec::new();
     while let Some((child, parent)) = pending.pop() {
         let made = match child {
-            Child::Inner(node) if !choice.is_leaf[node as usize] => {
+            Child::Inner(node) if !leaves.is_leaf[node as usize] => {
                 let place = nodes.len() as u32;
                 let pair = &tree.nodes[node as usize];
                 nodes.push(PairNode {
@@ -84,7 +70,7 @@ pub(super) fn with_leaves(tree: &BoxTree, rule: LeafRule) -> BoxTree {
                 let first = order.len() as u32;
                 let count = match child {
                     Child::Leaf { count, .. } => count,
-                    Child::Inner(node) => choice.counts[node as usize],
+                    Child::Inner(node) => leaves.counts[node as usize],
                 };
                 gathered.push(child);
                 while let Some(child) = gathered.pop() {

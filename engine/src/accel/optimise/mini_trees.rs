@@ -281,7 +281,7 @@ mod tests {
     fn mini_trees_are_small_and_hold_everything() {
         let mut random = Random(73);
         for boxes in [boxes_of(&mut random, 3000, 0.05), with_wall(&mut random, 2000)] {
-            let given = restructure(&linear_tree(&boxes, MAX_DEPTH), &boxes, &optimisation(1, 0, 0));
+            let (given, _) = restructure(&linear_tree(&boxes, MAX_DEPTH), &boxes, &optimisation(1, 0, 0));
             for most in [1, 2, 16, 256] {
                 let (mini_trees, opened, tallest) = cut(&given, most, MAX_DEPTH);
                 assert_eq!(mini_trees.len(), opened.len() + 1);

@@ -47,10 +47,11 @@ struct Restructure<'a> {
     total: u32,
 }
 
-/// Restructures a tree, each of whose leaves holds one primitive, and so do those of the result. Nodes come in depth-first order.
-pub(super) fn restructure(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisation) -> BoxTree {
+/// Restructures a tree, each of whose leaves holds one primitive, and so do those of the result. Nodes come in depth-first order. With it
+/// the expected cost of the tree that was given, times half the root's area.
+pub(super) fn restructure(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisation) -> (BoxTree, f32) {
     let Child::Inner(root) = tree.root else {
-        return tree.clone();
+        return (tree.clone(), half_area(&tree.bounds));
     };
     let ordered: Vec<Aabb> = tree.order.iter().map(|i| boxes[*i as usize]).collect();
     let work = Restructure {
@@ -75,11 +76,12 @@ pub(super) fn restructure(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisatio
         let children = nodes[i].children.map(|c| work.summary(c, &nodes, 0));
         nodes[i].summary = work.merged(children);
     }
+    let given_cost = nodes[0].summary.cost;
     for _ in 0..settings.rounds {
         work.subtree(&mut nodes, 0, 1);
         nodes = depth_first(&nodes, 0);
     }
-    work.finish(tree, &nodes)
+    (work.finish(tree, &nodes), given_cost)
 }
 
 /// Nodes in depth-first order, left child first: a subtree is then a slice.
