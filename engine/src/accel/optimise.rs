@@ -44,10 +44,13 @@ pub fn optimise(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisation) -> BoxT
     let (mut best, given_cost) = treelets::restructure(tree, boxes, settings);
     let mut leaves = None;
     if settings.mini_tree > 0 {
-        let rebuilt = mini_trees::rebuild(&best, settings.mini_tree, settings.max_depth);
-        let chosen = choose(&rebuilt, settings.leaves);
+        best = mini_trees::rebuild(best, settings.mini_tree, settings.max_depth);
+        let chosen = choose(&best, settings.leaves);
         if chosen.cost <= given_cost {
-            (best, leaves) = (rebuilt, Some(chosen));
+            leaves = Some(chosen);
+        } else {
+            // So rare that the tree before is rather made twice than kept.
+            best = treelets::restructure(tree, boxes, settings).0;
         }
     }
     let mut leaves = leaves.unwrap_or_else(|| choose(&best, settings.leaves));

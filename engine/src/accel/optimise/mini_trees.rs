@@ -43,24 +43,18 @@ impl MiniTree {
 
 /// Builds what is above mini trees of at most `most` primitives anew. The tree's nodes come in depth-first order, each of its leaves holds
 /// one primitive, and it is at most `max_depth` inner nodes deep, which ⌈log₂ n⌉ must be too; of the result all but the order of nodes holds.
-pub(super) fn rebuild(tree: &BoxTree, most: u32, max_depth: u32) -> BoxTree {
-    let (mut mini_trees, opened, tallest) = cut(tree, most, max_depth);
+pub(super) fn rebuild(mut tree: BoxTree, most: u32, max_depth: u32) -> BoxTree {
+    let (mut mini_trees, opened, tallest) = cut(&tree, most, max_depth);
     if mini_trees.len() < 2 {
-        return tree.clone();
+        return tree;
     }
     let mut above = vec![EMPTY_NODE; opened.len()];
-    let (_, root) = build(&mut mini_trees, &mut above, &opened, max_depth - tallest);
+    (_, tree.root) = build(&mut mini_trees, &mut above, &opened, max_depth - tallest);
     // As many nodes are built as were opened, and take their places.
-    let mut nodes = tree.nodes.clone();
     for (place, pair) in opened.iter().zip(above) {
-        nodes[*place as usize] = pair;
+        tree.nodes[*place as usize] = pair;
     }
-    BoxTree {
-        order: tree.order.clone(),
-        nodes,
-        bounds: tree.bounds,
-        root,
-    }
+    tree
 }
 
 /// The mini trees, the nodes above them in depth-first order, and the height of the tallest.

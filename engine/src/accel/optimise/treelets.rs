@@ -63,15 +63,11 @@ pub(super) fn restructure(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisatio
         Child::Leaf { first, .. } => Link::Primitive(first),
         Child::Inner(node) => Link::Inner(node),
     };
-    let mut nodes: Vec<Node> = tree
-        .nodes
-        .iter()
-        .map(|pair| Node {
-            children: pair.children.map(link),
-            summary: work.primitive(0),
-        })
-        .collect();
-    nodes = depth_first(&nodes, root);
+    let unread = work.primitive(0);
+    let mut nodes = depth_first(tree.nodes.len(), root, |node| Node {
+        children: tree.nodes[node as usize].children.map(link),
+        summary: unread,
+    });
     for i in (0..nodes.len()).rev() {
         let children = nodes[i].children.map(|c| work.summary(c, &nodes, 0));
         nodes[i].summary = work.merged(children);
@@ -79,14 +75,14 @@ pub(super) fn restructure(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisatio
     let given_cost = nodes[0].summary.cost;
     for _ in 0..settings.rounds {
         work.subtree(&mut nodes, 0, 1);
-        nodes = depth_first(&nodes, 0);
+        nodes = depth_first(nodes.len(), 0, |node| nodes[node as usize]);
     }
     (work.finish(tree, &nodes), given_cost)
 }
 
-/// Nodes in depth-first order, left child first: a subtree is then a slice.
-fn depth_first(nodes: &[Node], root: u32) -> Vec<Node> {
-    let mut ordered: Vec<Node> = Vec::with_capacity(nodes.len());
+/// At most `count` nodes in depth-first order, left child first: a subtree is then a slice.
+fn depth_first(count: usize, root: u32, read: impl Fn(u32) -> Node) -> Vec<Node> {
+    let mut ordered: Vec<Node> = Vec::with_capacity(count);
     let mut pending = vec![(root, None)];
     while let Some((node, parent)) = pending.pop() {
         let place = ordered.len() as u32;
@@ -95,9 +91,10 @@ fn depth_first(nodes: &[Node], root: u32) -> Vec<Node> {
             let side: usize = side;
             parent.children[side] = Link::Inner(place);
         }
-        ordered.push(nodes[node as usize]);
+        let node = read(node);
+        ordered.push(node);
         for side in [1, 0] {
-            if let Link::Inner(child) = nodes[node as usize].children[side] {
+            if let Link::Inner(child) = node.children[side] {
                 pending.push((child, Some((place, side))));
             }
         }
