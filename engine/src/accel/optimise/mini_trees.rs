@@ -14,6 +14,9 @@ use rayon::prelude::*;
 /// Share of the inner nodes, largest first, that never remain: what is above mini trees, at least.
 const OPENED: f64 = 0.1875;
 
+/// Least number of them: what small trees gain takes less than a millisecond.
+const LEAST_OPENED: usize = 1024;
+
 /// Most inner nodes on a way through a mini tree, which leaves the depth bound to what is above.
 const MAX_HEIGHT: u32 = 8;
 
@@ -77,11 +80,12 @@ fn cut(tree: &BoxTree, most: u32, max_depth: u32) -> (Vec<MiniTree>, Vec<u32>, u
         }
         (counts[i], heights[i]) = (count, height + 1);
     }
-    let largest = (OPENED * nodes as f64) as usize;
-    let mut sorted = areas.clone();
-    let limit = match sorted.len() {
-        0 => f32::INFINITY,
-        _ => *sorted.select_nth_unstable_by(largest, |a, b| b.total_cmp(a)).1,
+    let largest = LEAST_OPENED.max((OPENED * nodes as f64) as usize);
+    let limit = if largest < nodes {
+        let mut sorted = areas.clone();
+        *sorted.select_nth_unstable_by(largest, |a, b| b.total_cmp(a)).1
+    } else {
+        f32::NEG_INFINITY
     };
     let levels = tree.order.len().next_power_of_two().trailing_zeros();
     let tallest_allowed = MAX_HEIGHT.min(max_depth.saturating_sub(levels));
