@@ -22,12 +22,16 @@ const MAX_ROUNDS: u32 = 16;
 const MAX_MINI_TREE: u32 = 256;
 
 /// Whether to spend time on the tree after it stands.
+///
+/// Measured (`clerestory report tree-quality`) on a city of boxes, a sphere flake, a hall of materials and a triangle soup of 36 to 300
+/// thousand triangles: nodes and triangles that primary and diffuse rays visit, relative to the tree by the binned surface area heuristic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BuildQuality {
-    /// The tree that the codes spell.
+    /// The tree that the codes spell: 1.07 to 3.7 times the binned tree's steps, most where large triangles lie among small ones.
     Fast,
-    /// Optimised: see [`optimise`](crate::accel::optimise).
+    /// Optimised (see [`optimise`](crate::accel::optimise)): 1.00 to 1.05 times the binned tree's steps with default settings, 0.84 to 0.99
+    /// times with 3 reinsertions.
     #[default]
     High,
 }
@@ -42,13 +46,15 @@ pub struct LbvhSettings {
     pub leaf_size: u32,
     /// Default high.
     pub quality: BuildQuality,
-    /// Leaves of a treelet, 3..=16; high quality only. Default 5.
+    /// Leaves of a treelet, 3..=16; high quality only. Default 5: what mini trees are made of, so that larger ones gain nothing more.
     pub treelet: u32,
     /// Passes of treelets, 0..=16; high quality only. Default 1.
     pub rounds: u32,
     /// Most triangles in a subtree that is kept when what is above is built anew, 0..=256, 0 to leave that out; high quality only. Default 32.
+    /// Without it steps on the city are 2.1 times the binned tree's, and 1.4 times with treelets of 9 in 3 rounds.
     pub mini_tree: u32,
-    /// Rounds of reinsertion, 0..=16; high quality only. Default 0.
+    /// Rounds of reinsertion, 0..=16; high quality only. Default 0: each takes longer than the rest of the build. Worth it where a tree is
+    /// traced for minutes.
     pub reinsertions: u32,
 }
 
