@@ -44,8 +44,8 @@ impl MiniTree {
     }
 }
 
-/// Builds what is above mini trees of at most `most` primitives anew. The tree's nodes come in depth-first order, each of its leaves holds
-/// one primitive, and it is at most `max_depth` inner nodes deep, which ⌈log₂ n⌉ must be too; of the result all but the order of nodes holds.
+/// Builds what is above mini trees of at most `most` primitives anew. Nodes come in depth-first order, those of the result in none; each leaf
+/// holds one primitive; the tree is at most `max_depth` inner nodes deep, which ⌈log₂ n⌉ must be too.
 pub(super) fn rebuild(mut tree: BoxTree, most: u32, max_depth: u32) -> BoxTree {
     let (mut mini_trees, opened, tallest) = cut(&tree, most, max_depth);
     if mini_trees.len() < 2 {
