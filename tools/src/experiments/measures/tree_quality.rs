@@ -169,8 +169,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 ratio(1).into(),
                 u64::from(statistics.max_depth).into(),
             ];
-            for kind in 0..KINDS.len() {
-                row.extend(work[kind].map(|count| Cell::from(each(kind, count))));
+            for (kind, counts) in work.iter().enumerate() {
+                row.extend(counts.map(|count| Cell::from(each(kind, count))));
                 row.push(ratio(2 + kind).into());
             }
             table.row(row);
