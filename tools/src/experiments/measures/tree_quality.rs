@@ -184,7 +184,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     table.note(
         "The surface area cost does not foretell the steps: treelets alone have the lower cost and the more steps where large triangles lie \
-         among small ones. Rebuilding what is above mini trees takes that away at a fraction of a binned build's time; reinsertion then \
+         among small ones. Rebuilding what is above mini trees takes that away in less than the time of a binned build; reinsertion then \
          goes below the binned tree's steps, for several times its build.",
     );
     Ok(vec![table])
