@@ -22,10 +22,10 @@ use glam::Vec3;
 pub enum IndexKind {
     /// Binary hierarchy by the binned surface area heuristic.
     Bvh2(Bvh2Settings),
-    /// Linear hierarchy along the Morton curve: the shortest build and the slowest rays, unless its quality asks for treelets to be
-    /// restructured afterwards.
+    /// Linear hierarchy along the Morton curve: the shortest build and the slowest rays, unless its quality asks for the tree to be
+    /// optimised afterwards.
     Lbvh(LbvhSettings),
-    /// The same, built by the device where a scene is uploaded, and left there. Of the settings those of restructuring are not used.
+    /// The same, built by the device where a scene is uploaded, and left there. Of the settings those of quality are not used.
     LbvhOnDevice(LbvhSettings),
 }
 
@@ -36,8 +36,8 @@ impl Default for IndexKind {
 }
 
 impl IndexKind {
-    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same with restructured treelets, and the former
-    /// built by the device.
+    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, and the former built by
+    /// the device.
     pub const NAMES: [&'static str; 4] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device"];
 
     /// The linear hierarchy with default settings.

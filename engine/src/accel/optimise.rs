@@ -1,331 +1,68 @@
-//! Restructures a finished binary tree so that rays visit less of it: what turns a fast build into a good one.
+//! Works on a finished binary tree so that rays visit less of it: what turns a fast build into a good one.
 //!
-//! Source: treelets by T. Karras and T. Aila, "Fast Parallel Construction of High-Quality Bounding Volume Hierarchies", HPG 2013; their
-//! leaves merged greedily, nearest pair first, by L. Domingues and H. Pedrini, "Bounding Volume Hierarchy Optimization through Agglomerative
-//! Treelet Restructuring", HPG 2015. From the leaves up, each node takes the largest nodes below it as leaves of a treelet and keeps the
-//! better of the old and the new arrangement of these.
+//! Three steps, each of which has its file and its source: treelets are rearranged from the leaves up, everything above the small subtrees
+//! that result is built anew from the root down, and subtrees may then be taken out and put back where they cost least. Treelets alone
+//! lower the surface area cost below that of a tree built from the root down and still leave rays more to visit: large primitives among
+//! small ones pull the boxes of good subtrees over each other, which the cost, an expectation over lines through the whole scene, hardly
+//! sees (T. Aila, T. Karras, S. Laine, "On Quality Metrics of Bounding Volume Hierarchies", HPG 2013). The second step takes that overlap
+//! away.
 //!
-//! Guarantee: the expected cost never rises; the depth bound holds; the same tree whatever the number of threads, since a treelet depends
-//! on the subtrees below it alone.
+//! Guarantees: the expected cost never exceeds that of the tree given; the depth bound holds; the same tree whatever the number of
+//! threads.
+
+mod leaves;
+mod mini_trees;
+mod reinsertion;
+mod treelets;
+
+pub use treelets::MAX_TREELET;
 
 use super::bvh2::Aabb;
 use super::lbvh::radix::{LeafRule, half_area};
 use super::lbvh::tree::{BoxTree, Child, EMPTY_NODE, PairNode};
+use leaves::{choose, with_leaves};
 
-/// Subtrees of more inner nodes than this are worked on in parallel.
-const PARALLEL_NODES: usize = 2048;
-
-/// Most leaves of a treelet that settings may ask for.
-pub const MAX_TREELET: usize = 16;
-
-/// How much to restructure.
+/// How much to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Restructuring {
+pub struct Optimisation {
     /// Leaves of a treelet, 3..=[`MAX_TREELET`].
     pub treelet: usize,
-    /// Passes over the tree.
+    /// Passes of treelets over the tree.
     pub rounds: u32,
+    /// Most primitives in a subtree that is kept when what is above is built anew; 0 leaves the step out.
+    pub mini_tree: u32,
+    /// Rounds of reinsertion.
+    pub reinsertions: u32,
     /// When subtrees become leaves; part of the cost.
     pub leaves: LeafRule,
-    /// Most inner nodes on a way from the root; the tree that is given must keep it.
+    /// Most inner nodes on a way from the root; the tree that is given must keep it, and ⌈log₂ n⌉ must.
     pub max_depth: u32,
 }
 
-/// A place of the order, or an inner node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Link {
-    Primitive(u32),
-    Inner(u32),
-}
-
-/// A subtree's summary.
-#[derive(Debug, Clone, Copy)]
-struct Summary {
-    bounds: Aabb,
-    area: f32,
-    cost: f32,
-    height: u32,
-    count: u32,
-    is_leaf: bool,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Node {
-    children: [Link; 2],
-    summary: Summary,
-}
-
-struct Restructure<'a> {
-    settings: &'a Restructuring,
-    /// Boxes in the tree's order.
-    boxes: &'a [Aabb],
-    total: u32,
-}
-
-/// Restructures a tree, each of whose leaves holds one primitive, and makes its leaves. Nodes come in depth-first order.
-pub fn restructure(tree: &BoxTree, boxes: &[Aabb], settings: &Restructuring) -> BoxTree {
-    let Child::Inner(root) = tree.root else {
-        return tree.clone();
-    };
-    let ordered: Vec<Aabb> = tree.order.iter().map(|i| boxes[*i as usize]).collect();
-    let work = Restructure {
-        settings,
-        boxes: &ordered,
-        total: tree.order.len() as u32,
-    };
-    let link = |child| match child {
-        Child::Leaf { first, .. } => Link::Primitive(first),
-        Child::Inner(node) => Link::Inner(node),
-    };
-    let mut nodes: Vec<Node> = tree
-        .nodes
-        .iter()
-        .map(|pair| Node {
-            children: pair.children.map(link),
-            summary: work.primitive(0),
-        })
-        .collect();
-    nodes = depth_first(&nodes, root);
-    for i in (0..nodes.len()).rev() {
-        let children = nodes[i].children.map(|c| work.summary(c, &nodes, 0));
-        nodes[i].summary = work.merged(children);
-    }
-    for _ in 0..settings.rounds {
-        work.subtree(&mut nodes, 0, 1);
-        nodes = depth_first(&nodes, 0);
-    }
-    work.finish(tree, &nodes)
-}
-
-/// Nodes in depth-first order, left child first: a subtree is then a slice.
-fn depth_first(nodes: &[Node], root: u32) -> Vec<Node> {
-    let mut ordered: Vec<Node> = Vec::with_capacity(nodes.len());
-    let mut pending = vec![(root, None)];
-    while let Some((node, parent)) = pending.pop() {
-        let place = ordered.len() as u32;
-        if let Some((parent, side)) = parent {
-            let parent: &mut Node = &mut ordered[parent as usize];
-            let side: usize = side;
-            parent.children[side] = Link::Inner(place);
-        }
-        ordered.push(nodes[node as usize]);
-        for side in [1, 0] {
-            if let Link::Inner(child) = nodes[node as usize].children[side] {
-                pending.push((child, Some((place, side))));
-            }
-        }
-    }
-    ordered
-}
-
-impl Restructure<'_> {
-    fn primitive(&self, place: u32) -> Summary {
-        let bounds = self.boxes[place as usize];
-        let area = half_area(&bounds);
-        Summary {
-            bounds,
-            area,
-            cost: area,
-            height: 0,
-            count: 1,
-            is_leaf: true,
-        }
-    }
-
-    /// Of a child in a slice of nodes that begins at `base`.
-    fn summary(&self, link: Link, nodes: &[Node], base: u32) -> Summary {
-        match link {
-            Link::Primitive(place) => self.primitive(place),
-            Link::Inner(node) => nodes[(node - base) as usize].summary,
-        }
-    }
-
-    fn merged(&self, [a, b]: [Summary; 2]) -> Summary {
-        let bounds = a.bounds.union(b.bounds);
-        let area = half_area(&bounds);
-        let count = a.count + b.count;
-        let split_cost = area + (a.cost + b.cost);
-        let leaf_cost = area * count as f32;
-        let is_leaf = self
-            .settings
-            .leaves
-            .makes_leaf(count, leaf_cost, split_cost, count == self.total);
-        Summary {
-            bounds,
-            area,
-            cost: if is_leaf { leaf_cost } else { split_cost },
-            height: a.height.max(b.height) + 1,
-            count,
-            is_leaf,
-        }
-    }
-
-    /// Works on the subtree that is all of `nodes`, the first of them its root, whose index is `base` and whose depth is `depth`.
-    fn subtree(&self, nodes: &mut [Node], base: u32, depth: u32) {
-        let Some((root, below)) = nodes.split_first_mut() else {
-            return;
-        };
-        let left_count = match root.children {
-            [Link::Inner(_), Link::Inner(right)] => (right - base - 1) as usize,
-            [Link::Inner(_), _] => below.len(),
-            _ => 0,
-        };
-        let (left_base, right_base) = (base + 1, base + 1 + left_count as u32);
-        let (left, right) = below.split_at_mut(left_count);
-        if left.len() + right.len() > PARALLEL_NODES {
-            rayon::join(
-                || self.subtree(left, left_base, depth + 1),
-                || self.subtree(right, right_base, depth + 1),
-            );
+/// Optimises a tree, each of whose leaves holds one primitive, and makes its leaves. Nodes come in depth-first order.
+pub fn optimise(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisation) -> BoxTree {
+    let (mut best, given_cost) = treelets::restructure(tree, boxes, settings);
+    let mut leaves = None;
+    if settings.mini_tree > 0 {
+        best = mini_trees::rebuild(best, settings.mini_tree, settings.max_depth);
+        let chosen = choose(&best, settings.leaves);
+        if chosen.cost <= given_cost {
+            leaves = Some(chosen);
         } else {
-            self.subtree(left, left_base, depth + 1);
-            self.subtree(right, right_base, depth + 1);
-        }
-        let children = nodes[0].children.map(|c| self.summary(c, nodes, base));
-        nodes[0].summary = self.merged(children);
-        self.treelet(nodes, base, self.settings.max_depth + 1 - depth);
-    }
-
-    /// Rearranges the treelet below the first node, if that lowers the cost and keeps the height.
-    fn treelet(&self, nodes: &mut [Node], base: u32, max_height: u32) {
-        let mut inner = [0u32; MAX_TREELET];
-        let mut links = [Link::Primitive(0); MAX_TREELET];
-        let mut leaves = [nodes[0].summary; MAX_TREELET];
-        (links[0], links[1]) = (nodes[0].children[0], nodes[0].children[1]);
-        let mut count = 2;
-        leaves[0] = self.summary(links[0], nodes, base);
-        leaves[1] = self.summary(links[1], nodes, base);
-        while count < self.settings.treelet {
-            // The largest that can be opened; of equal ones the first.
-            let mut largest: Option<(usize, u32)> = None;
-            for (i, link) in links[..count].iter().enumerate() {
-                if let Link::Inner(node) = *link
-                    && largest.is_none_or(|(l, _)| leaves[i].area > leaves[l].area)
-                {
-                    largest = Some((i, node));
-                }
-            }
-            let Some((opened, node)) = largest else {
-                break;
-            };
-            let children = nodes[(node - base) as usize].children;
-            inner[count - 1] = node;
-            links[opened] = children[0];
-            links[count] = children[1];
-            leaves[opened] = self.summary(children[0], nodes, base);
-            leaves[count] = self.summary(children[1], nodes, base);
-            count += 1;
-        }
-        if count < 3 {
-            return;
-        }
-        let mut merged = [nodes[0]; MAX_TREELET];
-        self.agglomerate(&mut links, &mut leaves, count, &inner, &mut merged);
-        let new = leaves[0];
-        if new.cost < nodes[0].summary.cost && new.height <= max_height {
-            for slot in 1..count - 1 {
-                nodes[(inner[slot] - base) as usize] = merged[slot];
-            }
-            nodes[0] = merged[0];
+            // So rare that the tree before is rather made twice than kept.
+            best = treelets::restructure(tree, boxes, settings).0;
         }
     }
-
-    /// Merges the nearest pair until one is left, which then stands first. The k-th merge from the end takes the k-th inner node.
-    fn agglomerate(
-        &self,
-        links: &mut [Link; MAX_TREELET],
-        leaves: &mut [Summary; MAX_TREELET],
-        mut count: usize,
-        inner: &[u32; MAX_TREELET],
-        merged: &mut [Node; MAX_TREELET],
-    ) {
-        let distance = |a: &Summary, b: &Summary| half_area(&a.bounds.union(b.bounds));
-        let mut distances = [[f32::INFINITY; MAX_TREELET]; MAX_TREELET];
-        for i in 1..count {
-            for j in 0..i {
-                distances[i][j] = distance(&leaves[i], &leaves[j]);
-            }
-        }
-        while count > 1 {
-            let (mut a, mut b) = (0, 1);
-            for (i, row) in distances[..count].iter().enumerate() {
-                for (j, d) in row[..i].iter().enumerate() {
-                    if *d < distances[b][a] {
-                        (a, b) = (j, i);
-                    }
-                }
-            }
-            let slot = count - 2;
-            merged[slot] = Node {
-                children: [links[a], links[b]],
-                summary: self.merged([leaves[a], leaves[b]]),
-            };
-            // The pair's node takes the place of its first, and the last moves to that of its second.
-            count -= 1;
-            (links[b], leaves[b]) = (links[count], leaves[count]);
-            links[a] = Link::Inner(inner[slot]);
-            leaves[a] = merged[slot].summary;
-            for i in 0..count {
-                for changed in [a, b] {
-                    if i != changed && changed < count {
-                        distances[i.max(changed)][i.min(changed)] = distance(&leaves[i], &leaves[changed]);
-                    }
-                }
-            }
+    let mut leaves = leaves.unwrap_or_else(|| choose(&best, settings.leaves));
+    if settings.reinsertions > 0 {
+        let moved = reinsertion::reinsert(&best, settings.reinsertions, settings.max_depth);
+        let chosen = choose(&moved, settings.leaves);
+        if chosen.cost <= leaves.cost {
+            (best, leaves) = (moved, chosen);
         }
     }
-
-    /// Makes leaves of the subtrees that are better off so, in depth-first order.
-    fn finish(&self, tree: &BoxTree, nodes: &[Node]) -> BoxTree {
-        let mut order = Vec::with_capacity(tree.order.len());
-        let mut finished: Vec<PairNode> = Vec::with_capacity(nodes.len());
-        let mut pending = vec![(Link::Inner(0), None)];
-        let mut gathered = Vec::new();
-        while let Some((link, parent)) = pending.pop() {
-            let summary = self.summary(link, nodes, 0);
-            let child = match link {
-                Link::Inner(node) if !summary.is_leaf => {
-                    let place = finished.len() as u32;
-                    finished.push(EMPTY_NODE);
-                    for side in [1, 0] {
-                        pending.push((nodes[node as usize].children[side], Some((place, side))));
-                    }
-                    Child::Inner(place)
-                }
-                link => {
-                    let first = order.len() as u32;
-                    gathered.push(link);
-                    while let Some(link) = gathered.pop() {
-                        match link {
-                            Link::Primitive(place) => order.push(tree.order[place as usize]),
-                            Link::Inner(node) => gathered.extend(nodes[node as usize].children.iter().rev()),
-                        }
-                    }
-                    Child::Leaf {
-                        first,
-                        count: summary.count,
-                    }
-                }
-            };
-            if let Some((place, side)) = parent {
-                let (place, side): (u32, usize) = (place, side);
-                let pair = &mut finished[place as usize];
-                pair.bounds[side] = summary.bounds;
-                pair.children[side] = child;
-            }
-        }
-        let root = match finished.is_empty() {
-            false => Child::Inner(0),
-            true => Child::Leaf {
-                first: 0,
-                count: order.len() as u32,
-            },
-        };
-        BoxTree {
-            order,
-            nodes: finished,
-            bounds: tree.bounds,
-            root,
-        }
-    }
+    with_leaves(&best, &leaves)
 }
+
+#[cfg(test)]
+mod tests;

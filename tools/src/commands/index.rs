@@ -80,17 +80,25 @@ struct Measured {
 type Build = fn(&[[Vec3; 3]]) -> Result<Bvh2>;
 
 /// The indexes, the one that others are compared with first.
-const INDEXES: [(&str, Build); 4] = [
+const INDEXES: [(&str, Build); 5] = [
     ("bvh2, binned", |t| Bvh2::build(t, &Bvh2Settings::default())),
     ("lbvh, fast", |t| lbvh::build(t, &fast(30))),
     ("lbvh, fast, 63 bits", |t| lbvh::build(t, &fast(63))),
     ("lbvh, high", |t| lbvh::build(t, &LbvhSettings::default())),
+    ("lbvh, high, 3 reinsertions", |t| lbvh::build(t, &reinserted(3))),
 ];
 
 fn fast(code_bits: u32) -> LbvhSettings {
     LbvhSettings {
         code_bits,
         quality: BuildQuality::Fast,
+        ..LbvhSettings::default()
+    }
+}
+
+fn reinserted(reinsertions: u32) -> LbvhSettings {
+    LbvhSettings {
+        reinsertions,
         ..LbvhSettings::default()
     }
 }

@@ -320,6 +320,11 @@ fn settings_out_of_range_are_refused() {
         LbvhSettings { treelet: 2, ..good },
         LbvhSettings { treelet: 17, ..good },
         LbvhSettings { rounds: 17, ..good },
+        LbvhSettings { mini_tree: 257, ..good },
+        LbvhSettings {
+            reinsertions: 17,
+            ..good
+        },
     ] {
         assert!(build(&[], &bad).is_err(), "{bad:?}");
     }

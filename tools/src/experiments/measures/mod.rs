@@ -30,6 +30,7 @@ mod scene_profile;
 mod shading_normals;
 mod sphere_tests;
 mod tangents;
+mod tree_quality;
 mod triangle_tests;
 mod wide;
 
@@ -105,6 +106,7 @@ pub const MEASURES: &[Measure] = &[
     on_host("shading-normals", shading_normals::measure),
     on_host("sphere-tests", sphere_tests::measure),
     on_host("tangents", tangents::measure),
+    on_host("tree-quality", tree_quality::measure),
     on_host("triangle-tests", triangle_tests::measure),
 ];
 
