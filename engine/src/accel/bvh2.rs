@@ -13,7 +13,7 @@ pub(super) mod build;
 mod traverse;
 
 pub use build::Bvh2Settings;
-pub use traverse::{FINISHED, Traversal};
+pub use traverse::{FINISHED, Step, Traversal};
 
 use super::{CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
 use crate::Result;

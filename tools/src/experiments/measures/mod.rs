@@ -8,6 +8,7 @@ mod clock;
 mod compact_map;
 mod compact_rays;
 mod coupled_reflection;
+mod device_model;
 mod energy;
 mod errors;
 mod free_flight;
@@ -88,6 +89,7 @@ pub const MEASURES: &[Measure] = &[
     on_host("compact-map", compact_map::measure),
     on_host("compact-rays", compact_rays::measure),
     on_host("coupled-reflection", coupled_reflection::measure),
+    on_device("device-model", device_model::measure),
     on_host("free-flight", free_flight::measure),
     on_host("leaf-sizes", leaf_sizes::measure),
     on_device("map-construction", map_construction::measure),
