@@ -80,7 +80,7 @@ impl<'a> Kernel<'a> {
         };
         let buffers = |rays: &&[Ray]| {
             Ok(Buffers {
-                rays: gpu.buffer_with("rays", Category::Work, *rays)?,
+                rays: gpu.buffer_with("rays", Category::Work, rays)?,
                 hits: gpu.buffer_with("hits", Category::Work, &vec![0_u32; 4 * rays.len()])?,
                 resume: gpu.buffer_with("resume", Category::Work, &vec![0_u32; rays.len()])?,
                 status: gpu.buffer_with("status", Category::Work, &[0_u32; 4])?,

@@ -14,8 +14,8 @@ use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Step, Traversal};
 use clerestory::accel::{Ray, TraversalCounters};
 use clerestory::gpu::Gpu;
+use clerestory_tools::least_squares::non_negative;
 use clerestory_tools::machine::median;
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::KINDS;
@@ -32,8 +32,6 @@ const TRIANGLE_BYTES: u64 = 48;
 const ITERATIONS: usize = 3;
 /// Costs: of a subgroup, and of an iteration of each kind.
 const COSTS: usize = 1 + ITERATIONS;
-/// Relative to the largest, singular values that count as zero.
-const RANK_TOLERANCE: f64 = 1e-10;
 
 /// What subgroups do with some rays.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -154,36 +152,6 @@ pub struct Work {
     pub relative_error: f64,
 }
 
-/// Least squares without negative costs, each row with the weight 1/time²; by trying which costs are zero.
-fn fit(rows: &[([f64; COSTS], f64)]) -> [f64; COSTS] {
-    let mut best = (f64::INFINITY, [0.0; COSTS]);
-    for chosen in 1_usize..1 << COSTS {
-        let columns: Vec<usize> = (0..COSTS).filter(|i| chosen >> i & 1 == 1).collect();
-        let matrix = DMatrix::from_fn(rows.len(), columns.len(), |row, column| {
-            rows[row].0[columns[column]] / rows[row].1
-        });
-        let ones = DVector::from_element(rows.len(), 1.0);
-        let decomposed = matrix.clone().svd(true, true);
-        let least = RANK_TOLERANCE * decomposed.singular_values.max();
-        let Ok(solution) = decomposed.solve(&ones, least) else {
-            continue;
-        };
-        if solution.iter().any(|cost| !(*cost >= 0.0)) {
-            continue;
-        }
-        let error = (matrix * &solution - ones).norm_squared();
-        if error < best.0 {
-            let mut costs = [0.0; COSTS];
-            columns
-                .iter()
-                .zip(solution.iter())
-                .for_each(|(i, cost)| costs[*i] = *cost);
-            best = (error, costs);
-        }
-    }
-    best.1
-}
-
 /// Measures the indexes of one scene.
 pub fn measure(gpu: &Gpu, scene: &str, built: &[Built], rays: &[Vec<Ray>; 2], repeat: u32) -> Result<Vec<Work>> {
     let width = gpu.caps().subgroup_size.max(1) as usize;
@@ -210,12 +178,8 @@ pub fn measure(gpu: &Gpu, scene: &str, built: &[Built], rays: &[Vec<Ray>; 2], re
             all.push((one.name, kind, rays.len() as f64, whole, seconds.iter().sum::<f64>()));
         }
     }
-    let costs = fit(&rows);
-    let error = |(counts, seconds): &([f64; COSTS], f64)| {
-        let fitted: f64 = counts.iter().zip(&costs).map(|(count, cost)| count * cost).sum();
-        (fitted / seconds - 1.0).powi(2)
-    };
-    let relative_error = (rows.iter().map(error).sum::<f64>() / rows.len().max(1) as f64).sqrt();
+    let fit = non_negative(&rows);
+    let costs = fit.coefficients;
     let work = all.into_iter().map(|(index, kind, count, whole, seconds)| {
         let (fitted, parts) = (whole.seconds(&costs), whole.parts(&costs, width));
         let iterations: u64 = whole.iterations.iter().sum();
@@ -232,7 +196,7 @@ pub fn measure(gpu: &Gpu, scene: &str, built: &[Built], rays: &[Vec<Ray>; 2], re
             shares: parts.map(|part| part / fitted),
             costs: costs.map(|cost| 1e9 * cost),
             fitted: fitted / seconds,
-            relative_error,
+            relative_error: fit.relative_error,
         }
     });
     Ok(work.collect())
@@ -294,25 +258,5 @@ mod tests {
             (counters.nodes, counters.triangles, 5)
         );
         assert!(found.triangles > 0 && found.iterations[2] > 0);
-    }
-
-    #[test]
-    fn fits_find_exact_costs_and_none_below_zero() {
-        let costs = [5.0, 1.0, 0.0, 2.0];
-        let mut random = super::super::tests::stream();
-        let rows: Vec<([f64; COSTS], f64)> = (0..20)
-            .map(|_| {
-                let counts = [0; COSTS].map(|_| f64::from(random()) + 0.1);
-                (counts, counts.iter().zip(costs).map(|(a, b)| a * b).sum())
-            })
-            .collect();
-        let found = fit(&rows);
-        // Singular values of these rows span two powers of ten; f64 leaves more than ten digits.
-        assert!(found.iter().zip(costs).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
-        let lowered: Vec<_> = rows
-            .iter()
-            .map(|(counts, time)| (*counts, time - 0.3 * counts[2]))
-            .collect();
-        assert!(fit(&lowered).iter().all(|cost| *cost >= 0.0));
     }
 }

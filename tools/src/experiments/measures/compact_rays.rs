@@ -22,6 +22,9 @@ const LEAF_SIZE: u32 = 5;
 /// Bytes that shadow rays spare on a complete pair's stack entry: they need no distance.
 const SHADOW_ENTRY_SPARES: u64 = 4;
 
+/// Bytes of a compact pair's stack entry.
+const COMPACT_ENTRY_BYTES: u64 = 12;
+
 /// Scene, its light, its counterpart in the source.
 const CASES: [(&str, Vec3, &str); 4] = [
     ("builtin:box-room?source=point", Vec3::new(3.0, 2.5, 3.0), "Scene 6"),
@@ -181,11 +184,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "triangles tested a ray",
             "bytes a ray, complete",
             "bytes, compact (%)",
+            "bytes, compact, entries for push and pop (%)",
             "source: bytes, complete",
             "source: compact (%)",
             "ns a ray, complete",
             "speed, compact (%)",
             "source: speed (%)",
+            "deviation",
         ],
     );
     for (done, (scene, light, counterpart)) in cases.iter().enumerate() {
@@ -231,11 +236,21 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             each(complete[3]).into(),
             each(complete[2]).into(),
             change(compact[2], complete[2]).into(),
+            change(compact[2] + COMPACT_ENTRY_BYTES * compact[1], complete[2]).into(),
             theirs(2),
             theirs(3),
             times[0].into(),
             (100.0 * (times[0] / times[1] - 1.0)).into(),
             theirs(4),
+            match *counterpart {
+                "Scene 6" => format!(
+                    "bytes {:+.1} points of theirs, {:+.1} with entries for push and pop",
+                    change(compact[2], complete[2]) - SCENE_6[3],
+                    change(compact[2] + COMPACT_ENTRY_BYTES * compact[1], complete[2]) - SCENE_6[3]
+                )
+                .into(),
+                _ => "no counterpart".into(),
+            },
         ]);
     }
     table.note(format!(

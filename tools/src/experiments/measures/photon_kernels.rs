@@ -1,10 +1,11 @@
-//! Stand-ins for photon maps: kernels of fixed radius about the second and third hits of photons that walk through a scene, and the
-//! surface points that cameras see.
+//! Stand-ins for photon maps: kernels about the second and third hits of photons that walk through a scene, and the surface points that
+//! cameras see.
 //!
 //! Source of what they stand for: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6. Photons
 //! leave a point evenly, surfaces but mirrors scatter them by the cosine with probability [`SURVIVAL`], and hits two and three are kept.
 //! Radii go by the fourth root of the photon's way, the source's dampening; their scale is set so that a point of the scene's surfaces
-//! lies in a given number of kernels on average. Spheres take the place of the source's flattened ellipsoids.
+//! lies in a given number of kernels on average. The source's kernels are ellipsoids that lie on the surface; [`Shape`] has them stretched as
+//! the footprint of a beam is by its incidence, and spheres of the same area beside them.
 //!
 //! Guarantee: deterministic.
 
@@ -203,41 +204,173 @@ impl Surfaces {
     }
 }
 
+impl Surfaces {
+    /// Points anywhere on the surfaces but mirrors, evenly by area.
+    pub fn anywhere(&self, count: usize) -> Vec<Vec3> {
+        let mut random = Random::new(13);
+        let mut sum = 0.0;
+        let sums: Vec<f64> = self
+            .triangles
+            .iter()
+            .zip(&self.mirrors)
+            .map(|(triangle, is_mirror)| {
+                sum += if *is_mirror { 0.0 } else { area(triangle) };
+                sum
+            })
+            .collect();
+        let point = |_| {
+            let wanted = sum * random.unit();
+            let [a, b, c] = self.triangles[sums.partition_point(|sum| *sum <= wanted).min(sums.len() - 1)];
+            let (root, along) = (random.unit().sqrt() as f32, random.unit() as f32);
+            a + root * ((b - a) + along * (c - b))
+        };
+        (0..count).map(point).collect()
+    }
+}
+
+/// What kernels look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// Spheres.
+    Spheres,
+    /// Ellipsoids whose semi-axes on the surface are in the ratio of one to the cosine of incidence, at most [`MOST_STRETCHED`], and have the
+    /// product that the sphere's have; as thick as wide.
+    Ellipsoids,
+}
+
+impl Shape {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Spheres, Self::Ellipsoids];
+
+    /// For a table's cell.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Spheres => "spheres",
+            Self::Ellipsoids => "ellipsoids",
+        }
+    }
+}
+
+/// The shape that is nearest to the source's.
+pub const SOURCE_SHAPE: Shape = Shape::Ellipsoids;
+
+/// The source's bound on the ratio of a kernel's semi-axes.
+const MOST_STRETCHED: f64 = 20.0;
+
+/// An ellipsoid: the points whose way from the centre has products with the three vectors that lie in the unit ball.
+#[derive(Debug, Clone, Copy)]
+struct Ellipsoid {
+    centre: Vec3,
+    inverse: [Vec3; 3],
+}
+
+#[derive(Debug, Clone)]
+enum Records {
+    /// Centre and radius.
+    Spheres(Vec<Vec4>),
+    Ellipsoids(Vec<Ellipsoid>),
+}
+
 /// Kernels about hits of photons.
 pub struct Kernels {
-    /// Centre and radius, metres.
-    pub spheres: Vec<Vec4>,
+    records: Records,
+    /// Areas on the surface, m².
+    areas: Vec<f64>,
+    /// Ratios of semi-axes on the surface.
+    stretches: Vec<f64>,
     /// Their boxes.
     pub boxes: Vec<Aabb>,
 }
 
+/// Where a photon's kernel goes.
+#[derive(Debug, Clone, Copy)]
+struct Deposit {
+    point: Vec3,
+    normal: Vec3,
+    direction: Vec3,
+    /// Length of the photon's way, metres.
+    way: f32,
+}
+
+impl Deposit {
+    /// Semi-axes of an ellipsoid whose sphere has the radius: along the incidence, across, along the normal.
+    fn axes(&self, radius: f64) -> [Vec3; 3] {
+        let stretch = self.stretch();
+        let normal = self.normal.as_dvec3();
+        let along = self.direction.as_dvec3().reject_from(normal);
+        let along = along.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let across = normal.cross(along);
+        let (long, short) = (radius * stretch.sqrt(), radius / stretch.sqrt());
+        [long * along, short * across, short * normal].map(|axis| axis.as_vec3())
+    }
+
+    fn stretch(&self) -> f64 {
+        let cosine = f64::from(self.normal.dot(self.direction).abs());
+        (1.0 / cosine.max(1.0 / MOST_STRETCHED)).max(1.0)
+    }
+}
+
 impl Kernels {
     /// The kernels of `photons` photons, of which `cover` lie about a surface point on average.
-    pub fn trace(surfaces: &Surfaces, light: Vec3, photons: u32, cover: f64) -> Self {
+    pub fn trace(surfaces: &Surfaces, light: Vec3, photons: u32, cover: f64, shape: Shape) -> Self {
         let mut random = Random::new(12);
         let mut hits = Vec::new();
         for _ in 0..photons {
             walk(surfaces, light, &mut random, &mut hits);
         }
         // Radius = scale · (way / 1 m)^(1/4).
-        let squares: f64 = hits.iter().map(|(_, way)| f64::from(*way).sqrt()).sum();
+        let squares: f64 = hits.iter().map(|hit| f64::from(hit.way).sqrt()).sum();
         let scale = (cover * surfaces.area / (std::f64::consts::PI * squares)).sqrt();
-        let sphere = |(centre, way): &(Vec3, f32)| centre.extend((scale * f64::from(*way).powf(0.25)) as f32);
-        let spheres: Vec<Vec4> = hits.iter().map(sphere).collect();
-        let bounds = |sphere: &Vec4| Aabb {
-            lower: sphere.truncate() - sphere.w,
-            upper: sphere.truncate() + sphere.w,
+        let radius = |hit: &Deposit| scale * f64::from(hit.way).powf(0.25);
+        let around = |centre: Vec3, extent: Vec3| Aabb {
+            lower: centre - extent,
+            upper: centre + extent,
         };
-        Self {
-            boxes: spheres.iter().map(bounds).collect(),
-            spheres,
+        let disc = |radius: f64| std::f64::consts::PI * radius.powi(2);
+        match shape {
+            Shape::Spheres => {
+                let spheres: Vec<Vec4> = hits.iter().map(|hit| hit.point.extend(radius(hit) as f32)).collect();
+                Self {
+                    boxes: spheres.iter().map(|s| around(s.truncate(), Vec3::splat(s.w))).collect(),
+                    areas: spheres.iter().map(|s| disc(f64::from(s.w))).collect(),
+                    stretches: vec![1.0; spheres.len()],
+                    records: Records::Spheres(spheres),
+                }
+            }
+            Shape::Ellipsoids => {
+                let axes: Vec<[Vec3; 3]> = hits.iter().map(|hit| hit.axes(radius(hit))).collect();
+                let extent = |axes: &[Vec3; 3]| axes.iter().map(|axis| axis * axis).sum::<Vec3>().map(f32::sqrt);
+                let record = |(hit, axes): (&Deposit, &[Vec3; 3])| Ellipsoid {
+                    centre: hit.point,
+                    inverse: axes.map(|axis| axis / axis.length_squared()),
+                };
+                let pairs = hits.iter().zip(&axes);
+                Self {
+                    boxes: pairs
+                        .clone()
+                        .map(|(hit, axes)| around(hit.point, extent(axes)))
+                        .collect(),
+                    areas: hits.iter().map(|hit| disc(radius(hit))).collect(),
+                    stretches: hits.iter().map(Deposit::stretch).collect(),
+                    records: Records::Ellipsoids(pairs.map(record).collect()),
+                }
+            }
         }
     }
 
-    /// Areas of their discs on a surface, m².
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.boxes.len()
+    }
+
+    /// Their areas on the surface, m².
     pub fn areas(&self) -> impl Iterator<Item = f64> + '_ {
-        let area = |sphere: &Vec4| std::f64::consts::PI * f64::from(sphere.w).powi(2);
-        self.spheres.iter().map(area)
+        self.areas.iter().copied()
+    }
+
+    /// Mean ratio of their semi-axes on the surface.
+    pub fn mean_stretch(&self) -> f64 {
+        self.stretches.iter().sum::<f64>() / self.stretches.len().max(1) as f64
     }
 
     /// The tree of the voxel volume heuristic.
@@ -253,7 +386,7 @@ impl Kernels {
 }
 
 /// Follows one photon and keeps its second and third hits on diffuse surfaces with the length of its way.
-fn walk(surfaces: &Surfaces, light: Vec3, random: &mut Random, hits: &mut Vec<(Vec3, f32)>) {
+fn walk(surfaces: &Surfaces, light: Vec3, random: &mut Random, hits: &mut Vec<Deposit>) {
     let (mut origin, mut direction) = (light, random.direction().as_vec3());
     let mut way = 0.0;
     for hit in 1..=HITS {
@@ -265,7 +398,12 @@ fn walk(surfaces: &Surfaces, light: Vec3, random: &mut Random, hits: &mut Vec<(V
             direction = direction.reflect(meeting.normal);
         } else {
             if hit > 1 {
-                hits.push((meeting.point, way));
+                hits.push(Deposit {
+                    point: meeting.point,
+                    normal: meeting.normal,
+                    direction,
+                    way,
+                });
             }
             if random.unit() >= SURVIVAL {
                 return;
@@ -295,7 +433,7 @@ pub struct Map {
     pub complete: CompleteBvh,
     /// Compact pairs.
     pub compact: CompactBvh,
-    records: Vec<Vec4>,
+    records: Records,
 }
 
 impl Map {
@@ -304,18 +442,35 @@ impl Map {
         let complete = CompleteBvh::new(tree)?;
         let compact = CompactBvh::encode(&complete)
             .map_err(|fault| Error::setting("tree", "compact", format!("is not tight: {fault:?}")))?;
+        let order = || complete.order.iter().map(|i| *i as usize);
+        let records = match &kernels.records {
+            Records::Spheres(all) => Records::Spheres(order().map(|i| all[i]).collect()),
+            Records::Ellipsoids(all) => Records::Ellipsoids(order().map(|i| all[i]).collect()),
+        };
         Ok(Self {
-            records: complete.order.iter().map(|i| kernels.spheres[*i as usize]).collect(),
+            records,
             complete,
             compact,
         })
     }
 
     fn leaf(&self, point: Vec3, first: u32, work: &mut Work) {
-        let places = self.records.iter().zip(&self.complete.ends).skip(first as usize);
-        for (sphere, is_last) in places {
+        match &self.records {
+            Records::Spheres(all) => self.test(all, first, work, |sphere| {
+                (sphere.truncate() - point).length_squared() < sphere.w * sphere.w
+            }),
+            Records::Ellipsoids(all) => self.test(all, first, work, |ellipsoid| {
+                let way = point - ellipsoid.centre;
+                let [a, b, c] = ellipsoid.inverse.map(|axis| axis.dot(way));
+                a * a + b * b + c * c < 1.0
+            }),
+        }
+    }
+
+    fn test<T>(&self, records: &[T], first: u32, work: &mut Work, holds: impl Fn(&T) -> bool) {
+        for (record, is_last) in records.iter().zip(&self.complete.ends).skip(first as usize) {
             work.tests += 1;
-            work.contributions += u64::from((sphere.truncate() - point).length_squared() < sphere.w * sphere.w);
+            work.contributions += u64::from(holds(record));
             if *is_last {
                 break;
             }
@@ -328,6 +483,16 @@ impl Map {
         self.complete
             .point_query(point, &mut tree, |first| self.leaf(point, first, work));
         work.tree = tree;
+    }
+
+    /// As [`Self::gather_complete`], without the kernels.
+    pub fn visit_complete(&self, point: Vec3, work: &mut Work) {
+        self.complete.point_query(point, &mut work.tree, |_| {});
+    }
+
+    /// As [`Self::gather_compact`], without the kernels.
+    pub fn visit_compact(&self, point: Vec3, work: &mut Work) {
+        self.compact.point_query(point, &mut work.tree, |_| {});
     }
 
     /// Gathers at a point by compact pairs.
@@ -347,23 +512,34 @@ pub struct Prepared {
     pub surfaces: Surfaces,
     /// Kernels of the photons.
     pub kernels: Kernels,
-    /// Points to query at.
+    /// Their shape.
+    pub shape: Shape,
+    /// Points that the camera sees.
     pub points: Vec<Vec3>,
+    /// As many points anywhere on the surfaces, by area.
+    pub anywhere: Vec<Vec3>,
 }
 
-/// The cases that a measure takes, each made when its turn comes, until the measure is stopped.
-pub fn prepared<'a>(context: &'a Context<'_>) -> impl Iterator<Item = Result<Prepared>> + 'a {
+/// The cases that a measure takes, in each shape, each made when its turn comes, until the measure is stopped.
+pub fn prepared<'a>(context: &'a Context<'_>, shapes: &'a [Shape]) -> impl Iterator<Item = Result<Prepared>> + 'a {
     // Photons sent out, and pixels on a side of the camera.
     let (photons, side) = if context.smoke { (1 << 9, 8) } else { (1 << 17, 96) };
     let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
-    let going_on = cases.iter().enumerate().take_while(|_| !context.watch.stopped());
-    going_on.map(move |(done, case)| {
-        context.watch.begin(case.name(), done, cases.len());
+    let all = cases
+        .iter()
+        .flat_map(move |case| shapes.iter().map(move |shape| (case, *shape)));
+    let count = cases.len() * shapes.len();
+    let going_on = all.enumerate().take_while(|_| !context.watch.stopped());
+    going_on.map(move |(done, (case, shape))| {
+        context.watch.begin(case.name(), done, count);
         let surfaces = Surfaces::load(case.scene)?;
+        let points = surfaces.seen(side)?;
         Ok(Prepared {
             case,
-            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover),
-            points: surfaces.seen(side)?,
+            shape,
+            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover, shape),
+            anywhere: surfaces.anywhere(points.len()),
+            points,
             surfaces,
         })
     })
@@ -378,23 +554,62 @@ mod tests {
         let case = &CASES[0];
         let surfaces = Surfaces::load(case.scene).unwrap();
         assert!(surfaces.mirrors.iter().any(|m| *m) && surfaces.triangles.len() == 802);
-        let kernels = Kernels::trace(&surfaces, case.light, 2000, 50.0);
-        let cover = kernels.areas().sum::<f64>() / surfaces.area;
-        // Radii are rounded to f32.
-        assert!((cover / 50.0 - 1.0).abs() < 1e-6, "{cover}");
-        assert!(!kernels.spheres.is_empty() && kernels.spheres.len() <= 2 * 2000);
         let seen = surfaces.seen(16).unwrap();
         assert_eq!(seen.len(), 256);
-        let map = Map::new(&kernels, &kernels.linear(8)).unwrap();
-        let (mut complete, mut compact, mut brute) = (Work::default(), Work::default(), 0);
-        for point in seen {
-            map.gather_complete(point, &mut complete);
-            map.gather_compact(point, &mut compact);
-            let holds = |s: &&Vec4| (s.truncate() - point).length_squared() < s.w * s.w;
-            brute += kernels.spheres.iter().filter(holds).count() as u64;
+        for shape in Shape::ALL {
+            let kernels = Kernels::trace(&surfaces, case.light, 2000, 50.0, shape);
+            let cover = kernels.areas().sum::<f64>() / surfaces.area;
+            // Radii of spheres are rounded to f32.
+            assert!((cover / 50.0 - 1.0).abs() < 1e-6, "{cover}");
+            assert!(kernels.len() > 0 && kernels.len() <= 2 * 2000);
+            assert_eq!(kernels.mean_stretch() > 1.0, shape == Shape::Ellipsoids);
+            let map = Map::new(&kernels, &kernels.linear(8)).unwrap();
+            let one_leaf = Map::new(&kernels, &kernels.linear(u32::MAX)).unwrap();
+            let (mut complete, mut compact, mut brute) = (Work::default(), Work::default(), Work::default());
+            for point in &seen {
+                map.gather_complete(*point, &mut complete);
+                map.gather_compact(*point, &mut compact);
+                one_leaf.leaf(*point, 0, &mut brute);
+            }
+            assert_eq!(brute.tests, (seen.len() * kernels.len()) as u64);
+            let found = [complete, compact, brute].map(|work| work.contributions);
+            assert_eq!(found, [found[0]; 3]);
+            assert_eq!(complete.tests, compact.tests);
+            assert!(found[0] > 0 && compact.tree.bytes < complete.tree.bytes);
         }
-        assert_eq!((complete.contributions, compact.contributions), (brute, brute));
-        assert_eq!(complete.tests, compact.tests);
-        assert!(brute > 0 && compact.tree.bytes < complete.tree.bytes);
+    }
+
+    #[test]
+    fn ellipsoids_reach_their_boxes_and_have_the_area_of_their_discs() {
+        let deposit = Deposit {
+            point: Vec3::new(1.0, 2.0, 3.0),
+            normal: Vec3::new(0.6, 0.0, 0.8),
+            direction: Vec3::new(0.3, -0.5, -0.8).normalize(),
+            way: 2.0,
+        };
+        let axes = deposit.axes(0.5);
+        let lengths = axes.map(|axis| axis.length());
+        // f32 axes: a few roundings.
+        assert!((lengths[0] * lengths[1] - 0.25).abs() < 1e-6 && lengths[1] == lengths[2]);
+        assert!((f64::from(lengths[0] / lengths[1]) / deposit.stretch() - 1.0).abs() < 1e-5);
+        assert!(axes[0].dot(axes[1]).abs() < 1e-6 && axes[0].dot(deposit.normal).abs() < 1e-6);
+        let grazing = Deposit {
+            direction: Vec3::new(0.8, 0.0, -0.6),
+            ..deposit
+        };
+        assert_eq!(grazing.stretch(), MOST_STRETCHED);
+    }
+
+    #[test]
+    fn points_anywhere_lie_on_the_surfaces() {
+        let surfaces = Surfaces::load("builtin:cornell-box").unwrap();
+        let points = surfaces.anywhere(300);
+        let near = |point: &Vec3| {
+            surfaces.triangles.iter().any(|[a, b, c]| {
+                let normal = (*b - *a).cross(*c - *a).normalize_or_zero();
+                (*point - *a).dot(normal).abs() < 1e-5
+            })
+        };
+        assert!(points.len() == 300 && points.iter().all(near));
     }
 }
