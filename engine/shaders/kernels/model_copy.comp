@@ -2,7 +2,7 @@
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 256) in;
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer ModelFrom { uvec4 model_from[]; };
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer ModelTo { uvec4 model_to[]; };
