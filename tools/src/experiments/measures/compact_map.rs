@@ -120,7 +120,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             speed(times_of_trees).into(),
             theirs(4),
             document.map_or("no counterpart".into(), |row| {
-                deviation(bytes, speed(times), &row).into()
+                deviation(bytes, [speed(times), speed(times_of_trees)], &row).into()
             }),
         ]);
     }

@@ -150,8 +150,12 @@ fn deviation(shape: Shape, ours: &[f64; 5], theirs: &[f64; 5]) -> String {
         count => format!("{count} signs turned"),
     };
     let ratio = |(ours, theirs): (f64, f64)| format!("{:.1}", ours / theirs);
+    let reason = match shape {
+        Shape::Spheres => "rounder kernels",
+        Shape::Ellipsoids => "boxes of kernels askew",
+    };
     format!(
-        "{signs}; nodes {} and kernels {} times theirs",
+        "{signs}; nodes {} and kernels {} times theirs: {reason}",
         ratio(pairs[0]),
         ratio(pairs[1])
     )
