@@ -203,8 +203,8 @@ impl Stages {
                 host("merge, kernels in the tree's order"),
                 merge(&in_order, &renumbered),
             ),
+            (host("of the merge fresh memory"), fresh_of_merge),
         ];
-        seconds.push((host("of the merge fresh memory"), fresh_of_merge));
         seconds.extend(passes.into_iter().map(|(name, time)| (format!("device: {name}"), time)));
         seconds.push(("device: all".into(), device));
         seconds.push(("device: all, kernels in the tree's order".into(), device_in_order));
