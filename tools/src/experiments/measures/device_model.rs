@@ -45,10 +45,14 @@ const SOURCE_CLOCK: f64 = 1.296;
 /// Largest working set as a power of two, and the cycles that the source gives for loads from it.
 const SOURCE_CYCLES: [(u32, f64); 3] = [(23, 440.0), (25, 487.0), (u32::MAX, 698.0)];
 
-/// Median of some runs after one that warms up.
+/// What timestamps can tell apart at best.
+const LEAST_SECONDS: f64 = 1e-9;
+
+/// Median of some runs after one that warms up, above zero.
 fn repeated(repeats: usize, mut run: impl FnMut() -> Result<f64>) -> Result<f64> {
     run()?;
-    Ok(median((0..repeats).map(|_| run()).collect::<Result<_>>()?))
+    let seconds = median((0..repeats).map(|_| run()).collect::<Result<_>>()?);
+    Ok(seconds.max(LEAST_SECONDS))
 }
 
 /// The measure.
