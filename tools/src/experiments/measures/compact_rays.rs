@@ -14,7 +14,7 @@ use glam::Vec3;
 
 use super::Context;
 use super::clock::nanoseconds;
-use super::photon_kernels::Surfaces;
+use super::photon_scenes::Surfaces;
 use crate::experiments::table::{Cell, Table};
 
 /// As the source's trees.

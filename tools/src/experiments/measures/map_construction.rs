@@ -21,7 +21,8 @@ use rayon::prelude::*;
 
 use super::Context;
 use super::map_quality::SOURCE_SHARE;
-use super::photon_kernels::{CASES, Case, Kernels, SOURCE_SHAPE, Surfaces};
+use super::photon_kernels::{Kernels, SOURCE_SHAPE};
+use super::photon_scenes::{CASES, Case, Surfaces};
 use crate::experiments::table::{Cell, Table};
 use crate::machine::median;
 

@@ -23,6 +23,7 @@ mod path_sets;
 mod persistent_threads;
 mod phase_functions;
 mod photon_kernels;
+mod photon_scenes;
 mod picture_formats;
 mod pictures;
 mod ray_offsets;
