@@ -166,8 +166,8 @@ fn work(found: &Found) -> Table {
     }
     table.note(
         "Counts are exact: the twin of the kernel gives each ray's steps, and those of a subgroup's rays run side by side. Parts of the rays \
-         are traced by themselves, and their times are fitted as a sum over counts, without negative costs: of subgroups, and of \
-         iterations that only visit nodes, only test triangles, or do both. An iteration's time belongs in equal shares to its lanes. Bytes \
+         are traced by themselves, and their times are fitted as a sum over counts, without negative costs: of subgroups, of \
+         iterations, and of what nodes and triangles add to these. An iteration's time belongs in equal shares to its lanes. Bytes \
          are 64 a node and 48 a triangle, every access served by itself, without the stack.",
     );
     for one in costs {
