@@ -64,6 +64,8 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("kernels/scan_reduce.comp", "SpecConstantOp"),
     ("kernels/scan_reduce_subgroup.comp", "SpecConstantOp"),
     ("kernels/scan_totals.comp", "SpecConstantOp"),
+    // The choice of one lane of a subgroup.
+    ("kernels/model_queue.comp", "GroupNonUniformElect"),
     // Arrays of a specialized size.
     ("kernels/histogram.comp", "InvalidArraySize"),
 ];

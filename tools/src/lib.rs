@@ -3,6 +3,7 @@
 pub mod agreement;
 pub mod experiments;
 pub mod geometry;
+pub mod least_squares;
 pub mod machine;
 pub mod mitsuba;
 pub mod page;

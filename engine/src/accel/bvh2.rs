@@ -14,7 +14,7 @@ pub(super) mod layout;
 mod traverse;
 
 pub use build::Bvh2Settings;
-pub use traverse::{FINISHED, Traversal};
+pub use traverse::{FINISHED, Step, Traversal};
 
 use super::{BuildStages, CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
 use crate::Result;

@@ -108,5 +108,5 @@ pub fn markdown() -> String {
 
 /// All rows, ordered by document and id.
 pub fn all() -> &'static [Row] {
-    rows::ROWS
+    &rows::ROWS
 }

@@ -8,6 +8,7 @@
 //! Kernels over a stream reduce, then scan, then work: no workgroup ever waits for another. A team, which is a workgroup or a single
 //! invocation ([`Form`]), owns a contiguous block of the stream, so results are the same bits whatever the device.
 
+pub mod device_model;
 mod histogram;
 mod partition;
 mod permute;

@@ -1,6 +1,7 @@
 //! The kernels of floor 2 against their twins and against the standard library, in every form, under the validation layers.
 
 mod blocks;
+mod device_model;
 mod many_sorts;
 mod sort;
 

@@ -11,7 +11,7 @@ use clerestory::{Result, scene};
 use clerestory_tools::machine::{self, median};
 use clerestory_tools::page::Block;
 
-use super::{check_validation, sort_rates};
+use super::{check_validation, index, index_peers, sort_rates};
 use crate::failure::{Failure, Outcome};
 use crate::options::{DeviceOptions, Size, parse_size};
 use crate::output::{self, Table};
@@ -23,12 +23,13 @@ Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
   clerestory bench --sort --peers --folder out/sort --page RESULTS.md
+  clerestory bench --peers                       sorts, then builds of indexes and rays a second, beside other libraries
 
 One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to the last; figures move with \
 the load of the machine, so compare ratios of runs made together. `clerestory report` measures errors too.")]
 pub struct Arguments {
-    /// A scene; may be given several times
-    #[arg(long = "scene", value_name = "SCENE", default_values = ["builtin:cornell-box", "builtin:materials"])]
+    /// A scene; may be given several times; by default the Cornell box and the materials, with --peers those of `clerestory index`
+    #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<String>,
     /// Measured runs of each scene
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=999))]
@@ -42,11 +43,12 @@ pub struct Arguments {
     /// Measures keys per second of the radix sort beside the standard library's instead
     #[arg(long)]
     sort: bool,
-    /// Adds the sorts of the crates rdst and radsort to --sort
-    #[arg(long, requires = "sort")]
+    /// Measures the kernels beside other libraries instead: with --sort the sort alone, beside rdst and radsort too; else also what
+    /// `clerestory index --peers` measures, builds of indexes and rays a second
+    #[arg(long)]
     peers: bool,
-    /// Writes the rates of --sort as JSON, CSV and plots (SVG) into this folder too
-    #[arg(long, value_name = "FOLDER", requires = "sort")]
+    /// Writes the rates of --sort and --peers as JSON, CSV and plots (SVG) into this folder too
+    #[arg(long, value_name = "FOLDER")]
     folder: Option<PathBuf>,
     /// Writes the rates of --sort into a marked part of this page too; the rest of it stays
     #[arg(long, value_name = "FILE.md", requires = "sort")]
@@ -58,16 +60,21 @@ pub struct Arguments {
     device: DeviceOptions,
 }
 
+/// Scenes to render when none is asked for.
+const SCENES: [&str; 2] = ["builtin:cornell-box", "builtin:materials"];
+/// Rays of --peers.
+const PEER_RAYS: u32 = 100_000;
+
 /// Median and range of one quantity.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
-struct Spread {
-    median: f64,
-    least: f64,
-    greatest: f64,
+pub(super) struct Spread {
+    pub(super) median: f64,
+    pub(super) least: f64,
+    pub(super) greatest: f64,
 }
 
 impl Spread {
-    fn of(mut values: Vec<f64>) -> Self {
+    pub(super) fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         Self {
             least: values.first().copied().unwrap_or(f64::NAN),
@@ -77,7 +84,7 @@ impl Spread {
     }
 
     /// Half the range over the median.
-    fn relative(&self) -> f64 {
+    pub(super) fn relative(&self) -> f64 {
         0.5 * (self.greatest - self.least) / self.median
     }
 }
@@ -96,12 +103,20 @@ struct Measured {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let of_kernels = arguments.sort || arguments.peers;
+    if arguments.folder.is_some() && !of_kernels {
+        return Err(Failure::usage("--folder wants --sort or --peers"));
+    }
+    let scenes = |defaults: &[&str]| match &arguments.scenes[..] {
+        [] => defaults.iter().map(|scene| (*scene).to_owned()).collect(),
+        given => given.to_vec(),
+    };
     let gpu = arguments.device.open()?;
-    if arguments.sort {
-        return run_sort(gpu, arguments);
+    if of_kernels {
+        return run_kernels(gpu, arguments, &scenes(&index::SCENES));
     }
     let mut all = Vec::new();
-    for address in &arguments.scenes {
+    for address in &scenes(&SCENES) {
         let scene = scene::load(address).map_err(Failure::scene)?;
         let options = RenderOptions {
             technique: Some("path".into()),
@@ -153,17 +168,32 @@ const SORT_BLOCK: Block = Block {
     command: "clerestory bench --sort --peers",
 };
 
-fn run_sort(gpu: Gpu, arguments: &Arguments) -> Outcome<ExitCode> {
+/// The sort beside its peers and, where not it alone is asked for, the indexes beside theirs.
+fn run_kernels(gpu: Gpu, arguments: &Arguments, scenes: &[String]) -> Outcome<ExitCode> {
     let load = || machine::load().unwrap_or_else(|| "unknown".into());
     let load_before = load();
     let rates = sort_rates::measure(&gpu, arguments.repeat, arguments.peers)?;
     let load_after = load();
+    let settings = index_peers::Settings {
+        scenes,
+        rays: PEER_RAYS,
+        repeat: arguments.repeat,
+        json: arguments.json,
+        folder: arguments.folder.as_deref(),
+        page: None,
+    };
+    let indexes = if arguments.sort {
+        None
+    } else {
+        Some(index_peers::measure(&gpu, &settings)?)
+    };
     let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
     drop(gpu);
     check_validation(&log)?;
     let document = serde_json::json!({
         "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"), "processor": machine::processor(),
         "threads": machine::threads(), "load_before": load_before, "load_after": load_after, "repeat": arguments.repeat, "sorts": rates,
+        "indexes": indexes,
     });
     if let Some(folder) = &arguments.folder {
         sort_rates::write(folder, &rates, &document)?;
@@ -181,11 +211,17 @@ fn run_sort(gpu: Gpu, arguments: &Arguments) -> Outcome<ExitCode> {
         SORT_BLOCK.write(page, &format!("{head}.\n\n{}", sort_rates::markdown(&rates)))?;
         output::note(&format!("wrote {}", page.display()));
     }
+    if let Some(indexes) = &indexes {
+        index_peers::write(indexes, &settings)?;
+    }
     if arguments.json {
         output::print_json(&document)?;
         return Ok(ExitCode::SUCCESS);
     }
     output::print(&format!("{head}\n{}", sort_rates::tables(&rates)))?;
+    if let Some(indexes) = &indexes {
+        output::print(&index_peers::markdown(indexes))?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 

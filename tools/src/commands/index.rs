@@ -1,5 +1,6 @@
 //! `clerestory index`: ray indexes side by side, by the time they take to build, their cost and the work of rays in them.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -25,6 +26,7 @@ Examples:
   clerestory index
   clerestory index --scene 'builtin:sphere-flake?depth=4' --repeat 9 --json
   clerestory index --peers --rays 262144
+  clerestory index --peers --rays 262144 --repeat 9 --folder out/index --page RESULTS.md
 
 Build times are medians by wall clock on the host's threads, by stage those of the median build; that of the device is the least time of \
 its passes, whose tree is the host's to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
@@ -39,9 +41,15 @@ pub struct Arguments {
     /// Rays
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(2..))]
     rays: u32,
-    /// Instead: builds, and rays a second of the device's kernels, beside the crate obvhs on the processor
+    /// Instead: builds, and rays a second of the device's kernels, beside obvhs, bvh and, where it is installed, Embree on the processor
     #[arg(long)]
     peers: bool,
+    /// Writes what --peers finds as JSON, CSV, Markdown and charts (SVG) into this folder too
+    #[arg(long, value_name = "FOLDER", requires = "peers")]
+    folder: Option<PathBuf>,
+    /// Writes what --peers finds into a marked part of this page; the rest of it stays
+    #[arg(long, value_name = "FILE.md", requires = "peers")]
+    page: Option<PathBuf>,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -50,7 +58,7 @@ pub struct Arguments {
 }
 
 /// Scenes of a quarter of a million triangles and of fewer.
-const SCENES: [&str; 4] = [
+pub(super) const SCENES: [&str; 4] = [
     "builtin:box-city?n=25000",
     "builtin:sphere-flake?depth=3&frequency=4",
     "builtin:materials",
@@ -107,7 +115,15 @@ fn reinserted(reinsertions: u32) -> LbvhSettings {
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
     if arguments.peers {
-        return index_peers::run(gpu, &arguments.scenes, arguments.rays, arguments.repeat, arguments.json);
+        let settings = index_peers::Settings {
+            scenes: &arguments.scenes,
+            rays: arguments.rays,
+            repeat: arguments.repeat,
+            json: arguments.json,
+            folder: arguments.folder.as_deref(),
+            page: arguments.page.as_deref(),
+        };
+        return index_peers::run(gpu, &settings);
     }
     let builder = LbvhBuilder::new(&gpu, &fast(30))?;
     let mut all: Vec<Measured> = Vec::new();

@@ -5,6 +5,7 @@
 //! - it *sweeps*: `[sweep]`, pictures of scenes by techniques and settings with growing budgets, their errors against converged
 //!   references, plots, slopes and strips. [`sweep`] describes the format with an example.
 
+pub mod bars;
 pub mod equal_error;
 pub mod fingerprint;
 pub mod measurement;

@@ -27,6 +27,15 @@ pub struct Traversal {
     any: bool,
 }
 
+/// What an iteration of a traversal does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// Tests both boxes of an inner node.
+    Node,
+    /// Tests a triangle.
+    Triangle,
+}
+
 /// Origin, clamped reciprocal direction and slack of the box test.
 #[derive(Debug, Clone, Copy)]
 struct BoxTest {
@@ -94,6 +103,19 @@ impl Traversal {
         filter: CandidateFilter<'_>,
         counters: &mut TraversalCounters,
     ) {
+        self.run_watched(bvh, ray, quota, filter, counters, |_| {});
+    }
+
+    /// As [`Self::run`]; `watch` sees each iteration, in order.
+    pub fn run_watched(
+        &mut self,
+        bvh: &Bvh2,
+        ray: &Ray,
+        quota: u64,
+        filter: CandidateFilter<'_>,
+        counters: &mut TraversalCounters,
+        mut watch: impl FnMut(Step),
+    ) {
         if self.resume == FINISHED {
             return;
         }
@@ -113,6 +135,7 @@ impl Traversal {
             iterations += 1;
             if word & COUNT_MASK == 0 {
                 counters.nodes += 1;
+                watch(Step::Node);
                 let node = &nodes[(word >> COUNT_BITS) as usize];
                 let [(near0, far0), (near1, far1)] = node.bounds.map(|b| boxes.span(b.lower, b.upper));
                 let (enter0, enter1) = (near0.max(ray.t_min), near1.max(ray.t_min));
@@ -136,6 +159,7 @@ impl Traversal {
                 replay = 0;
             } else {
                 counters.triangles += 1;
+                watch(Step::Triangle);
                 let first = word >> COUNT_BITS;
                 if self.test(&triangles[first as usize], &shear, ray.t_min, filter) && self.any {
                     word = FINISHED;

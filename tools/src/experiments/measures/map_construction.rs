@@ -1,4 +1,5 @@
-//! Construction of photon maps: nodes of the linear hierarchy and of the voxel volume heuristic, and build times against the number of kernels.
+//! Construction of photon maps: nodes of the linear hierarchy and of the voxel volume heuristic, and build times against the number of kernels,
+//! stage by stage; and with kernels that lie in memory in the order of the tree, which tells what the memory costs.
 //!
 //! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.2.
 
@@ -13,13 +14,16 @@ use clerestory::accel::lbvh::split_lists::split_list_hierarchy;
 use clerestory::accel::lbvh::tree::BoxTree;
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
+use clerestory::gpu::Timings;
 use clerestory::{Error, Result};
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::Context;
 use super::map_quality::SOURCE_SHARE;
-use super::photon_kernels::{CASES, Case, Kernels, Surfaces};
-use crate::experiments::table::Table;
+use super::photon_kernels::{Kernels, SOURCE_SHAPE};
+use super::photon_scenes::{CASES, Case, Surfaces};
+use crate::experiments::table::{Cell, Table};
 use crate::machine::median;
 
 /// Photons as powers of two.
@@ -28,6 +32,8 @@ const SIZES: [u32; 4] = [13, 15, 17, 19];
 const SIZE: u32 = 17;
 const SMOKE_SIZE: u32 = 9;
 const REPEATS: usize = 3;
+/// Per cent that node counts of the source differ by at most.
+const MOST_NODES: f64 = 8.0;
 /// Bits of a pass of the clustered form.
 const PASS_BITS: u32 = 5;
 
@@ -68,20 +74,194 @@ fn timed<T>(smoke: bool, mut build: impl FnMut() -> T) -> (T, f64) {
     (built, median(later))
 }
 
+/// Why the linear hierarchy's nodes differ from the source's, both in per cent of the volume heuristic's.
+fn deviation(ours: f64, theirs: f64) -> String {
+    let word = if ours.signum() == theirs.signum() {
+        "sign as there"
+    } else {
+        "sign turned"
+    };
+    let within = if ours.abs() <= MOST_NODES {
+        "within 8 %"
+    } else {
+        "beyond 8 %"
+    };
+    format!("{word}, {within}; the source's kernels lie otherwise")
+}
+
 /// A triangle whose box is the given one: the device builds over triangles.
 fn triangle_in(bounds: &Aabb) -> [Vec3; 3] {
     let corner = Vec3::new(bounds.upper.x, bounds.lower.y, bounds.lower.z);
     [bounds.lower, corner, bounds.upper]
 }
 
-/// Milliseconds of the device's passes, least of some builds.
-fn on_device(builder: &LbvhBuilder, boxes: &[Aabb], smoke: bool) -> Result<f64> {
+/// The device's passes of the fastest of some builds: names and seconds.
+fn on_device(builder: &LbvhBuilder, boxes: &[Aabb], smoke: bool) -> Result<Vec<(String, f64)>> {
     let triangles: Vec<[Vec3; 3]> = boxes.iter().map(triangle_in).collect();
-    let mut least = f64::INFINITY;
+    let mut best: Option<Timings> = None;
     for _ in 0..=if smoke { 0 } else { REPEATS } {
-        least = least.min(1e3 * builder.build(&triangles)?.timings.seconds());
+        let timings = builder.build(&triangles)?.timings;
+        if best.as_ref().is_none_or(|best| timings.seconds() < best.seconds()) {
+            best = Some(timings);
+        }
     }
-    Ok(least)
+    let passes = best.unwrap_or_default().passes.into_iter();
+    Ok(passes
+        .map(|pass| (pass.name, 1e-9 * pass.nanoseconds.unwrap_or(0) as f64))
+        .collect())
+}
+
+/// Seconds of all of them.
+fn whole(passes: &[(String, f64)]) -> f64 {
+    passes.iter().map(|pass| pass.1).sum()
+}
+
+/// Pages that this process has touched for the first time so far, where the system tells; else 0.
+fn first_touches() -> u64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name in parentheses may hold blanks; minor faults are the eighth field behind it.
+    let fields = text.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace();
+    fields.skip(7).next().and_then(|field| field.parse().ok()).unwrap_or(0)
+}
+
+/// Seconds that the first touch of a page takes; 0 where the system does not count them.
+fn price_of_a_page(smoke: bool) -> f64 {
+    let words = if smoke { 1 << 16 } else { 1 << 23 };
+    let before = first_touches();
+    let start = Instant::now();
+    let memory: Vec<u64> = (0..words).collect();
+    let touched = start.elapsed().as_secs_f64();
+    let pages = first_touches().saturating_sub(before);
+    let mut memory = std::hint::black_box(memory);
+    let start = Instant::now();
+    memory.iter_mut().zip(0..).for_each(|(word, i)| *word = i);
+    std::hint::black_box(&memory);
+    let again = start.elapsed().as_secs_f64();
+    if pages == 0 {
+        0.0
+    } else {
+        (touched - again).max(0.0) / pages as f64
+    }
+}
+
+/// Seconds of every stage of the linear hierarchy's build over some number of kernels.
+struct Stages {
+    kernels: usize,
+    seconds: Vec<(String, f64)>,
+}
+
+impl Stages {
+    /// Takes the times that are not known yet.
+    fn of(
+        boxes: &[Aabb],
+        sorted: &SortedCodes,
+        leaf_size: u32,
+        builder: &LbvhBuilder,
+        page_price: f64,
+        smoke: bool,
+    ) -> Result<Self> {
+        let (_, codes_and_sort) = timed(smoke, || SortedCodes::of_boxes(boxes, MORTON_30_AXIS_BITS));
+        let mut unsorted = vec![0; boxes.len()];
+        for (code, i) in sorted.codes.iter().zip(&sorted.order) {
+            unsorted[*i as usize] = code << 32 | u64::from(*i);
+        }
+        let mut seconds_of_sort = f64::INFINITY;
+        for _ in 0..=if smoke { 0 } else { REPEATS } {
+            let mut pairs = unsorted.clone();
+            let start = Instant::now();
+            pairs.par_sort_unstable();
+            seconds_of_sort = seconds_of_sort.min(start.elapsed().as_secs_f64());
+        }
+        let merge = |boxes: &[Aabb], sorted: &SortedCodes| {
+            timed(smoke, || merged_hierarchy(boxes, sorted, leaf_size, |_| {})).1
+        };
+        let fresh = |build: &mut dyn FnMut() -> Result<()>| -> Result<f64> {
+            let before = first_touches();
+            build()?;
+            Ok(page_price * first_touches().saturating_sub(before) as f64)
+        };
+        let in_order: Vec<Aabb> = sorted.order.iter().map(|i| boxes[*i as usize]).collect();
+        let renumbered = SortedCodes {
+            codes: sorted.codes.clone(),
+            order: (0..boxes.len() as u32).collect(),
+            bits: sorted.bits,
+        };
+        let fresh_of_merge = fresh(&mut || {
+            merged_hierarchy(boxes, sorted, leaf_size, |_| {});
+            Ok(())
+        })?;
+        let passes = on_device(builder, boxes, smoke)?;
+        let triangles: Vec<[Vec3; 3]> = boxes.iter().map(triangle_in).collect();
+        let fresh_of_device = fresh(&mut || builder.build(&triangles).map(drop))?;
+        let passes_in_order = on_device(builder, &in_order, smoke)?;
+        let (device, device_in_order) = (whole(&passes), whole(&passes_in_order));
+        let host = |name: &str| format!("host: {name}");
+        let mut seconds = vec![
+            (host("codes and sort"), codes_and_sort),
+            (host("of these the sort, by comparisons"), seconds_of_sort),
+            (host("merge"), merge(boxes, sorted)),
+            (
+                host("merge, kernels in the tree's order"),
+                merge(&in_order, &renumbered),
+            ),
+            (host("of the merge fresh memory"), fresh_of_merge),
+        ];
+        seconds.extend(passes.into_iter().map(|(name, time)| (format!("device: {name}"), time)));
+        seconds.push(("device: all".into(), device));
+        seconds.push(("device: all, kernels in the tree's order".into(), device_in_order));
+        seconds.push((
+            "device: fresh memory of a build, its copies included".into(),
+            fresh_of_device,
+        ));
+        Ok(Self {
+            kernels: boxes.len(),
+            seconds,
+        })
+    }
+
+    fn second(&self, stage: &str) -> f64 {
+        let found = self.seconds.iter().find(|(name, _)| name == stage);
+        found.map_or(f64::NAN, |(_, seconds)| *seconds)
+    }
+}
+
+/// Growth of seconds with the number of kernels: the exponent from the fewest to the most.
+fn exponent(first: &Stages, last: &Stages, stage: &str) -> f64 {
+    (last.second(stage) / first.second(stage)).ln() / (last.kernels as f64 / first.kernels as f64).ln()
+}
+
+/// Nanoseconds a kernel of every stage and size.
+fn by_stage(all: &[Stages], page_price: f64) -> Table {
+    let sizes: Vec<String> = all
+        .iter()
+        .map(|one| format!("ns a kernel, {} kernels", one.kernels))
+        .collect();
+    let mut heads = vec!["stage"];
+    heads.extend(sizes.iter().map(String::as_str));
+    heads.push("exponent");
+    let mut table = Table::new("Construction by stage", &heads);
+    let (Some(first), Some(last)) = (all.first(), all.last()) else {
+        return table;
+    };
+    for (stage, _) in &first.seconds {
+        let mut cells: Vec<Cell> = vec![stage.clone().into()];
+        cells.extend(
+            all.iter()
+                .map(|one| (1e9 * one.second(stage) / one.kernels as f64).into()),
+        );
+        let grows = exponent(first, last, stage);
+        cells.push(if grows.is_finite() { grows.into() } else { "none".into() });
+        table.row(cells);
+    }
+    table.note(format!(
+        "The exponent is that of the number of kernels, from the fewest to the most: 1 is linear, less where fixed costs weigh. The same \
+         kernels in the order of the tree ask for the same work from memory that lies side by side: what they save is what scattered \
+         reads cost. Fresh memory is the number of pages that a build touches for the first time, as the system counts them, times what such a \
+         page costs here, {:.0} ns: small builds get the memory of the one before, large ones get new pages from the system. Sorting by \
+         comparisons alone grows as n log n, an exponent of about 1.09 over this range.",
+        1e9 * page_price
+    ));
+    table
 }
 
 /// The measure.
@@ -120,16 +300,18 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "clusters, host (ms)",
             "linear, device (ms)",
             "source: linear (ms)",
+            "deviation of nodes",
         ],
     );
-    let mut points = Vec::new();
+    let mut stages: Vec<Stages> = Vec::new();
+    let page_price = price_of_a_page(context.smoke);
     for (done, (case, size)) in wanted.iter().enumerate() {
         if context.watch.stopped() {
             break;
         }
         context.watch.begin(case.name(), done, wanted.len());
         let surfaces = Surfaces::load(case.scene)?;
-        let kernels = Kernels::trace(&surfaces, case.light, 1 << size, case.cover);
+        let kernels = Kernels::trace(&surfaces, case.light, 1 << size, case.cover, SOURCE_SHAPE);
         let boxes = &kernels.boxes;
         let leaf_size = automatic_leaf_size(kernels.areas(), surfaces.area, SOURCE_SHARE);
         let start = Instant::now();
@@ -141,7 +323,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let (clustered, clustered_seconds) = timed(context.smoke, || {
             clustered_hierarchy(boxes, &sorted, leaf_size, PASS_BITS, &mut ClusterCounts::default())
         });
-        let device = on_device(&builder, boxes, context.smoke)?;
+        let device = whole(&on_device(&builder, boxes, context.smoke)?);
         let [of_volume, of_merge, of_lists, of_clusters] = [
             nodes(&by_volume, boxes)?,
             nodes(&merged, boxes)?,
@@ -156,12 +338,20 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             ));
         }
         if case.scene == CASES[0].scene {
-            points.push((boxes.len() as f64, [1e3 * (sort_seconds + merge_seconds), device]));
+            stages.push(Stages::of(
+                boxes,
+                &sorted,
+                leaf_size,
+                &builder,
+                page_price,
+                context.smoke,
+            )?);
         }
         let document = DOCUMENT
             .iter()
             .find(|row| row.0 == case.counterpart && *size == SIZE)
             .map(|row| row.1);
+        let change = 100.0 * (of_merge as f64 / of_volume as f64 - 1.0);
         table.row([
             case.name().into(),
             case.counterpart().into(),
@@ -170,7 +360,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             document.map_or("none".into(), |row| (row[0] as u64).into()),
             u64::from(leaf_size).into(),
             of_volume.into(),
-            (100.0 * (of_merge as f64 / of_volume as f64 - 1.0)).into(),
+            change.into(),
             document.map_or("none".into(), |row| (row[1] as u64).into()),
             document.map_or("none".into(), |row| row[2].into()),
             (1e3 * volume_seconds).into(),
@@ -178,23 +368,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             (1e3 * merge_seconds).into(),
             (1e3 * lists_seconds).into(),
             (1e3 * clustered_seconds).into(),
-            device.into(),
+            (1e3 * device).into(),
             document.map_or("none".into(), |row| (1e-3 * row[3]).into()),
+            document.map_or("no counterpart".into(), |row| deviation(change, row[2]).into()),
         ]);
     }
-    if let (Some(first), Some(last)) = (points.first(), points.last())
-        && last.0 > first.0
-    {
-        let exponent = |i: usize| (last.1[i] / first.1[i]).ln() / (last.0 / first.0).ln();
-        table.note(format!(
-            "From the fewest kernels of the first scene to the most, build times grow as the number of kernels to the power {:.2} on the host \
-             (codes, sort and merge) and {:.2} on the device; 1 is linear, less where fixed costs weigh, more where data outgrow a cache.",
-            exponent(0),
-            exponent(1)
-        ));
-    }
     table.note(
-        "Synthetic kernels: spheres about the second and third hits of photons; radii shrink with their number so that a surface point lies \
+        "Synthetic kernels: ellipsoids about the second and third hits of photons; radii shrink with their number so that a surface point lies \
          in as many as the source's Table 5.1 says of the counterpart, hence leaf sizes stay. Nodes are inner ones and leaves, of trees that \
          were checked; merging, split lists and clusters give the same number. The source's kernels are its own, up to twenty times as long \
          as wide, in its own scenes, so what can be reproduced is that both trees are about the same size; the sign of a change of so few \
@@ -204,5 +384,5 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         "On the host one thread but for the sort; on the device the least of the passes' times over triangles in the kernels' boxes, by \
          the renderer's form of the linear hierarchy with leaves by surface area. The source's times are of its GPU of 2008.",
     );
-    Ok(vec![table])
+    Ok(vec![table, by_stage(&stages, page_price)])
 }

@@ -8,6 +8,7 @@ mod clock;
 mod compact_map;
 mod compact_rays;
 mod coupled_reflection;
+mod device_model;
 mod energy;
 mod errors;
 mod free_flight;
@@ -22,6 +23,7 @@ mod path_sets;
 mod persistent_threads;
 mod phase_functions;
 mod photon_kernels;
+mod photon_scenes;
 mod picture_formats;
 mod pictures;
 mod ray_offsets;
@@ -89,6 +91,7 @@ pub const MEASURES: &[Measure] = &[
     on_host("compact-map", compact_map::measure),
     on_host("compact-rays", compact_rays::measure),
     on_host("coupled-reflection", coupled_reflection::measure),
+    on_device("device-model", device_model::measure),
     on_host("free-flight", free_flight::measure),
     on_host("leaf-sizes", leaf_sizes::measure),
     on_device("map-construction", map_construction::measure),

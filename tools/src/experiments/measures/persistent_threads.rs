@@ -10,9 +10,9 @@ use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::trace::{Execution, PersistentThreads, RayTracer, TraceSettings, Traced};
 use clerestory::accel::{Hit, Ray};
 use clerestory::gpu::Gpu;
-use clerestory::scene::{Camera, Projection};
+use clerestory::scene::Camera;
 use clerestory::{Result, scene};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::Context;
 use super::inputs::Random;
@@ -39,28 +39,19 @@ struct Form {
     seconds: Vec<f64>,
 }
 
-fn ray(origin: Vec3, direction: DVec3, t_min: f32) -> Ray {
+fn ray(origin: Vec3, direction: Vec3, t_min: f32) -> Ray {
     Ray {
         origin: origin.into(),
         t_min,
-        direction: direction.as_vec3().into(),
+        direction: direction.into(),
         t_max: f32::INFINITY,
     }
 }
 
 /// A ray through the middle of each pixel, row by row.
-fn primary_rays(camera: &Camera, side: u32) -> Vec<Ray> {
-    let half = match camera.projection {
-        Projection::Perspective { fov_y } => (0.5 * f64::from(fov_y)).tan(),
-        Projection::Orthographic { .. } => 0.5,
-    };
-    let pixel = |i: u32| half * (2.0 * (f64::from(i) + 0.5) / f64::from(side) - 1.0);
-    let eye = camera.transform.translation.as_vec3();
-    let through = |x, y| camera.transform.matrix3 * DVec3::new(pixel(x), -pixel(y), -1.0);
-    (0..side)
-        .flat_map(|y| (0..side).map(move |x| (x, y)))
-        .map(|(x, y)| ray(eye, through(x, y), 0.0))
-        .collect()
+fn primary_rays(camera: &Camera, side: u32) -> Result<Vec<Ray>> {
+    let rays = geometry::camera_rays(camera, side)?.into_iter();
+    Ok(rays.map(|(eye, direction)| ray(eye, direction, 0.0)).collect())
 }
 
 /// From where the rays end, in uniform directions.
@@ -69,7 +60,7 @@ fn diffuse_rays(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
     let met = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit());
     met.map(|(from, hit)| {
         let end = Vec3::from(from.origin) + hit.t * Vec3::from(from.direction);
-        ray(end, random.direction(), 1e-3)
+        ray(end, random.direction().as_vec3(), 1e-3)
     })
     .collect()
 }
@@ -144,7 +135,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     for address in &SCENES[..scenes] {
         let scene = scene::load(address)?;
         let index = Bvh2::build(&geometry::triangles(&scene), &Bvh2Settings::default())?;
-        let primary = primary_rays(scene.require_camera(None)?, side);
+        let primary = primary_rays(scene.require_camera(None)?, side)?;
         let hits = RayTracer::new(&gpu, &index, &TraceSettings::thread_a_ray())?
             .trace(&primary)?
             .hits;

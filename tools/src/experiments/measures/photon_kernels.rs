@@ -1,14 +1,15 @@
-//! Stand-ins for photon maps: kernels of fixed radius about the second and third hits of photons that walk through a scene, and the
-//! surface points that cameras see.
+//! Stand-ins for photon maps: kernels about the second and third hits of photons that walk through a scene, and the surface points that
+//! cameras see.
 //!
 //! Source of what they stand for: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6. Photons
 //! leave a point evenly, surfaces but mirrors scatter them by the cosine with probability [`SURVIVAL`], and hits two and three are kept.
 //! Radii go by the fourth root of the photon's way, the source's dampening; their scale is set so that a point of the scene's surfaces
-//! lies in a given number of kernels on average. Spheres take the place of the source's flattened ellipsoids.
+//! lies in a given number of kernels on average. The source's kernels are ellipsoids that lie on the surface; [`Shape`] has them stretched as
+//! the footprint of a beam is by its incidence, and spheres of the same area beside them.
 //!
 //! Guarantee: deterministic.
 
-use clerestory::accel::bvh2::{Aabb, Bvh2, Bvh2Settings};
+use clerestory::accel::bvh2::Aabb;
 use clerestory::accel::compact_bvh::CompactBvh;
 use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters};
 use clerestory::accel::lbvh::merge::merged_hierarchy;
@@ -16,228 +17,161 @@ use clerestory::accel::lbvh::radix::SortedCodes;
 use clerestory::accel::lbvh::tree::BoxTree;
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
 use clerestory::accel::vvh::{Heuristic, sweep_tree};
-use clerestory::accel::{Hit, Ray, RayIndex};
-use clerestory::scene::{Camera, Scene};
-use clerestory::{Error, Result, scene};
+use clerestory::{Error, Result};
 use glam::{Vec3, Vec4};
 
 use super::Context;
 use super::inputs::Random;
-use crate::geometry::{self, area, triangles_with_materials};
+use super::photon_scenes::{CASES, Case, Surfaces};
 
 /// Probability that a diffuse surface scatters a photon.
 const SURVIVAL: f64 = 0.7;
 /// Hits after which a photon ends.
 const HITS: u32 = 3;
-/// Rays begin that far from surfaces, relative to the scene's extent.
-const RELATIVE_OFFSET: f32 = 1e-5;
-/// Mirrors that a camera ray is followed through.
-const MIRRORS: u32 = 8;
 
-/// A scene with a light, and what the source says of its counterpart.
-pub struct Case {
-    /// Address of the scene.
-    pub scene: &'static str,
-    /// Where photons begin, metres.
-    pub light: Vec3,
-    /// Mean number of kernels about a surface point.
-    pub cover: f64,
-    /// Name of the counterpart in the source's tables; empty where there is none.
-    pub counterpart: &'static str,
+/// What kernels look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// Spheres.
+    Spheres,
+    /// Ellipsoids whose semi-axes on the surface are in the ratio of one to the cosine of incidence, at most [`MOST_STRETCHED`], and have the
+    /// product that the sphere's have; as thick as wide.
+    Ellipsoids,
 }
 
-/// Scenes of the size and number of triangles of the source's, with its numbers of contributions (Table 5.1), and two more.
-pub static CASES: [Case; 5] = [
-    Case {
-        scene: "builtin:box-room?source=point",
-        light: Vec3::new(3.0, 2.5, 3.0),
-        cover: 337.6,
-        counterpart: "Scene 6",
-    },
-    Case {
-        scene: "builtin:passage",
-        light: Vec3::new(0.35, 0.97, 0.5),
-        cover: 459.6,
-        counterpart: "Passage",
-    },
-    Case {
-        scene: "builtin:ring",
-        light: Vec3::new(1.7, 1.0, 0.0),
-        cover: 186.6,
-        counterpart: "Ring",
-    },
-    Case {
-        scene: "builtin:cornell-box?source=point",
-        light: Vec3::new(0.278, 0.54, 0.28),
-        cover: 200.0,
-        counterpart: "",
-    },
-    Case {
-        scene: "builtin:divider-room",
-        light: Vec3::new(0.0, 1.9, -0.6),
-        cover: 200.0,
-        counterpart: "",
-    },
-];
+impl Shape {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Spheres, Self::Ellipsoids];
 
-impl Case {
-    /// The scene's name.
-    pub fn name(&self) -> &'static str {
-        self.scene.trim_start_matches("builtin:")
-    }
-
-    /// Its counterpart, for a table's cell.
-    pub fn counterpart(&self) -> &'static str {
-        if self.counterpart.is_empty() {
-            "none"
-        } else {
-            self.counterpart
+    /// For a table's cell.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Spheres => "spheres",
+            Self::Ellipsoids => "ellipsoids",
         }
     }
 }
 
-/// Where a ray meets a surface.
+/// The shape that is nearest to the source's.
+pub const SOURCE_SHAPE: Shape = Shape::Ellipsoids;
+
+/// The source's bound on the ratio of a kernel's semi-axes.
+const MOST_STRETCHED: f64 = 20.0;
+
+/// An ellipsoid: the points whose way from the centre has products with the three vectors that lie in the unit ball.
 #[derive(Debug, Clone, Copy)]
-pub struct Meeting {
-    /// The point.
-    pub point: Vec3,
-    /// Unit normal on the side that the ray comes from.
-    pub normal: Vec3,
-    /// Length of the way, metres.
-    pub distance: f32,
-    /// Whether the surface is a mirror.
-    pub is_mirror: bool,
+struct Ellipsoid {
+    centre: Vec3,
+    inverse: [Vec3; 3],
 }
 
-/// A scene's triangles as rays meet them.
-pub struct Surfaces {
-    /// The triangles in world space.
-    pub triangles: Vec<[Vec3; 3]>,
-    /// Their area, m².
-    pub area: f64,
-    /// How far from a surface rays begin, metres.
-    pub offset: f32,
-    mirrors: Vec<bool>,
-    index: Bvh2,
-    camera: Camera,
-}
-
-impl Surfaces {
-    /// Of a scene that has a camera.
-    pub fn load(address: &str) -> Result<Self> {
-        let scene: Scene = scene::load(address)?;
-        let is_mirror = |material: Option<u32>| {
-            let material = material.and_then(|i| scene.materials.get(i as usize));
-            material.is_some_and(|m| m.metallic > 0.0 && m.roughness == 0.0)
-        };
-        let (triangles, mirrors): (Vec<_>, Vec<_>) = triangles_with_materials(&scene)
-            .map(|(triangle, material)| (triangle, is_mirror(material)))
-            .unzip();
-        let corners = triangles.iter().flatten();
-        let bounds = corners.fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner));
-        Ok(Self {
-            area: triangles.iter().map(area).sum(),
-            offset: RELATIVE_OFFSET * (bounds.upper - bounds.lower).max_element(),
-            mirrors,
-            index: Bvh2::build(&triangles, &Bvh2Settings::default())?,
-            camera: scene.require_camera(None)?.clone(),
-            triangles,
-        })
-    }
-
-    /// What a ray of unit direction meets first.
-    pub fn meet(&self, origin: Vec3, direction: Vec3) -> Option<Meeting> {
-        let ray = Ray {
-            origin: origin.into(),
-            t_min: 0.0,
-            direction: direction.into(),
-            t_max: f32::INFINITY,
-        };
-        let hit: Hit = self.index.closest_hit(&ray);
-        let [a, b, c] = *self.triangles.get(hit.triangle as usize)?;
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        Some(Meeting {
-            point: origin + hit.t * direction,
-            normal: if normal.dot(direction) > 0.0 { -normal } else { normal },
-            distance: hit.t,
-            is_mirror: self.mirrors[hit.triangle as usize],
-        })
-    }
-
-    /// Origin, unit direction and length of the way from a surface to a light.
-    pub fn shadow_ray(&self, from: &Meeting, light: Vec3) -> (Vec3, Vec3, f32) {
-        let origin = from.point + self.offset * from.normal;
-        let way = light - origin;
-        (origin, way.normalize_or(Vec3::Y), way.length())
-    }
-
-    /// Origin and unit direction of rays through the middles of a picture's pixels, row by row.
-    pub fn camera_rays(&self, size: u32) -> Result<Vec<(Vec3, Vec3)>> {
-        geometry::camera_rays(&self.camera, size)
-    }
-
-    /// The first surface on a ray's way that is no mirror, and all meetings before it.
-    pub fn follow(&self, mut origin: Vec3, mut direction: Vec3) -> Vec<(Vec3, Vec3, Option<Meeting>)> {
-        let mut way = Vec::new();
-        for _ in 0..MIRRORS {
-            let meeting = self.meet(origin, direction);
-            way.push((origin, direction, meeting));
-            let Some(mirror) = meeting.filter(|meeting| meeting.is_mirror) else {
-                break;
-            };
-            direction = direction.reflect(mirror.normal);
-            origin = mirror.point + self.offset * mirror.normal;
-        }
-        way
-    }
-
-    /// Surface points that the camera sees, directly or in mirrors.
-    pub fn seen(&self, size: u32) -> Result<Vec<Vec3>> {
-        let last = |(origin, direction): (Vec3, Vec3)| {
-            let (_, _, meeting) = self.follow(origin, direction).pop()?;
-            meeting
-                .filter(|meeting| !meeting.is_mirror)
-                .map(|meeting| meeting.point)
-        };
-        Ok(self.camera_rays(size)?.into_iter().filter_map(last).collect())
-    }
+#[derive(Debug, Clone)]
+enum Records {
+    /// Centre and radius.
+    Spheres(Vec<Vec4>),
+    Ellipsoids(Vec<Ellipsoid>),
 }
 
 /// Kernels about hits of photons.
 pub struct Kernels {
-    /// Centre and radius, metres.
-    pub spheres: Vec<Vec4>,
+    records: Records,
+    /// Areas on the surface, m².
+    areas: Vec<f64>,
+    /// Ratios of semi-axes on the surface.
+    stretches: Vec<f64>,
     /// Their boxes.
     pub boxes: Vec<Aabb>,
 }
 
+/// Where a photon's kernel goes.
+#[derive(Debug, Clone, Copy)]
+struct Deposit {
+    point: Vec3,
+    normal: Vec3,
+    direction: Vec3,
+    /// Length of the photon's way, metres.
+    way: f32,
+}
+
+impl Deposit {
+    /// Semi-axes of an ellipsoid whose sphere has the radius: along the incidence, across, along the normal.
+    fn axes(&self, radius: f64) -> [Vec3; 3] {
+        let stretch = self.stretch();
+        let normal = self.normal.as_dvec3();
+        let along = self.direction.as_dvec3().reject_from(normal);
+        let along = along.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let across = normal.cross(along);
+        let (long, short) = (radius * stretch.sqrt(), radius / stretch.sqrt());
+        [long * along, short * across, short * normal].map(|axis| axis.as_vec3())
+    }
+
+    fn stretch(&self) -> f64 {
+        let cosine = f64::from(self.normal.dot(self.direction).abs());
+        (1.0 / cosine.max(1.0 / MOST_STRETCHED)).max(1.0)
+    }
+}
+
 impl Kernels {
     /// The kernels of `photons` photons, of which `cover` lie about a surface point on average.
-    pub fn trace(surfaces: &Surfaces, light: Vec3, photons: u32, cover: f64) -> Self {
+    pub fn trace(surfaces: &Surfaces, light: Vec3, photons: u32, cover: f64, shape: Shape) -> Self {
         let mut random = Random::new(12);
         let mut hits = Vec::new();
         for _ in 0..photons {
             walk(surfaces, light, &mut random, &mut hits);
         }
         // Radius = scale · (way / 1 m)^(1/4).
-        let squares: f64 = hits.iter().map(|(_, way)| f64::from(*way).sqrt()).sum();
+        let squares: f64 = hits.iter().map(|hit| f64::from(hit.way).sqrt()).sum();
         let scale = (cover * surfaces.area / (std::f64::consts::PI * squares)).sqrt();
-        let sphere = |(centre, way): &(Vec3, f32)| centre.extend((scale * f64::from(*way).powf(0.25)) as f32);
-        let spheres: Vec<Vec4> = hits.iter().map(sphere).collect();
-        let bounds = |sphere: &Vec4| Aabb {
-            lower: sphere.truncate() - sphere.w,
-            upper: sphere.truncate() + sphere.w,
+        let radius = |hit: &Deposit| scale * f64::from(hit.way).powf(0.25);
+        let around = |centre: Vec3, extent: Vec3| Aabb {
+            lower: centre - extent,
+            upper: centre + extent,
         };
-        Self {
-            boxes: spheres.iter().map(bounds).collect(),
-            spheres,
+        let disc = |radius: f64| std::f64::consts::PI * radius.powi(2);
+        match shape {
+            Shape::Spheres => {
+                let spheres: Vec<Vec4> = hits.iter().map(|hit| hit.point.extend(radius(hit) as f32)).collect();
+                Self {
+                    boxes: spheres.iter().map(|s| around(s.truncate(), Vec3::splat(s.w))).collect(),
+                    areas: spheres.iter().map(|s| disc(f64::from(s.w))).collect(),
+                    stretches: vec![1.0; spheres.len()],
+                    records: Records::Spheres(spheres),
+                }
+            }
+            Shape::Ellipsoids => {
+                let axes: Vec<[Vec3; 3]> = hits.iter().map(|hit| hit.axes(radius(hit))).collect();
+                let extent = |axes: &[Vec3; 3]| axes.iter().map(|axis| axis * axis).sum::<Vec3>().map(f32::sqrt);
+                let record = |(hit, axes): (&Deposit, &[Vec3; 3])| Ellipsoid {
+                    centre: hit.point,
+                    inverse: axes.map(|axis| axis / axis.length_squared()),
+                };
+                let pairs = hits.iter().zip(&axes);
+                Self {
+                    boxes: pairs
+                        .clone()
+                        .map(|(hit, axes)| around(hit.point, extent(axes)))
+                        .collect(),
+                    areas: hits.iter().map(|hit| disc(radius(hit))).collect(),
+                    stretches: hits.iter().map(Deposit::stretch).collect(),
+                    records: Records::Ellipsoids(pairs.map(record).collect()),
+                }
+            }
         }
     }
 
-    /// Areas of their discs on a surface, m².
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.boxes.len()
+    }
+
+    /// Their areas on the surface, m².
     pub fn areas(&self) -> impl Iterator<Item = f64> + '_ {
-        let area = |sphere: &Vec4| std::f64::consts::PI * f64::from(sphere.w).powi(2);
-        self.spheres.iter().map(area)
+        self.areas.iter().copied()
+    }
+
+    /// Mean ratio of their semi-axes on the surface.
+    pub fn mean_stretch(&self) -> f64 {
+        self.stretches.iter().sum::<f64>() / self.stretches.len().max(1) as f64
     }
 
     /// The tree of the voxel volume heuristic.
@@ -253,7 +187,7 @@ impl Kernels {
 }
 
 /// Follows one photon and keeps its second and third hits on diffuse surfaces with the length of its way.
-fn walk(surfaces: &Surfaces, light: Vec3, random: &mut Random, hits: &mut Vec<(Vec3, f32)>) {
+fn walk(surfaces: &Surfaces, light: Vec3, random: &mut Random, hits: &mut Vec<Deposit>) {
     let (mut origin, mut direction) = (light, random.direction().as_vec3());
     let mut way = 0.0;
     for hit in 1..=HITS {
@@ -265,7 +199,12 @@ fn walk(surfaces: &Surfaces, light: Vec3, random: &mut Random, hits: &mut Vec<(V
             direction = direction.reflect(meeting.normal);
         } else {
             if hit > 1 {
-                hits.push((meeting.point, way));
+                hits.push(Deposit {
+                    point: meeting.point,
+                    normal: meeting.normal,
+                    direction,
+                    way,
+                });
             }
             if random.unit() >= SURVIVAL {
                 return;
@@ -295,7 +234,7 @@ pub struct Map {
     pub complete: CompleteBvh,
     /// Compact pairs.
     pub compact: CompactBvh,
-    records: Vec<Vec4>,
+    records: Records,
 }
 
 impl Map {
@@ -304,18 +243,35 @@ impl Map {
         let complete = CompleteBvh::new(tree)?;
         let compact = CompactBvh::encode(&complete)
             .map_err(|fault| Error::setting("tree", "compact", format!("is not tight: {fault:?}")))?;
+        let order = || complete.order.iter().map(|i| *i as usize);
+        let records = match &kernels.records {
+            Records::Spheres(all) => Records::Spheres(order().map(|i| all[i]).collect()),
+            Records::Ellipsoids(all) => Records::Ellipsoids(order().map(|i| all[i]).collect()),
+        };
         Ok(Self {
-            records: complete.order.iter().map(|i| kernels.spheres[*i as usize]).collect(),
+            records,
             complete,
             compact,
         })
     }
 
     fn leaf(&self, point: Vec3, first: u32, work: &mut Work) {
-        let places = self.records.iter().zip(&self.complete.ends).skip(first as usize);
-        for (sphere, is_last) in places {
+        match &self.records {
+            Records::Spheres(all) => self.test(all, first, work, |sphere| {
+                (sphere.truncate() - point).length_squared() < sphere.w * sphere.w
+            }),
+            Records::Ellipsoids(all) => self.test(all, first, work, |ellipsoid| {
+                let way = point - ellipsoid.centre;
+                let [a, b, c] = ellipsoid.inverse.map(|axis| axis.dot(way));
+                a * a + b * b + c * c < 1.0
+            }),
+        }
+    }
+
+    fn test<T>(&self, records: &[T], first: u32, work: &mut Work, holds: impl Fn(&T) -> bool) {
+        for (record, is_last) in records.iter().zip(&self.complete.ends).skip(first as usize) {
             work.tests += 1;
-            work.contributions += u64::from((sphere.truncate() - point).length_squared() < sphere.w * sphere.w);
+            work.contributions += u64::from(holds(record));
             if *is_last {
                 break;
             }
@@ -328,6 +284,16 @@ impl Map {
         self.complete
             .point_query(point, &mut tree, |first| self.leaf(point, first, work));
         work.tree = tree;
+    }
+
+    /// As [`Self::gather_complete`], without the kernels.
+    pub fn visit_complete(&self, point: Vec3, work: &mut Work) {
+        self.complete.point_query(point, &mut work.tree, |_| {});
+    }
+
+    /// As [`Self::gather_compact`], without the kernels.
+    pub fn visit_compact(&self, point: Vec3, work: &mut Work) {
+        self.compact.point_query(point, &mut work.tree, |_| {});
     }
 
     /// Gathers at a point by compact pairs.
@@ -347,23 +313,34 @@ pub struct Prepared {
     pub surfaces: Surfaces,
     /// Kernels of the photons.
     pub kernels: Kernels,
-    /// Points to query at.
+    /// Their shape.
+    pub shape: Shape,
+    /// Points that the camera sees.
     pub points: Vec<Vec3>,
+    /// As many points anywhere on the surfaces, by area.
+    pub anywhere: Vec<Vec3>,
 }
 
-/// The cases that a measure takes, each made when its turn comes, until the measure is stopped.
-pub fn prepared<'a>(context: &'a Context<'_>) -> impl Iterator<Item = Result<Prepared>> + 'a {
+/// The cases that a measure takes, in each shape, each made when its turn comes, until the measure is stopped.
+pub fn prepared<'a>(context: &'a Context<'_>, shapes: &'a [Shape]) -> impl Iterator<Item = Result<Prepared>> + 'a {
     // Photons sent out, and pixels on a side of the camera.
     let (photons, side) = if context.smoke { (1 << 9, 8) } else { (1 << 17, 96) };
     let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
-    let going_on = cases.iter().enumerate().take_while(|_| !context.watch.stopped());
-    going_on.map(move |(done, case)| {
-        context.watch.begin(case.name(), done, cases.len());
+    let all = cases
+        .iter()
+        .flat_map(move |case| shapes.iter().map(move |shape| (case, *shape)));
+    let count = cases.len() * shapes.len();
+    let going_on = all.enumerate().take_while(|_| !context.watch.stopped());
+    going_on.map(move |(done, (case, shape))| {
+        context.watch.begin(case.name(), done, count);
         let surfaces = Surfaces::load(case.scene)?;
+        let points = surfaces.seen(side)?;
         Ok(Prepared {
             case,
-            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover),
-            points: surfaces.seen(side)?,
+            shape,
+            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover, shape),
+            anywhere: surfaces.anywhere(points.len()),
+            points,
             surfaces,
         })
     })
@@ -377,24 +354,49 @@ mod tests {
     fn points_lie_in_as_many_kernels_as_asked_for() {
         let case = &CASES[0];
         let surfaces = Surfaces::load(case.scene).unwrap();
-        assert!(surfaces.mirrors.iter().any(|m| *m) && surfaces.triangles.len() == 802);
-        let kernels = Kernels::trace(&surfaces, case.light, 2000, 50.0);
-        let cover = kernels.areas().sum::<f64>() / surfaces.area;
-        // Radii are rounded to f32.
-        assert!((cover / 50.0 - 1.0).abs() < 1e-6, "{cover}");
-        assert!(!kernels.spheres.is_empty() && kernels.spheres.len() <= 2 * 2000);
         let seen = surfaces.seen(16).unwrap();
         assert_eq!(seen.len(), 256);
-        let map = Map::new(&kernels, &kernels.linear(8)).unwrap();
-        let (mut complete, mut compact, mut brute) = (Work::default(), Work::default(), 0);
-        for point in seen {
-            map.gather_complete(point, &mut complete);
-            map.gather_compact(point, &mut compact);
-            let holds = |s: &&Vec4| (s.truncate() - point).length_squared() < s.w * s.w;
-            brute += kernels.spheres.iter().filter(holds).count() as u64;
+        for shape in Shape::ALL {
+            let kernels = Kernels::trace(&surfaces, case.light, 2000, 50.0, shape);
+            let cover = kernels.areas().sum::<f64>() / surfaces.area;
+            // Radii of spheres are rounded to f32.
+            assert!((cover / 50.0 - 1.0).abs() < 1e-6, "{cover}");
+            assert!(kernels.len() > 0 && kernels.len() <= 2 * 2000);
+            assert_eq!(kernels.mean_stretch() > 1.0, shape == Shape::Ellipsoids);
+            let map = Map::new(&kernels, &kernels.linear(8)).unwrap();
+            let one_leaf = Map::new(&kernels, &kernels.linear(u32::MAX)).unwrap();
+            let (mut complete, mut compact, mut brute) = (Work::default(), Work::default(), Work::default());
+            for point in &seen {
+                map.gather_complete(*point, &mut complete);
+                map.gather_compact(*point, &mut compact);
+                one_leaf.leaf(*point, 0, &mut brute);
+            }
+            assert_eq!(brute.tests, (seen.len() * kernels.len()) as u64);
+            let found = [complete, compact, brute].map(|work| work.contributions);
+            assert_eq!(found, [found[0]; 3]);
+            assert_eq!(complete.tests, compact.tests);
+            assert!(found[0] > 0 && compact.tree.bytes < complete.tree.bytes);
         }
-        assert_eq!((complete.contributions, compact.contributions), (brute, brute));
-        assert_eq!(complete.tests, compact.tests);
-        assert!(brute > 0 && compact.tree.bytes < complete.tree.bytes);
+    }
+
+    #[test]
+    fn ellipsoids_reach_their_boxes_and_have_the_area_of_their_discs() {
+        let deposit = Deposit {
+            point: Vec3::new(1.0, 2.0, 3.0),
+            normal: Vec3::new(0.6, 0.0, 0.8),
+            direction: Vec3::new(0.3, -0.5, -0.8).normalize(),
+            way: 2.0,
+        };
+        let axes = deposit.axes(0.5);
+        let lengths = axes.map(|axis| axis.length());
+        // f32 axes: a few roundings.
+        assert!((lengths[0] * lengths[1] - 0.25).abs() < 1e-6 && lengths[1] == lengths[2]);
+        assert!((f64::from(lengths[0] / lengths[1]) / deposit.stretch() - 1.0).abs() < 1e-5);
+        assert!(axes[0].dot(axes[1]).abs() < 1e-6 && axes[0].dot(deposit.normal).abs() < 1e-6);
+        let grazing = Deposit {
+            direction: Vec3::new(0.8, 0.0, -0.6),
+            ..deposit
+        };
+        assert_eq!(grazing.stretch(), MOST_STRETCHED);
     }
 }

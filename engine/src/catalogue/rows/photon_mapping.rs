@@ -1,0 +1,368 @@
+//! Rows of the document on photon mapping (`PM-`).
+
+use super::super::{Row, measured, part, unbiased};
+use crate::techniques::Bias;
+
+pub(super) const ROWS: &[Row] = &[
+    measured(
+        "clerestory bench --sort",
+        part(
+            "PM-B-1",
+            "inclusive and exclusive scan, segmented scan, reductions",
+            "Blelloch 1990; Sengupta et al. 2007; Dotsenko et al. 2008",
+            "engine/src/kernels/scan.rs",
+            &[
+                "tests/tests/kernels/blocks.rs::scans_are_as_their_twin",
+                "tests/tests/kernels/blocks.rs::reductions_of_words_are_as_their_twin",
+                "tests/tests/kernels/blocks.rs::boxes_are_exact_and_leave_nans_out",
+                "engine/src/kernels/stream.rs::every_element_is_in_one_block",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory bench --sort",
+        part(
+            "PM-B-2",
+            "stream compaction",
+            "Blelloch 1990",
+            "engine/src/kernels/partition.rs",
+            &["tests/tests/kernels/blocks.rs::partitions_are_as_their_twins"],
+        ),
+    ),
+    measured(
+        "clerestory bench --sort",
+        part(
+            "PM-B-3",
+            "split",
+            "Blelloch 1990",
+            "engine/src/kernels/partition.rs",
+            &[
+                "tests/tests/kernels/blocks.rs::partitions_are_as_their_twins",
+                "tests/tests/kernels/blocks.rs::splits_by_bits_sort",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory bench --sort --peers",
+        part(
+            "PM-B-4",
+            "radix sort of 32- and 64-bit keys, with or without values",
+            "Satish, Harris and Garland 2009; Ashkiani et al. 2016",
+            "engine/src/kernels/radix_sort.rs",
+            &[
+                "tests/tests/kernels/sort.rs::every_size_and_pattern_is_as_by_std",
+                "tests/tests/kernels/sort.rs::bits_and_orders_are_those_asked_for",
+                "tests/tests/kernels/sort.rs::runs_give_the_same_bits",
+                "tests/tests/kernels/sort.rs::many_keys_take_the_other_plan",
+                "tests/tests/kernels/many_sorts.rs::sorts_of_random_sizes_and_patterns_are_as_by_std",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory agreement --scene cornell-point,sphere-flake",
+        part(
+            "PM-F-1",
+            "radiometry of point and spot lights, split into direct and indirect light",
+            "Veach 1997, chapter 3; Khronos, KHR_lights_punctual",
+            "engine/src/transport/lights.rs",
+            &[
+                "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
+                "engine/src/transport/lights.rs::spot_flux_and_falloff",
+                "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+                "tests/tests/path_tracer.rs::path_sets_are_a_partition",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
+        unbiased(part(
+            "PM-F-2",
+            "surface models: Lambert, mirror, refraction (path tracer); modified Phong (function)",
+            "Lafortune and Willems 1994; Walter et al. 2007",
+            "engine/src/transport/phong.rs",
+            &[
+                "engine/src/transport/phong.rs::white_furnace",
+                "engine/src/transport/phong.rs::reciprocal",
+                "engine/src/transport/phong.rs::samples_follow_their_density",
+                "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
+                "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
+                "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory report phase-functions",
+        unbiased(part(
+            "PM-F-3",
+            "phase functions of Henyey and Greenstein, Schlick and Rayleigh",
+            "Henyey and Greenstein 1941; Blasi, Le Saëc and Schlick 1993",
+            "engine/src/transport/phase.rs",
+            &[
+                "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
+                "engine/src/transport/phase.rs::samples_follow_their_density",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory report sphere-tests",
+        part(
+            "PM-I-1",
+            "ray/sphere hit and closest approach",
+            "Haines et al. 2019",
+            "engine/src/accel/sphere.rs",
+            &[
+                "engine/src/accel/sphere.rs::approach_matches_the_definition",
+                "engine/src/accel/sphere.rs::sphere_hits_inside_outside_tangent_and_behind",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report triangle-tests",
+        part(
+            "PM-I-2",
+            "Möller–Trumbore triangle test (oracle in f64)",
+            "Möller and Trumbore 1997",
+            "engine/src/accel/triangle.rs",
+            &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
+        ),
+    ),
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-1",
+            "transmittance: analytic and by ratio tracking; ray marching as their baseline",
+            "Jensen and Christensen 1998; Novák et al. 2014",
+            "engine/src/transport/medium.rs",
+            &[
+                "tests/tests/media/absorption.rs::beers_law_is_exact",
+                "tests/tests/media/absorption.rs::shadow_rays_are_attenuated_exactly",
+                "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
+                "engine/src/transport/free_flight.rs::marched_transmittance_errs_by_the_step_and_in_the_middle_by_its_square",
+                "engine/src/transport/free_flight.rs::ratio_tracking_is_unbiased_however_loose_the_majorant",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-2",
+            "free flight through homogeneous media",
+            "Jensen and Christensen 1998; Wilkie et al. 2014",
+            "engine/src/transport/medium.rs",
+            &[
+                "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
+                "engine/src/transport/medium.rs::extremes_stay_finite",
+            ],
+        )),
+    ),
+    Row {
+        bias: Some(Bias::Consistent("the step")),
+        experiment: "clerestory report free-flight",
+        ..part(
+            "PM-VOL-3",
+            "free flight by ray marching, steps fixed or adaptive (baseline)",
+            "Jensen and Christensen 1998",
+            "engine/src/transport/free_flight.rs",
+            &["engine/src/transport/free_flight.rs::marched_flights_are_biased_by_their_step"],
+        )
+    },
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-4",
+            "free flight by delta tracking",
+            "Woodcock et al. 1965; Coleman 1968",
+            "engine/src/transport/medium.rs",
+            &[
+                "engine/src/transport/free_flight.rs::tracked_flights_follow_their_distribution_however_loose_the_majorant",
+                "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
+                "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
+                "tests/tests/media/heterogeneous.rs::emptiness_and_loose_majorants_cost_noise_only",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory report compact-rays",
+        part(
+            "PM-I-4",
+            "slabs test of boxes",
+            "Kay and Kajiya 1986",
+            "engine/src/accel/complete_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+                "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report compact-map",
+        part(
+            "PM-I-5",
+            "points in boxes",
+            "Interactive Manycore Photon Mapping, 2011, §3.2.4.2",
+            "engine/src/accel/complete_bvh.rs",
+            &["engine/src/accel/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order"],
+        ),
+    ),
+    measured(
+        "clerestory report map-quality",
+        part(
+            "PM-MAP-3",
+            "tree by the voxel volume heuristic",
+            "Interactive Manycore Photon Mapping, 2011, §6.1.1",
+            "engine/src/accel/vvh.rs",
+            &["engine/src/accel/lbvh/builders_tests.rs::sweeps_are_valid_and_beat_the_linear_tree"],
+        ),
+    ),
+    measured(
+        "clerestory report map-construction merge-example",
+        part(
+            "PM-MAP-4",
+            "linear hierarchy by split lists",
+            "Lauterbach et al. 2009",
+            "engine/src/accel/lbvh/split_lists.rs",
+            &[
+                "engine/src/accel/lbvh/builders_tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report map-construction map-quality merge-example",
+        part(
+            "PM-MAP-5",
+            "linear hierarchy by merging",
+            "Interactive Manycore Photon Mapping, 2011, §6.1.2",
+            "engine/src/accel/lbvh/merge.rs",
+            &[
+                "engine/src/accel/lbvh/builders_tests.rs::the_worked_example_of_the_merge_comes_out_step_by_step",
+                "engine/src/accel/lbvh/builders_tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report leaf-sizes",
+        part(
+            "PM-MAP-6",
+            "automatic leaf size of photon maps",
+            "Interactive Manycore Photon Mapping, 2011, §6.1.3",
+            "engine/src/accel/lbvh/leaf_threshold.rs",
+            &["engine/src/accel/lbvh/leaf_threshold.rs::leaf_sizes_follow_the_cover_of_the_scene"],
+        ),
+    ),
+    measured(
+        "clerestory report compact-map",
+        part(
+            "PM-MAP-7",
+            "complete nodes and sibling pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.4",
+            "engine/src/accel/complete_bvh.rs",
+            &["engine/src/accel/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes"],
+        ),
+    ),
+    measured(
+        "clerestory report compact-map",
+        part(
+            "PM-MAP-8",
+            "compact sibling pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.1",
+            "engine/src/accel/compact_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes",
+                "engine/src/accel/compact_bvh/tests.rs::loose_boxes_are_refused",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report compact-map",
+        part(
+            "PM-MAP-9",
+            "point queries on compact pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.3",
+            "engine/src/accel/compact_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
+                "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report compact-rays",
+        part(
+            "PM-MAP-10",
+            "ray queries on compact pairs",
+            "Interactive Manycore Photon Mapping, 2011, §6.2.2",
+            "engine/src/accel/compact_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+                "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report map-construction",
+        part(
+            "PM-MAP-11",
+            "linear hierarchy by clusters",
+            "Pantaleoni and Luebke 2010",
+            "engine/src/accel/lbvh/clustered.rs",
+            &[
+                "engine/src/accel/lbvh/builders_tests.rs::sorting_by_clusters_is_the_stable_sort",
+                "engine/src/accel/lbvh/builders_tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report device-model",
+        part(
+            "PM-X-0",
+            "cost model of the device: dependent loads, copies, tickets of a queue, boundaries",
+            "Interactive Manycore Photon Mapping, 2011, §2.2.2 to §2.2.4; Wong et al. 2010",
+            "engine/src/kernels/device_model.rs",
+            &[
+                "engine/src/kernels/device_model.rs::chains_visit_every_place_before_they_come_back",
+                "tests/tests/kernels/device_model.rs::what_is_timed_is_what_was_done",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report persistent-threads",
+        part(
+            "PM-X-1",
+            "closest hits of a buffer of rays: one thread a ray",
+            "Aila and Laine 2009",
+            "engine/src/accel/trace.rs",
+            &[
+                "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+                "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
+                "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report persistent-threads",
+        part(
+            "PM-X-2",
+            "closest hits of a buffer of rays: persistent threads on a queue with quotas",
+            "Aila and Laine 2009; Interactive Manycore Photon Mapping, 2011, §2.2.3.4",
+            "engine/src/accel/trace.rs",
+            &[
+                "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+                "tests/tests/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
+                "tests/tests/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report compact-map compact-rays",
+        part(
+            "PM-X-3",
+            "traffic model: every access served by itself, as exact counts of bytes",
+            "Interactive Manycore Photon Mapping, 2011, §4.3.3",
+            "engine/src/accel/complete_bvh.rs",
+            &[
+                "engine/src/accel/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
+                "engine/src/accel/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+            ],
+        ),
+    ),
+];

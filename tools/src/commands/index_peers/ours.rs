@@ -1,0 +1,168 @@
+//! Our indexes in the comparison: built on the processor, traced by the device's kernel with an invocation a ray.
+
+use std::time::Instant;
+
+use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
+use clerestory::accel::{Hit, Ray, RayIndex};
+use clerestory::gpu::ash::vk::Format;
+use clerestory::gpu::shaders::accel::trace_closest;
+use clerestory::gpu::shaders::sets::Bvh2Set;
+use clerestory::gpu::{Buffer, Category, ComputePipeline, Gpu, TexelView, rw_compute_to_compute, transfer_to_compute};
+use clerestory::{Error, Result};
+use glam::Vec3;
+
+use super::{Contender, Met, Spread, timed};
+
+/// Steps of a ray in one dispatch: few enough for software devices, which end long loops, and more than these rays need.
+const QUOTA: u32 = 50_000;
+
+/// Builds an index of ours.
+pub type Build = fn(&[[Vec3; 3]]) -> Result<Bvh2>;
+
+/// Our indexes; the first one's hits are those that others are compared with.
+pub const INDEXES: [(&str, Build); 3] = [
+    ("bvh2, binned", |t| Bvh2::build(t, &Bvh2Settings::default())),
+    ("lbvh, fast", |t| {
+        let quality = BuildQuality::Fast;
+        lbvh::build(
+            t,
+            &LbvhSettings {
+                quality,
+                ..LbvhSettings::default()
+            },
+        )
+    }),
+    ("lbvh, high", |t| lbvh::build(t, &LbvhSettings::default())),
+];
+
+/// An index that was built, with its seconds.
+pub struct Built {
+    /// Its name.
+    pub name: &'static str,
+    /// The index.
+    pub index: Bvh2,
+    /// Seconds of its build.
+    pub build: Spread,
+}
+
+/// Builds all of them.
+pub fn build_all(triangles: &[[Vec3; 3]], repeat: u32) -> Result<Vec<Built>> {
+    let built = INDEXES.iter().map(|(name, build)| {
+        let (index, build) = timed(repeat, || build(triangles))?;
+        Ok(Built { name, index, build })
+    });
+    built.collect()
+}
+
+struct Buffers {
+    rays: Buffer,
+    hits: Buffer,
+    resume: Buffer,
+    status: Buffer,
+    count: u32,
+}
+
+/// An index and rays of several sets on the device.
+pub struct Kernel<'a> {
+    gpu: &'a Gpu,
+    pipeline: ComputePipeline<trace_closest::Kernel>,
+    quarters: TexelView,
+    sets: Vec<Buffers>,
+}
+
+impl<'a> Kernel<'a> {
+    /// Uploads them.
+    pub fn new(gpu: &'a Gpu, index: &Bvh2, sets: &[&[Ray]]) -> Result<Self> {
+        let spec = trace_closest::Spec {
+            bvh2_quota: QUOTA,
+            bvh2_count: false,
+        };
+        let buffers = |rays: &&[Ray]| {
+            Ok(Buffers {
+                rays: gpu.buffer_with("rays", Category::Work, rays)?,
+                hits: gpu.buffer_with("hits", Category::Work, &vec![0_u32; 4 * rays.len()])?,
+                resume: gpu.buffer_with("resume", Category::Work, &vec![0_u32; rays.len()])?,
+                status: gpu.buffer_with("status", Category::Work, &[0_u32; 4])?,
+                count: rays.len() as u32,
+            })
+        };
+        let format = Format::R32G32B32A32_UINT;
+        Ok(Self {
+            gpu,
+            pipeline: gpu.compute_pipeline::<trace_closest::Kernel>(&spec)?,
+            quarters: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
+            sets: sets.iter().map(buffers).collect::<Result<_>>()?,
+        })
+    }
+
+    /// Traces a set; seconds by wall clock from submission to the end of waiting.
+    pub fn trace(&self, set: usize) -> Result<f64> {
+        let buffers = &self.sets[set];
+        let set = trace_closest::Set0 {
+            trace_rays: buffers.rays.view(),
+            trace_hits: buffers.hits.view(),
+            trace_resume: buffers.resume.view(),
+            trace_status: buffers.status.view(),
+        };
+        let bvh2 = Bvh2Set {
+            bvh2_quarters: &self.quarters,
+        };
+        let mut recorder = self.gpu.recorder("trace")?;
+        recorder.pass("trace", |pass| {
+            pass.fill(buffers.status.view(), 0)?;
+            pass.fill(buffers.resume.view(), 0)?;
+            pass.barrier(&[
+                transfer_to_compute(&buffers.status),
+                transfer_to_compute(&buffers.resume),
+            ]);
+            let push = trace_closest::Push {
+                first_ray: 0,
+                ray_count: buffers.count,
+            };
+            let groups = [self.pipeline.groups_for(push.ray_count), 1, 1];
+            pass.dispatch(&self.pipeline, &[&set, &bvh2], &push, groups)?;
+            pass.barrier(&[rw_compute_to_compute(&buffers.hits)]);
+            Ok(())
+        })?;
+        let start = Instant::now();
+        recorder.submit()?.wait()?;
+        let seconds = start.elapsed().as_secs_f64();
+        let status = self.gpu.read::<trace_closest::TraceStatus>(buffers.status.view(), 1)?;
+        match status.first().map_or(0, |status| status.unfinished) {
+            0 => Ok(seconds),
+            unfinished => Err(Error::setting("rays", unfinished, "did not end in one dispatch")),
+        }
+    }
+
+    /// What a set met when it was traced last.
+    pub fn met(&self, set: usize) -> Result<Vec<Met>> {
+        let buffers = &self.sets[set];
+        let hits = self.gpu.read::<Hit>(buffers.hits.view(), buffers.count as usize)?;
+        let met = |hit: &Hit| {
+            if hit.is_hit() {
+                Met {
+                    t: hit.t,
+                    triangle: hit.triangle,
+                }
+            } else {
+                Met::NOTHING
+            }
+        };
+        Ok(hits.iter().map(met).collect())
+    }
+}
+
+/// An index of ours that traces both kinds of rays.
+pub fn contender<'a>(gpu: &'a Gpu, built: &Built, rays: &[Vec<Ray>; 2]) -> Result<Contender<'a>> {
+    let kernel = Kernel::new(gpu, &built.index, &[&rays[0], &rays[1]])?;
+    Ok(Contender {
+        name: built.name.into(),
+        build: built.build,
+        sah_cost: Some(built.index.statistics().sah_cost),
+        trace: Box::new(move |kind| {
+            let seconds = kernel.trace(kind)?;
+            Ok((seconds, kernel.met(kind)?))
+        }),
+    })
+}
