@@ -46,14 +46,14 @@ pub enum Error {
         /// What the driver or the allocator said.
         cause: String,
     },
-    /// A buffer is larger than a limit of the device.
-    #[error("{name:?} wants {bytes} bytes; the device's {limit_name} is {limit}")]
+    /// Something is larger than a limit of the device or of the engine allows. Buffers count in bytes; what else counts is in the limit's name.
+    #[error("{name:?} wants {bytes}, more than {limit_name} = {limit}")]
     LimitExceeded {
         /// The buffer's or image's name.
         name: String,
-        /// Bytes (or texels, groups …) asked for.
+        /// Bytes, texels, groups or elements asked for.
         bytes: u64,
-        /// The limit's Vulkan name.
+        /// The limit's name, that of Vulkan where it is one of a device.
         limit_name: &'static str,
         /// Its value.
         limit: u64,

@@ -14,8 +14,8 @@
 //! # }
 //! ```
 //!
-//! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`scene`] and [`film`], [`accel`] (spatial
-//! indexes), [`transport`] (what light does), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] says where each
+//! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`kernels`] (sort, scan
+//! and the like), [`scene`] and [`film`], [`accel`] (spatial indexes), [`transport`] (what light does), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] says where each
 //! published method lives.
 
 pub mod accel;

@@ -33,7 +33,7 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
 const FLOORS: [&[&str]; 7] = [
     &["gpu"],
     &["kernels", "scene", "film"],
-    &["accel", "maps", "raster"],
+    &["accel"],
     &["transport"],
     &["techniques"],
     &["render"],

@@ -161,6 +161,7 @@ fn device_refits_are_the_twins() {
             let (device, _) = builder.refit(&before, &triangles).unwrap();
             let host = refit(&before.index, &triangles).unwrap();
             assert!(device.texels() == host.texels(), "{count}");
+            assert_eq!(device.statistics(), host.statistics(), "{count}");
             assert!(builder.refit(&before, &triangles[1..]).is_err());
         }
     });

@@ -4,6 +4,7 @@
 //! f64 test alone.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
+use clerestory::accel::trace::wide_counter;
 use clerestory::accel::{Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::shaders::accel::{trace_any, trace_closest};
 use clerestory::gpu::shaders::sets::Bvh2Set;
@@ -83,9 +84,9 @@ macro_rules! trace {
                 .unwrap();
             recorder.submit().unwrap().wait().unwrap();
             let s = gpu.read::<$shader::TraceStatus>(status.view(), 1).unwrap()[0];
-            traced.counters.nodes += u64::from(s.node_visits);
-            traced.counters.triangles += u64::from(s.triangle_tests);
-            traced.counters.iterations += u64::from(s.iterations);
+            traced.counters.nodes += wide_counter(s.node_visits);
+            traced.counters.triangles += wide_counter(s.triangle_tests);
+            traced.counters.iterations += wide_counter(s.iterations);
             traced.dispatches += 1;
             if s.unfinished == 0 {
                 break;

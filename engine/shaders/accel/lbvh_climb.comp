@@ -1,8 +1,9 @@
 // Fifth stage of the linear hierarchy: the nodes that reach into several runs.
 //
-// An invocation arrives at a node for one of its children. The first to arrive ends, the second joins both and goes on to the parent:
-// nobody waits, so nothing is asked of the scheduler, and which of both it is does not show in the tree (T. Karras, "Maximizing
-// Parallelism in the Construction of BVHs, Octrees, and k-d Trees", 2012). The host fills `lbvh_arrivals` with zero.
+// An invocation goes through what its run has left, and arrives at each of these nodes for one of its children. The first to arrive there
+// ends, the second joins both and goes on to the parent: nobody waits, so nothing is asked of the scheduler, and which of both it is does
+// not show in the tree (T. Karras, "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees", 2012). The host fills
+// `lbvh_arrivals` with zero.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -14,13 +15,8 @@ layout(local_size_x = LBVH_GROUP_SIZE) in;
 
 layout(set = 0, binding = 5, scalar) restrict coherent buffer LbvhArrivals { uint lbvh_arrivals[]; };
 
-void main() {
-    uint turn = gl_GlobalInvocationID.x / lbvh_push.runs;
-    uint run = gl_GlobalInvocationID.x - turn * lbvh_push.runs;
-    if (turn >= lbvh_pending[run]) {
-        return;
-    }
-    uint node = lbvh_pending[lbvh_push.runs * (1u + turn) + run];
+// From a node at which a child is ready.
+void climb(uint node) {
     bool climbing = true;
     for (uint i = 0u; climbing && i < LBVH_MAX_ASCENT; ++i) {
         lbvh_fence();
@@ -37,5 +33,16 @@ void main() {
                 lbvh_store_mail(node, is_left ? 0u : 1u, own);
             }
         }
+    }
+}
+
+void main() {
+    uint run = gl_GlobalInvocationID.x;
+    if (run >= lbvh_push.runs) {
+        return;
+    }
+    uint left = lbvh_pending[run];
+    for (uint turn = 0u; turn < left; ++turn) {
+        climb(lbvh_pending[lbvh_push.runs * (1u + turn) + run]);
     }
 }

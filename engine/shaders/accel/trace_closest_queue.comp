@@ -21,7 +21,7 @@ layout(constant_id = 2) const uint TRACE_BATCH = 64u;
 layout(set = 0, binding = 4, scalar) restrict buffer TraceQueue {
     // First ray that nobody has fetched, or beyond the last.
     uint next_ray;
-    // Fetches that found rays, and the rays that they found.
+    // Fetches that found rays, and the rays that they found, when counting is specialised in.
     uint batches;
     uint fetched_rays;
 } trace_queue;
@@ -42,7 +42,7 @@ void main() {
         // Read by all before the next is fetched.
         barrier();
         uint batch_end = min(first + TRACE_BATCH, end);
-        if (gl_LocalInvocationIndex == 0u && first < end) {
+        if (BVH2_COUNT && gl_LocalInvocationIndex == 0u && first < end) {
             atomicAdd(trace_queue.batches, 1u);
             atomicAdd(trace_queue.fetched_rays, batch_end - first);
         }

@@ -203,4 +203,4 @@ impl RayIndex for Bvh2 {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -23,6 +23,7 @@
 pub mod bvh2;
 pub mod compact_bvh;
 pub mod complete_bvh;
+pub mod kd;
 mod kind;
 pub mod lbvh;
 pub mod morton;

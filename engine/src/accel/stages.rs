@@ -16,8 +16,8 @@ pub struct BuildStages {
     pub sort: f64,
     /// The tree: its splits, boxes and leaves.
     pub hierarchy: f64,
-    /// Restructuring it.
-    pub restructure: f64,
+    /// Optimising it, of high quality.
+    pub optimise: f64,
     /// Nodes and triangles to where rays want them.
     pub layout: f64,
     /// Depth and surface area cost.
@@ -38,7 +38,7 @@ impl BuildStages {
             ("codes", self.codes),
             ("sort", self.sort),
             ("hierarchy", self.hierarchy),
-            ("restructure", self.restructure),
+            ("optimise", self.optimise),
             ("layout", self.layout),
             ("statistics", self.statistics),
         ]

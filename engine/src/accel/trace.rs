@@ -130,6 +130,11 @@ impl TraceSettings {
     }
 }
 
+/// A counter of the kernels: two words, the low one first.
+pub fn wide_counter([low, high]: [u32; 2]) -> u64 {
+    u64::from(high) << 32 | u64::from(low)
+}
+
 /// Lanes of a queue's workgroup: a subgroup, so that no lane waits for the rays of another one.
 fn group_size(caps: &Caps) -> u32 {
     caps.subgroup_size.clamp(1, 128)
@@ -142,9 +147,9 @@ pub struct Traced {
     pub hits: Vec<Hit>,
     /// Exact work, when it was counted.
     pub work: TraversalCounters,
-    /// Batches that were fetched, all rounds together; 0 without a queue.
+    /// Batches that were fetched, all rounds together, when work was counted; 0 without a queue.
     pub batches: u64,
-    /// Rays that were fetched, all rounds together; 0 without a queue.
+    /// Rays that were fetched, all rounds together, when work was counted; 0 without a queue.
     pub fetched_rays: u64,
     /// Rays that were stopped by their quota, all rounds together.
     pub unfinished: u64,
@@ -199,6 +204,17 @@ impl RayTracer {
     /// [`Error::Setting`] for settings out of range, or with which a software device could lose rays; [`Error::LimitExceeded`] for an index
     /// that does not fit the device; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, index: &Bvh2, settings: &TraceSettings) -> Result<Self> {
+        let format = vk::Format::R32G32B32A32_UINT;
+        let texels = gpu.texels_with(index.name(), Category::Index, format, index.texels())?;
+        Self::with_texels(gpu, texels, settings)
+    }
+
+    /// The same for an index that is on the device, such as [`ResidentLbvh::quarters`](super::lbvh::ResidentLbvh::quarters): texels as
+    /// [`RayIndex::texels`] has them.
+    ///
+    /// # Errors
+    /// As [`RayTracer::new`].
+    pub fn with_texels(gpu: &Gpu, index: TexelView, settings: &TraceSettings) -> Result<Self> {
         settings.check(gpu.caps())?;
         let (bvh2_quota, bvh2_count) = (settings.ray_quota, settings.count);
         let kernel = match settings.execution {
@@ -216,11 +232,10 @@ impl RayTracer {
                 Kernel::Queue(threads, gpu.compute_pipeline(&spec)?)
             }
         };
-        let format = vk::Format::R32G32B32A32_UINT;
         Ok(Self {
             gpu: gpu.clone(),
             kernel,
-            index: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
+            index,
             settings: *settings,
         })
     }
@@ -245,15 +260,18 @@ impl RayTracer {
         }
     }
 
-    /// Tries powers of two for the number of workgroups on `rays` and keeps the fastest; does nothing where there is no queue, or where the
-    /// device has no timestamps. Returns what [`RayTracer::groups`] is now.
+    /// Tries powers of two for the number of workgroups on `rays` and keeps the fastest; does nothing where there is no queue, where the
+    /// device has no timestamps, or without rays. Returns what [`RayTracer::groups`] is now.
     ///
     /// # Errors
     /// As [`RayTracer::trace`].
     pub fn tune(&mut self, rays: &[Ray]) -> Result<Option<u32>> {
         const MOST: u32 = 1 << 14;
         // The first run may compile the kernel.
-        self.trace(rays)?;
+        let first = self.trace(rays)?;
+        if rays.is_empty() || first.timings.untimed.is_some() {
+            return Ok(self.groups());
+        }
         let mut best: Option<(f64, u32)> = None;
         let mut groups = 1;
         while let Kernel::Queue(threads, _) = &mut self.kernel
@@ -307,9 +325,9 @@ impl RayTracer {
                 break;
             };
             if self.settings.count {
-                traced.work.nodes += u64::from(status.node_visits);
-                traced.work.triangles += u64::from(status.triangle_tests);
-                traced.work.iterations += u64::from(status.iterations);
+                traced.work.nodes += wide_counter(status.node_visits);
+                traced.work.triangles += wide_counter(status.triangle_tests);
+                traced.work.iterations += wide_counter(status.iterations);
             }
             traced.batches += u64::from(queue.batches);
             traced.fetched_rays += u64::from(queue.fetched_rays);

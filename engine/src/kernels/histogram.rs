@@ -11,7 +11,7 @@ use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass};
 use crate::{Error, Result};
 
 /// The most bins of a [`Histogram`].
-pub const MAX_BINS: u32 = 4096;
+pub const MAX_BINS: u32 = 4095;
 
 /// Counts how often each value below a bound occurs.
 ///

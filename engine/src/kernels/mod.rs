@@ -5,6 +5,36 @@
 //! shaders before, and what is written wants a barrier after; each kernel says which accesses. Between its own stages a kernel records its
 //! barriers itself. The number of elements is known to the host, or read from a buffer ([`Count`]).
 //!
+//! The twin of a kernel is a plain Rust function of the same result ([`scan()`], [`radix_sort()`] …); tests hold both together.
+//!
+//! ```no_run
+//! use clerestory::gpu::{BufferDesc, Category, Gpu, GpuOptions};
+//! use clerestory::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
+//!
+//! # fn main() -> clerestory::Result<()> {
+//! let gpu = Gpu::headless(&GpuOptions::default())?;
+//! let sort = RadixSort::new(&gpu, RadixSortOptions::new(KeyWidth::Bits32, false))?;
+//! let keys = [30_u32, 10, 20];
+//! let count = keys.len() as u32;
+//! // Two sides: passes go from one to the other and back.
+//! let sides = [sort.keys("keys", count)?, sort.keys("other keys", count)?];
+//! gpu.upload(sides[0].buffer(), 0, &keys)?;
+//! let scratch = gpu.buffer(&BufferDesc::storage("scratch", sort.scratch_bytes(count), Category::Work))?;
+//! let buffers = SortBuffers { keys: [&sides[0], &sides[1]], values: None };
+//! let mut recorder = gpu.recorder("sort")?;
+//! let mut side = 0;
+//! recorder.pass("sort", |pass| {
+//!     side = sort.record(pass, &buffers, Count::Host(count), &scratch)?;
+//!     Ok(())
+//! })?;
+//! recorder.submit()?.wait()?;
+//! // No barriers here: a submission sees all that earlier ones wrote, and reading back waits.
+//! let sorted: Vec<u32> = gpu.read(sides[side].buffer().view(), keys.len())?;
+//! assert_eq!(sorted, [10, 20, 30]);
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! Kernels over a stream reduce, then scan, then work: no workgroup ever waits for another. A team, which is a workgroup or a single
 //! invocation ([`Form`]), owns a contiguous block of the stream, so results are the same bits whatever the device.
 

@@ -21,6 +21,10 @@ pub(super) const MAX_COUNT: u32 = 1 << 31;
 /// Elements that one invocation of the serial form walks at most: software drivers end loops in silence after 65,535 iterations.
 pub(super) const SERIAL_QUOTA: u32 = 1 << 15;
 
+/// Bytes of shared memory that the subgroup forms take at most: a row of counters for each subgroup of a scatter, the next place of each digit,
+/// and a scan's words.
+const SUBGROUP_SHARED_MEMORY: u32 = 20 << 10;
+
 /// What a team of a kernel is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Form {
@@ -39,12 +43,13 @@ impl Form {
     /// Resolves [`Form::Auto`].
     ///
     /// # Errors
-    /// [`Error::MissingFeature`] when subgroup operations are asked for that the device lacks.
+    /// [`Error::MissingFeature`] when subgroup operations are asked for that the device lacks, or that lack shared memory.
     pub fn on(self, caps: &Caps, kernel: &str) -> Result<Self> {
         let able = caps.subgroup.basic
             && caps.subgroup.ballot
             && caps.subgroup.shuffle
-            && (4..=128).contains(&caps.subgroup_size);
+            && (4..=128).contains(&caps.subgroup_size)
+            && caps.max_shared_memory >= SUBGROUP_SHARED_MEMORY;
         match self {
             Self::Auto if able && caps.kind != DeviceKind::Cpu => Ok(Self::Subgroup),
             Self::Auto if caps.kind != DeviceKind::Cpu => Ok(Self::Shared),
@@ -52,7 +57,9 @@ impl Form {
             Self::Shared => Ok(Self::Shared),
             Self::Subgroup if able => Ok(Self::Subgroup),
             Self::Subgroup => Err(Error::MissingFeature {
-                feature: "subgroup ballot and shuffle in compute shaders, of 4 to 128 lanes".into(),
+                feature: format!(
+                    "subgroup ballot and shuffle in compute shaders, of 4 to 128 lanes, and {SUBGROUP_SHARED_MEMORY} bytes of shared memory"
+                ),
                 needed_by: kernel.into(),
                 device: caps.device.clone(),
                 instead: "choose Form::Shared or Form::Serial".into(),

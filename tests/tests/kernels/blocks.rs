@@ -14,12 +14,17 @@ use super::{FORMS, PATTERNS, Pattern, SIZES, empty, read, run, words};
 
 /// Every other time the count is read from a buffer.
 fn counted(counts: &Buffer, count: u32, turn: usize) -> Count<'_> {
+    counted_of(counts, count, count, turn)
+}
+
+/// The same where the buffers hold more.
+fn counted_of(counts: &Buffer, count: u32, capacity: u32, turn: usize) -> Count<'_> {
     if turn.is_multiple_of(2) {
         Count::Host(count)
     } else {
         Count::Device {
             view: counts.view(),
-            capacity: count,
+            capacity,
         }
     }
 }
@@ -40,12 +45,13 @@ fn flags(random: &mut Random, count: u32, one_in: usize) -> Vec<u32> {
 fn check_scan(gpu: &Gpu, options: ScanOptions, random: &mut Random) {
     let kernel = Scan::new(gpu, options).unwrap();
     for (turn, size) in SIZES.into_iter().enumerate() {
-        let values = random.choose(&PATTERNS).words(random, size);
-        let heads = flags(random, size, [2, 40, 5000][turn % 3]);
+        let capacity = size + [1, 300, 5_000, 100_000][turn % 4];
+        let values = random.choose(&PATTERNS).words(random, capacity);
+        let heads = flags(random, capacity, [2, 40, 5000][turn % 3]);
         let input = words(gpu, "input", &values);
         let head_words = words(gpu, "heads", &heads);
-        let output = empty(gpu, "output", 4 * u64::from(size));
-        let scratch = empty(gpu, "scratch", kernel.scratch_bytes(size));
+        let output = words(gpu, "output", &values);
+        let scratch = empty(gpu, "scratch", kernel.scratch_bytes(capacity));
         let counts = words(gpu, "count", &[size]);
         // Every third time in place.
         let target = if turn % 3 == 2 { &input } else { &output };
@@ -55,11 +61,14 @@ fn check_scan(gpu: &Gpu, options: ScanOptions, random: &mut Random) {
             output: target.view(),
         };
         run(gpu, |pass| {
-            kernel.record(pass, &buffers, counted(&counts, size, turn), &scratch)
+            kernel.record(pass, &buffers, counted_of(&counts, size, capacity, turn), &scratch)
         });
-        let heads = options.segmented.then_some(heads.as_slice());
-        let (expected, total) = scan(&values, heads, options.operation, options.inclusive);
-        assert!(read(gpu, target, size as usize) == expected, "{size}: {options:?}");
+        let (within, beyond) = values.split_at(size as usize);
+        let heads = options.segmented.then_some(&heads[..size as usize]);
+        let (expected, total) = scan(within, heads, options.operation, options.inclusive);
+        let found = read(gpu, target, capacity as usize);
+        assert!(found[..size as usize] == expected, "{size}: {options:?}");
+        assert!(found[size as usize..] == *beyond, "written beyond {size}: {options:?}");
         assert_eq!(
             gpu.read::<u32>(kernel.total(&scratch), 1).unwrap(),
             [total],

@@ -45,28 +45,38 @@ fn random_keys(random: &mut Random, pattern: Pattern, width: KeyWidth, count: u3
     }
 }
 
-/// Sorts on the device; keys as words, and values where there are any.
+/// What no sort writes: beyond the count, keys stay this.
+const UNTOUCHED: u32 = 0xA5A5_5A5A;
+
+/// Sorts on the device; keys as words, and values where there are any. A count on the device comes with a capacity that is larger.
 fn sorted(gpu: &Gpu, sort: &RadixSort, keys: &[u64], on_device: bool) -> (Vec<u32>, Vec<u32>) {
     let (count, options) = (keys.len() as u32, sort.options());
     let input = to_words(keys, options.key);
-    let sides = ["keys", "other keys"].map(|name| sort.keys(name, count).unwrap());
-    let values = ["values", "other values"].map(|name| sort.values(name, count).unwrap());
+    let more = [1, 300, 5_000, 100_000][keys.len() % 4];
+    let capacity = if on_device { count + more } else { count };
+    let sides = ["keys", "other keys"].map(|name| sort.keys(name, capacity).unwrap());
+    let values = ["values", "other values"].map(|name| sort.values(name, capacity).unwrap());
+    let capacity_words = capacity as usize * options.key.words() as usize;
+    if capacity > 0 {
+        for view in &sides {
+            gpu.upload(view.buffer(), 0, &vec![UNTOUCHED; capacity_words]).unwrap();
+        }
+    }
     if count > 0 {
         gpu.upload(sides[0].buffer(), 0, &input).unwrap();
         gpu.upload(values[0].buffer(), 0, &(0..count).collect::<Vec<_>>())
             .unwrap();
     }
-    // With a count on the device the capacity is larger than the count, and the buffers hold just the capacity.
     let counts = words(gpu, "count", &[count]);
     let count_given = if on_device {
         Count::Device {
             view: counts.view(),
-            capacity: count,
+            capacity,
         }
     } else {
         Count::Host(count)
     };
-    let scratch = empty(gpu, "scratch", sort.scratch_bytes(count));
+    let scratch = empty(gpu, "scratch", sort.scratch_bytes(capacity));
     let buffers = SortBuffers {
         keys: [&sides[0], &sides[1]],
         values: options.values.then_some([&values[0], &values[1]]),
@@ -76,12 +86,16 @@ fn sorted(gpu: &Gpu, sort: &RadixSort, keys: &[u64], on_device: bool) -> (Vec<u3
         side = sort.record(pass, &buffers, count_given, &scratch)?;
         Ok(())
     });
-    assert_eq!(side, sort.side(count));
+    assert_eq!(side, sort.side(capacity));
     if on_device {
         let status = StreamStatus::read(gpu, &scratch).unwrap();
         assert_eq!((status.count, status.wanted), (count, count));
     }
-    let result = gpu.read(sides[side].buffer().view(), input.len()).unwrap();
+    let mut result: Vec<u32> = gpu.read(sides[side].buffer().view(), capacity_words).unwrap();
+    assert!(
+        result.drain(input.len()..).all(|word| word == UNTOUCHED),
+        "written beyond the count: {count} of {capacity}, {options:?}"
+    );
     let moved = gpu.read(values[side].buffer().view(), count as usize).unwrap();
     (result, if options.values { moved } else { Vec::new() })
 }

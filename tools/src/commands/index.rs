@@ -8,13 +8,12 @@ use clap::Args;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::{Ray, RayIndex, TraversalCounters};
-use clerestory::gpu::{PassTiming, Timings};
 use clerestory::scene::Scene;
 use clerestory::{Result, scene};
-use clerestory_tools::geometry;
+use clerestory_tools::{geometry, machine};
 use glam::Vec3;
 
-use super::index_peers;
+use super::{check_validation, index_peers};
 use crate::failure::{Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output::{self, Table};
@@ -28,8 +27,8 @@ Examples:
   clerestory index --peers --rays 262144
   clerestory index --peers --rays 262144 --repeat 9 --folder out/index --page RESULTS.md
 
-Build times are medians by wall clock on the host's threads, by stage those of the median build; that of the device is the least time of \
-its passes, whose tree is the host's to the bit. Steps are nodes and triangles that a ray visits, exact counts of the same \
+Build times are medians by wall clock from triangles on the host to an index where it was built, by stage those of the median build; on \
+the device with the copies to it. Steps are nodes and triangles that a ray visits, exact counts of the same \
 rays for every index: half of them leave the camera, half leave surfaces in random directions.")]
 pub struct Arguments {
     /// A scene; may be given several times
@@ -80,7 +79,7 @@ struct Measured {
     /// Nodes and triangles a ray, and the ratio to those of the first index.
     steps: f64,
     steps_ratio: f64,
-    /// Milliseconds by stage, on the device by pass.
+    /// Milliseconds by stage.
     stages: Vec<(String, f64)>,
 }
 
@@ -141,24 +140,19 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             }
             all.push(measured);
         }
-        let mut device = measure(&triangles, &rays, INDEXES[1].1, 1)?;
+        let mut device = measure_device(&builder, &triangles, &rays, arguments.repeat)?;
         (device.scene, device.index) = (address.clone(), "lbvh, fast, device".into());
         (device.sah_ratio, device.steps_ratio) = (device.sah_cost / all[base].sah_cost, device.steps / all[base].steps);
-        let mut best: Option<Timings> = None;
-        for _ in 0..=arguments.repeat {
-            let timings = builder.build(&triangles)?.timings;
-            if best.as_ref().is_none_or(|best| timings.seconds() < best.seconds()) {
-                best = Some(timings);
-            }
-        }
-        let best = best.unwrap_or_default();
-        device.seconds = best.seconds();
-        let stage = |pass: &PassTiming| (pass.name.clone(), pass.nanoseconds.unwrap_or(0) as f64 * 1e-6);
-        device.stages = best.passes.iter().map(stage).collect();
         all.push(device);
     }
+    let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
+    drop((builder, gpu));
+    check_validation(&log)?;
     if arguments.json {
-        output::print_json(&serde_json::json!({ "engine_version": env!("CARGO_PKG_VERSION"), "indexes": all }))?;
+        output::print_json(&serde_json::json!({
+            "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"),
+            "processor": machine::processor(), "threads": machine::threads(), "load": machine::load(), "indexes": all,
+        }))?;
         return Ok(ExitCode::SUCCESS);
     }
     let head = [
@@ -205,17 +199,43 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
     for _ in 0..repeat {
         let begin = Instant::now();
         index = build(triangles)?;
-        builds.push((begin.elapsed().as_secs_f64(), index.stages()));
+        let stages = index.stages().named().into_iter().filter(|(_, ms)| *ms > 0.0);
+        builds.push((
+            begin.elapsed().as_secs_f64(),
+            stages.map(|(name, ms)| (name.to_owned(), ms)).collect(),
+        ));
     }
+    Ok(measured(&index, rays, builds))
+}
+
+/// Of the build on the device that leaves the index there; what rays visit is counted in one that is read back.
+fn measure_device(builder: &LbvhBuilder, triangles: &[[Vec3; 3]], rays: &[Ray], repeat: u32) -> Result<Measured> {
+    let index = builder.build(triangles)?.index;
+    let mut builds = Vec::new();
+    for _ in 0..repeat {
+        let begin = Instant::now();
+        let resident = builder.build_resident(triangles)?;
+        let seconds = begin.elapsed().as_secs_f64();
+        let stages = resident.map(|resident| resident.stages).unwrap_or_default();
+        let stages = stages.named().into_iter().filter(|(_, ms)| *ms > 0.0);
+        builds.push((seconds, stages.map(|(name, ms)| (name.to_owned(), ms)).collect()));
+    }
+    Ok(measured(&index, rays, builds))
+}
+
+/// Seconds of a build and its milliseconds by stage.
+type BuildTime = (f64, Vec<(String, f64)>);
+
+fn measured(index: &Bvh2, rays: &[Ray], mut builds: Vec<BuildTime>) -> Measured {
     builds.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (seconds, stages) = builds.get(builds.len() / 2).copied().unwrap_or_default();
-    let stages = stages.named().into_iter().filter(|(_, ms)| *ms > 0.0);
+    let middle = builds.len() / 2;
+    let (seconds, stages) = builds.into_iter().nth(middle).unwrap_or_default();
     let mut counters = TraversalCounters::default();
     for ray in rays {
         index.closest_hit_filtered(ray, &mut |_, _| true, &mut counters);
     }
     let statistics = index.statistics();
-    Ok(Measured {
+    Measured {
         scene: String::new(),
         index: String::new(),
         triangles: statistics.triangles,
@@ -226,8 +246,8 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
         sah_ratio: 1.0,
         steps: (counters.nodes + counters.triangles) as f64 / rays.len() as f64,
         steps_ratio: 1.0,
-        stages: stages.map(|(name, ms)| (name.to_owned(), ms)).collect(),
-    })
+        stages,
+    }
 }
 
 /// Rays from the middle of the first camera's picture outwards, and from triangles' centres in random directions.

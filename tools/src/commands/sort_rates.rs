@@ -72,20 +72,44 @@ impl RadixKey for Pair {
     }
 }
 
-/// A sort that gives the seconds it took.
+/// What is sorted by its key.
+trait Element: Copy {
+    fn pair(self) -> Pair;
+}
+
+impl Element for u32 {
+    /// Bare keys stand for themselves.
+    fn pair(self) -> Pair {
+        Pair { key: self, value: self }
+    }
+}
+
+impl Element for Pair {
+    fn pair(self) -> Pair {
+        self
+    }
+}
+
+/// Gives the seconds it took; what has been sorted goes into a vector, if one is given.
+type Run<'a> = Box<dyn FnMut(Option<&mut Vec<Pair>>) -> Result<f64> + 'a>;
+
+/// A sort to be measured.
 struct Sorter<'a> {
     name: &'static str,
-    run: Box<dyn FnMut() -> Result<f64> + 'a>,
+    run: Run<'a>,
 }
 
 impl<'a> Sorter<'a> {
-    fn of<T: Clone>(name: &'static str, data: &'a [T], sort: impl Fn(&mut [T]) + 'a) -> Self {
-        let run = move || {
+    fn of<T: Element>(name: &'static str, data: &'a [T], sort: impl Fn(&mut [T]) + 'a) -> Self {
+        let run = move |sorted: Option<&mut Vec<Pair>>| {
             let mut data = data.to_vec();
             let start = Instant::now();
             sort(&mut data);
             let seconds = start.elapsed().as_secs_f64();
-            std::hint::black_box(data);
+            let data = std::hint::black_box(data);
+            if let Some(sorted) = sorted {
+                sorted.extend(data.into_iter().map(Element::pair));
+            }
             Ok(seconds)
         };
         Self {
@@ -111,20 +135,35 @@ pub fn measure(gpu: &Gpu, repeat: u32, with_peers: bool) -> Result<Vec<Rate>> {
                 Load::Pairs => of_pairs(&pairs, with_peers),
             };
             sorters.insert(0, by_kernel(gpu, &keys, load)?);
-            rates.extend(rates_of(sorters, load, 1 << size, repeat)?);
+            rates.extend(rates_of(sorters, load, &keys, repeat)?);
         }
     }
     Ok(rates)
 }
 
-fn rates_of(mut sorters: Vec<Sorter<'_>>, load: Load, keys: u32, repeat: u32) -> Result<Vec<Rate>> {
+/// Rates of sorters in turns. Of the run before the measured ones the result is checked.
+fn rates_of(mut sorters: Vec<Sorter<'_>>, load: Load, input: &[u32], repeat: u32) -> Result<Vec<Rate>> {
+    let keys = input.len() as u32;
+    let mut expected = input.to_vec();
+    expected.sort_unstable();
     let mut rates = vec![Vec::new(); sorters.len()];
-    for round in 0..=repeat {
+    for (sorter, rates) in sorters.iter_mut().zip(&mut rates) {
+        let mut sorted = Vec::with_capacity(input.len());
+        (sorter.run)(Some(&mut sorted))?;
+        let in_order = sorted.iter().map(|pair| pair.key).eq(expected.iter().copied());
+        let is_moved = |pair: &Pair| load == Load::Keys || input.get(pair.value as usize) == Some(&pair.key);
+        if !in_order || !sorted.iter().all(is_moved) {
+            return Err(Error::setting(
+                "sorter",
+                sorter.name,
+                format!("has not sorted {keys} {}", load.word()),
+            ));
+        }
+        rates.reserve(repeat as usize);
+    }
+    for _ in 0..repeat {
         for (sorter, rates) in sorters.iter_mut().zip(&mut rates) {
-            let seconds = (sorter.run)()?;
-            if round > 0 {
-                rates.push(f64::from(keys) / seconds);
-            }
+            rates.push(f64::from(keys) / (sorter.run)(None)?);
         }
     }
     let rate = |(sorter, rates): (&Sorter<'_>, Vec<f64>)| Rate {
@@ -194,17 +233,37 @@ fn by_kernel<'a>(gpu: &'a Gpu, keys: &'a [u32], load: Load) -> Result<Sorter<'a>
         sort.scratch_bytes(count),
         Category::Work,
     ))?;
-    let run = move || {
+    let run = move |sorted: Option<&mut Vec<Pair>>| {
         let buffers = SortBuffers {
             keys: [&sides[0], &sides[1]],
             values: values.then_some([&values_of[0], &values_of[1]]),
         };
         gpu.upload(sides[0].buffer(), 0, keys)?;
+        if values {
+            gpu.upload(values_of[0].buffer(), 0, &(0..count).collect::<Vec<_>>())?;
+        }
         let mut recorder = gpu.recorder("sort")?;
-        recorder.pass("sort", |pass| sort.record(pass, &buffers, Count::Host(count), &scratch))?;
+        let mut side = 0;
+        recorder.pass("sort", |pass| {
+            side = sort.record(pass, &buffers, Count::Host(count), &scratch)?;
+            Ok(())
+        })?;
         let start = Instant::now();
         recorder.submit()?.wait()?;
-        Ok(start.elapsed().as_secs_f64())
+        let seconds = start.elapsed().as_secs_f64();
+        if let Some(sorted) = sorted {
+            let keys: Vec<u32> = gpu.read(sides[side].buffer().view(), keys.len())?;
+            let values = if values {
+                gpu.read(values_of[side].buffer().view(), keys.len())?
+            } else {
+                keys.clone()
+            };
+            sorted.extend(keys.iter().zip(&values).map(|(key, value)| Pair {
+                key: *key,
+                value: *value,
+            }));
+        }
+        Ok(seconds)
     };
     Ok(Sorter {
         name: "kernel",
@@ -339,24 +398,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_sorters_sort() {
-        let keys = random_keys(5000);
-        let mut sorted = keys.clone();
-        sorted.sort_unstable();
+    fn sorters_are_checked_measured_and_written() {
+        let keys = random_keys(1024);
         let pairs: Vec<Pair> = keys
             .iter()
             .zip(0..)
             .map(|(key, value)| Pair { key: *key, value })
             .collect();
-        let mut by_rdst = pairs.clone();
-        by_rdst.radix_sort_unstable();
-        assert!(by_rdst.iter().map(|pair| pair.key).eq(sorted.iter().copied()));
+        let wrong = || vec![Sorter::of("idle", &keys, |_| {})];
+        assert!(rates_of(wrong(), Load::Keys, &keys, 1).is_err());
         let rates: Vec<Rate> = [
             (of_keys(&keys, true), Load::Keys),
             (of_pairs(&pairs, true), Load::Pairs),
         ]
         .into_iter()
-        .flat_map(|(sorters, load)| rates_of(sorters, load, 1024, 1).unwrap())
+        .flat_map(|(sorters, load)| rates_of(sorters, load, &keys, 1).unwrap())
         .collect();
         assert_eq!(sorters(&rates, Load::Keys).len(), 5);
         assert_eq!(sorters(&rates, Load::Pairs).len(), 5);

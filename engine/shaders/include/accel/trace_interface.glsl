@@ -19,12 +19,12 @@ layout(set = 0, binding = 2, scalar) restrict buffer TraceResume {
     uint trace_resume[];
 };
 
-// Rays stopped by the quota, and traversal counters modulo 2³² when counting is specialised in.
+// Rays stopped by the quota, and traversal counters of two words, the low one first, when counting is specialised in.
 layout(set = 0, binding = 3, scalar) restrict buffer TraceStatus {
     uint unfinished;
-    uint node_visits;
-    uint triangle_tests;
-    uint iterations;
+    uint node_visits[2];
+    uint triangle_tests[2];
+    uint iterations[2];
 } trace_status;
 
 layout(push_constant, scalar) uniform TraceConstants {

@@ -22,15 +22,21 @@ uint trace_ray(uint index) {
     return resume == BVH2_FINISHED ? 0u : 1u;
 }
 
+// Adds to a counter of two words: whoever carries the low word over adds the carry.
+#define TRACE_ADD_WIDE(counter, more) \
+    if (atomicAdd(counter[0], more) > 0xFFFFFFFFu - (more)) { \
+        atomicAdd(counter[1], 1u); \
+    }
+
 // Adds what an invocation has done.
 void trace_account(uint unfinished) {
     if (unfinished > 0u) {
         atomicAdd(trace_status.unfinished, unfinished);
     }
     if (BVH2_COUNT) {
-        atomicAdd(trace_status.node_visits, bvh2_counters.x);
-        atomicAdd(trace_status.triangle_tests, bvh2_counters.y);
-        atomicAdd(trace_status.iterations, bvh2_counters.z);
+        TRACE_ADD_WIDE(trace_status.node_visits, bvh2_counters.x);
+        TRACE_ADD_WIDE(trace_status.triangle_tests, bvh2_counters.y);
+        TRACE_ADD_WIDE(trace_status.iterations, bvh2_counters.z);
     }
 }
 

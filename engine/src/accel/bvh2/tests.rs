@@ -6,7 +6,7 @@ fn build(triangles: &[[Vec3; 3]]) -> Bvh2 {
     Bvh2::build(triangles, &Bvh2Settings::default()).expect("valid input")
 }
 
-fn soup(random: &mut Random, count: usize, size: f32, scale: f32, centre: Vec3) -> Vec<[Vec3; 3]> {
+pub(in crate::accel) fn soup(random: &mut Random, count: usize, size: f32, scale: f32, centre: Vec3) -> Vec<[Vec3; 3]> {
     let triangle = |random: &mut Random| {
         let p = random.vector();
         [0; 3].map(|_| centre + (p + random.vector() * size) * scale)
@@ -15,7 +15,7 @@ fn soup(random: &mut Random, count: usize, size: f32, scale: f32, centre: Vec3) 
 }
 
 /// A grid of unit quads in the plane z = 0: coplanar, boxes without extent, shared edges.
-fn grid(n: usize) -> Vec<[Vec3; 3]> {
+pub(in crate::accel) fn grid(n: usize) -> Vec<[Vec3; 3]> {
     let point = |i: usize, j: usize| Vec3::new(i as f32, j as f32, 0.0);
     let cell = |i, j| {
         let corners = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
@@ -53,7 +53,7 @@ fn sphere(stacks: usize, slices: usize, radius: f32, centre: Vec3) -> Vec<[Vec3;
     triangles
 }
 
-fn hard_scenes() -> Vec<(&'static str, Vec<[Vec3; 3]>)> {
+pub(in crate::accel) fn hard_scenes() -> Vec<(&'static str, Vec<[Vec3; 3]>)> {
     let mut random = Random(7);
     let random = &mut random;
     let one = soup(random, 1, 0.5, 1.0, Vec3::ZERO);
@@ -98,7 +98,7 @@ fn hard_scenes() -> Vec<(&'static str, Vec<[Vec3; 3]>)> {
 }
 
 /// Rays of every awkward kind about a set of triangles.
-fn hard_rays(random: &mut Random, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray> {
+pub(in crate::accel) fn hard_rays(random: &mut Random, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray> {
     let valid: Vec<_> = triangles
         .iter()
         .filter(|t| t.iter().all(|v| v.abs().max_element() < 1e9))
@@ -152,7 +152,7 @@ fn usable(triangles: &[[Vec3; 3]], bvh: &Bvh2) -> Vec<bool> {
     usable
 }
 
-fn same_bits(a: &Hit, b: &Hit) -> bool {
+pub(in crate::accel) fn same_bits(a: &Hit, b: &Hit) -> bool {
     bytemuck::bytes_of(a) == bytemuck::bytes_of(b)
 }
 

@@ -57,7 +57,8 @@ struct Pending {
     parent: Option<(u32, usize)>,
 }
 
-/// The hierarchy over boxes, of which `sorted` has the codes: each pass decides `levels` bits of all ranges that are left.
+/// The hierarchy over boxes, of which `sorted` has the codes: each pass decides `levels` bits, at least one, of all ranges that
+/// are left.
 pub fn clustered_hierarchy(
     boxes: &[Aabb],
     sorted: &SortedCodes,
@@ -66,6 +67,7 @@ pub fn clustered_hierarchy(
     counts: &mut ClusterCounts,
 ) -> BoxTree {
     let count = sorted.order.len();
+    let levels = levels.max(1);
     let mut tree = BoxTree::single_leaf(sorted.order.clone(), Aabb::EMPTY);
     let mut pending = vec![Pending {
         first: 0,

@@ -2,13 +2,13 @@
 //!
 //! Sources: see [`radix`](super::radix) for the tree, [`RadixSort`] for the sort. The stages are `shaders/accel/lbvh_*.comp`.
 //!
-//! Guarantees: the same bytes as [`build`](super::build) of quality [`Fast`](super::BuildQuality::Fast), on every device; no invocation
-//! ever waits for another.
+//! Guarantees: the same bytes as [`build`](super::build) of quality [`Fast`](super::BuildQuality::Fast), on every device that keeps
+//! subnormal numbers, and on all where no box has an area below the smallest normal one (boxes of 10⁻¹⁹ m); no invocation ever waits for
+//! another.
 
 use super::device_buffers::LbvhBuffers;
 use super::radix::next_skipped;
 use super::ray_index::{LbvhSettings, check_moved, moved_corners};
-use crate::Result;
 use crate::accel::bvh2::build::{Met, check_count};
 use crate::accel::bvh2::layout::Layout;
 use crate::accel::bvh2::{Bvh2, MAX_DEPTH, NODE_QUARTERS, TRIANGLE_QUARTERS};
@@ -22,10 +22,11 @@ use crate::gpu::shaders::constants::{LBVH_BOXES_EACH, LBVH_GROUP_SIZE};
 use crate::gpu::shaders::types::LbvhState;
 use crate::gpu::{Access, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings};
 use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, Scan, ScanBuffers, ScanOptions, SortBuffers};
+use crate::{Error, Result};
 use glam::Vec3;
 
 /// Places that an invocation walks along. Long runs save atomic operations; devices of many lanes want many invocations.
-const CPU_RUN: u32 = 32;
+const CPU_RUN: u32 = 128;
 const GPU_RUN: u32 = 4;
 
 /// A finished build.
@@ -77,7 +78,7 @@ struct Ran {
 }
 
 impl LbvhBuilder {
-    /// Makes the pipelines. Of the settings those of restructuring are not used.
+    /// Makes the pipelines. Of the settings those of quality are not used.
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) for settings out of range, and as [`Gpu::compute_pipeline`].
@@ -90,7 +91,8 @@ impl LbvhBuilder {
             KeyWidth::Bits64
         };
         let is_cpu = gpu.caps().kind == DeviceKind::Cpu;
-        let lbvh_fences = !is_cpu;
+        // See shaders/include/accel/lbvh_fence.glsl.
+        let lbvh_fences = !(is_cpu && gpu.caps().driver.contains("llvmpipe"));
         let run = if is_cpu { CPU_RUN } else { GPU_RUN };
         let mut options = RadixSortOptions::new(key, true);
         options.bits = 0..settings.code_bits;
@@ -117,16 +119,33 @@ impl LbvhBuilder {
     /// Memory for `count` triangles, at least two.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where a buffer is larger than the device binds,
+    /// [`Error::Setting`](crate::Error::Setting) for fewer than two, [`Error::LimitExceeded`](crate::Error::LimitExceeded) for more than
+    /// [`MAX_TRIANGLES`](crate::accel::bvh2::MAX_TRIANGLES), or where a buffer or a dispatch is larger than the device allows,
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn buffers(&self, count: u32) -> Result<LbvhBuffers> {
+        if count < 2 {
+            return Err(Error::setting("lbvh.triangles", count, "is less than two"));
+        }
+        check_count(count as usize)?;
+        // A refit takes an invocation for each child.
+        let groups = u64::from(self.refit.groups_for(2 * (count - 1)));
+        let limit = u64::from(self.gpu.caps().max_workgroups);
+        if groups > limit {
+            return Err(Error::LimitExceeded {
+                name: "lbvh refit".into(),
+                bytes: groups,
+                limit_name: "maxComputeWorkGroupCount",
+                limit,
+            });
+        }
         LbvhBuffers::new(&self.gpu, &self.sort, &self.ranks, self.run, count)
     }
 
-    /// Records a build of the triangles in `corners`, which must be visible to compute shaders.
+    /// Records a build of the triangles in `corners`, named by `indices`: both must be filled and visible to compute shaders. Other uses of
+    /// these buffers by compute shaders may come before it without a barrier.
     ///
-    /// Passes: `lbvh: boxes`, `lbvh: codes`, `lbvh: sort`, `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks`, `lbvh: emit`. After it `quarters` has been
-    /// written by compute shaders. The tree may be deeper than rays can go: [`LbvhBuilder::overflow`] says so once it has run.
+    /// Passes: `lbvh: boxes`, `lbvh: codes`, `lbvh: sort`, `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks`, `lbvh: emit`. It ends with a
+    /// barrier: compute shaders and copies may read `quarters` after it. The tree may be deeper than rays can go: [`LbvhBuilder::overflow`] says so once it has run.
     ///
     /// # Errors
     /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
@@ -224,7 +243,7 @@ impl LbvhBuilder {
                 skipped,
                 leaf_size: self.settings.leaf_size,
             };
-            let groups = [self.climb.groups_for(runs * self.run), 1, 1];
+            let groups = [self.climb.groups_for(runs), 1, 1];
             pass.dispatch(&self.climb, &[&set], &push, groups)?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             Ok(())
@@ -428,7 +447,13 @@ impl LbvhBuilder {
         let mut recorder = self.gpu.recorder("lbvh refit")?;
         self.record_refit(&mut recorder, buffers)?;
         let timings = recorder.submit()?.wait()?;
-        let statistics = build.index.statistics();
+        let before = build.index.statistics();
+        let statistics = IndexStatistics {
+            triangles: before.triangles,
+            excluded_range: before.excluded_range,
+            excluded_degenerate: before.excluded_degenerate,
+            ..IndexStatistics::default()
+        };
         let nodes = build.index.nodes().len() as u32;
         Ok((self.read(buffers, nodes, statistics)?, timings))
     }

@@ -268,12 +268,11 @@ impl Splits {
         let root = self.root.slot as usize;
         let chunks = slots.par_chunks_mut(CHUNK).zip(before).enumerate();
         chunks.for_each(|(chunk, (slots, before))| {
-            let mut rank = before as u32;
-            for (i, slot) in slots.iter_mut().enumerate().filter(|(_, slot)| slot.target != 0) {
+            let stay = slots.iter_mut().enumerate().filter(|(_, slot)| slot.target != 0);
+            for (rank, (i, slot)) in (before as u32..).zip(stay) {
                 let at = chunk * CHUNK + i;
                 // Of those before the root one place is the root's, of those behind it the root is counted.
                 slot.target = if at == root { 1 } else { rank + 1 + u32::from(at < root) };
-                rank += 1;
             }
         });
     }

@@ -168,7 +168,7 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
             let tree = hierarchy(&boxes, &sorted, LeafRule::Area(1), MAX_DEPTH);
             stages.hierarchy = watch.lap();
             let tree = optimised(&tree, &boxes, settings);
-            stages.restructure = watch.lap();
+            stages.optimise = watch.lap();
             Layout::of(&nodes_of(&tree), boxes.len(), |place| met.triangle(tree.order[place]))
         }
     };

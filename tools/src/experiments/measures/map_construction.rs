@@ -120,8 +120,8 @@ fn whole(passes: &[(String, f64)]) -> f64 {
 fn first_touches() -> u64 {
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     // The name in parentheses may hold blanks; minor faults are the eighth field behind it.
-    let fields = text.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace();
-    fields.skip(7).next().and_then(|field| field.parse().ok()).unwrap_or(0)
+    let mut fields = text.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace();
+    fields.nth(7).and_then(|field| field.parse().ok()).unwrap_or(0)
 }
 
 /// Seconds that the first touch of a page takes; 0 where the system does not count them.

@@ -12,7 +12,7 @@ use glam::Vec3;
 use super::Context;
 use super::clock::seconds;
 use super::inputs::Random;
-use super::photon_kernels::{Meeting, Surfaces};
+use super::photon_scenes::{Meeting, Surfaces};
 use crate::experiments::table::{Cell, Table};
 
 /// Scenes with a light.

@@ -1,0 +1,260 @@
+use super::tree::KdKind;
+use super::*;
+use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
+use crate::accel::test_support::{Random, brute_force, ray};
+
+const SCHEMES: [Scheme; 7] = [
+    Scheme::Stack,
+    flags(false, 0),
+    flags(true, 0),
+    flags(false, 1),
+    flags(false, 4),
+    flags(true, 1),
+    flags(true, 4),
+];
+
+const fn flags(push_down: bool, short_stack: u32) -> Scheme {
+    Scheme::Flags { push_down, short_stack }
+}
+
+fn build(triangles: &[[Vec3; 3]], settings: &KdSettings) -> KdTree {
+    let tree = KdTree::build(triangles, settings).expect("valid input");
+    tree.validate().expect("a valid tree");
+    tree
+}
+
+fn settings_of_all_kinds() -> [KdSettings; 4] {
+    let default = KdSettings::default();
+    [
+        default,
+        KdSettings {
+            heuristic: Heuristic::SurfaceArea,
+            clip: false,
+            ..default
+        },
+        KdSettings {
+            heuristic: Heuristic::Regions,
+            leaf_size: 1,
+            ..default
+        },
+        // Deep trees.
+        KdSettings {
+            intersection_cost: 1000.0,
+            leaf_size: 1,
+            ..default
+        },
+    ]
+}
+
+/// The leaves of a ray in order, as the triangles tested.
+fn tested(tree: &KdTree, scheme: Scheme, ray: &Ray) -> (Hit, KdCounters) {
+    let mut counters = KdCounters::default();
+    let hit = tree.closest_hit_by(scheme, ray, &mut |_, _| true, &mut counters);
+    (hit, counters)
+}
+
+#[test]
+fn every_scheme_returns_what_trying_all_triangles_returns() {
+    let mut random = Random(61);
+    for (name, triangles) in hard_scenes() {
+        for settings in settings_of_all_kinds() {
+            let tree = build(&triangles, &settings);
+            let mut usable = vec![false; triangles.len()];
+            tree.indices().iter().for_each(|i| usable[*i as usize] = true);
+            for ray in hard_rays(&mut random, &triangles, 60) {
+                let expected = brute_force(&triangles, |i| usable[i], &ray);
+                let (_, with_stack) = tested(&tree, Scheme::Stack, &ray);
+                for scheme in SCHEMES {
+                    let (hit, counters) = tested(&tree, scheme, &ray);
+                    assert!(
+                        same_bits(&hit, &expected),
+                        "{name} {scheme:?} {ray:?}: {hit:?} for {expected:?}"
+                    );
+                    assert_eq!(
+                        (counters.leaves, counters.triangles),
+                        (with_stack.leaves, with_stack.triangles),
+                        "{name} {scheme:?}"
+                    );
+                    let any = tree.any_hit_by(scheme, &ray, &mut |_, _| true, &mut KdCounters::default());
+                    assert_eq!(any.is_hit(), expected.is_hit(), "{name} {scheme:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_point_of_a_triangle_lies_in_a_leaf_that_holds_it() {
+    let mut random = Random(62);
+    for (name, triangles) in hard_scenes() {
+        for settings in settings_of_all_kinds() {
+            let tree = build(&triangles, &settings);
+            for _ in 0..200.min(200 * tree.positions().len()) {
+                let place = random.below(tree.positions().len());
+                let [a, b, c] = tree.positions()[place].map(|v| v.as_dvec3());
+                let (u, v) = (f64::from(random.unit()), f64::from(random.unit()));
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let point = a + (b - a) * u + (c - a) * v;
+                // Rounding of the point, in f64.
+                let slack = 1e-12 * (1.0 + a.abs().max(b.abs()).max(c.abs()).max_element());
+                let mut pending = vec![0];
+                let mut found = false;
+                while let Some(node) = pending.pop() {
+                    match tree.nodes()[node as usize].kind() {
+                        KdKind::Inner { axis, plane, children } => {
+                            let height = point[axis] - f64::from(plane);
+                            if height <= slack {
+                                pending.push(children);
+                            }
+                            if height >= -slack {
+                                pending.push(children + 1);
+                            }
+                        }
+                        KdKind::Leaf { first, count } => {
+                            found |= tree.references()[first as usize..][..count as usize].contains(&(place as u32));
+                        }
+                    }
+                }
+                assert!(found, "{name}: triangle {place} at {point}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bytes_do_not_depend_on_the_number_of_threads() {
+    let triangles = soup(&mut Random(63), 6000, 0.05, 1.0, Vec3::ZERO);
+    let build_with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        pool.install(|| build(&triangles, &KdSettings::default()))
+            .texels()
+            .to_vec()
+    };
+    let one = build_with(1);
+    for threads in [2, 4] {
+        assert!(build_with(threads) == one, "{threads} threads");
+    }
+}
+
+#[test]
+fn a_wall_ends_in_a_leaf_without_volume() {
+    let mut triangles = grid(8);
+    triangles.extend(soup(&mut Random(64), 200, 0.1, 1.0, Vec3::new(4.0, 4.0, 3.0)));
+    let tree = build(&triangles, &KdSettings::default());
+    let mut flat = 0;
+    tree.walk(|_, kind, bounds, _| {
+        if let KdKind::Leaf { count, .. } = kind {
+            flat += u32::from(count > 0 && bounds.lower.z == bounds.upper.z);
+        }
+    });
+    assert!(flat > 0);
+}
+
+#[test]
+fn small_and_empty_scenes_have_trees() {
+    let none = build(&[], &KdSettings::default());
+    assert!(!none.closest_hit(&ray(Vec3::ZERO, Vec3::X)).is_hit());
+    let triangles = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
+    let one = build(&triangles, &KdSettings::default());
+    let hit = one.closest_hit(&ray(Vec3::new(0.2, 0.2, 1.0), -Vec3::Z));
+    assert_eq!((hit.t, hit.triangle), (1.0, 0));
+    assert_eq!((one.statistics().leaves, one.statistics().nodes), (1, 0));
+}
+
+/// Squares across the x axis, one between each two of `levels` planes: a chain, since every plane cuts off one square.
+fn chain(levels: u32) -> (KdTree, Vec<[Vec3; 3]>) {
+    let triangles: Vec<[Vec3; 3]> = (0..=levels)
+        .map(|i| {
+            let x = i as f32 + 0.5;
+            [
+                Vec3::new(x, -1.0, -1.0),
+                Vec3::new(x, 3.0, -1.0),
+                Vec3::new(x, -1.0, 3.0),
+            ]
+        })
+        .collect();
+    let leaf = |i: u32| build::Built::Leaf(vec![i]);
+    let mut built = leaf(levels);
+    for level in (0..levels).rev() {
+        built = build::Built::Inner(0, level as f32 + 1.0, Box::new([leaf(level), built]));
+    }
+    let bounds = triangles.iter().flatten().fold(Aabb::EMPTY, |b, p| b.with_point(*p));
+    let indices = (0..=levels).collect();
+    let tree = KdTree::lay_out(&built, bounds, triangles.clone(), indices, IndexStatistics::default());
+    (tree.expect("small"), triangles)
+}
+
+#[test]
+fn ways_as_long_as_the_word_of_flags_are_gone_to_their_end() {
+    for levels in [1, 2, 31, 32] {
+        let (tree, _) = chain(levels);
+        tree.validate().expect("valid");
+        assert_eq!(tree.statistics().max_depth, levels);
+        for direction in [Vec3::X, -Vec3::X] {
+            let start = if direction.x > 0.0 { -1.0 } else { levels as f32 + 2.0 };
+            let ray = ray(Vec3::new(start, 0.1, 0.1), direction);
+            for scheme in SCHEMES {
+                let mut seen = Vec::new();
+                let mut counters = KdCounters::default();
+                // No candidate counts, so all leaves are gone to.
+                let mut filter = |triangle: u32, _: [f32; 2]| {
+                    seen.push(triangle);
+                    false
+                };
+                assert!(!tree.closest_hit_by(scheme, &ray, &mut filter, &mut counters).is_hit());
+                let mut expected: Vec<u32> = (0..=levels).collect();
+                if direction.x < 0.0 {
+                    expected.reverse();
+                }
+                assert_eq!(seen, expected, "{levels} {scheme:?}");
+            }
+        }
+    }
+    let (deeper, _) = chain(33);
+    assert!(matches!(deeper.validate(), Err(KdFault::Depth { .. })));
+}
+
+#[test]
+fn work_is_in_the_order_of_the_schemes() {
+    let triangles = soup(&mut Random(65), 4000, 0.05, 1.0, Vec3::ZERO);
+    let tree = build(&triangles, &KdSettings::default());
+    let mut random = Random(66);
+    let mut nodes = [0; 7];
+    for _ in 0..2000 {
+        let ray = ray(random.vector(), random.direction());
+        for (i, scheme) in SCHEMES.into_iter().enumerate() {
+            nodes[i] += tested(&tree, scheme, &ray).1.nodes;
+        }
+    }
+    println!("{nodes:?}");
+    let [stack, plain, push_down, _, short, _, both] = nodes;
+    assert!(plain > push_down && push_down > short && short >= both && both >= stack);
+}
+
+#[test]
+fn settings_out_of_range_are_refused() {
+    let default = KdSettings::default();
+    for wrong in [
+        KdSettings {
+            leaf_size: 0,
+            ..default
+        },
+        KdSettings {
+            max_depth: 33,
+            ..default
+        },
+        KdSettings {
+            traversal_cost: f64::NAN,
+            ..default
+        },
+        KdSettings {
+            empty_bonus: 1.5,
+            ..default
+        },
+    ] {
+        assert!(matches!(KdTree::build(&[], &wrong), Err(Error::Setting { .. })));
+    }
+}

@@ -1,0 +1,243 @@
+//! The layout of a kd-tree: nodes of 8 bytes in pairs of siblings, references of leaves, triangles once each.
+//!
+//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.3.1; the packed form of a node goes back
+//! to I. Wald, "Realtime Ray Tracing and Interactive Global Illumination", PhD thesis, Saarland University, 2004, §7.1.
+
+use super::bounds::Bounds;
+use super::build::Built;
+use super::probability::Heuristic;
+use super::{KdTree, MAX_DEPTH};
+use crate::accel::IndexStatistics;
+use crate::accel::bvh2::Aabb;
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Low bits of a node's word: the axis, or this for a leaf.
+const LEAF: u32 = 3;
+const KIND_BITS: u32 = 2;
+
+/// Most references, and most nodes.
+const MAX_INDEX: u64 = 1 << (32 - KIND_BITS);
+
+/// A node as kernels read it (8 bytes).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct KdNode {
+    /// Coordinate of the plane, as bits of f32; of a leaf the number of its references.
+    pub value: u32,
+    /// Low two bits: axis of the plane, or 3 for a leaf. Above: index of the child below the plane, that above is the next; of a leaf the
+    /// first of its references.
+    pub word: u32,
+}
+
+/// What a node is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum KdKind {
+    /// A plane, and the index of the child below it.
+    Inner { axis: usize, plane: f32, children: u32 },
+    /// A range of references.
+    Leaf { first: u32, count: u32 },
+}
+
+impl KdNode {
+    /// A plane.
+    fn inner(axis: u8, plane: f32, children: u32) -> Self {
+        Self {
+            value: plane.to_bits(),
+            word: children << KIND_BITS | u32::from(axis),
+        }
+    }
+
+    fn leaf(first: u32, count: u32) -> Self {
+        Self {
+            value: count,
+            word: first << KIND_BITS | LEAF,
+        }
+    }
+
+    /// What it is.
+    pub fn kind(&self) -> KdKind {
+        let above = self.word >> KIND_BITS;
+        match self.word & LEAF {
+            LEAF => KdKind::Leaf {
+                first: above,
+                count: self.value,
+            },
+            axis => KdKind::Inner {
+                axis: axis as usize,
+                plane: f32::from_bits(self.value),
+                children: above,
+            },
+        }
+    }
+}
+
+/// What is wrong with a tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KdFault {
+    /// A plane outside its node.
+    Plane {
+        /// Index of the node.
+        node: u32,
+    },
+    /// A way from the root with more than [`MAX_DEPTH`] inner nodes.
+    Depth {
+        /// Index of the first node too deep.
+        node: u32,
+    },
+    /// A triangle that lies in no leaf.
+    Lost {
+        /// Its place in [`KdTree::positions`].
+        triangle: u32,
+    },
+}
+
+impl KdTree {
+    /// Lays out what was built.
+    pub(super) fn lay_out(
+        built: &Built,
+        bounds: Aabb,
+        positions: Vec<[Vec3; 3]>,
+        indices: Vec<u32>,
+        statistics: IndexStatistics,
+    ) -> Result<Self> {
+        let mut nodes = vec![KdNode::leaf(0, 0); 2];
+        let mut references = Vec::new();
+        let mut pending = vec![(built, 0)];
+        while let Some((built, place)) = pending.pop() {
+            let place: usize = place;
+            match built {
+                Built::Leaf(triangles) => {
+                    nodes[place] = KdNode::leaf(references.len() as u32, triangles.len() as u32);
+                    references.extend_from_slice(triangles);
+                }
+                Built::Inner(axis, plane, children) => {
+                    let first = nodes.len();
+                    nodes[place] = KdNode::inner(*axis, *plane, first as u32);
+                    nodes.extend([KdNode::default(); 2]);
+                    pending.extend([(&children[1], first + 1), (&children[0], first)]);
+                }
+            }
+            if nodes.len().max(references.len()) as u64 >= MAX_INDEX {
+                return Err(Error::LimitExceeded {
+                    name: "kd-tree".into(),
+                    bytes: nodes.len().max(references.len()) as u64,
+                    limit_name: "2^30 nodes and references",
+                    limit: MAX_INDEX,
+                });
+            }
+        }
+        let mut tree = Self {
+            bounds,
+            nodes,
+            references,
+            positions,
+            indices,
+            packed: Vec::new(),
+            statistics,
+        };
+        tree.packed = tree.pack();
+        tree.measure();
+        Ok(tree)
+    }
+
+    /// Box and where nodes, references and triangles begin, then these: a pair of nodes a texel, four references a texel, three texels a
+    /// triangle.
+    fn pack(&self) -> Vec<[u32; 4]> {
+        const HEADER: usize = 2;
+        let references = HEADER + self.nodes.len() / 2;
+        let triangles = references + self.references.len().div_ceil(4);
+        let corner = |v: Vec3, word: usize| [v.x.to_bits(), v.y.to_bits(), v.z.to_bits(), word as u32];
+        let mut packed = vec![
+            corner(self.bounds.lower, references),
+            corner(self.bounds.upper, triangles),
+        ];
+        packed.extend_from_slice(bytemuck::cast_slice(&self.nodes));
+        packed.extend(self.references.chunks(4).map(|chunk| {
+            let mut texel = [0; 4];
+            texel[..chunk.len()].copy_from_slice(chunk);
+            texel
+        }));
+        for (corners, index) in self.positions.iter().zip(&self.indices) {
+            let [a, b, c] = corners.map(|v| v.to_array().map(f32::to_bits));
+            packed.extend([[a[0], a[1], a[2], b[0]], [b[1], b[2], c[0], c[1]], [c[2], *index, 0, 0]]);
+        }
+        packed
+    }
+
+    /// Nodes, leaves, depth, cost by surface areas.
+    fn measure(&mut self) {
+        let mut statistics = self.statistics;
+        let scene = Bounds::from(self.bounds);
+        let mut tests_and_visits = 0.0;
+        self.walk(|_, kind, bounds, depth| {
+            let share = if scene.half_area() > 0.0 {
+                Heuristic::SurfaceArea.probability(&Bounds::from(*bounds), &scene)
+            } else {
+                1.0
+            };
+            match kind {
+                KdKind::Inner { .. } => {
+                    statistics.nodes += 1;
+                    statistics.max_depth = statistics.max_depth.max(depth + 1);
+                    tests_and_visits += share;
+                }
+                KdKind::Leaf { count, .. } => {
+                    statistics.leaves += u64::from(count > 0);
+                    tests_and_visits += share * f64::from(count);
+                }
+            }
+        });
+        statistics.sah_cost = tests_and_visits;
+        statistics.triangles = self.positions.len() as u64;
+        statistics.bytes = size_of_val(self.packed.as_slice()) as u64;
+        self.statistics = statistics;
+    }
+
+    /// Every node with its box and the number of inner nodes above it.
+    pub(super) fn walk(&self, mut visit: impl FnMut(u32, KdKind, &Aabb, u32)) {
+        let mut pending = vec![(0, self.bounds, 0)];
+        while let Some((node, bounds, depth)) = pending.pop() {
+            let kind = self.nodes[node as usize].kind();
+            visit(node, kind, &bounds, depth);
+            if let KdKind::Inner { axis, plane, children } = kind {
+                let (mut below, mut above) = (bounds, bounds);
+                below.upper[axis] = plane;
+                above.lower[axis] = plane;
+                pending.extend([(children + 1, above, depth + 1), (children, below, depth + 1)]);
+            }
+        }
+    }
+
+    /// Whether planes lie in their nodes, ways are short enough, and every triangle is in a leaf.
+    ///
+    /// # Errors
+    /// The first [`KdFault`].
+    pub fn validate(&self) -> Result<(), KdFault> {
+        let mut fault = None;
+        let mut found = vec![false; self.positions.len()];
+        self.walk(|node, kind, bounds, depth| match kind {
+            KdKind::Inner { axis, plane, .. } => {
+                if !(bounds.lower[axis] <= plane && plane <= bounds.upper[axis]) {
+                    fault.get_or_insert(KdFault::Plane { node });
+                }
+                if depth >= MAX_DEPTH {
+                    fault.get_or_insert(KdFault::Depth { node });
+                }
+            }
+            KdKind::Leaf { first, count } => {
+                for reference in &self.references[first as usize..][..count as usize] {
+                    found[*reference as usize] = true;
+                }
+            }
+        });
+        let lost = found.iter().position(|found| !found);
+        match fault.or(lost.map(|triangle| KdFault::Lost {
+            triangle: triangle as u32,
+        })) {
+            Some(fault) => Err(fault),
+            None => Ok(()),
+        }
+    }
+}
