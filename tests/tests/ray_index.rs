@@ -44,7 +44,9 @@ macro_rules! trace {
         let resume = gpu
             .buffer_with("resume", Category::Work, &vec![0u32; rays.len()])
             .unwrap();
-        let status = gpu.buffer_with("status", Category::Work, &[0u32; 4]).unwrap();
+        let status = gpu
+            .buffer_with("status", Category::Work, &[0u32; size_of::<$shader::TraceStatus>() / 4])
+            .unwrap();
         let set = $shader::Set0 {
             trace_rays: ray_buffer.view(),
             trace_hits: hits.view(),

@@ -56,6 +56,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("kernels/permute.comp", "SpecConstantOp"),
     ("kernels/radix_count_subgroup.comp", "SpecConstantOp"),
     ("kernels/radix_scan.comp", "SpecConstantOp"),
+    ("kernels/radix_small.comp", "SpecConstantOp"),
     ("kernels/radix_scatter_subgroup.comp", "SpecConstantOp"),
     ("kernels/reduce_box.comp", "SpecConstantOp"),
     ("kernels/reduce_words.comp", "SpecConstantOp"),

@@ -285,9 +285,9 @@ mod tests {
             .collect();
         let rays: Vec<Ray> = (0..500)
             .map(|_| Ray {
-                origin: [4.0 * random() - 2.0, 3.0, 4.0 * random() - 2.0],
+                origin: [1.2 * random(), 3.0, 1.2 * random()],
                 t_min: 0.0,
-                direction: [random() - 0.5, -1.0, random() - 0.5],
+                direction: [0.2 * random() - 0.1, -1.0, 0.2 * random() - 0.1],
                 t_max: f32::INFINITY,
             })
             .collect();
