@@ -63,7 +63,7 @@ void main() {
     uint low = begin;
     uint waiting = 0u;
     uvec2 code = lbvh_code(begin);
-    uvec2 next = lbvh_code(begin + 1u);
+    uvec2 next = lbvh_code(min(begin + 1u, count - 1u));
     uint level = begin == 0u ? LBVH_NO_LEVEL : lbvh_level(begin - 1u, lbvh_code(begin - 1u), code);
     LbvhSubtree own = lbvh_leaf(begin, level, begin + 1u == count ? LBVH_NO_LEVEL : lbvh_level(begin, code, next));
     uint slot = 0u;
@@ -91,7 +91,7 @@ void main() {
                 going = place < end;
                 if (going) {
                     code = next;
-                    next = lbvh_code(place + 1u);
+                    next = lbvh_code(min(place + 1u, count - 1u));
                     level = own.right_level;
                     own = lbvh_leaf(place, level, place + 1u == count ? LBVH_NO_LEVEL : lbvh_level(place, code, next));
                 }

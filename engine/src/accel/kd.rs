@@ -17,7 +17,7 @@ mod traverse;
 mod tree;
 
 pub use probability::Heuristic;
-pub use traverse::{KdCounters, Scheme};
+pub use traverse::{KdCounters, MAX_SHORT_STACK, Scheme};
 pub use tree::{KdFault, KdNode};
 
 use super::bvh2::Aabb;

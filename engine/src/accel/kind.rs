@@ -102,7 +102,7 @@ impl IndexKind {
                 Ok(None) => fallback = Some("fewer than two triangles that rays can meet"),
                 // What the build needs is more than what remains of it.
                 Err(Error::LimitExceeded { .. }) => {
-                    fallback = Some("more triangles than the device can bind while it builds")
+                    fallback = Some("more triangles than the device can bind or dispatch while it builds")
                 }
                 Err(error) => return Err(error),
             }

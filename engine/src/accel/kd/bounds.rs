@@ -13,9 +13,9 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Differences of the corners.
+    /// Differences of the corners; zero for the empty box.
     pub fn extent(&self) -> DVec3 {
-        self.upper - self.lower
+        (self.upper - self.lower).max(DVec3::ZERO)
     }
 
     /// Volume.

@@ -157,6 +157,7 @@ fn a_wall_ends_in_a_leaf_without_volume() {
 fn small_and_empty_scenes_have_trees() {
     let none = build(&[], &KdSettings::default());
     assert!(!none.closest_hit(&ray(Vec3::ZERO, Vec3::X)).is_hit());
+    assert_eq!(none.statistics().sah_cost, 0.0);
     let triangles = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
     let one = build(&triangles, &KdSettings::default());
     let hit = one.closest_hit(&ray(Vec3::new(0.2, 0.2, 1.0), -Vec3::Z));

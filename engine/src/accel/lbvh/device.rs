@@ -120,24 +120,13 @@ impl LbvhBuilder {
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) for fewer than two, [`Error::LimitExceeded`](crate::Error::LimitExceeded) for more than
-    /// [`MAX_TRIANGLES`](crate::accel::bvh2::MAX_TRIANGLES), or where a buffer or a dispatch is larger than the device allows,
+    /// [`MAX_TRIANGLES`](crate::accel::bvh2::MAX_TRIANGLES), or where a buffer is larger than the device binds,
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn buffers(&self, count: u32) -> Result<LbvhBuffers> {
         if count < 2 {
             return Err(Error::setting("lbvh.triangles", count, "is less than two"));
         }
         check_count(count as usize)?;
-        // A refit takes an invocation for each child.
-        let groups = u64::from(self.refit.groups_for(2 * (count - 1)));
-        let limit = u64::from(self.gpu.caps().max_workgroups);
-        if groups > limit {
-            return Err(Error::LimitExceeded {
-                name: "lbvh refit".into(),
-                bytes: groups,
-                limit_name: "maxComputeWorkGroupCount",
-                limit,
-            });
-        }
         LbvhBuffers::new(&self.gpu, &self.sort, &self.ranks, self.run, count)
     }
 

@@ -9,6 +9,7 @@
 #![expect(unsafe_code, reason = "a C library is called here")]
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
+use std::mem::ManuallyDrop;
 use std::time::Instant;
 
 use clerestory::accel::Ray;
@@ -124,8 +125,8 @@ pub struct Embree {
     intersect: Intersect,
     device: Handle,
     version: isize,
-    // Last: unloaded after everything that comes from it is released.
-    _library: Library,
+    // Never unloaded: the library's threads outlive its devices, and their code must stay.
+    _library: ManuallyDrop<Library>,
 }
 
 /// A function by its C name.
@@ -184,7 +185,7 @@ impl Embree {
             intersect,
             device,
             version,
-            _library: library,
+            _library: ManuallyDrop::new(library),
         })
     }
 

@@ -8,7 +8,9 @@ use clerestory::accel::{Hit, Ray, RayIndex};
 use clerestory::gpu::ash::vk::Format;
 use clerestory::gpu::shaders::accel::trace_closest;
 use clerestory::gpu::shaders::sets::Bvh2Set;
-use clerestory::gpu::{Buffer, Category, ComputePipeline, Gpu, TexelView, rw_compute_to_compute, transfer_to_compute};
+use clerestory::gpu::{
+    Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, rw_compute_to_compute, transfer_to_compute,
+};
 use clerestory::{Error, Result};
 use glam::Vec3;
 
@@ -83,7 +85,11 @@ impl<'a> Kernel<'a> {
                 rays: gpu.buffer_with("rays", Category::Work, rays)?,
                 hits: gpu.buffer_with("hits", Category::Work, &vec![0_u32; 4 * rays.len()])?,
                 resume: gpu.buffer_with("resume", Category::Work, &vec![0_u32; rays.len()])?,
-                status: gpu.buffer_with("status", Category::Work, &[0_u32; 4])?,
+                status: gpu.buffer(&BufferDesc::storage(
+                    "status",
+                    size_of::<trace_closest::TraceStatus>() as u64,
+                    Category::Work,
+                ))?,
                 count: rays.len() as u32,
             })
         };
