@@ -117,8 +117,8 @@ fn rates(found: &Found) -> Table {
     table.note(
         "Rays that differ from our first index, whose hits are those of trying all triangles: \"same place\" is another triangle at the same \
          distance up to rounding, as at an edge that two triangles share, where we take the one of least index and others the one that \
-         comes first; \"lost\", \"gained\" and \"elsewhere\" are rays that pass between triangles that touch, or leave a surface within rounding \
-         of its plane. Our test closes the seams between triangles; of the others only Embree's robust form does.",
+         comes first; \"lost\", \"gained\" and \"elsewhere\" are rays near edges or within rounding of a plane, where tests that round otherwise decide \
+         otherwise. Our test closes the seams between triangles.",
     );
     table
 }
