@@ -11,7 +11,7 @@
 
 pub(super) mod build;
 pub(super) mod layout;
-mod traverse;
+pub(super) mod traverse;
 
 pub use build::Bvh2Settings;
 pub use traverse::{FINISHED, Step, Traversal};
@@ -91,6 +91,14 @@ impl Aabb {
             lower: point,
             upper: point,
         })
+    }
+
+    /// The same box with one kind of zero: both have one order, but two patterns of bits, which some compare and devices need not keep.
+    pub fn without_negative_zero(self) -> Self {
+        Self {
+            lower: self.lower + Vec3::ZERO,
+            upper: self.upper + Vec3::ZERO,
+        }
     }
 
     /// Half the surface area, m²; zero for the empty box.

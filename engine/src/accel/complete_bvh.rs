@@ -136,12 +136,12 @@ impl CompleteBvh {
         let nodes = tree.preorder().map(|(node, _)| &tree.nodes[node as usize]);
         let pairs: Vec<RayPair> = nodes
             .map(|node| RayPair {
-                bounds: node.bounds.map(without_negative_zero),
+                bounds: node.bounds.map(Aabb::without_negative_zero),
                 references: node.children.map(&mut reference),
             })
             .collect();
         let root = RootDescriptor {
-            bounds: without_negative_zero(tree.bounds),
+            bounds: tree.bounds.without_negative_zero(),
             reference: (!tree.order.is_empty()).then(|| reference(tree.root)),
         };
         let node = |bounds: Aabb, reference| CompleteNode {
@@ -231,14 +231,6 @@ impl CompleteBvh {
                 next = met([entry, t_max]).then_some(reference);
             }
         }
-    }
-}
-
-/// Both zeros have one order, but two patterns of bits, and compact nodes compare planes.
-fn without_negative_zero(bounds: Aabb) -> Aabb {
-    Aabb {
-        lower: bounds.lower + Vec3::ZERO,
-        upper: bounds.upper + Vec3::ZERO,
     }
 }
 

@@ -120,7 +120,8 @@ impl KdTree {
         let bounds = positions
             .iter()
             .flatten()
-            .fold(Aabb::EMPTY, |b, p| b.with_point(*p + Vec3::ZERO));
+            .fold(Aabb::EMPTY, |b, p| b.with_point(*p))
+            .without_negative_zero();
         let built = match positions.is_empty() {
             true => build::Built::Leaf(Vec::new()),
             false => build::build(&positions, bounds, settings),

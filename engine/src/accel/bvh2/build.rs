@@ -342,19 +342,20 @@ fn centroid_bounds(references: &[Reference]) -> Aabb {
     }
 }
 
+/// What of a split's candidates falls between two of their borders.
 #[derive(Debug, Clone, Copy)]
-struct Bin {
-    bounds: Aabb,
-    count: u32,
+pub(in crate::accel) struct Bin {
+    pub(in crate::accel) bounds: Aabb,
+    pub(in crate::accel) count: u32,
 }
 
-const EMPTY_BIN: Bin = Bin {
+pub(in crate::accel) const EMPTY_BIN: Bin = Bin {
     bounds: Aabb::EMPTY,
     count: 0,
 };
 
 impl Bin {
-    fn union(self, other: Self) -> Self {
+    pub(in crate::accel) fn union(self, other: Self) -> Self {
         Self {
             bounds: self.bounds.union(other.bounds),
             count: self.count + other.count,

@@ -6,7 +6,7 @@
 //! sibling that comes after the walk in the order, which rebuilds the stack, less what the hit so far has culled. Nothing is lost, and nothing
 //! is tested twice.
 
-use super::{BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
+use super::{Aabb, BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
 use crate::accel::{CandidateFilter, Hit, Ray, TraversalCounters};
 use crate::gpu::shaders::constants;
@@ -38,14 +38,15 @@ pub enum Step {
 
 /// Origin, clamped reciprocal direction and slack of the box test.
 #[derive(Debug, Clone, Copy)]
-struct BoxTest {
-    origin: Vec3,
-    inverse: Vec3,
-    slack: Vec3,
+pub(in crate::accel) struct BoxTest {
+    pub(in crate::accel) origin: Vec3,
+    pub(in crate::accel) inverse: Vec3,
+    pub(in crate::accel) slack: Vec3,
 }
 
 impl BoxTest {
-    fn new(bvh: &Bvh2, ray: &Ray) -> Self {
+    /// For boxes within `root`.
+    pub(in crate::accel) fn new(root: &Aabb, ray: &Ray) -> Self {
         let origin = Vec3::from(ray.origin);
         let direction = Vec3::from(ray.direction);
         let least = direction.abs().max_element() * MIN_RELATIVE_COMPONENT;
@@ -53,8 +54,6 @@ impl BoxTest {
             let size = if d.abs() > least { d.abs() } else { least };
             (if d < 0.0 { -1.0 } else { 1.0 }) / size
         }));
-        let [a, b] = bvh.nodes()[0].bounds;
-        let root = a.union(b);
         let reach = (root.lower - origin).abs().max((root.upper - origin).abs());
         Self {
             origin,
@@ -64,7 +63,7 @@ impl BoxTest {
     }
 
     /// Entry and exit distance of a box.
-    fn span(&self, lower: Vec3, upper: Vec3) -> (f32, f32) {
+    pub(in crate::accel) fn span(&self, lower: Vec3, upper: Vec3) -> (f32, f32) {
         let t0 = (lower - self.origin) * self.inverse;
         let t1 = (upper - self.origin) * self.inverse;
         let near = t0.min(t1) - self.slack;
@@ -124,7 +123,8 @@ impl Traversal {
             return;
         }
         let shear = ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction));
-        let boxes = BoxTest::new(bvh, ray);
+        let [a, b] = bvh.nodes()[0].bounds;
+        let boxes = BoxTest::new(&a.union(b), ray);
         let (nodes, triangles) = (bvh.nodes(), bvh.triangles());
         let mut stack = [FINISHED; MAX_DEPTH as usize + 1];
         let mut top = 0;

@@ -12,6 +12,7 @@ use super::clip::clipped_bounds;
 use super::probability::{Heuristic, InteriorOrigin};
 use super::{KdSettings, MAX_DEPTH};
 use crate::accel::bvh2::Aabb;
+use crate::accel::bvh2::build::bounds_of;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -122,11 +123,9 @@ pub fn build(triangles: &[[Vec3; 3]], bounds: Aabb, settings: &KdSettings) -> Bu
     })
 }
 
+/// With one kind of zero, since events compare planes by their bits.
 fn triangle_bounds(triangle: &[Vec3; 3]) -> Aabb {
-    // Adding zero makes both zeros one, which events compare by their bits.
-    triangle
-        .iter()
-        .fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner + Vec3::ZERO))
+    bounds_of(triangle).without_negative_zero()
 }
 
 fn push_events(events: &mut Vec<Event>, bounds: &Aabb, triangle: u32, axis: usize) {

@@ -78,11 +78,7 @@ pub fn clipped_bounds(triangle: &[Vec3; 3], node: &Aabb) -> Option<Aabb> {
         clipped.lower[axis] = clipped.lower[axis].max(below(lower[axis]));
         clipped.upper[axis] = clipped.upper[axis].min(above(upper[axis]));
     }
-    // Adding zero makes both zeros one.
-    Some(Aabb {
-        lower: clipped.lower + Vec3::ZERO,
-        upper: clipped.upper + Vec3::ZERO,
-    })
+    Some(clipped.without_negative_zero())
 }
 
 /// The greatest f32 that is not above.

@@ -9,7 +9,7 @@
 
 use super::KdTree;
 use super::tree::KdKind;
-use crate::accel::bvh2::{BOX_SLACK, MIN_RELATIVE_COMPONENT};
+use crate::accel::bvh2::traverse::BoxTest;
 use crate::accel::triangle::{intersect_triangle, ray_shear};
 use crate::accel::{CandidateFilter, Hit, Ray, TraversalCounters};
 use glam::Vec3;
@@ -58,12 +58,8 @@ impl KdCounters {
     }
 }
 
-/// What planes are met by.
-struct PlaneTest {
-    origin: Vec3,
-    inverse: Vec3,
-    slack: Vec3,
-}
+/// What planes are met by: the box test's ray and slack.
+struct PlaneTest(BoxTest);
 
 /// Which children of a node a ray meets within its span.
 enum Met {
@@ -74,50 +70,25 @@ enum Met {
 }
 
 impl PlaneTest {
-    fn new(tree: &KdTree, ray: &Ray) -> Self {
-        let origin = Vec3::from(ray.origin);
-        let least = Vec3::from(ray.direction).abs().max_element() * MIN_RELATIVE_COMPONENT;
-        let inverse = Vec3::from_array(ray.direction.map(|d| {
-            let size = if d.abs() > least { d.abs() } else { least };
-            (if d < 0.0 { -1.0 } else { 1.0 }) / size
-        }));
-        let bounds = tree.bounds;
-        let reach = (bounds.lower - origin).abs().max((bounds.upper - origin).abs());
-        Self {
-            origin,
-            inverse,
-            slack: (BOX_SLACK * reach.max_element()) * inverse.abs(),
-        }
-    }
-
-    /// The part of a span within a box.
-    fn span(&self, lower: Vec3, upper: Vec3, t_min: f32, t_max: f32) -> [f32; 2] {
-        let t0 = (lower - self.origin) * self.inverse;
-        let t1 = (upper - self.origin) * self.inverse;
-        let near = t0.min(t1) - self.slack;
-        let far = t0.max(t1) + self.slack;
-        [near.max_element().max(t_min), far.min_element().min(t_max)]
-    }
-
     /// Which of the two is near: 0 for that below the plane.
     fn near(&self, axis: usize) -> u32 {
-        u32::from(self.inverse[axis] < 0.0)
+        u32::from(self.0.inverse[axis] < 0.0)
     }
 
     fn met(&self, axis: usize, plane: f32, [enter, leave]: [f32; 2]) -> Met {
-        let t = (plane - self.origin[axis]) * self.inverse[axis];
-        if t - self.slack[axis] > leave {
+        let t = (plane - self.0.origin[axis]) * self.0.inverse[axis];
+        if t - self.0.slack[axis] > leave {
             Met::Near
-        } else if t + self.slack[axis] < enter {
+        } else if t + self.0.slack[axis] < enter {
             Met::Far
         } else {
-            Met::Both(leave.min(t + self.slack[axis]))
+            Met::Both(leave.min(t + self.0.slack[axis]))
         }
     }
 
     /// Where the far child begins when the near one has ended at `leave`. A function of this alone, so that stack entries need not hold it.
     fn far_begins(&self, axis: usize, leave: f32, t_min: f32) -> f32 {
-        (leave - 2.0 * self.slack[axis]).max(t_min)
+        (leave - 2.0 * self.0.slack[axis]).max(t_min)
     }
 }
 
@@ -190,9 +161,11 @@ pub fn traverse(
     if !ray.is_traceable() || tree.positions.is_empty() {
         return hit;
     }
-    let planes = PlaneTest::new(tree, ray);
+    let boxes = BoxTest::new(&tree.bounds, ray);
+    let (enter, leave) = boxes.span(tree.bounds.lower, tree.bounds.upper);
+    let span = [enter.max(ray.t_min), leave.min(ray.t_max)];
+    let planes = PlaneTest(boxes);
     let shear = ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction));
-    let span = planes.span(tree.bounds.lower, tree.bounds.upper, ray.t_min, ray.t_max);
     if span[0] > span[1] {
         return hit;
     }

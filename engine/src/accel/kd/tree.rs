@@ -8,7 +8,7 @@ use super::build::Built;
 use super::probability::Heuristic;
 use super::{KdTree, MAX_DEPTH};
 use crate::accel::IndexStatistics;
-use crate::accel::bvh2::Aabb;
+use crate::accel::bvh2::{Aabb, Bvh2Triangle};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -160,8 +160,7 @@ impl KdTree {
             texel
         }));
         for (corners, index) in self.positions.iter().zip(&self.indices) {
-            let [a, b, c] = corners.map(|v| v.to_array().map(f32::to_bits));
-            packed.extend([[a[0], a[1], a[2], b[0]], [b[1], b[2], c[0], c[1]], [c[2], *index, 0, 0]]);
+            packed.extend_from_slice(bytemuck::cast_slice(&[Bvh2Triangle::new(*corners, *index)]));
         }
         packed
     }

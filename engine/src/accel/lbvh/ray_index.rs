@@ -134,14 +134,7 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
     let mut watch = Stopwatch::start();
     let mut stages = BuildStages::default();
     let met = Met::among(triangles);
-    // Adding zero makes both zeros one, whose order devices need not keep.
-    let boxes: Vec<Aabb> = met.map(|triangle, _| {
-        let bounds = bounds_of(triangle);
-        Aabb {
-            lower: bounds.lower + Vec3::ZERO,
-            upper: bounds.upper + Vec3::ZERO,
-        }
-    });
+    let boxes: Vec<Aabb> = met.map(|triangle, _| bounds_of(triangle).without_negative_zero());
     stages.triangles = watch.lap();
     if boxes.len() < 2 {
         let layout = Layout::of(&[], boxes.len(), |place| met.triangle(place as u32));

@@ -8,6 +8,7 @@
 //! Guarantee: the same tree whatever the number of threads; the depth bound holds. The cost may rise.
 
 use super::{Aabb, BoxTree, Child, EMPTY_NODE, PairNode, half_area};
+use crate::accel::bvh2::build::{Bin, EMPTY_BIN};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -140,33 +141,13 @@ fn build(mini_trees: &mut [MiniTree], above: &mut [PairNode], places: &[u32], le
     (left.0.union(right.0), Child::Inner(places[0]))
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Bin {
-    bounds: Aabb,
-    count: u32,
-}
-
 type Bins = [[Bin; BINS]; 3];
 
-const EMPTY_BIN: Bin = Bin {
-    bounds: Aabb::EMPTY,
-    count: 0,
-};
-
-impl Bin {
-    fn union(self, other: Self) -> Self {
-        Self {
-            bounds: self.bounds.union(other.bounds),
-            count: self.count + other.count,
-        }
-    }
-
-    /// Infinite for the empty bin, whose side of a border no split may have.
-    fn cost(&self) -> f32 {
-        match self.count {
-            0 => f32::INFINITY,
-            count => half_area(&self.bounds) * count as f32,
-        }
+/// Cost of one side of a border; infinite for the empty bin, which no split may have there.
+fn side_cost(bin: &Bin) -> f32 {
+    match bin.count {
+        0 => f32::INFINITY,
+        count => half_area(&bin.bounds) * count as f32,
     }
 }
 
@@ -253,12 +234,12 @@ fn best_border(bins: &Bins) -> Option<(usize, usize)> {
         let mut right = EMPTY_BIN;
         for i in (1..BINS).rev() {
             right = right.union(bins[i]);
-            right_costs[i] = right.cost();
+            right_costs[i] = side_cost(&right);
         }
         let mut left = EMPTY_BIN;
         for (i, bin) in bins[..BINS - 1].iter().enumerate() {
             left = left.union(*bin);
-            let cost = left.cost() + right_costs[i + 1];
+            let cost = side_cost(&left) + right_costs[i + 1];
             if cost < best.0 {
                 best = (cost, Some((axis, i)));
             }
@@ -305,7 +286,7 @@ mod tests {
                 })
             });
             let cost = |(axis, last): (usize, usize)| {
-                let side = |bins: &[Bin]| bins.iter().fold(EMPTY_BIN, |all, bin| all.union(*bin)).cost();
+                let side = |bins: &[Bin]| side_cost(&bins.iter().fold(EMPTY_BIN, |all, bin| all.union(*bin)));
                 side(&bins[axis][..=last]) + side(&bins[axis][last + 1..])
             };
             let all = (0..3).flat_map(|axis| (0..BINS - 1).map(move |last| (axis, last)));
