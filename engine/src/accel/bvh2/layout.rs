@@ -1,6 +1,6 @@
 //! The binary hierarchy as kernels read it, filled by whoever built it, and measured.
 //!
-//! Guarantee: everything is filled and summed in parts that depend on the tree alone, so bytes and statistics are the same whatever the
+//! Guarantee: everything is filled and summed in parts that depend on the nodes alone, so bytes and statistics are the same whatever the
 //! number of threads.
 
 use super::build::{bounds_of, leaf_word};
@@ -24,6 +24,8 @@ const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
 pub(in crate::accel) struct Layout {
     quarters: Vec<[u32; 4]>,
     nodes: usize,
+    /// Most inner nodes on a way from the root, where the builder knows.
+    depth: Option<u32>,
 }
 
 impl Layout {
@@ -32,12 +34,25 @@ impl Layout {
         Self {
             quarters: vec![[0; 4]; NODE_QUARTERS * nodes + TRIANGLE_QUARTERS * triangles],
             nodes,
+            depth: None,
         }
     }
 
     /// What a device has filled.
     pub(in crate::accel) fn filled(quarters: Vec<[u32; 4]>, nodes: usize) -> Self {
-        Self { quarters, nodes }
+        Self {
+            quarters,
+            nodes,
+            depth: None,
+        }
+    }
+
+    /// Most inner nodes on a way from the root, which [`Layout::finish`] need not find out then.
+    pub(in crate::accel) fn with_depth(self, depth: u32) -> Self {
+        Self {
+            depth: Some(depth),
+            ..self
+        }
     }
 
     /// Finished nodes over `count` triangles. Fewer than two have no node; one is made.
@@ -95,9 +110,11 @@ impl Layout {
         mut watch: Stopwatch,
     ) -> Bvh2 {
         let triangles = (NODE_QUARTERS * self.nodes) as u32;
+        let depth = self.depth;
         let (nodes, _) = self.parts();
         nodes[0].triangles = triangles;
         measure(nodes, &mut statistics);
+        statistics.max_depth = depth.unwrap_or_else(|| depth_of(nodes));
         statistics.bytes = size_of_val(self.quarters.as_slice()) as u64;
         stages.statistics = watch.lap();
         Bvh2 {
@@ -123,66 +140,54 @@ pub(in crate::accel) fn fill_triangles(
     });
 }
 
-/// What a part of the tree adds to the statistics.
-#[derive(Debug, Clone, Copy, Default)]
-struct Measure {
-    cost: f64,
-    leaves: u64,
-    max_depth: u32,
-}
-
-impl Measure {
-    /// Adds a node that is `depth` deep, and gives those of its children that are nodes.
-    fn add(&mut self, node: &Bvh2Node, depth: u32, triangles: u32) -> impl Iterator<Item = u32> + use<> {
-        self.max_depth = self.max_depth.max(depth);
-        for (bounds, word) in node.bounds.iter().zip(node.children) {
-            let count = word & COUNT_MASK;
-            self.cost += bounds.half_area() * f64::from(count.max(1));
-            self.leaves += u64::from(count > 0 && word >> COUNT_BITS < triangles);
-        }
-        let inner = node.children.into_iter().filter(|word| word & COUNT_MASK == 0);
-        inner.map(|word| word >> COUNT_BITS)
-    }
-
-    /// Adds a subtree.
-    fn add_below(mut self, nodes: &[Bvh2Node], root: (u32, u32), triangles: u32) -> Self {
-        let mut pending = vec![root];
-        while let Some((node, depth)) = pending.pop() {
-            let children = self.add(&nodes[node as usize], depth, triangles);
-            pending.extend(children.map(|child| (child, depth + 1)));
-        }
-        self
-    }
-
-    fn with(self, other: Self) -> Self {
-        Self {
-            cost: self.cost + other.cost,
-            leaves: self.leaves + other.leaves,
-            max_depth: self.max_depth.max(other.max_depth),
-        }
-    }
-}
-
-/// Counts nodes, leaves, depth and the SAH cost: the top of the tree, then each subtree below it.
+/// Counts nodes and leaves, and sums the SAH cost.
 fn measure(nodes: &[Bvh2Node], statistics: &mut IndexStatistics) {
     let triangles = statistics.triangles as u32;
-    let mut top = Measure::default();
-    let mut subtrees = vec![(0, 1)];
-    while !subtrees.is_empty() && subtrees.len() < MEASURED_SUBTREES {
-        let level = std::mem::take(&mut subtrees);
-        for (node, depth) in level {
-            let children = top.add(&nodes[node as usize], depth, triangles);
-            subtrees.extend(children.map(|child| (child, depth + 1)));
-        }
-    }
-    let below: Vec<Measure> = subtrees
-        .par_iter()
-        .map(|subtree| Measure::default().add_below(nodes, *subtree, triangles))
+    let chunks: Vec<(f64, u64)> = nodes
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            let children = chunk.iter().flat_map(|node| node.bounds.iter().zip(node.children));
+            children.fold((0.0, 0), |(cost, leaves), (bounds, word)| {
+                let count = word & COUNT_MASK;
+                // The sentinel lies beyond the triangles.
+                let is_leaf = count > 0 && word >> COUNT_BITS < triangles;
+                (
+                    cost + bounds.half_area() * f64::from(count.max(1)),
+                    leaves + u64::from(is_leaf),
+                )
+            })
+        })
         .collect();
-    let all = below.into_iter().fold(top, Measure::with);
     let root = nodes[0].bounds[0].union(nodes[0].bounds[1]).half_area();
+    let below: f64 = chunks.iter().map(|(cost, _)| cost).sum();
     statistics.nodes = nodes.len() as u64;
-    statistics.leaves = all.leaves;
-    statistics.max_depth = all.max_depth;
-    statistics.sah_cost = if root > 0.0 { (root + all.cost) / root } else { 0.0 };
+    statistics.leaves = chunks.iter().map(|(_, leaves)| leaves).sum();
+    statistics.sah_cost = if root > 0.0 { (root + below) / root } else { 0.0 };
+}
+
+/// Most inner nodes on a way from the root.
+fn depth_of(nodes: &[Bvh2Node]) -> u32 {
+    let children = |(node, depth): (u32, u32)| {
+        let inner = nodes[node as usize]
+            .children
+            .into_iter()
+            .filter(|word| word & COUNT_MASK == 0);
+        inner.map(move |word| (word >> COUNT_BITS, depth + 1))
+    };
+    let mut level = vec![(0, 1)];
+    let mut depth = 0;
+    while !level.is_empty() && level.len() < MEASURED_SUBTREES {
+        depth += 1;
+        level = level.into_iter().flat_map(children).collect();
+    }
+    let below = level.into_par_iter().map(|subtree| {
+        let mut deepest = 0;
+        let mut pending = vec![subtree];
+        while let Some(node) = pending.pop() {
+            deepest = deepest.max(node.1);
+            pending.extend(children(node));
+        }
+        deepest
+    });
+    below.max().unwrap_or(0).max(depth)
 }

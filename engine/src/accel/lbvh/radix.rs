@@ -154,8 +154,6 @@ struct Slot {
     children: [u32; 2],
     /// Slot of the parent × 2 + which of its children this is.
     parent: u32,
-    /// 0 inside of leaves; otherwise 1, and in the end 1 + where the node goes.
-    target: u32,
 }
 
 /// Words of a slot.
@@ -181,6 +179,17 @@ impl Built {
             (LEAF, _) => LEAF | self.last,
             (slot, _) => slot,
         }
+    }
+}
+
+fn leaf(place: u32, bounds: Aabb) -> Built {
+    Built {
+        bounds,
+        first: place,
+        last: place,
+        slot: LEAF,
+        cost: half_area(&bounds),
+        height: 0,
     }
 }
 
@@ -210,9 +219,34 @@ pub fn hierarchy(boxes: &[Aabb], sorted: &SortedCodes, rule: LeafRule, max_depth
 pub(super) struct Splits {
     /// Slots, by words.
     words: Vec<[u32; SLOT_WORDS]>,
+    /// Of each slot 0 if it lies inside of a leaf, otherwise 1, and in the end 1 + where its node goes.
+    targets: Vec<u32>,
     root: Built,
     /// Nodes outside of leaves, by chunks of slots.
     kept: Vec<usize>,
+}
+
+/// A range of slots that a task fills.
+struct Slots<'a> {
+    slots: &'a mut [Slot],
+    targets: &'a mut [u32],
+}
+
+impl<'a> Slots<'a> {
+    /// Those before a slot and those behind it.
+    fn around(&mut self, slot: usize) -> [Slots<'_>; 2] {
+        let (left, right) = self.slots.split_at_mut(slot);
+        let (left_targets, right_targets) = self.targets.split_at_mut(slot);
+        let before = Slots {
+            slots: left,
+            targets: left_targets,
+        };
+        let behind = Slots {
+            slots: &mut right[1..],
+            targets: &mut right_targets[1..],
+        };
+        [before, behind]
+    }
 }
 
 impl Splits {
@@ -222,6 +256,7 @@ impl Splits {
         let mut skipped = 0;
         loop {
             let mut words = vec![[0; SLOT_WORDS]; inner];
+            let mut targets = vec![0; inner];
             let levels: Vec<u8> = (0..inner).into_par_iter().map(|i| sorted.level(i, skipped)).collect();
             let builder = Builder {
                 sorted,
@@ -230,10 +265,15 @@ impl Splits {
                 rule,
                 skipped,
             };
-            let root = builder.range(0, inner, bytemuck::cast_slice_mut(&mut words));
+            let mut slots = Slots {
+                slots: bytemuck::cast_slice_mut(&mut words),
+                targets: &mut targets,
+            };
+            let root = builder.range(0, inner, &mut slots);
             if root.height <= max_depth || skipped >= sorted.bits {
                 let mut splits = Self {
                     words,
+                    targets,
                     root,
                     kept: Vec::new(),
                 };
@@ -253,26 +293,28 @@ impl Splits {
         self.kept.iter().sum()
     }
 
+    /// Most inner nodes on a way from the root.
+    pub(super) fn depth(&self) -> u32 {
+        self.root.height
+    }
+
     /// Gives each node that stays its place: the root the first, the others by their slots.
     fn number(&mut self) {
-        let slots: &mut [Slot] = bytemuck::cast_slice_mut(&mut self.words);
-        self.kept = slots
-            .par_chunks(CHUNK)
-            .map(|chunk| chunk.iter().filter(|slot| slot.target != 0).count())
-            .collect();
+        let staying = |targets: &[u32]| targets.iter().map(|target| *target as usize).sum();
+        self.kept = self.targets.par_chunks(CHUNK).map(staying).collect();
         let before: Vec<usize> = self
             .kept
             .iter()
             .scan(0, |sum, kept| Some(std::mem::replace(sum, *sum + kept)))
             .collect();
         let root = self.root.slot as usize;
-        let chunks = slots.par_chunks_mut(CHUNK).zip(before).enumerate();
-        chunks.for_each(|(chunk, (slots, before))| {
-            let stay = slots.iter_mut().enumerate().filter(|(_, slot)| slot.target != 0);
-            for (rank, (i, slot)) in (before as u32..).zip(stay) {
+        let chunks = self.targets.par_chunks_mut(CHUNK).zip(before).enumerate();
+        chunks.for_each(|(chunk, (targets, before))| {
+            let stay = targets.iter_mut().enumerate().filter(|(_, target)| **target != 0);
+            for (rank, (i, target)) in (before as u32..).zip(stay) {
                 let at = chunk * CHUNK + i;
                 // Of those before the root one place is the root's, of those behind it the root is counted.
-                slot.target = if at == root { 1 } else { rank + 1 + u32::from(at < root) };
+                *target = if at == root { 1 } else { rank + 1 + u32::from(at < root) };
             }
         });
     }
@@ -293,8 +335,8 @@ impl Splits {
         }
         let chunks = slots.par_chunks(CHUNK).zip(targets).enumerate();
         chunks.for_each(|(chunk, (slots, targets))| {
-            let all = slots.iter().enumerate().map(|(i, slot)| (chunk * CHUNK + i, slot));
-            let kept = all.filter(|(at, slot)| slot.target != 0 && *at != root);
+            let all = (chunk * CHUNK..).zip(slots);
+            let kept = all.filter(|(at, _)| self.targets[*at] != 0 && *at != root);
             for (to, (at, slot)) in targets.iter_mut().zip(kept) {
                 *to = node(at, slot);
             }
@@ -305,7 +347,7 @@ impl Splits {
     fn child(&self, at: usize, side: usize, word: u32) -> Child {
         let (at, end) = (at as u32, word & !LEAF);
         match (word & LEAF, side) {
-            (0, _) => Child::Inner(self.slots()[word as usize].target - 1),
+            (0, _) => Child::Inner(self.targets[word as usize] - 1),
             (_, 0) => Child::Leaf {
                 first: end,
                 count: at - end + 1,
@@ -336,8 +378,7 @@ impl Splits {
 
     /// The nodes in the layout of rays; the root must not be a leaf, and leaves must be small enough for their words.
     pub(super) fn emit_nodes(&self, nodes: &mut [Bvh2Node]) {
-        let slots = self.slots();
-        let target = |slot: u32| slots[slot as usize].target - 1;
+        let target = |slot: u32| self.targets[slot as usize] - 1;
         self.emit(nodes, |at, slot| Bvh2Node {
             bounds: slot.bounds,
             children: [0, 1].map(|side| match self.child(at, side, slot.children[side]) {
@@ -361,23 +402,28 @@ pub(crate) fn next_skipped(skipped: u32, height: u32, max_depth: u32, bits: u32)
 
 impl Builder<'_> {
     /// Builds a range, both ends included; its slots begin with that of its first place.
-    fn range(&self, first: usize, last: usize, slots: &mut [Slot]) -> Built {
+    fn range(&self, first: usize, last: usize, slots: &mut Slots) -> Built {
         if last - first <= PARALLEL_RANGE {
             return self.run(first, last, slots);
         }
         let split = self.sorted.split(first, last, self.skipped);
-        let (left_slots, rest) = slots.split_at_mut(split - first);
-        let right_slots = &mut rest[1..];
-        let left = || self.range(first, split, left_slots);
-        let right = || self.range(split + 1, last, right_slots);
+        let [mut left_slots, mut right_slots] = slots.around(split - first);
+        let left = || self.range(first, split, &mut left_slots);
+        let right = || self.range(split + 1, last, &mut right_slots);
         let (left, right) = rayon::join(left, right);
         self.merge(&left, &right, first as u32, slots)
     }
 
     /// As [`Builder::range`] in one run over the places: whatever lies lower than the level after a place is merged there.
-    fn run(&self, first: usize, last: usize, slots: &mut [Slot]) -> Built {
+    fn run(&self, first: usize, last: usize, slots: &mut Slots) -> Built {
+        // In a loop of its own, so that several boxes are on their way from memory at once.
+        let bounds: Vec<Aabb> = self.sorted.order[first..=last]
+            .iter()
+            .map(|i| self.boxes[*i as usize])
+            .collect();
+        let leaf = |place: usize| leaf(place as u32, bounds[place - first]);
         let mut pending: Vec<Built> = Vec::with_capacity(usize::from(NO_LEVEL));
-        let mut top = self.leaf(first);
+        let mut top = leaf(first);
         for place in first..=last {
             let level = if place == last { NO_LEVEL } else { self.levels[place] };
             while let Some(left) = pending.pop_if(|left| self.levels[left.last as usize] < level) {
@@ -385,26 +431,14 @@ impl Builder<'_> {
             }
             if place < last {
                 pending.push(top);
-                top = self.leaf(place + 1);
+                top = leaf(place + 1);
             }
         }
         top
     }
 
-    fn leaf(&self, place: usize) -> Built {
-        let bounds = self.boxes[self.sorted.order[place] as usize];
-        Built {
-            bounds,
-            first: place as u32,
-            last: place as u32,
-            slot: LEAF,
-            cost: half_area(&bounds),
-            height: 0,
-        }
-    }
-
     /// Joins two neighbouring ranges; `slots` begin with that of place `origin`.
-    fn merge(&self, left: &Built, right: &Built, origin: u32, slots: &mut [Slot]) -> Built {
+    fn merge(&self, left: &Built, right: &Built, origin: u32, to: &mut Slots) -> Built {
         let bounds = left.bounds.union(right.bounds);
         let count = right.last - left.first + 1;
         let area = half_area(&bounds);
@@ -415,8 +449,7 @@ impl Builder<'_> {
         if self.rule.makes_leaf(count, leaf_cost, split_cost, is_root) {
             // What a leaf holds does not stay.
             if left.slot != LEAF || right.slot != LEAF {
-                let inside = &mut slots[(first - origin) as usize..(last - origin) as usize];
-                inside.iter_mut().for_each(|slot| slot.target = 0);
+                to.targets[(first - origin) as usize..(last - origin) as usize].fill(0);
             }
             return Built {
                 bounds,
@@ -429,13 +462,13 @@ impl Builder<'_> {
         }
         let slot = left.last;
         for (side, child) in [left, right].into_iter().enumerate().filter(|(_, c)| c.slot != LEAF) {
-            slots[(child.slot - origin) as usize].parent = slot << 1 | side as u32;
+            to.slots[(child.slot - origin) as usize].parent = slot << 1 | side as u32;
         }
-        slots[(slot - origin) as usize] = Slot {
+        to.targets[(slot - origin) as usize] = 1;
+        to.slots[(slot - origin) as usize] = Slot {
             bounds: [left.bounds, right.bounds],
             children: [left.word(0), right.word(1)],
             parent: 0,
-            target: 1,
         };
         Built {
             bounds,

@@ -148,8 +148,10 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
         BuildQuality::Fast => {
             let splits = Splits::build(&boxes, &sorted, LeafRule::Area(settings.leaf_size), MAX_DEPTH);
             stages.hierarchy = watch.lap();
-            let nodes = splits.as_ref().map_or(0, Splits::nodes);
-            let mut layout = Layout::new(nodes, boxes.len());
+            let (nodes, depth) = splits
+                .as_ref()
+                .map_or((0, 0), |splits| (splits.nodes(), splits.depth()));
+            let mut layout = Layout::new(nodes, boxes.len()).with_depth(depth);
             let (nodes, places) = layout.parts();
             rayon::join(
                 || splits.iter().for_each(|splits| splits.emit_nodes(nodes)),
@@ -209,7 +211,7 @@ pub fn refit(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
         ..Default::default()
     };
     let triangle = |place: usize| Bvh2Triangle::new(positions[place], indices[place]);
-    let layout = Layout::of(&nodes, count, triangle);
+    let layout = Layout::of(&nodes, count, triangle).with_depth(statistics.max_depth);
     Ok(layout.finish(index.name(), excluded, BuildStages::default(), Stopwatch::start()))
 }
 
