@@ -7,14 +7,14 @@ use clerestory::{Error, Result};
 
 /// A measured part of a page, between two marks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Block {
+pub struct Block<'a> {
     /// What it holds; unique within a page.
-    pub name: &'static str,
+    pub name: &'a str,
     /// The command that writes it.
-    pub command: &'static str,
+    pub command: &'a str,
 }
 
-impl Block {
+impl Block<'_> {
     /// Replaces what stands between the marks, or appends it with a heading; a page that is not there is made.
     ///
     /// # Errors

@@ -75,7 +75,7 @@ pub struct Arguments {
     device: DeviceOptions,
 }
 
-const BLOCK: Block = Block {
+const BLOCK: Block<'static> = Block {
     name: "error and speed beside Mitsuba 3",
     command: "clerestory agreement",
 };

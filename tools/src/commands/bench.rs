@@ -163,7 +163,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
 }
 
 /// The part of a page that holds the rates of sorts.
-const SORT_BLOCK: Block = Block {
+const SORT_BLOCK: Block<'static> = Block {
     name: "sorted keys a second",
     command: "clerestory bench --sort --peers",
 };

@@ -63,6 +63,9 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
     /// What a reader must know to judge the numbers.
     pub notes: Vec<String>,
+    /// Too long for a page of results, which names its file instead.
+    #[serde(skip)]
+    pub is_long: bool,
 }
 
 impl Table {
@@ -73,7 +76,13 @@ impl Table {
             heads: heads.iter().map(|head| (*head).to_owned()).collect(),
             rows: Vec::new(),
             notes: Vec::new(),
+            is_long: false,
         }
+    }
+
+    /// The same for a folder of results alone, not for a page that holds other results too.
+    pub fn long(self) -> Self {
+        Self { is_long: true, ..self }
     }
 
     /// Adds a row.

@@ -11,7 +11,7 @@ use super::{BASE, Found, KINDS, Measured, Settings};
 use crate::failure::Outcome;
 use crate::output;
 
-const BLOCK: Block = Block {
+const BLOCK: Block<'static> = Block {
     name: "indexes and rays beside other libraries",
     command: "clerestory index --peers",
 };

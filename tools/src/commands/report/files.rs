@@ -35,6 +35,23 @@ pub fn tables(folder: &Path, experiment: &Experiment, tables: &[Table]) -> Outco
     Ok(page)
 }
 
+/// What a page of results says of a measure: its tables, but of long ones the file alone.
+pub fn for_a_page(experiment: &Experiment, tables: &[Table]) -> String {
+    let mut text = format!("{}. {}\n", experiment.title, experiment.about.trim_end());
+    for (index, table) in tables.iter().enumerate() {
+        text += &if table.is_long {
+            let (rows, file) = (table.rows.len(), index + 1);
+            format!(
+                "\n### {}\n\n{rows} rows, in `{file}.csv` of the experiment's folder.\n",
+                table.title
+            )
+        } else {
+            format!("\n{}", table.markdown())
+        };
+    }
+    text
+}
+
 /// Writes everything of a sweep: page, Markdown, JSON, CSV, plots and picture strips. Returns the Markdown of facts and tables.
 pub fn sweep(folder: &Path, results: &Results) -> Outcome<String> {
     let (plots, strips) = (folder.join("plots"), folder.join("strips"));

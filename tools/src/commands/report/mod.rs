@@ -4,7 +4,7 @@
 
 mod files;
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -16,6 +16,7 @@ use clerestory_tools::experiments::render_sweep::{self, Places};
 use clerestory_tools::experiments::sweep::Sweep;
 use clerestory_tools::experiments::watch::Watch;
 use clerestory_tools::experiments::{self, Experiment, Kind};
+use clerestory_tools::machine;
 use clerestory_tools::page::Block;
 
 use super::check_validation;
@@ -31,6 +32,7 @@ Examples:
   clerestory report --list                         the experiments
   clerestory report samplers                       into out/report/samplers: index.html, report.md, report.json, CSV, plots, pictures
   clerestory report convergence roulette           two of them
+  clerestory report map-quality --page RESULTS.md  its tables also into a part of that page
   clerestory report my-experiment.toml             an experiment of your own; the format is that of tools/experiments/
   clerestory report                                error against time on surfaces and in media, also into RESULTS.md
   clerestory report --smoke                        its smallest form, under two minutes on two cores
@@ -64,6 +66,9 @@ pub struct Arguments {
     /// File whose marked parts are replaced when no experiment is named, made if there is none; by default RESULTS.md, with --smoke none
     #[arg(short, long, value_name = "FILE", conflicts_with = "experiments")]
     output: Option<PathBuf>,
+    /// File of which a named experiment replaces its marked part, made if there is none
+    #[arg(long, value_name = "FILE", requires = "experiments")]
+    page: Option<PathBuf>,
     /// Folder that keeps the references
     #[arg(long, value_name = "FOLDER", default_value = "out/references")]
     references: PathBuf,
@@ -74,7 +79,7 @@ pub struct Arguments {
 /// The page of results.
 const PAGE: &str = "RESULTS.md";
 /// What runs without names, and the part of the page that it writes.
-const DEFAULTS: [(&str, Block); 2] = [
+const DEFAULTS: [(&str, Block<'static>); 2] = [
     (
         "error-against-time",
         Block {
@@ -101,11 +106,20 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     // Opened for the first experiment that needs it, and kept: kernels compile once.
     let mut gpu = None;
     for (experiment, block) in found {
+        let command = format!("clerestory report {}", experiment.name);
+        let own = Block {
+            name: &experiment.name,
+            command: &command,
+        };
+        let part = match block {
+            Some(block) => page_of_all(arguments).map(|page| (block, page)),
+            None => arguments.page.clone().map(|page| (own, page)),
+        };
         let about = format!("{}: {}", experiment.name, experiment.title);
         let interrupted = match experiment.kind()? {
             Kind::Measure(name) => {
                 output::note(&about);
-                measure(arguments, &experiment, name, &bar)?
+                measure(arguments, &experiment, name, &bar, part)?
             }
             Kind::Sweep(sweep) => {
                 let gpu = match &mut gpu {
@@ -113,7 +127,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
                     None => gpu.insert(arguments.device.open()?),
                 };
                 output::note(&about);
-                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar, block)?
+                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar, part)?
             }
         };
         if interrupted {
@@ -130,7 +144,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
 }
 
 /// The experiments to run, with the part of the page that each writes. Scenes of the command line's stand in for those of one experiment.
-fn wanted(arguments: &Arguments) -> Result<Vec<(Experiment, Option<Block>)>> {
+fn wanted(arguments: &Arguments) -> Result<Vec<(Experiment, Option<Block<'static>>)>> {
     if arguments.experiments.is_empty() {
         let count = if arguments.scenes.is_empty() { DEFAULTS.len() } else { 1 };
         let found = DEFAULTS[..count].iter();
@@ -167,8 +181,20 @@ fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
 }
 
 /// The tables go to standard output and, with all digits, into the folder. Says whether it was interrupted.
-fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar) -> Outcome<bool> {
-    let open = || Gpu::headless(&arguments.device.options());
+fn measure(
+    arguments: &Arguments,
+    experiment: &Experiment,
+    name: &str,
+    bar: &Bar,
+    part: Option<(Block<'_>, PathBuf)>,
+) -> Outcome<bool> {
+    let device = RefCell::new("none".to_owned());
+    let open = || {
+        let gpu = Gpu::headless(&arguments.device.options())?;
+        *device.borrow_mut() = format!("{}, driver {}", gpu.caps().device, gpu.caps().driver);
+        Ok(gpu)
+    };
+    let load = machine::load().unwrap_or_else(|| "unknown".into());
     let folder = folder(arguments, experiment);
     let context = Context {
         smoke: arguments.smoke,
@@ -186,7 +212,24 @@ fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar
     let page = files::tables(&folder, experiment, &tables)?;
     output::print(&page)?;
     output::note(&format!("wrote {}", folder.display()));
+    if let Some((block, path)) = part {
+        let facts = output::one_line(&format!(
+            "Machine: {}, {} threads, load average {load} when it began; Vulkan device: {}. Clerestory {}.",
+            machine::processor(),
+            machine::threads(),
+            device.borrow(),
+            env!("CARGO_PKG_VERSION"),
+        ));
+        block.write(&path, &format!("{facts}\n\n{}", files::for_a_page(experiment, &tables)))?;
+        output::note(&format!("wrote {}", path.display()));
+    }
     Ok(false)
+}
+
+/// Where the experiments go that run without being named.
+fn page_of_all(arguments: &Arguments) -> Option<PathBuf> {
+    let page = arguments.output.clone();
+    page.or_else(|| (!arguments.smoke).then(|| PAGE.into()))
 }
 
 /// The sweep with the changes that the command line asks for.
@@ -210,7 +253,7 @@ fn render(
     sweep: &Sweep,
     gpu: &Gpu,
     bar: &Bar,
-    block: Option<Block>,
+    part: Option<(Block<'_>, PathBuf)>,
 ) -> Outcome<bool> {
     let places = Places {
         folder: folder(arguments, experiment),
@@ -229,11 +272,7 @@ fn render(
         }
     })?;
     let text = files::sweep(&places.folder, &results)?;
-    let page = arguments
-        .output
-        .clone()
-        .or_else(|| (!arguments.smoke).then(|| PAGE.into()));
-    match block.zip(page).filter(|_| !results.interrupted) {
+    match part.filter(|_| !results.interrupted) {
         Some((block, page)) => {
             block.write(&page, &text)?;
             output::note(&format!("wrote {}", page.display()));

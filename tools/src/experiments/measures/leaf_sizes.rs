@@ -187,7 +187,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "speed / best of the sweep",
             "source: frames/s / best of its sweep",
         ],
-    );
+    )
+    .long();
     let mut automatic_sizes = Table::new(
         "Automatic leaf sizes",
         &[
