@@ -50,7 +50,7 @@ uvec2 scan_team(uvec2 value, out uvec2 total) {
 }
 
 uint scan_team_index() { return SERIAL ? gl_GlobalInvocationID.x : gl_WorkGroupID.x; }
-uint scan_team_lane() { return SERIAL ? 0u : gl_LocalInvocationID.x; }
+uint scan_team_lane() { return SERIAL ? 0u : team_lane(); }
 uint scan_team_lanes() { return SERIAL ? 1u : LANES; }
 
 #endif

@@ -1,7 +1,8 @@
 // The exclusive scan over the invocations of a workgroup by any associative operation, with or without subgroup operations.
 //
 // Without: Hillis and Steele (Data parallel algorithms, 1986) in shared memory. With: the same within each subgroup by shuffles, then a
-// walk over the subgroups' results, of any size of subgroups. A file that includes this defines LANES, the size of its workgroups,
+// walk over the subgroups' results, of any size of subgroups; the order is that of team_lane, since how invocations are dealt to subgroups is
+// the device's choice. A file that includes this defines LANES, the size of its workgroups,
 // TEAM_TYPE, TEAM_IDENTITY and TEAM_COMBINE(earlier, later), and KERNEL_SUBGROUPS for the second form. All invocations must call it; it has
 // what barriers it needs, so shared memory that was written before a call can be read after it.
 #ifndef CLERESTORY_KERNELS_TEAM_SCAN_GLSL
@@ -10,6 +11,9 @@
 shared TEAM_TYPE team_values[LANES];
 
 #ifdef KERNEL_SUBGROUPS
+// The place of this invocation in the scan.
+uint team_lane() { return gl_SubgroupID * (LANES / gl_NumSubgroups) + gl_SubgroupInvocationID; }
+
 TEAM_TYPE team_exclusive(TEAM_TYPE value, out TEAM_TYPE total) {
     // Subgroups may be smaller than gl_SubgroupSize says, but they are full.
     uint width = LANES / gl_NumSubgroups;
@@ -41,8 +45,11 @@ TEAM_TYPE team_exclusive(TEAM_TYPE value, out TEAM_TYPE total) {
     return TEAM_COMBINE(others, before);
 }
 #else
+// The place of this invocation in the scan.
+uint team_lane() { return gl_LocalInvocationID.x; }
+
 TEAM_TYPE team_exclusive(TEAM_TYPE value, out TEAM_TYPE total) {
-    uint lane = gl_LocalInvocationID.x;
+    uint lane = team_lane();
     TEAM_TYPE all = value;
     barrier();
     team_values[lane] = all;

@@ -4,9 +4,12 @@
 //! the same mathematics library. Every scene has a camera named `main` and a `defaults.aspect`.
 
 mod city;
+mod conference;
 mod cornell;
 mod fog;
+mod forest;
 mod furnace;
+mod halls;
 mod materials;
 mod media;
 pub mod noise;
@@ -45,12 +48,16 @@ pub struct Entry {
 /// All generated scenes, by name.
 pub fn catalogue() -> &'static [Entry] {
     &[
+        halls::ATRIUM,
         city::BOX_CITY,
         rooms::BOX_ROOM,
+        halls::CATHEDRAL,
         volumes::CLOUD,
+        conference::CONFERENCE,
         cornell::CORNELL_BOX,
         rooms::DIVIDER_ROOM,
         fog::FOG_BOX,
+        forest::FOREST,
         furnace::FURNACE_BOX,
         media::FURNACE_MEDIUM,
         furnace::FURNACE_SPHERE,

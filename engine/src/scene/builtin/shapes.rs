@@ -246,6 +246,121 @@ pub fn cylinder_wall(name: &str, material: u32, radius: f64, height: f64, segmen
     mesh
 }
 
+/// A body of revolution around +Y: its outline as pairs of radius and height, from below upward, closed where it begins and ends with
+/// radius 0; flat faces, outward. 2·segments triangles between two points of the outline, half of them where one has radius 0.
+pub fn lathe(name: &str, material: u32, outline: &[(f64, f64)], segments: u32) -> Mesh {
+    let segments = segments.max(3);
+    let mut mesh = Mesh {
+        name: name.into(),
+        material: Some(material),
+        ..Mesh::default()
+    };
+    for (radius, height) in outline {
+        for segment in 0..segments {
+            let phi = TAU * f64::from(segment) / f64::from(segments);
+            let position = DVec3::new(radius * phi.cos(), *height, -radius * phi.sin());
+            mesh.positions.push(position.as_vec3());
+        }
+    }
+    for (ring, pair) in (0..).zip(outline.windows(2)) {
+        for segment in 0..segments {
+            let next = (segment + 1) % segments;
+            let [a, b] = [segment, next].map(|s| ring * segments + s);
+            let [c, d] = [a, b].map(|below| below + segments);
+            if pair[0].0 > 0.0 {
+                mesh.triangles.push([a, b, d]);
+            }
+            if pair[1].0 > 0.0 {
+                mesh.triangles.push([a, d, c]);
+            }
+        }
+    }
+    mesh
+}
+
+/// Half a ring that stands on the plane y = 0 around the z axis: between two radii, `depth` thick about z = 0, with its feet closed;
+/// 8·segments + 4 triangles, outward. `rise` stretches its height: 1 for a round arch, more for one that is steeper.
+pub fn arch(name: &str, material: u32, [inner, outer]: [f64; 2], depth: f64, rise: f64, segments: u32) -> Mesh {
+    let segments = segments.max(1);
+    let mut builder = MeshBuilder::new(name, material);
+    let corner = |segment: u32, radius: f64, side: f64| {
+        let angle = std::f64::consts::PI * f64::from(segment) / f64::from(segments);
+        // The second foot stands exactly as high as the first.
+        let sine = if segment == segments { 0.0 } else { angle.sin() };
+        DVec3::new(radius * angle.cos(), rise * radius * sine, side * depth / 2.0).as_vec3()
+    };
+    let ring = |segment: u32| {
+        let at = |radius, side| corner(segment, radius, side);
+        [at(inner, -1.0), at(outer, -1.0), at(outer, 1.0), at(inner, 1.0)]
+    };
+    for segment in 0..segments {
+        let (from, to) = (ring(segment), ring(segment + 1));
+        for side in 0..4 {
+            let next = (side + 1) % 4;
+            builder.quad([from[side], to[side], to[next], from[next]]);
+        }
+    }
+    builder.quad(ring(0));
+    let [a, b, c, d] = ring(segments);
+    builder.quad([d, c, b, a]);
+    builder.build()
+}
+
+/// A box around the origin with round edges: each face a grid of `cells`², whose points lie `radius` away from a smaller box;
+/// 12·cells² triangles, outward.
+pub fn rounded_box(name: &str, material: u32, half: Vec3, radius: f32, cells: u32) -> Mesh {
+    let cells = cells.max(1);
+    let core = half - Vec3::splat(radius);
+    let mut builder = MeshBuilder::new(name, material);
+    for [a, b, _, d] in cuboid_faces(-half, half) {
+        let point = |i: u32, j: u32| {
+            let mut on_box = a;
+            for axis in 0..3 {
+                let steps = |corner: Vec3, k: u32| {
+                    let difference = corner[axis] - a[axis];
+                    (difference != 0.0).then_some(if difference > 0.0 { k } else { cells - k })
+                };
+                // Counted from the low side on every face, so that neighbours share their points to the bit.
+                if let Some(k) = steps(b, i).or(steps(d, j)) {
+                    on_box[axis] = half[axis] * ((2.0 * k as f32 - cells as f32) / cells as f32);
+                }
+            }
+            let middle = on_box.clamp(-core, core);
+            middle + (on_box - middle).normalize() * radius
+        };
+        for i in 0..cells {
+            for j in 0..cells {
+                builder.quad([point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)]);
+            }
+        }
+    }
+    builder.build()
+}
+
+/// A sheet of `columns` × `rows` cells over the unit square, each point where `place` puts it; counter-clockwise as the square is when
+/// its second axis points up; 2·columns·rows triangles that share their corners.
+pub fn sheet(name: &str, material: u32, columns: u32, rows: u32, place: impl Fn(f32, f32) -> Vec3) -> Mesh {
+    let mut mesh = Mesh {
+        name: name.into(),
+        material: Some(material),
+        ..Mesh::default()
+    };
+    for row in 0..=rows {
+        for column in 0..=columns {
+            mesh.positions
+                .push(place(column as f32 / columns as f32, row as f32 / rows as f32));
+        }
+    }
+    for row in 0..rows {
+        for column in 0..columns {
+            let a = row * (columns + 1) + column;
+            let above = a + columns + 1;
+            mesh.triangles.extend([[a, a + 1, above + 1], [a, above + 1, above]]);
+        }
+    }
+    mesh
+}
+
 /// Turns a mesh inside out: faces and normals point the other way.
 pub fn inverted(mut mesh: Mesh) -> Mesh {
     for triangle in &mut mesh.triangles {
@@ -333,6 +448,23 @@ pub mod tests {
                 assert!((b - a).cross(c - a).length() > 1e-4);
             }
         }
+    }
+
+    #[test]
+    fn turned_arched_and_rounded_bodies_are_closed_and_face_outward() {
+        let vase = lathe("", 0, &[(0.0, 0.0), (0.5, 0.0), (0.3, 1.0), (0.0, 1.5)], 24);
+        assert_eq!((vase.triangles.len(), open_edges(&vase)), (24 * 4, 0));
+        assert!(volume(&vase) > 0.5 && volume(&vase) < 0.7);
+        let half_ring = arch("", 0, [1.0, 1.2], 0.5, 1.5, 16);
+        assert_eq!((half_ring.triangles.len(), open_edges(&half_ring)), (8 * 16 + 4, 0));
+        let smooth = 0.5 * 0.5 * std::f64::consts::PI * 1.5 * (1.2 * 1.2 - 1.0);
+        assert!(volume(&half_ring) > 0.98 * smooth && volume(&half_ring) < smooth);
+        let cushion = rounded_box("", 0, Vec3::new(0.3, 0.05, 0.25), 0.04, 9);
+        assert_eq!((cushion.triangles.len(), open_edges(&cushion)), (12 * 81, 0));
+        assert!(volume(&cushion) > 0.8 * 0.03 && volume(&cushion) < 0.03);
+        let cloth = sheet("", 0, 5, 3, |u, v| Vec3::new(u, v, 0.0));
+        assert_eq!((cloth.triangles.len(), open_edges(&cloth)), (30, 16));
+        assert!((area(&cloth) - 1.0).abs() < 1e-6);
     }
 
     #[test]

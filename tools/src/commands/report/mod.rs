@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     for (experiment, block) in found {
         let command = format!("clerestory report {}", experiment.name);
         let own = Block {
-            name: &experiment.name,
+            name: experiment.title.split(':').next().unwrap_or(&experiment.name),
             command: &command,
         };
         let part = match block {
