@@ -1,6 +1,6 @@
 //! The device's linear hierarchies and compact traversals against their Rust twins, bit for bit.
 
-use clerestory::accel::bvh2::Aabb;
+use clerestory::accel::Aabb;
 use clerestory::accel::compact_bvh::CompactBvh;
 use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
 use clerestory::accel::lbvh::radix::{LeafRule, SortedCodes, hierarchy};

@@ -9,8 +9,8 @@
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
 //! differs from run to run, and shows in nothing but the time.
 
-use super::bvh2::build::check_range;
 use super::bvh2::{Bvh2, MAX_DEPTH, MAX_LEAF_SIZE};
+use super::input::check_range;
 use super::{Hit, Ray, RayIndex, TraversalCounters};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_closest;

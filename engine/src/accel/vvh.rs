@@ -8,8 +8,8 @@
 //! Guarantee: deterministic; at most [`MAX_SWEEP_DEPTH`] inner nodes deep; where no border is better than another, as with equal centres or
 //! boxes without volume, the median is taken.
 
-use super::bvh2::Aabb;
-use super::lbvh::tree::{BoxTree, Child, EMPTY_NODE, volume};
+use super::Aabb;
+use super::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use super::morton::doubled_centre;
 
 /// Most inner nodes on a way from the root.
@@ -27,7 +27,7 @@ pub enum Heuristic {
 impl Heuristic {
     fn measure(self, bounds: &Aabb) -> f64 {
         match self {
-            Self::Volume => volume(bounds),
+            Self::Volume => bounds.volume(),
             Self::Area => bounds.half_area(),
         }
     }
@@ -37,7 +37,7 @@ struct Sweep<'a> {
     boxes: &'a [Aabb],
     leaf_size: usize,
     heuristic: Heuristic,
-    nodes: Vec<super::lbvh::tree::PairNode>,
+    nodes: Vec<PairNode>,
 }
 
 /// The tree over boxes, with leaves of at most `leaf_size` primitives unless the depth ends first.

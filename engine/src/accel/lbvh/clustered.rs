@@ -7,8 +7,8 @@
 //! Guarantee: the order of [`SortedCodes::of_boxes`] and the tree of [`merged_hierarchy`](super::merge::merged_hierarchy).
 
 use super::radix::SortedCodes;
-use super::tree::{BoxTree, Child, EMPTY_NODE};
-use crate::accel::bvh2::Aabb;
+use crate::accel::Aabb;
+use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 
 /// How much was left to sort and to pass over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -9,9 +9,9 @@
 use super::device_buffers::LbvhBuffers;
 use super::radix::next_skipped;
 use super::ray_index::{LbvhSettings, check_moved, moved_corners};
-use crate::accel::bvh2::build::{Met, check_count};
 use crate::accel::bvh2::layout::Layout;
 use crate::accel::bvh2::{Bvh2, MAX_DEPTH, NODE_QUARTERS, TRIANGLE_QUARTERS};
+use crate::accel::input::{Met, check_count};
 use crate::accel::morton::MORTON_30_AXIS_BITS;
 use crate::accel::stages::Stopwatch;
 use crate::accel::{BuildStages, IndexStatistics, RayIndex};

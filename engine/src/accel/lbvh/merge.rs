@@ -8,8 +8,8 @@
 //! run of them is a leaf, whatever the leaf size.
 
 use super::radix::SortedCodes;
-use super::tree::{BoxTree, Child, EMPTY_NODE, PairNode};
-use crate::accel::bvh2::Aabb;
+use crate::accel::Aabb;
+use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 
 /// Two neighbours whose codes differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

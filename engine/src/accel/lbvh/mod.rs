@@ -16,7 +16,6 @@ pub mod radix;
 mod ray_index;
 mod sort;
 pub mod split_lists;
-pub mod tree;
 
 pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
 pub use device_buffers::LbvhBuffers;

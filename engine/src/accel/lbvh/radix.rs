@@ -10,9 +10,9 @@
 //! asked for, see [`hierarchy`].
 
 use super::sort::sort_by_key;
-use super::tree::{BoxTree, Child, EMPTY_NODE, PairNode};
-use crate::accel::bvh2::build::leaf_word;
-use crate::accel::bvh2::{Aabb, Bvh2Node, COUNT_BITS};
+use crate::accel::Aabb;
+use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
+use crate::accel::bvh2::{Bvh2Node, COUNT_BITS, leaf_word};
 use crate::accel::morton::{MORTON_30_AXIS_BITS, MortonGrid, doubled_centre};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;

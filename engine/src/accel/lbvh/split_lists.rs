@@ -7,8 +7,8 @@
 //! Guarantee: the same tree as [`merged_hierarchy`](super::merge::merged_hierarchy), and how many nodes stood before chains were taken out.
 
 use super::radix::SortedCodes;
-use super::tree::{BoxTree, Child, EMPTY_NODE};
-use crate::accel::bvh2::Aabb;
+use crate::accel::Aabb;
+use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 
 /// A node of one level: a range of places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

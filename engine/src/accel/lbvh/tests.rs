@@ -1,9 +1,9 @@
 use super::radix::{LeafRule, SortedCodes, half_area, hierarchy, next_skipped};
-use super::tree::{BoxTree, Child, TreeShape};
 use super::*;
-use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Settings, MAX_DEPTH};
+use crate::accel::box_tree::{BoxTree, Child, TreeShape};
+use crate::accel::bvh2::{Bvh2, Bvh2Settings, MAX_DEPTH};
 use crate::accel::test_support::{Random, ray};
-use crate::accel::{Ray, RayIndex};
+use crate::accel::{Aabb, Ray, RayIndex};
 use glam::Vec3;
 
 /// Boxes around points, of random sizes up to `size`.

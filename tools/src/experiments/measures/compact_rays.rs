@@ -4,7 +4,7 @@
 //! model in which every access is served by itself (§4.3.3): 28 bytes a node of a complete pair, 32 a compact pair, stack entries of 8
 //! bytes (4 for shadow rays) and 12.
 
-use clerestory::accel::bvh2::Aabb;
+use clerestory::accel::Aabb;
 use clerestory::accel::compact_bvh::{COMPACT_PAIR_BYTES, CompactBvh};
 use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters, RAY_STACK_ENTRY_BYTES, RayPair, SlabRay};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};

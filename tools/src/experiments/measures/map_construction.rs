@@ -5,13 +5,13 @@
 
 use std::time::Instant;
 
-use clerestory::accel::bvh2::Aabb;
+use clerestory::accel::Aabb;
+use clerestory::accel::box_tree::BoxTree;
 use clerestory::accel::lbvh::clustered::{ClusterCounts, clustered_hierarchy};
 use clerestory::accel::lbvh::leaf_threshold::automatic_leaf_size;
 use clerestory::accel::lbvh::merge::merged_hierarchy;
 use clerestory::accel::lbvh::radix::SortedCodes;
 use clerestory::accel::lbvh::split_lists::split_list_hierarchy;
-use clerestory::accel::lbvh::tree::BoxTree;
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
 use clerestory::gpu::Timings;

@@ -3,11 +3,11 @@
 //! Source of the method: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2. Oracle: the example
 //! carried out by hand; for more codes, the tree by lists of splits, which is built from the root.
 
-use clerestory::accel::bvh2::Aabb;
+use clerestory::accel::Aabb;
+use clerestory::accel::box_tree::{BoxTree, Child};
 use clerestory::accel::lbvh::merge::{merge_points, merged_hierarchy};
 use clerestory::accel::lbvh::radix::SortedCodes;
 use clerestory::accel::lbvh::split_lists::split_list_hierarchy;
-use clerestory::accel::lbvh::tree::{BoxTree, Child};
 use clerestory::{Error, Result};
 use glam::Vec3;
 

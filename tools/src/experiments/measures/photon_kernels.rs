@@ -9,12 +9,12 @@
 //!
 //! Guarantee: deterministic.
 
-use clerestory::accel::bvh2::Aabb;
+use clerestory::accel::Aabb;
+use clerestory::accel::box_tree::BoxTree;
 use clerestory::accel::compact_bvh::CompactBvh;
 use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters};
 use clerestory::accel::lbvh::merge::merged_hierarchy;
 use clerestory::accel::lbvh::radix::SortedCodes;
-use clerestory::accel::lbvh::tree::BoxTree;
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
 use clerestory::accel::vvh::{Heuristic, sweep_tree};
 use clerestory::{Error, Result};

@@ -4,7 +4,8 @@
 //!
 //! Guarantee: deterministic.
 
-use clerestory::accel::bvh2::{Aabb, Bvh2, Bvh2Settings};
+use clerestory::accel::Aabb;
+use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::{Hit, Ray, RayIndex};
 use clerestory::scene::{Camera, Scene};
 use clerestory::{Result, scene};

@@ -6,7 +6,7 @@
 //! Guarantee: [`BoxTree::shape`] accepts exactly the trees in which every primitive lies in one leaf and every box is the union of the
 //! primitives below it, to the bit.
 
-use crate::accel::bvh2::Aabb;
+use super::Aabb;
 
 /// Where a tree goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -207,7 +207,7 @@ impl BoxTree {
 
     /// Expected node visits and primitive tests of a point in the root box.
     pub fn volume_cost(&self) -> f64 {
-        self.cost(volume)
+        self.cost(Aabb::volume)
     }
 
     fn cost(&self, measure: impl Fn(&Aabb) -> f64) -> f64 {
@@ -227,10 +227,4 @@ impl BoxTree {
         });
         below.sum::<f64>() / whole + weight(self.root)
     }
-}
-
-/// Volume of a box, m³; zero for the empty box.
-pub(crate) fn volume(bounds: &Aabb) -> f64 {
-    let e = (bounds.upper.as_dvec3() - bounds.lower.as_dvec3()).max(glam::DVec3::ZERO);
-    e.x * e.y * e.z
 }
