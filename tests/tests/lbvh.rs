@@ -3,7 +3,7 @@
 use clerestory::accel::Aabb;
 use clerestory::accel::compact_bvh::CompactBvh;
 use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
-use clerestory::accel::lbvh::radix::{LeafRule, SortedCodes, hierarchy};
+use clerestory::accel::lbvh::radix_tree::{LeafRule, SortedCodes, hierarchy};
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, build, refit};
 use clerestory::accel::{Ray, RayIndex};
 use clerestory::gpu::shaders::accel::{compact_points, compact_rays};

@@ -1,5 +1,5 @@
 // Fourth stage of the linear hierarchy: the nodes below runs of neighbouring places, with their boxes, costs and leaves; twin of
-// clerestory::accel::lbvh::radix.
+// clerestory::accel::lbvh::radix_tree.
 //
 // An invocation walks along its run and joins what lies lower than the level after it: of two neighbouring ranges the one whose codes
 // differ in the lower bit is joined first (C. Apetrei, "Fast and Simple Agglomerative LBVH Construction", 2014). What it leaves on the way

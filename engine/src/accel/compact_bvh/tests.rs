@@ -1,6 +1,6 @@
 use super::*;
 use crate::accel::lbvh::hard_boxes;
-use crate::accel::lbvh::radix::{LeafRule, SortedCodes, hierarchy};
+use crate::accel::lbvh::radix_tree::{LeafRule, SortedCodes, hierarchy};
 use crate::accel::vvh::{Heuristic, sweep_tree};
 use crate::test_random::Random;
 

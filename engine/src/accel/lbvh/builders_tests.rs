@@ -2,7 +2,7 @@
 
 use super::clustered::{ClusterCounts, clustered_hierarchy, sort_by_clusters};
 use super::merge::{MergePoint, merge_points, merged_hierarchy};
-use super::radix::{LeafRule, SortedCodes, hierarchy};
+use super::radix_tree::{LeafRule, SortedCodes, hierarchy};
 use super::split_lists::split_list_hierarchy;
 use super::tests::{hard_boxes, valid};
 use crate::accel::Aabb;

@@ -6,7 +6,7 @@
 //!
 //! Guarantee: the order of [`SortedCodes::of_boxes`] and the tree of [`merged_hierarchy`](super::merge::merged_hierarchy).
 
-use super::radix::SortedCodes;
+use super::radix_tree::SortedCodes;
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 

@@ -1,13 +1,13 @@
 //! The linear hierarchy built by the device: bounds, codes, sort, tree, ranks and layout, each a pass of its own with its time.
 //!
-//! Sources: see [`radix`](super::radix) for the tree, [`RadixSort`] for the sort. The stages are `shaders/accel/lbvh_*.comp`.
+//! Sources: see [`radix_tree`](super::radix_tree) for the tree, [`RadixSort`] for the sort. The stages are `shaders/accel/lbvh_*.comp`.
 //!
 //! Guarantees: the same bytes as [`build`](super::build) of quality [`Fast`](super::BuildQuality::Fast), on every device that keeps
 //! subnormal numbers, and on all where no box has an area below the smallest normal one (boxes of 10⁻¹⁹ m); no invocation ever waits for
 //! another.
 
 use super::device_buffers::LbvhBuffers;
-use super::radix::next_skipped;
+use super::radix_tree::next_skipped;
 use super::ray_index::{LbvhSettings, check_moved, moved_corners};
 use crate::accel::bvh2::layout::Layout;
 use crate::accel::bvh2::{Bvh2, MAX_DEPTH, NODE_QUARTERS, TRIANGLE_QUARTERS};

@@ -2,7 +2,7 @@
 //! of photon maps alike.
 //!
 //! Sources: C. Lauterbach et al., "Fast BVH Construction on GPUs", Eurographics 2009, for the idea; each module names the form it builds.
-//! [`radix`] is the form that renderers use, here and on the device; the others are what it is compared with, and what photon maps use.
+//! [`radix_tree`] is the form that renderers use, here and on the device; the others are what it is compared with, and what photon maps use.
 //!
 //! Guarantees: the same tree whatever the number of threads; every box the exact union of what it holds; any set of finite boxes gives a
 //! tree, equal codes and equal boxes included.
@@ -12,7 +12,7 @@ mod device;
 mod device_buffers;
 pub mod leaf_threshold;
 pub mod merge;
-pub mod radix;
+pub mod radix_tree;
 mod ray_index;
 mod sort;
 pub mod split_lists;

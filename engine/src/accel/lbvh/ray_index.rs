@@ -1,6 +1,6 @@
 //! The linear hierarchy as a ray index: over triangles, in the node layout that the path tracer traverses.
 
-use super::radix::{Codes, LeafRule, SortedCodes, Splits, hierarchy};
+use super::radix_tree::{Codes, LeafRule, SortedCodes, Splits, hierarchy};
 use crate::Result;
 use crate::accel::box_tree::{BoxTree, Child};
 use crate::accel::bvh2::layout::{Layout, fill_triangles};

@@ -6,7 +6,7 @@
 //!
 //! Guarantee: the same tree as [`merged_hierarchy`](super::merge::merged_hierarchy), and how many nodes stood before chains were taken out.
 
-use super::radix::SortedCodes;
+use super::radix_tree::SortedCodes;
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 

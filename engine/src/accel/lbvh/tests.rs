@@ -1,4 +1,4 @@
-use super::radix::{LeafRule, SortedCodes, half_area, hierarchy, next_skipped};
+use super::radix_tree::{LeafRule, SortedCodes, half_area, hierarchy, next_skipped};
 use super::*;
 use crate::accel::box_tree::{BoxTree, Child, TreeShape};
 use crate::accel::bvh2::{Bvh2, Bvh2Settings, MAX_DEPTH};
