@@ -23,8 +23,6 @@
 mod aabb;
 pub mod box_tree;
 pub mod bvh2;
-pub mod compact_bvh;
-pub mod complete_bvh;
 mod input;
 pub mod kd;
 mod kind;
@@ -32,11 +30,11 @@ pub mod lbvh;
 pub mod morton;
 pub mod offset;
 pub mod optimise;
+pub mod photon_map;
 pub mod sphere;
 mod stages;
 pub mod trace;
 pub mod triangle;
-pub mod vvh;
 
 #[cfg(test)]
 mod test_support;

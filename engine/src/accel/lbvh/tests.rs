@@ -64,7 +64,7 @@ const RULES: [LeafRule; 5] = [
     LeafRule::Area(8),
 ];
 
-pub(super) fn valid(name: &str, tree: &BoxTree, boxes: &[Aabb]) -> TreeShape {
+pub(crate) fn valid(name: &str, tree: &BoxTree, boxes: &[Aabb]) -> TreeShape {
     tree.shape(boxes).unwrap_or_else(|fault| panic!("{name}: {fault:?}"))
 }
 

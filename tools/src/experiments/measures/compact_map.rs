@@ -4,9 +4,9 @@
 //! model in which every access is served by itself (§4.3.3): 32 bytes a node or compact pair, 4 a stack entry.
 
 use clerestory::Result;
-use clerestory::accel::compact_bvh::COMPACT_PAIR_BYTES;
-use clerestory::accel::complete_bvh::COMPLETE_NODE_BYTES;
-use clerestory::accel::lbvh::leaf_threshold::automatic_leaf_size;
+use clerestory::accel::photon_map::compact_bvh::COMPACT_PAIR_BYTES;
+use clerestory::accel::photon_map::complete_bvh::COMPLETE_NODE_BYTES;
+use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
 
 use super::Context;
 use super::clock::nanoseconds;

@@ -5,10 +5,12 @@
 //! bytes (4 for shadow rays) and 12.
 
 use clerestory::accel::Aabb;
-use clerestory::accel::compact_bvh::{COMPACT_PAIR_BYTES, CompactBvh};
-use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters, RAY_STACK_ENTRY_BYTES, RayPair, SlabRay};
+use clerestory::accel::photon_map::compact_bvh::{COMPACT_PAIR_BYTES, CompactBvh};
+use clerestory::accel::photon_map::complete_bvh::{
+    CompleteBvh, QueryCounters, RAY_STACK_ENTRY_BYTES, RayPair, SlabRay,
+};
+use clerestory::accel::photon_map::vvh::{Heuristic, sweep_tree};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
-use clerestory::accel::vvh::{Heuristic, sweep_tree};
 use clerestory::{Error, Result};
 use glam::Vec3;
 

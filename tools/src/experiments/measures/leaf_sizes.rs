@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use clerestory::Result;
-use clerestory::accel::lbvh::leaf_threshold::{LEAF_SHARE, automatic_leaf_size};
+use clerestory::accel::photon_map::leaf_threshold::{LEAF_SHARE, automatic_leaf_size};
 use glam::Vec3;
 
 use super::Context;

@@ -7,13 +7,13 @@ use std::time::Instant;
 
 use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::BoxTree;
-use clerestory::accel::lbvh::clustered::{ClusterCounts, clustered_hierarchy};
-use clerestory::accel::lbvh::leaf_threshold::automatic_leaf_size;
-use clerestory::accel::lbvh::merge::merged_hierarchy;
 use clerestory::accel::lbvh::radix_tree::SortedCodes;
-use clerestory::accel::lbvh::split_lists::split_list_hierarchy;
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
+use clerestory::accel::photon_map::clustered::{ClusterCounts, clustered_hierarchy};
+use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
+use clerestory::accel::photon_map::merge::merged_hierarchy;
+use clerestory::accel::photon_map::split_lists::split_list_hierarchy;
 use clerestory::gpu::Timings;
 use clerestory::{Error, Result};
 use glam::Vec3;

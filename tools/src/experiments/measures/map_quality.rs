@@ -3,7 +3,7 @@
 //! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.3.
 
 use clerestory::Result;
-use clerestory::accel::lbvh::leaf_threshold::automatic_leaf_size;
+use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
 use glam::Vec3;
 
 use super::Context;

@@ -11,12 +11,12 @@
 
 use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::BoxTree;
-use clerestory::accel::compact_bvh::CompactBvh;
-use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters};
-use clerestory::accel::lbvh::merge::merged_hierarchy;
 use clerestory::accel::lbvh::radix_tree::SortedCodes;
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
-use clerestory::accel::vvh::{Heuristic, sweep_tree};
+use clerestory::accel::photon_map::compact_bvh::CompactBvh;
+use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};
+use clerestory::accel::photon_map::merge::merged_hierarchy;
+use clerestory::accel::photon_map::vvh::{Heuristic, sweep_tree};
 use clerestory::{Error, Result};
 use glam::{Vec3, Vec4};
 

@@ -2,12 +2,12 @@
 
 use super::clustered::{ClusterCounts, clustered_hierarchy, sort_by_clusters};
 use super::merge::{MergePoint, merge_points, merged_hierarchy};
-use super::radix_tree::{LeafRule, SortedCodes, hierarchy};
 use super::split_lists::split_list_hierarchy;
-use super::tests::{hard_boxes, valid};
+use super::vvh::{Heuristic, MAX_SWEEP_DEPTH, sweep_tree};
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child};
-use crate::accel::vvh::{Heuristic, MAX_SWEEP_DEPTH, sweep_tree};
+use crate::accel::lbvh::radix_tree::{LeafRule, SortedCodes, hierarchy};
+use crate::accel::lbvh::{hard_boxes, valid};
 use crate::test_random::Random;
 use glam::Vec3;
 

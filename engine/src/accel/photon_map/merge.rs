@@ -7,9 +7,9 @@
 //! Guarantee: the tree that splits every range at its highest differing bit and stops at the leaf size. Equal codes are never split: a
 //! run of them is a leaf, whatever the leaf size.
 
-use super::radix_tree::SortedCodes;
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
+use crate::accel::lbvh::radix_tree::SortedCodes;
 
 /// Two neighbours whose codes differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,9 +6,9 @@
 //!
 //! Guarantee: the same tree as [`merged_hierarchy`](super::merge::merged_hierarchy), and how many nodes stood before chains were taken out.
 
-use super::radix_tree::SortedCodes;
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
+use crate::accel::lbvh::radix_tree::SortedCodes;
 
 /// A node of one level: a range of places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,9 +8,9 @@
 //! Guarantee: deterministic; at most [`MAX_SWEEP_DEPTH`] inner nodes deep; where no border is better than another, as with equal centres or
 //! boxes without volume, the median is taken.
 
-use super::Aabb;
-use super::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
-use super::morton::doubled_centre;
+use crate::accel::Aabb;
+use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
+use crate::accel::morton::doubled_centre;
 
 /// Most inner nodes on a way from the root.
 pub const MAX_SWEEP_DEPTH: u32 = 64;

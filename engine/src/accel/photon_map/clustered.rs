@@ -6,9 +6,9 @@
 //!
 //! Guarantee: the order of [`SortedCodes::of_boxes`] and the tree of [`merged_hierarchy`](super::merge::merged_hierarchy).
 
-use super::radix_tree::SortedCodes;
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
+use crate::accel::lbvh::radix_tree::SortedCodes;
 
 /// How much was left to sort and to pass over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,7 +1,7 @@
 use super::*;
 use crate::accel::lbvh::hard_boxes;
 use crate::accel::lbvh::radix_tree::{LeafRule, SortedCodes, hierarchy};
-use crate::accel::vvh::{Heuristic, sweep_tree};
+use crate::accel::photon_map::vvh::{Heuristic, sweep_tree};
 use crate::test_random::Random;
 
 /// Complete and compact trees of hard sets of boxes, with these.

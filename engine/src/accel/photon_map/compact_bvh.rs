@@ -8,12 +8,12 @@
 //! Guarantees: boxes are recovered to the bit; queries visit the leaves of [`CompleteBvh`] in the same order. Trees without tight boxes,
 //! such as refitted ones before they are encoded anew, are refused.
 
-use super::Aabb;
-use super::box_tree::TreeFault;
 use super::complete_bvh::{
     CompleteBvh, INDEX_BITS, LEAF_BIT, NO_PLANE, POINT_STACK_ENTRY_BYTES, QueryCounters, RayPair, RootDescriptor,
     STACK_SIZE, SlabRay, holds_inside, met,
 };
+use crate::accel::Aabb;
+use crate::accel::box_tree::TreeFault;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 

@@ -6,8 +6,8 @@
 //! Guarantee: twins of the kernels' traversals with exact counters of what these read; every leaf whose box holds a point in its interior,
 //! or that a ray meets before its end, is visited, once.
 
-use super::Aabb;
-use super::box_tree::{BoxTree, Child};
+use crate::accel::Aabb;
+use crate::accel::box_tree::{BoxTree, Child};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
