@@ -47,8 +47,8 @@ pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);
 ///   18uM of q along the dominant axis and 34uM along the others;
 /// - slab distances: difference u, reciprocal 5u, product u: 7uM; subtracting the slack: uM.
 ///
-/// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. This
-/// replaces a relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013), which covers only the last item.
+/// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. A
+/// relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013) would cover the last item only.
 pub const BOX_SLACK: f32 = constants::BVH2_BOX_SLACK;
 
 /// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).

@@ -102,7 +102,7 @@ pub(super) fn check_count(triangles: usize) -> Result<()> {
     }
     Err(Error::LimitExceeded {
         name: "bvh2 triangles".into(),
-        bytes: triangles as u64,
+        value: triangles as u64,
         limit_name: "accel::bvh2::MAX_TRIANGLES",
         limit: MAX_TRIANGLES as u64,
     })

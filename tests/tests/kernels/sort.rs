@@ -86,7 +86,7 @@ fn sorted(gpu: &Gpu, sort: &RadixSort, keys: &[u64], on_device: bool) -> (Vec<u3
         side = sort.record(pass, &buffers, count_given, &scratch)?;
         Ok(())
     });
-    assert_eq!(side, sort.side(capacity));
+    assert_eq!(side, sort.result_side(capacity));
     if on_device {
         let status = StreamStatus::read(gpu, &scratch).unwrap();
         assert_eq!((status.count, status.wanted), (count, count));
@@ -375,7 +375,7 @@ fn what_does_not_fit_is_refused_before_it_is_recorded() {
         };
         assert!(matches!(
             record(none, 11, &scratch),
-            Err(Error::LimitExceeded { bytes: 88, .. })
+            Err(Error::LimitExceeded { value: 88, .. })
         ));
         assert!(matches!(record(none, 10, &small), Err(Error::LimitExceeded { .. })));
         assert!(matches!(

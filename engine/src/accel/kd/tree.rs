@@ -122,7 +122,7 @@ impl KdTree {
             if nodes.len().max(references.len()) as u64 >= MAX_INDEX {
                 return Err(Error::LimitExceeded {
                     name: "kd-tree".into(),
-                    bytes: nodes.len().max(references.len()) as u64,
+                    value: nodes.len().max(references.len()) as u64,
                     limit_name: "2^30 nodes and references",
                     limit: MAX_INDEX,
                 });

@@ -77,7 +77,7 @@ fn climbed(
     leaves: &[usize],
 ) -> (Vec<[u32; 2]>, u32, usize) {
     let end = boxes.len() - 1;
-    let mut arrivals = vec![None; end];
+    let mut waiting = vec![None; end];
     let mut words = vec![[0; 2]; end];
     let (mut height_of_all, mut root) = (0, 0);
     for &leaf in leaves {
@@ -92,7 +92,7 @@ fn climbed(
             let (parent, side) = if is_left { (last, 0) } else { (first - 1, 1) };
             words[parent][side] = word;
             let mine = (if is_left { first } else { last }, bounds, cost, height);
-            let Some((other, sibling, sibling_cost, sibling_height)) = arrivals[parent].replace(mine) else {
+            let Some((other, sibling, sibling_cost, sibling_height)) = waiting[parent].replace(mine) else {
                 break;
             };
             (first, last) = if is_left { (first, other) } else { (other, last) };

@@ -101,7 +101,7 @@ impl CompleteBvh {
         let limit = |what: &str, value: u64, limit_name, limit: u64| {
             let error = || Error::LimitExceeded {
                 name: what.into(),
-                bytes: value,
+                value,
                 limit_name,
                 limit,
             };

@@ -1,4 +1,4 @@
-//! The hierarchy by lists of splits, level by level from the root: the original form, kept to measure what came after it.
+//! The hierarchy by lists of splits, level by level from the root: the baseline of the other forms.
 //!
 //! Source: C. Lauterbach et al., "Fast BVH Construction on GPUs", Eurographics 2009. Neighbours whose codes differ first in bit m are split
 //! at every level below, which makes chains of nodes with one child; left children are found by their first place, right ones by their

@@ -82,7 +82,7 @@ fn forms(gpu: &Gpu, index: &Bvh2, rays: &[Ray]) -> Result<Vec<Form>> {
     };
     let mut forms = Vec::new();
     for (name, settings) in [
-        ("thread a ray", TraceSettings::thread_a_ray()),
+        ("ray per thread", TraceSettings::ray_per_thread()),
         ("queue, batches of a subgroup", persistent(1)),
         ("queue, batches of 4 subgroups", persistent(4)),
     ] {
@@ -136,7 +136,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let scene = scene::load(address)?;
         let index = Bvh2::build(&geometry::triangles(&scene), &Bvh2Settings::default())?;
         let primary = primary_rays(scene.require_camera(None)?, side)?;
-        let hits = RayTracer::new(&gpu, &index, &TraceSettings::thread_a_ray())?
+        let hits = RayTracer::new(&gpu, &index, &TraceSettings::ray_per_thread())?
             .trace(&primary)?
             .hits;
         let diffuse = diffuse_rays(&primary, &hits);
