@@ -9,7 +9,7 @@ use super::pareto;
 use super::results::{Point, Results, SceneResults, VariantResults};
 use super::slope::{self, Slope};
 use super::sweep::Budget;
-use crate::machine::median;
+use crate::timing::median;
 
 /// What work is counted in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -4,16 +4,15 @@
 //! Oracle: the hazards of random sequences of fills and copies, found by comparing every command with all since the last barrier.
 
 use std::sync::Arc;
-use std::time::Instant;
 
-use clerestory::gpu::{Access, Buffer, BufferDesc, Category, Gpu};
+use clerestory::gpu::{Access, Buffer, BufferDesc, Category, Gpu, Pass};
 use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result, scene};
 
 use super::Context;
-use super::inputs::Random;
 use crate::experiments::table::Table;
-use crate::machine::median;
+use crate::random::Random;
+use crate::timing::{median, repeated, timed};
 
 /// Buffers of a sequence and its commands.
 const BUFFERS: usize = 4;
@@ -138,28 +137,27 @@ fn hazards(gpu: &Gpu, buffers: &[Buffer], sequences: usize) -> Result<Table> {
 fn recording(gpu: &Gpu, buffers: &[Buffer], smoke: bool) -> Result<Table> {
     let (commands, repeats) = if smoke { (64, 3) } else { (4096, 15) };
     let time = |barriers: bool| -> Result<f64> {
-        let mut times = Vec::new();
-        for _ in 0..repeats {
-            let mut recorder = gpu.recorder("cost")?;
-            let start = Instant::now();
-            recorder.pass("cost", |pass| {
-                for i in 0..commands {
-                    // With barriers one buffer, without them each its own: neither has a hazard.
-                    if barriers {
-                        pass.fill(buffers[0].view(), 0)?;
+        let record = |pass: &mut Pass<'_>| {
+            for i in 0..commands {
+                // With barriers one buffer, without them each its own: neither has a hazard.
+                if barriers {
+                    pass.fill(buffers[0].view(), 0)?;
+                    pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
+                } else {
+                    if i % buffers.len() == 0 && i > 0 {
                         pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
-                    } else {
-                        if i % buffers.len() == 0 && i > 0 {
-                            pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
-                        }
-                        pass.fill(buffers[i % buffers.len()].view(), 0)?;
                     }
+                    pass.fill(buffers[i % buffers.len()].view(), 0)?;
                 }
-                Ok(())
-            })?;
-            times.push(start.elapsed().as_secs_f64() * 1e9 / commands as f64);
-        }
-        Ok(median(times))
+            }
+            Ok(())
+        };
+        let (_, seconds) = repeated(repeats, || {
+            let mut recorder = gpu.recorder("cost")?;
+            let (recorded, seconds) = timed(|| recorder.pass("cost", record));
+            recorded.map(|()| (recorder, seconds))
+        })?;
+        Ok(1e9 * median(seconds) / commands as f64)
     };
     let mut table = Table::new("Recording", &["commands", "check", "barriers a fill", "host ns a fill"]);
     let build = if cfg!(debug_assertions) {

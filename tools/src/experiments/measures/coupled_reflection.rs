@@ -15,8 +15,8 @@ use glam::DVec3;
 use super::Context;
 use super::clock::nanoseconds;
 use super::energy::{COSINES, Mean, ROUGHNESSES, WHITE, albedo, context as bsdf, direction, mean, numbers};
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Form {

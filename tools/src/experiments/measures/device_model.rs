@@ -8,7 +8,7 @@ use clerestory::{Error, Result};
 
 use super::Context;
 use crate::experiments::table::Table;
-use crate::machine::median;
+use crate::timing::{median, repeated};
 
 /// Working sets as powers of two, bytes; copies likewise; steps of a walk, repeats, workgroups and tickets of an invocation, dispatches.
 struct Plan {
@@ -49,10 +49,9 @@ const SOURCE_CYCLES: [(u32, f64); 3] = [(23, 440.0), (25, 487.0), (u32::MAX, 698
 const LEAST_SECONDS: f64 = 1e-9;
 
 /// Median of some runs after one that warms up, above zero.
-fn repeated(repeats: usize, mut run: impl FnMut() -> Result<f64>) -> Result<f64> {
-    run()?;
-    let seconds = median((0..repeats).map(|_| run()).collect::<Result<_>>()?);
-    Ok(seconds.max(LEAST_SECONDS))
+fn typical(repeats: usize, mut run: impl FnMut() -> Result<f64>) -> Result<f64> {
+    let ((), seconds) = repeated(repeats, || Ok(((), run()?)))?;
+    Ok(median(seconds).max(LEAST_SECONDS))
 }
 
 /// The measure.
@@ -88,9 +87,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         }
         context.watch.begin("loads", done, sets.clone().count());
         let chain = model.chain(1 << set)?;
-        let seconds = repeated(plan.repeats, || chain.walk(plan.steps))?;
+        let seconds = typical(plan.repeats, || chain.walk(plan.steps))?;
         // What an empty dispatch takes is no part of the walk.
-        let idle = repeated(plan.repeats, || chain.walk(0))?;
+        let idle = typical(plan.repeats, || chain.walk(0))?;
         let source = SOURCE_CYCLES.iter().find(|(largest, _)| set <= *largest);
         loads.row([
             (1_u64 << (set - 10)).into(),
@@ -110,8 +109,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let copy = model.copies(1 << size)?;
         let rate = |seconds: f64| 1e-9 * copy.bytes() as f64 / seconds;
         let (by_kernel, by_command) = (
-            repeated(plan.repeats, || copy.by_kernel())?,
-            repeated(plan.repeats, || copy.by_command())?,
+            typical(plan.repeats, || copy.by_kernel())?,
+            typical(plan.repeats, || copy.by_command())?,
         );
         if !copy.are_equal()? {
             return Err(Error::setting("copy", *size, "is not what was copied"));
@@ -130,7 +129,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     for by_subgroup in [false, true] {
         let mut given = 0;
-        let seconds = repeated(plan.repeats, || {
+        let seconds = typical(plan.repeats, || {
             let tickets = model.tickets(plan.groups, plan.fetches, by_subgroup)?;
             given = u64::from(tickets.given);
             Ok(tickets.seconds)
@@ -143,8 +142,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let each = seconds / given.max(1) as f64;
         queue.row([what.into(), given.into(), (1e-6 / each).into(), (1e9 * each).into()]);
     }
-    let boundary = repeated(plan.repeats, || model.boundaries(plan.dispatches))? / f64::from(plan.dispatches);
-    let submission = repeated(plan.repeats, || model.submission())?;
+    let boundary = typical(plan.repeats, || model.boundaries(plan.dispatches))? / f64::from(plan.dispatches);
+    let submission = typical(plan.repeats, || model.submission())?;
     for (what, seconds) in [
         ("dispatch of one idle invocation with a barrier", boundary),
         ("submission of one, to the end of waiting", submission),

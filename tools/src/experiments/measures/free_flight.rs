@@ -15,8 +15,8 @@ use glam::DVec3;
 
 use super::Context;
 use super::clock::nanoseconds;
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// Flights and estimates end here, m.
 const T_MAX: f64 = 1.0;

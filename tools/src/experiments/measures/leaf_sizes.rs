@@ -3,7 +3,6 @@
 //! Source of the sweep: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.1.
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use clerestory::Result;
 use clerestory::accel::photon_map::leaf_threshold::{LEAF_SHARE, automatic_leaf_size};
@@ -13,7 +12,7 @@ use super::Context;
 use super::photon_kernels::{Kernels, Map, Prepared, SOURCE_SHAPE, Shape, Work, prepared};
 use crate::experiments::table::{Cell, Table};
 use crate::least_squares::{Fit, non_negative};
-use crate::machine::median;
+use crate::timing::{median, timed};
 
 const SIZES: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
 /// The share that the source's own leaf sizes need.
@@ -47,15 +46,15 @@ pub fn query_times(maps: &[Map], points: &[Vec3], repeats: usize, gather: fn(&Ma
     for repeat in 0..=repeats {
         for (map, times) in maps.iter().zip(&mut times) {
             let mut work = Work::default();
-            let start = Instant::now();
-            for point in points {
-                gather(map, black_box(*point), &mut work);
-            }
-            let nanoseconds = start.elapsed().as_secs_f64() * 1e9 / points.len().max(1) as f64;
+            let ((), seconds) = timed(|| {
+                for point in points {
+                    gather(map, black_box(*point), &mut work);
+                }
+            });
             black_box(work);
             // The first run warms up.
             if repeat > 0 {
-                times.push(nanoseconds);
+                times.push(1e9 * seconds / points.len().max(1) as f64);
             }
         }
     }

@@ -3,7 +3,7 @@
 //!
 //! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.2.
 
-use std::time::Instant;
+use std::convert::Infallible;
 
 use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::BoxTree;
@@ -24,7 +24,7 @@ use super::map_quality::SOURCE_SHARE;
 use super::photon_kernels::{Kernels, SOURCE_SHAPE};
 use super::photon_scenes::{CASES, Case, Surfaces};
 use crate::experiments::table::{Cell, Table};
-use crate::machine::median;
+use crate::timing::{median, repeated, timed};
 
 /// Photons as powers of two.
 const SIZES: [u32; 4] = [13, 15, 17, 19];
@@ -53,25 +53,10 @@ fn nodes(tree: &BoxTree, boxes: &[Aabb]) -> Result<u64> {
 }
 
 /// What a build gives, and the median of its seconds.
-fn timed<T>(smoke: bool, mut build: impl FnMut() -> T) -> (T, f64) {
-    let mut seconds = Vec::new();
-    let mut run = || {
-        let start = Instant::now();
-        let built = build();
-        seconds.push(start.elapsed().as_secs_f64());
-        built
-    };
-    let mut built = run();
-    for _ in 0..if smoke { 0 } else { REPEATS } {
-        built = run();
-    }
-    // The first run warms up.
-    let later = if seconds.len() > 1 {
-        seconds.split_off(1)
-    } else {
-        seconds
-    };
-    (built, median(later))
+fn built_in<T>(smoke: bool, mut build: impl FnMut() -> T) -> (T, f64) {
+    let repeats = if smoke { 0 } else { REPEATS };
+    let Ok((built, seconds)) = repeated(repeats, || Ok::<_, Infallible>(timed(&mut build)));
+    (built, median(seconds))
 }
 
 /// Why the linear hierarchy's nodes differ from the source's, both in per cent of the volume heuristic's.
@@ -128,15 +113,13 @@ fn first_touches() -> u64 {
 fn price_of_a_page(smoke: bool) -> f64 {
     let words = if smoke { 1 << 16 } else { 1 << 23 };
     let before = first_touches();
-    let start = Instant::now();
-    let memory: Vec<u64> = (0..words).collect();
-    let touched = start.elapsed().as_secs_f64();
+    let (memory, touched) = timed(|| (0..words).collect::<Vec<u64>>());
     let pages = first_touches().saturating_sub(before);
     let mut memory = std::hint::black_box(memory);
-    let start = Instant::now();
-    memory.iter_mut().zip(0..).for_each(|(word, i)| *word = i);
-    std::hint::black_box(&memory);
-    let again = start.elapsed().as_secs_f64();
+    let ((), again) = timed(|| {
+        memory.iter_mut().zip(0..).for_each(|(word, i)| *word = i);
+        std::hint::black_box(&memory);
+    });
     if pages == 0 {
         0.0
     } else {
@@ -160,7 +143,7 @@ impl Stages {
         page_price: f64,
         smoke: bool,
     ) -> Result<Self> {
-        let (_, codes_and_sort) = timed(smoke, || SortedCodes::of_boxes(boxes, MORTON_30_AXIS_BITS));
+        let (_, codes_and_sort) = built_in(smoke, || SortedCodes::of_boxes(boxes, MORTON_30_AXIS_BITS));
         let mut unsorted = vec![0; boxes.len()];
         for (code, i) in sorted.codes.iter().zip(&sorted.order) {
             unsorted[*i as usize] = code << 32 | u64::from(*i);
@@ -168,12 +151,11 @@ impl Stages {
         let mut seconds_of_sort = f64::INFINITY;
         for _ in 0..=if smoke { 0 } else { REPEATS } {
             let mut pairs = unsorted.clone();
-            let start = Instant::now();
-            pairs.par_sort_unstable();
-            seconds_of_sort = seconds_of_sort.min(start.elapsed().as_secs_f64());
+            let ((), seconds) = timed(|| pairs.par_sort_unstable());
+            seconds_of_sort = seconds_of_sort.min(seconds);
         }
         let merge = |boxes: &[Aabb], sorted: &SortedCodes| {
-            timed(smoke, || merged_hierarchy(boxes, sorted, leaf_size, |_| {})).1
+            built_in(smoke, || merged_hierarchy(boxes, sorted, leaf_size, |_| {})).1
         };
         let fresh = |build: &mut dyn FnMut() -> Result<()>| -> Result<f64> {
             let before = first_touches();
@@ -314,13 +296,11 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let kernels = Kernels::trace(&surfaces, case.light, 1 << size, case.cover, SOURCE_SHAPE);
         let boxes = &kernels.boxes;
         let leaf_size = automatic_leaf_size(kernels.areas(), surfaces.area, SOURCE_SHARE);
-        let start = Instant::now();
-        let by_volume = kernels.by_volume(leaf_size);
-        let volume_seconds = start.elapsed().as_secs_f64();
-        let (sorted, sort_seconds) = timed(context.smoke, || SortedCodes::of_boxes(boxes, MORTON_30_AXIS_BITS));
-        let (merged, merge_seconds) = timed(context.smoke, || merged_hierarchy(boxes, &sorted, leaf_size, |_| {}));
-        let ((lists, _), lists_seconds) = timed(context.smoke, || split_list_hierarchy(boxes, &sorted, leaf_size));
-        let (clustered, clustered_seconds) = timed(context.smoke, || {
+        let (by_volume, volume_seconds) = timed(|| kernels.by_volume(leaf_size));
+        let (sorted, sort_seconds) = built_in(context.smoke, || SortedCodes::of_boxes(boxes, MORTON_30_AXIS_BITS));
+        let (merged, merge_seconds) = built_in(context.smoke, || merged_hierarchy(boxes, &sorted, leaf_size, |_| {}));
+        let ((lists, _), lists_seconds) = built_in(context.smoke, || split_list_hierarchy(boxes, &sorted, leaf_size));
+        let (clustered, clustered_seconds) = built_in(context.smoke, || {
             clustered_hierarchy(boxes, &sorted, leaf_size, PASS_BITS, &mut ClusterCounts::default())
         });
         let device = whole(&on_device(&builder, boxes, context.smoke)?);

@@ -12,8 +12,8 @@ use clerestory::{Error, Result};
 use glam::Vec3;
 
 use super::Context;
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 const CODES: [u64; 7] = [0b0010, 0b0011, 0b0101, 0b0101, 0b0110, 0b1001, 0b1101];
 const BITS: u32 = 4;

@@ -12,7 +12,6 @@ mod device_model;
 mod energy;
 mod errors;
 mod free_flight;
-mod inputs;
 mod leaf_sizes;
 mod map_construction;
 mod map_quality;

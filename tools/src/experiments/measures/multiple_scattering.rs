@@ -9,8 +9,8 @@ use glam::DVec3;
 use super::Context;
 use super::clock::nanoseconds;
 use super::energy::{COSINES, ROUGHNESSES, WHITE, albedo, context as bsdf, direction};
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {

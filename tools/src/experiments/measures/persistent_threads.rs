@@ -4,8 +4,6 @@
 //! thesis, Trinity College Dublin, 2011, appendix A.1, whose trees by the surface area heuristic gave the persistent form a ratio of
 //! 0.9 on a trivial scene and of 1.9 to 2.4 on four others.
 
-use std::time::Instant;
-
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::trace::{Execution, PersistentThreads, RayTracer, TraceSettings, Traced};
 use clerestory::accel::{Hit, Ray};
@@ -15,10 +13,10 @@ use clerestory::{Result, scene};
 use glam::Vec3;
 
 use super::Context;
-use super::inputs::Random;
 use crate::experiments::table::Table;
 use crate::geometry;
-use crate::machine::median;
+use crate::random::Random;
+use crate::timing::{median, timed};
 
 /// The trivial scene first.
 const SCENES: [&str; 4] = [
@@ -144,9 +142,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             let mut forms = forms(&gpu, &index, rays)?;
             for _ in 0..repeats {
                 for form in &mut forms {
-                    let begin = Instant::now();
-                    let traced = form.tracer.trace(rays)?;
-                    let wall = begin.elapsed().as_secs_f64();
+                    let (traced, wall) = timed(|| form.tracer.trace(rays));
+                    let traced = traced?;
                     let on_device = traced.seconds();
                     form.seconds.push(if on_device > 0.0 { on_device } else { wall });
                 }

@@ -13,8 +13,8 @@ use clerestory_hard_cases::chi_square::{chi_square, chi_square_z};
 
 use super::Context;
 use super::clock::nanoseconds;
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// Nodes and weights of the five-point rule on [-1, 1].
 const GAUSS: [(f64, f64); 5] = [

@@ -21,8 +21,8 @@ use clerestory::{Error, Result};
 use glam::{Vec3, Vec4};
 
 use super::Context;
-use super::inputs::Random;
 use super::photon_scenes::{CASES, Case, Surfaces};
+use crate::random::Random;
 
 /// Probability that a diffuse surface scatters a photon.
 const SURVIVAL: f64 = 0.7;

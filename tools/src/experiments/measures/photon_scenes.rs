@@ -11,8 +11,8 @@ use clerestory::scene::{Camera, Scene};
 use clerestory::{Result, scene};
 use glam::Vec3;
 
-use super::inputs::Random;
 use crate::geometry::{self, area, triangles_with_materials};
+use crate::random::Random;
 
 /// Rays begin that far from surfaces, relative to the scene's extent.
 const RELATIVE_OFFSET: f32 = 1e-5;

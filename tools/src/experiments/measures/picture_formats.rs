@@ -11,8 +11,8 @@ use clerestory::{Error, Result};
 use super::Context;
 use super::clock::seconds;
 use super::errors::Errors;
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// Radiances of a rendered look: large smooth parts, noise of a few per cent and highlights far above one.
 fn picture(size: u32) -> Result<Picture> {

@@ -11,8 +11,8 @@ use glam::Vec3;
 use super::Context;
 use super::clock::nanoseconds;
 use super::errors::Errors;
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// Distance of the wall over the size of the triangle.
 const GAP: f64 = 0.01;

@@ -8,9 +8,9 @@ use clerestory::film::accumulate::{TwoFloat, two_float_add};
 
 use super::Context;
 use super::clock::nanoseconds;
-use super::inputs::Random;
 use super::wide::Wide;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 fn plain(samples: &[f32]) -> f64 {
     samples.iter().fold(0.0_f32, |sum, x| sum + x).into()

@@ -14,8 +14,8 @@ use glam::DVec3;
 use super::Context;
 use super::clock::nanoseconds;
 use super::energy::{WHITE, context as bsdf, direction, numbers};
-use super::inputs::Random;
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// A frame about a normal.
 struct Frame(DVec3, DVec3, DVec3);

@@ -10,9 +10,9 @@ use glam::{DVec3, Vec3};
 use super::Context;
 use super::clock::nanoseconds;
 use super::errors::Errors;
-use super::inputs::Random;
 use super::wide::{Wide, WideVec};
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// A ray and a sphere; all numbers are representable in f32 for the forms in f32.
 struct Input {

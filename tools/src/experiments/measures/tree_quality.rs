@@ -11,9 +11,9 @@ use glam::Vec3;
 
 use super::Context;
 use super::clock::seconds;
-use super::inputs::Random;
 use super::photon_scenes::{Meeting, Surfaces};
 use crate::experiments::table::{Cell, Table};
+use crate::random::Random;
 
 /// Scenes with a light.
 const CASES: [(&str, Vec3); 4] = [

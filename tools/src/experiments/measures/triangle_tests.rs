@@ -12,9 +12,9 @@ use glam::{DVec3, Vec3};
 use super::Context;
 use super::clock::nanoseconds;
 use super::errors::Errors;
-use super::inputs::Random;
 use super::wide::{Wide, WideVec};
 use crate::experiments::table::Table;
+use crate::random::Random;
 
 /// The unit of relative errors, half a step of f32.
 const UNIT: f64 = 1.0 / 16_777_216.0;

@@ -1,4 +1,4 @@
-//! Random inputs that are the same on every machine: PCG hashes of a counter (`clerestory::transport::random`).
+//! The random stream of measurements, the same on every machine: PCG hashes of a counter (`clerestory::transport::random`).
 
 use clerestory::transport::random::{pcg3d, unit_float};
 use clerestory::transport::warp::square_to_sphere;
@@ -16,11 +16,16 @@ impl Random {
         Self { seed, drawn: 0 }
     }
 
-    /// Uniform in [0, 1), a multiple of 2⁻²⁴.
-    pub fn unit(&mut self) -> f64 {
+    /// 32 random bits.
+    pub fn word(&mut self) -> u32 {
         let hash = pcg3d(UVec3::new(self.drawn as u32, (self.drawn >> 32) as u32, self.seed));
         self.drawn += 1;
-        unit_float(hash.x)
+        hash.x
+    }
+
+    /// Uniform in [0, 1), a multiple of 2⁻²⁴.
+    pub fn unit(&mut self) -> f64 {
+        unit_float(self.word())
     }
 
     /// Uniform in [low, high).
