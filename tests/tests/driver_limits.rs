@@ -27,7 +27,7 @@ fn counted(gpu: &Gpu, outer: u32, inner: u32) -> Vec<u32> {
 }
 
 #[test]
-fn loops_end_where_they_did() {
+fn loops_end_at_the_cap_on_lavapipe_and_nowhere_else() {
     with_gpu(|gpu| {
         const ASKED: u32 = 70_000;
         let ran = counted(gpu, ASKED, 0);

@@ -191,7 +191,7 @@ pub(super) const ROWS: &[Row] = &[
             "Rousselle, Knaus and Zwicker 2011; Andersson et al. 2020",
             "engine/src/film/metrics.rs",
             &[
-                "engine/src/film/metrics.rs::formulas_on_numbers_done_by_hand",
+                "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
                 "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
             ],
         ),

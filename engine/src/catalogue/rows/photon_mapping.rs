@@ -52,7 +52,7 @@ pub(super) const ROWS: &[Row] = &[
             &[
                 "tests/tests/kernels/sort.rs::every_size_and_pattern_is_as_by_std",
                 "tests/tests/kernels/sort.rs::bits_and_orders_are_those_asked_for",
-                "tests/tests/kernels/sort.rs::runs_give_the_same_bits",
+                "tests/tests/kernels/sort.rs::repeated_sorts_give_the_same_bits_in_every_form",
                 "tests/tests/kernels/sort.rs::many_keys_take_the_other_plan",
                 "tests/tests/kernels/many_sorts.rs::sorts_of_random_sizes_and_patterns_are_as_by_std",
             ],
@@ -112,7 +112,7 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/accel/sphere.rs",
             &[
                 "engine/src/accel/sphere.rs::approach_matches_the_definition",
-                "engine/src/accel/sphere.rs::sphere_hits_inside_outside_tangent_and_behind",
+                "engine/src/accel/sphere.rs::spheres_are_hit_from_outside_inside_and_behind_and_touched_once",
             ],
         ),
     ),
@@ -318,7 +318,7 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/kernels/device_model.rs",
             &[
                 "engine/src/kernels/device_model.rs::chains_visit_every_place_before_they_come_back",
-                "tests/tests/kernels/device_model.rs::what_is_timed_is_what_was_done",
+                "tests/tests/kernels/device_model.rs::timed_runs_have_walked_copied_and_counted_what_was_asked",
             ],
         ),
     ),

@@ -24,20 +24,20 @@ const REPEATS: usize = 5;
 /// What automatic sizes reach of the best of the sweep, in the source's frames a second.
 const AIM: f64 = 0.97;
 
-/// A row of the source's table: frames a second.
+/// A row of the source's table: frames in a hundred seconds.
 struct Published {
     counterpart: &'static str,
     tree: &'static str,
     /// By the leaf sizes of the sweep.
-    sweep: [f64; SIZES.len()],
+    sweep: [u32; SIZES.len()],
     /// With its automatic leaf size.
-    automatic: f64,
+    automatic: u32,
 }
 
 impl Published {
-    /// The most of the sweep.
-    fn best(&self) -> f64 {
-        self.sweep.into_iter().fold(0.0, f64::max)
+    /// Some of these rates over the most of the sweep.
+    fn reached(&self, rate: u32) -> f64 {
+        f64::from(rate) / f64::from(self.sweep.into_iter().fold(1, u32::max))
     }
 }
 
@@ -45,26 +45,26 @@ const PUBLISHED: [Published; 4] = [
     Published {
         counterpart: "Scene 6",
         tree: "volume heuristic",
-        sweep: [2.60, 3.27, 3.49, 3.71, 3.74, 3.68, 3.55, 3.28],
-        automatic: 3.74,
+        sweep: [260, 327, 349, 371, 374, 368, 355, 328],
+        automatic: 374,
     },
     Published {
         counterpart: "Scene 6",
         tree: "linear",
-        sweep: [2.56, 2.91, 3.23, 3.50, 3.56, 3.55, 3.35, 3.14],
-        automatic: 3.59,
+        sweep: [256, 291, 323, 350, 356, 355, 335, 314],
+        automatic: 359,
     },
     Published {
         counterpart: "Passage",
         tree: "volume heuristic",
-        sweep: [4.78, 5.17, 5.39, 5.58, 5.69, 5.72, 5.54, 5.28],
-        automatic: 5.67,
+        sweep: [478, 517, 539, 558, 569, 572, 554, 528],
+        automatic: 567,
     },
     Published {
         counterpart: "Passage",
         tree: "linear",
-        sweep: [4.46, 4.73, 4.95, 5.19, 5.28, 5.21, 5.01, 4.52],
-        automatic: 5.22,
+        sweep: [446, 473, 495, 519, 528, 521, 501, 452],
+        automatic: 522,
     },
 ];
 
@@ -114,7 +114,7 @@ fn reached(cost: impl Fn(&Work) -> f64, works: &[Work], sizes: usize, chosen: us
 fn source_frames(published: &Published, works: &[Work], points: usize) -> Fit<3> {
     let rows = published.sweep.iter().zip(works).map(|(rate, work)| {
         let each = |count: u64| count as f64 / points.max(1) as f64;
-        ([1.0, each(work.tree.nodes), each(work.tests)], 1.0 / rate)
+        ([1.0, each(work.tree.nodes), each(work.tests)], 100.0 / f64::from(*rate))
     });
     non_negative(&rows.collect::<Vec<_>>())
 }
@@ -138,7 +138,7 @@ struct Sweep<'a> {
 impl Sweep<'_> {
     /// Rows of both automatic sizes.
     fn automatic(&self, table: &mut Table) {
-        let theirs = self.published.map(|row| row.automatic / row.best());
+        let theirs = self.published.map(|row| row.reached(row.automatic));
         // A quick look has too few sizes.
         let frames = self
             .published
@@ -170,7 +170,7 @@ impl Sweep<'_> {
                 anywhere.into(),
                 cell(frames.as_ref().map(|fit| {
                     let [frame, ..] = fit.coefficients;
-                    100.0 * frame * self.published.map_or(0.0, |row| row.automatic)
+                    frame * self.published.map_or(0.0, |row| f64::from(row.automatic))
                 })),
                 cell(frames.as_ref().map(|fit| 100.0 * fit.relative_error)),
                 cell(in_frames),
@@ -283,8 +283,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 let each = |count: u64| count as f64 / points.len().max(1) as f64;
                 let (size, by) = wanted[i];
                 let theirs = published.and_then(|row| match by {
-                    "sweep" => Some(row.sweep[i] / row.best()),
-                    SMALL => Some(row.automatic / row.best()),
+                    "sweep" => Some(row.reached(row.sweep[i])),
+                    SMALL => Some(row.reached(row.automatic)),
                     _ => None,
                 });
                 sweep.row([

@@ -133,7 +133,7 @@ mod tests {
     use crate::experiments::watch::Unwatched;
 
     #[test]
-    fn everything_is_as_by_hand() {
+    fn every_array_of_the_worked_example_is_as_by_hand() {
         let context = Context {
             smoke: true,
             gpu: &|| Err(Error::setting("device", "none", "is not to be opened")),
