@@ -46,13 +46,13 @@ pub enum Error {
         /// What the driver or the allocator said.
         cause: String,
     },
-    /// Something is larger than a limit of the device or of the engine allows. Buffers count in bytes; what else counts is in the limit's name.
-    #[error("{name:?} wants {bytes}, more than {limit_name} = {limit}")]
+    /// Something is larger than a limit of the device or of the engine allows. Buffers are in bytes; else the limit's name says what counts.
+    #[error("{name:?} wants {value}, more than {limit_name} = {limit}")]
     LimitExceeded {
         /// The buffer's or image's name.
         name: String,
-        /// Bytes, texels, groups or elements asked for.
-        bytes: u64,
+        /// What was asked for, in the unit of the limit: bytes, texels, groups or elements.
+        value: u64,
         /// The limit's name, that of Vulkan where it is one of a device.
         limit_name: &'static str,
         /// Its value.

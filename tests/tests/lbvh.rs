@@ -1,10 +1,10 @@
 //! The device's linear hierarchies and compact traversals against their Rust twins, bit for bit.
 
-use clerestory::accel::bvh2::Aabb;
-use clerestory::accel::compact_bvh::CompactBvh;
-use clerestory::accel::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
-use clerestory::accel::lbvh::radix::{LeafRule, SortedCodes, hierarchy};
+use clerestory::accel::Aabb;
+use clerestory::accel::lbvh::radix_tree::{LeafRule, SortedCodes, hierarchy};
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, build, refit};
+use clerestory::accel::photon_map::compact_bvh::CompactBvh;
+use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
 use clerestory::accel::{Ray, RayIndex};
 use clerestory::gpu::shaders::accel::{compact_points, compact_rays};
 use clerestory::gpu::shaders::types::{CompactRoot, CompactWork};

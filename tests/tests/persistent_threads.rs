@@ -7,12 +7,12 @@
 use clerestory::Error;
 use clerestory::accel::RayIndex;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
-use clerestory::accel::trace::{Execution, PersistentThreads, RayTracer, SOFTWARE_LOOP_CAP, TraceSettings, Traced};
+use clerestory::accel::trace::{Execution, PersistentThreads, RayTracer, TraceSettings, Traced};
 use clerestory::accel::{Hit, Ray, TraversalCounters, lbvh};
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::accel::trace_closest_queue;
 use clerestory::gpu::shaders::sets::Bvh2Set;
-use clerestory::gpu::{Category, DeviceKind, Gpu};
+use clerestory::gpu::{Category, DeviceKind, Gpu, SOFTWARE_LOOP_CAP};
 use clerestory_hard_cases::misses;
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
@@ -87,13 +87,13 @@ fn both_models_trace_every_ray_once_and_find_what_the_twin_finds() {
             let rays = &all[..count];
             // A small quota stops many rays.
             for ray_quota in [512, 40] {
-                let thread_a_ray = TraceSettings {
+                let ray_per_thread = TraceSettings {
                     ray_quota,
                     count: true,
-                    ..TraceSettings::thread_a_ray()
+                    ..TraceSettings::ray_per_thread()
                 };
                 let what = format!("{count} rays, quota {ray_quota}");
-                let one = check(gpu, &what, &triangles, &bvh, rays, &thread_a_ray);
+                let one = check(gpu, &what, &triangles, &bvh, rays, &ray_per_thread);
                 assert_eq!((one.batches, one.fetched_rays), (0, 0));
                 if ray_quota == 40 && count == all.len() {
                     assert!(one.unfinished > 0 && one.rounds > 1, "{what}: the quota stops nothing");
@@ -102,7 +102,7 @@ fn both_models_trace_every_ray_once_and_find_what_the_twin_finds() {
                     let threads = PersistentThreads { groups, batch, fetches };
                     let settings = TraceSettings {
                         execution: Execution::Persistent(threads),
-                        ..thread_a_ray
+                        ..ray_per_thread
                     };
                     let what = format!("{what}, {threads:?}");
                     let queue = check(gpu, &what, &triangles, &bvh, rays, &settings);
@@ -241,7 +241,7 @@ fn settings_that_could_lose_rays_are_refused() {
             }));
             wrong.push(TraceSettings {
                 ray_quota: SOFTWARE_LOOP_CAP,
-                ..TraceSettings::thread_a_ray()
+                ..TraceSettings::ray_per_thread()
             });
         }
         for settings in wrong {

@@ -7,3 +7,5 @@ pub mod least_squares;
 pub mod machine;
 pub mod mitsuba;
 pub mod page;
+pub mod random;
+pub mod timing;

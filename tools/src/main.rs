@@ -2,10 +2,10 @@
 
 mod commands;
 mod failure;
+mod frame_report;
 mod options;
 mod output;
 mod pictures;
-mod statistics;
 mod stop;
 
 use std::process::ExitCode;

@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes() {
+    fn sizes_are_a_height_or_both_sides_within_their_range() {
         let size = |text| parse_size(text).map(|size| size.pixels(Some(1.5)));
         assert_eq!(size("640x480"), Ok([640, 480]));
         assert_eq!(size("1X65535"), Ok([1, 65_535]));
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn durations() {
+    fn durations_are_numbers_with_a_unit_or_in_seconds() {
         for (text, milliseconds) in [
             ("10s", 10_000),
             ("500ms", 500),

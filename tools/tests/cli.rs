@@ -347,7 +347,7 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
 }
 
 #[test]
-fn comparisons() -> Tested {
+fn comparisons_judge_by_thresholds_and_refuse_what_cannot_be_compared() -> Tested {
     let folder = tempfile::tempdir()?;
     let at = |name: &str| folder.path().join(name);
     let (a, b, small, broken) = (at("a.exr"), at("b.exr"), at("small.exr"), at("broken.exr"));

@@ -24,8 +24,8 @@ void main() {
     }
     barrier();
     LbvhBox centres = LbvhBox(ivec3(0x7FFFFFFF), ivec3(int(0x80000000u)));
-    uint place = gl_WorkGroupID.x * LBVH_GROUP_SIZE * LBVH_BOXES_EACH + lane;
-    for (uint i = 0u; i < LBVH_BOXES_EACH && place < lbvh_push.count; ++i) {
+    uint place = gl_WorkGroupID.x * LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION + lane;
+    for (uint i = 0u; i < LBVH_BOXES_PER_INVOCATION && place < lbvh_push.count; ++i) {
         ivec3 a = ordered_integers(lbvh_corners[3u * place]);
         ivec3 b = ordered_integers(lbvh_corners[3u * place + 1u]);
         ivec3 c = ordered_integers(lbvh_corners[3u * place + 2u]);

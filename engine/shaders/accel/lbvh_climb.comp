@@ -3,7 +3,7 @@
 // An invocation goes through what its run has left, and arrives at each of these nodes for one of its children. The first to arrive there
 // ends, the second joins both and goes on to the parent: nobody waits, so nothing is asked of the scheduler, and which of both it is does
 // not show in the tree (T. Karras, "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees", 2012). The host fills
-// `lbvh_arrivals` with zero.
+// `lbvh_arrival_counters` with zero.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -13,14 +13,14 @@
 
 layout(local_size_x = LBVH_GROUP_SIZE) in;
 
-layout(set = 0, binding = 5, scalar) restrict coherent buffer LbvhArrivals { uint lbvh_arrivals[]; };
+layout(set = 0, binding = 5, scalar) restrict coherent buffer LbvhArrivalCounters { uint lbvh_arrival_counters[]; };
 
 // From a node at which a child is ready.
 void climb(uint node) {
     bool climbing = true;
     for (uint i = 0u; climbing && i < LBVH_MAX_ASCENT; ++i) {
         lbvh_fence();
-        climbing = atomicAdd(lbvh_arrivals[node], 1u) != 0u;
+        climbing = atomicAdd(lbvh_arrival_counters[node], 1u) != 0u;
         lbvh_fence();
         if (climbing) {
             LbvhSubtree own = lbvh_join(lbvh_load_child(node, 0u), lbvh_load_child(node, 1u), node);
@@ -30,7 +30,7 @@ void climb(uint node) {
                 uint slot = node;
                 node = is_left ? own.last : own.first - 1u;
                 lbvh_store_child(node, is_left ? 0u : 1u, own, slot);
-                lbvh_store_mail(node, is_left ? 0u : 1u, own);
+                lbvh_store_summary(node, is_left ? 0u : 1u, own);
             }
         }
     }

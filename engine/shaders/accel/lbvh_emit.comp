@@ -9,7 +9,7 @@
 layout(local_size_x = LBVH_GROUP_SIZE) in;
 
 layout(set = 0, binding = 0) uniform utextureBuffer lbvh_nodes;
-layout(set = 0, binding = 1) uniform utextureBuffer lbvh_kept;
+layout(set = 0, binding = 1) uniform utextureBuffer lbvh_retained;
 // Nodes that stay before each.
 layout(set = 0, binding = 2) uniform utextureBuffer lbvh_ranks;
 layout(set = 0, binding = 3) uniform utextureBuffer lbvh_order;
@@ -48,14 +48,14 @@ void main() {
         return;
     }
     uint root = lbvh_state.root;
-    uint nodes = lbvh_rank(count - 2u) + texelFetch(lbvh_kept, int(count - 2u)).x;
+    uint nodes = lbvh_rank(count - 2u) + texelFetch(lbvh_retained, int(count - 2u)).x;
     uint primitive = texelFetch(lbvh_order, int(place >> 2))[place & 3u];
     uint triangle = LBVH_BVH2_NODE_WORDS * nodes + LBVH_BVH2_TRIANGLE_WORDS * place;
     for (uint corner = 0u; corner < 3u; ++corner) {
         lbvh_store(triangle + 3u * corner, floatBitsToUint(lbvh_corners[3u * primitive + corner]));
     }
     lbvh_store(triangle + 9u, uvec3(lbvh_indices[primitive], 0u, 0u));
-    if (place + 1u < count && texelFetch(lbvh_kept, int(place)).x != 0u) {
+    if (place + 1u < count && texelFetch(lbvh_retained, int(place)).x != 0u) {
         uint to = lbvh_target(place, root);
         uint at = LBVH_BVH2_NODE_WORDS * to;
         ivec4 a = ivec4(texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place)));

@@ -1,5 +1,5 @@
 // Fourth stage of the linear hierarchy: the nodes below runs of neighbouring places, with their boxes, costs and leaves; twin of
-// clerestory::accel::lbvh::radix.
+// clerestory::accel::lbvh::radix_tree.
 //
 // An invocation walks along its run and joins what lies lower than the level after it: of two neighbouring ranges the one whose codes
 // differ in the lower bit is joined first (C. Apetrei, "Fast and Simple Agglomerative LBVH Construction", 2014). What it leaves on the way
@@ -81,7 +81,7 @@ void main() {
                 own = lbvh_join(lbvh_load_child(node, 0u), own, node);
                 slot = node;
             } else {
-                lbvh_store_mail(node, is_left ? 0u : 1u, own);
+                lbvh_store_summary(node, is_left ? 0u : 1u, own);
                 uint place = own.last + 1u;
                 if (!is_left) {
                     lbvh_wait(run, waiting, node);
@@ -103,7 +103,7 @@ void main() {
     for (uint i = 0u; at > low && i < LBVH_RUN; ++i) {
         lbvh_wait(run, waiting, at - 1u);
         ++waiting;
-        at = lbvh_mails[2u * (at - 1u)].end;
+        at = lbvh_summaries[2u * (at - 1u)].end;
     }
     lbvh_pending[run] = waiting;
 }

@@ -1,7 +1,7 @@
 // Second stage of refitting: boxes of moved triangles from the leaves up; the tree stays what it is. Twin of
 // clerestory::accel::lbvh::refit.
 //
-// One invocation a child of a node: those of leaves climb, and the second to arrive at a node goes on. The host fills `lbvh_arrivals` with
+// One invocation a child of a node: those of leaves climb, and the second to arrive at a node goes on. The host fills `lbvh_arrival_counters` with
 // zero.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -13,7 +13,7 @@
 layout(local_size_x = LBVH_GROUP_SIZE) in;
 
 layout(set = 0, binding = 0, scalar) restrict coherent buffer LbvhWords { uint lbvh_words[]; };
-layout(set = 0, binding = 1, scalar) restrict coherent buffer LbvhArrivals { uint lbvh_arrivals[]; };
+layout(set = 0, binding = 1, scalar) restrict coherent buffer LbvhArrivalCounters { uint lbvh_arrival_counters[]; };
 layout(set = 0, binding = 2, scalar) restrict readonly buffer LbvhStateBlock { LbvhState lbvh_state; };
 
 ivec3 lbvh_load(uint at) {
@@ -50,7 +50,7 @@ void main() {
         lbvh_words[own + 4u] = upper.y;
         lbvh_words[own + 5u] = upper.z;
         lbvh_fence();
-        bool is_second = atomicAdd(lbvh_arrivals[node], 1u) != 0u;
+        bool is_second = atomicAdd(lbvh_arrival_counters[node], 1u) != 0u;
         lbvh_fence();
         climbing = is_second && node != 0u;
         if (climbing) {

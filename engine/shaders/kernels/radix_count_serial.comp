@@ -21,7 +21,7 @@ void main() {
     uvec2 range = stream_range(team, count, block);
     uvec4 low, high;
     uint first = range.x;
-    for (; first + KEYS_A_READ <= range.y; first += KEYS_A_READ) {
+    for (; first + KEYS_PER_READ <= range.y; first += KEYS_PER_READ) {
         load_keys(first, range.y, low, high);
         counts[radix_digit(low.x, high.x)] += 1u;
         counts[radix_digit(low.y, high.y)] += 1u;

@@ -16,7 +16,7 @@ layout(constant_id = 4) const bool READS_AHEAD = false;
 // Words of a cache line, as processors have them.
 const uint LINE_WORDS = 16u;
 // Keys of an average digit between two reads ahead, which reach twice as far: a line.
-const uint KEYS_A_DIGIT = LINE_WORDS / KEY_WORDS;
+const uint KEYS_PER_DIGIT = LINE_WORDS / KEY_WORDS;
 
 uint places[BINS];
 
@@ -73,13 +73,13 @@ void main() {
     uvec4 low, high;
     uint any = 0u;
     uint first = range.x;
-    while (first + KEYS_A_READ <= range.y) {
+    while (first + KEYS_PER_READ <= range.y) {
         uint last = range.y;
         if (READS_AHEAD) {
             any |= read_ahead(count);
-            last = min(last, first + KEYS_A_DIGIT * BINS);
+            last = min(last, first + KEYS_PER_DIGIT * BINS);
         }
-        for (; first + KEYS_A_READ <= last; first += KEYS_A_READ) {
+        for (; first + KEYS_PER_READ <= last; first += KEYS_PER_READ) {
             load_keys(first, range.y, low, high);
             uvec4 values = load_values(first);
             place(low.x, high.x, values.x);

@@ -12,7 +12,7 @@ layout(local_size_x_id = 0) in;
 #include "kernels/radix_subgroup.glsl"
 #include "kernels/wrapping_sum.glsl"
 
-layout(constant_id = 5) const uint KEYS_A_LANE = 8u;
+layout(constant_id = 5) const uint KEYS_PER_INVOCATION = 8u;
 layout(constant_id = 6) const uint MAX_SUBGROUPS = 16u;
 
 // The next place of each digit.
@@ -56,15 +56,15 @@ void main() {
     // Subgroups may be smaller than gl_SubgroupSize says, but they are full.
     uint width = LANES / gl_NumSubgroups;
     uint row = gl_SubgroupID * BINS;
-    for (uint tile = range.x; tile < range.y; tile += LANES * KEYS_A_LANE) {
+    for (uint tile = range.x; tile < range.y; tile += LANES * KEYS_PER_INVOCATION) {
         for (uint i = lane; i < MAX_SUBGROUPS * BINS; i += LANES) {
             subgroup_counts[i] = 0u;
         }
         barrier();
-        uint first = tile + gl_SubgroupID * width * KEYS_A_LANE + gl_SubgroupInvocationID;
-        uvec2 keys[KEYS_A_LANE];
-        uint ranks[KEYS_A_LANE];
-        for (uint i = 0u; i < KEYS_A_LANE; ++i) {
+        uint first = tile + gl_SubgroupID * width * KEYS_PER_INVOCATION + gl_SubgroupInvocationID;
+        uvec2 keys[KEYS_PER_INVOCATION];
+        uint ranks[KEYS_PER_INVOCATION];
+        for (uint i = 0u; i < KEYS_PER_INVOCATION; ++i) {
             uint at = first + i * width;
             bool live = at < range.y;
             keys[i] = live ? load_key(at) : uvec2(0u);
@@ -92,7 +92,7 @@ void main() {
             places[digit] = next;
         }
         barrier();
-        for (uint i = 0u; i < KEYS_A_LANE; ++i) {
+        for (uint i = 0u; i < KEYS_PER_INVOCATION; ++i) {
             uint at = first + i * width;
             if (at < range.y) {
                 uint target = subgroup_counts[row + radix_digit(keys[i].x, keys[i].y)] + ranks[i];

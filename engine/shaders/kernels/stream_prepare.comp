@@ -13,7 +13,7 @@ layout(set = 0, binding = 1, scalar) restrict readonly buffer StreamCounts { uin
 layout(push_constant, scalar) uniform Push {
     StreamPlan plan;
     uint capacity;
-    uint teams_a_group;
+    uint teams_per_group;
 } push;
 
 void main() {
@@ -21,7 +21,7 @@ void main() {
     uint count = wanted <= push.capacity ? wanted : 0u;
     uint teams = stream_teams(count, stream_block(count, push.plan.tile, push.plan.max_teams));
     // One at least: kernels write their results for no elements, too.
-    stream_groups[0] = max((teams + push.teams_a_group - 1u) / push.teams_a_group, 1u);
+    stream_groups[0] = max((teams + push.teams_per_group - 1u) / push.teams_per_group, 1u);
     stream_groups[1] = 1u;
     stream_groups[2] = 1u;
     stream_count = count;

@@ -18,8 +18,8 @@ void main() {
     uvec2 target = path_chunks[chunk];
     for (uint texel = range.x; texel < range.y; ++texel) {
         uvec4 flags = load_flags(texel, status.previous_count);
-        for (uint i = 0u; i < FLAGS_A_TEXEL; ++i) {
-            uint place = FLAGS_A_TEXEL * texel + i;
+        for (uint i = 0u; i < FLAGS_PER_TEXEL; ++i) {
+            uint place = FLAGS_PER_TEXEL * texel + i;
             if ((flags[i] & FLAG_ALIVE) != 0u) {
                 path_queue_out[target.x++] = first_bounce ? place : texelFetch(path_queue_in, int(place)).x;
             }

@@ -187,7 +187,7 @@ void main() {
     bool lighting = lit && scattering && path_set_contains(push.path_set, path.bounce + 1u);
     lighting = lighting && (!HAS_PATH_AUTOMATON || (push.accepting >> after & 1u) != 0u);
     // Draws of the medium are numbered by the round, which is the number of the path's ways so far.
-    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_A_WAY * status.rounds;
+    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * status.rounds;
     if (medium != NO_MEDIUM && way.end > way.start) {
         m = load_medium(medium);
         // Where collisions would only end the path, it goes on in proportion to the transmittance instead.

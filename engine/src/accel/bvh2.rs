@@ -16,7 +16,7 @@ pub(super) mod traverse;
 pub use build::Bvh2Settings;
 pub use traverse::{FINISHED, Step, Traversal};
 
-use super::{BuildStages, CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
+use super::{Aabb, BuildStages, CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
 use crate::Result;
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
@@ -47,8 +47,8 @@ pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);
 ///   18uM of q along the dominant axis and 34uM along the others;
 /// - slab distances: difference u, reciprocal 5u, product u: 7uM; subtracting the slack: uM.
 ///
-/// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. This
-/// replaces a relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013), which covers only the last item.
+/// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. A
+/// relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013) would cover the last item only.
 pub const BOX_SLACK: f32 = constants::BVH2_BOX_SLACK;
 
 /// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).
@@ -60,52 +60,9 @@ pub(super) const NODE_QUARTERS: usize = size_of::<Bvh2Node>() / size_of::<[u32; 
 /// Quarters of a triangle.
 pub(super) const TRIANGLE_QUARTERS: usize = size_of::<Bvh2Triangle>() / size_of::<[u32; 4]>();
 
-/// An axis-aligned box.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Aabb {
-    /// Lower corner.
-    pub lower: Vec3,
-    /// Upper corner.
-    pub upper: Vec3,
-}
-
-impl Aabb {
-    /// The box that holds nothing.
-    pub const EMPTY: Self = Self {
-        lower: Vec3::INFINITY,
-        upper: Vec3::NEG_INFINITY,
-    };
-
-    /// Smallest box around both.
-    pub fn union(self, other: Self) -> Self {
-        Self {
-            lower: self.lower.min(other.lower),
-            upper: self.upper.max(other.upper),
-        }
-    }
-
-    /// Smallest box around this and a point.
-    pub fn with_point(self, point: Vec3) -> Self {
-        self.union(Self {
-            lower: point,
-            upper: point,
-        })
-    }
-
-    /// The same box with one kind of zero: both have one order, but two patterns of bits, which some compare and devices need not keep.
-    pub fn without_negative_zero(self) -> Self {
-        Self {
-            lower: self.lower + Vec3::ZERO,
-            upper: self.upper + Vec3::ZERO,
-        }
-    }
-
-    /// Half the surface area, m²; zero for the empty box.
-    pub fn half_area(&self) -> f64 {
-        let e = (self.upper.as_dvec3() - self.lower.as_dvec3()).max(glam::DVec3::ZERO);
-        e.x * e.y + e.y * e.z + e.z * e.x
-    }
+/// The child word of a leaf.
+pub(super) fn leaf_word(first: u32, count: u32) -> u32 {
+    first << COUNT_BITS | count
 }
 
 /// An inner node as the kernels read it: both children's boxes and words (64 bytes).

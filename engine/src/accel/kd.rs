@@ -20,9 +20,8 @@ pub use probability::Heuristic;
 pub use traverse::{KdCounters, MAX_SHORT_STACK, Scheme};
 pub use tree::{KdFault, KdNode};
 
-use super::bvh2::Aabb;
-use super::bvh2::build::{Met, check_count, check_range};
-use super::{CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
+use super::input::{Met, check_count, check_range};
+use super::{Aabb, CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
 use crate::{Error, Result};
 use glam::Vec3;
 

@@ -20,24 +20,26 @@
 //! constant `…_RESUMES` leaves the bookkeeping out where rays never stop. The kernels that include it are `accel/trace_ray.glsl` and
 //! `transport/path_candidates.glsl`, `path_extend.glsl` and `path_shadow.glsl`, where the names of the index's constants stand.
 
+mod aabb;
+pub mod box_tree;
 pub mod bvh2;
-pub mod compact_bvh;
-pub mod complete_bvh;
+mod input;
 pub mod kd;
 mod kind;
 pub mod lbvh;
 pub mod morton;
 pub mod offset;
 pub mod optimise;
+pub mod photon_map;
 pub mod sphere;
 mod stages;
 pub mod trace;
 pub mod triangle;
-pub mod vvh;
 
 #[cfg(test)]
 mod test_support;
 
+pub use aabb::Aabb;
 pub use kind::{IndexKind, IndexReport};
 pub use stages::BuildStages;
 

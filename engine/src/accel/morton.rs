@@ -7,7 +7,7 @@
 //! Guarantee: twin of `accel/morton.glsl` to the bit on every device. The grid's scale is an integer quotient, since devices may divide
 //! with an error; all else is a subtraction, a product and a comparison, which they round correctly.
 
-use super::bvh2::Aabb;
+use super::Aabb;
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 

@@ -17,9 +17,9 @@ mod treelets;
 
 pub use treelets::MAX_TREELET;
 
-use super::bvh2::Aabb;
-use super::lbvh::radix::{LeafRule, half_area};
-use super::lbvh::tree::{BoxTree, Child, EMPTY_NODE, PairNode};
+use super::Aabb;
+use super::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
+use super::lbvh::radix_tree::{LeafRule, half_area};
 use leaves::{choose, with_leaves};
 
 /// How much to do.

@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn sphere_hits_inside_outside_tangent_and_behind() {
+    fn spheres_are_hit_from_outside_inside_and_behind_and_touched_once() {
         let z = DVec3::Z;
         let hit = |x: f64, o: f64, r: f64| intersect_sphere(DVec3::new(x, 0.0, o), z, DVec3::ZERO, r);
         assert_eq!(hit(0.0, -3.0, 1.0), Some([2.0, 4.0]));

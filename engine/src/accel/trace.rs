@@ -9,31 +9,30 @@
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
 //! differs from run to run, and shows in nothing but the time.
 
-use super::bvh2::build::check_range;
 use super::bvh2::{Bvh2, MAX_DEPTH, MAX_LEAF_SIZE};
+use super::input::check_range;
 use super::{Hit, Ray, RayIndex, TraversalCounters};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_closest;
 use crate::gpu::shaders::accel::trace_closest_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::sets::Bvh2Set;
-use crate::gpu::{Access, Buffer, BufferDesc, Caps, Category, ComputePipeline, DeviceKind, Gpu, TexelView, Timings};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Caps, Category, ComputePipeline, DeviceKind, Gpu, SOFTWARE_LOOP_CAP, TexelView, Timings,
+};
 use crate::{Error, Result};
-
-/// Iterations of all loops of an invocation together after which software drivers end loops in silence.
-pub const SOFTWARE_LOOP_CAP: u32 = 65_535;
 
 /// Most rays of one call.
 pub const MAX_RAYS: usize = 1 << 31;
 
 /// Dispatches of one submission, so that none takes seconds.
-const DISPATCHES_A_SUBMISSION: u32 = 1024;
+const DISPATCHES_PER_SUBMISSION: u32 = 1024;
 
 /// How rays are dealt out to invocations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Execution {
     /// As many invocations as rays; the driver's scheduler deals them out.
-    ThreadARay,
+    RayPerThread,
     /// As many workgroups as stay on the device, which fetch batches of rays from a counter.
     Persistent(PersistentThreads),
 }
@@ -78,9 +77,9 @@ pub struct TraceSettings {
 
 impl TraceSettings {
     /// One invocation a ray.
-    pub fn thread_a_ray() -> Self {
+    pub fn ray_per_thread() -> Self {
         Self {
-            execution: Execution::ThreadARay,
+            execution: Execution::RayPerThread,
             ray_quota: 32_768,
             count: false,
         }
@@ -101,7 +100,7 @@ impl TraceSettings {
         let walk_back = MAX_DEPTH + 1;
         let ray = u64::from(self.ray_quota) + u64::from(leaves_on_the_stack + walk_back);
         match self.execution {
-            Execution::ThreadARay => ray,
+            Execution::RayPerThread => ray,
             Execution::Persistent(threads) => {
                 let rays = u64::from(threads.batch.div_ceil(group_size(caps)));
                 u64::from(threads.fetches).saturating_mul(rays * (ray + 1) + 2)
@@ -122,7 +121,7 @@ impl TraceSettings {
                 "lets an invocation run {iterations} iterations; software devices end loops after {SOFTWARE_LOOP_CAP}"
             );
             return Err(match self.execution {
-                Execution::ThreadARay => Error::setting("trace.ray_quota", self.ray_quota, cause),
+                Execution::RayPerThread => Error::setting("trace.ray_quota", self.ray_quota, cause),
                 Execution::Persistent(threads) => Error::setting("trace.fetches", threads.fetches, cause),
             });
         }
@@ -176,7 +175,7 @@ const TRACE_PASS: &str = "trace";
 
 #[derive(Debug)]
 enum Kernel {
-    ThreadARay(ComputePipeline<trace_closest::Kernel>),
+    RayPerThread(ComputePipeline<trace_closest::Kernel>),
     Queue(PersistentThreads, ComputePipeline<trace_closest_queue::Kernel>),
 }
 
@@ -218,8 +217,8 @@ impl RayTracer {
         settings.check(gpu.caps())?;
         let (bvh2_quota, bvh2_count) = (settings.ray_quota, settings.count);
         let kernel = match settings.execution {
-            Execution::ThreadARay => {
-                Kernel::ThreadARay(gpu.compute_pipeline(&trace_closest::Spec { bvh2_quota, bvh2_count })?)
+            Execution::RayPerThread => {
+                Kernel::RayPerThread(gpu.compute_pipeline(&trace_closest::Spec { bvh2_quota, bvh2_count })?)
             }
             Execution::Persistent(threads) => {
                 let spec = trace_closest_queue::Spec {
@@ -243,7 +242,7 @@ impl RayTracer {
     /// The settings as they are now, those that [`RayTracer::tune`] has chosen among them.
     pub fn settings(&self) -> TraceSettings {
         let execution = match &self.kernel {
-            Kernel::ThreadARay(_) => Execution::ThreadARay,
+            Kernel::RayPerThread(_) => Execution::RayPerThread,
             Kernel::Queue(threads, _) => Execution::Persistent(*threads),
         };
         TraceSettings {
@@ -255,7 +254,7 @@ impl RayTracer {
     /// Workgroups of a dispatch, of persistent threads.
     pub fn groups(&self) -> Option<u32> {
         match &self.kernel {
-            Kernel::ThreadARay(_) => None,
+            Kernel::RayPerThread(_) => None,
             Kernel::Queue(threads, _) => Some(threads.groups),
         }
     }
@@ -359,7 +358,7 @@ impl RayTracer {
                 pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
                 Ok(())
             })?;
-            let now = dispatches.min(DISPATCHES_A_SUBMISSION);
+            let now = dispatches.min(DISPATCHES_PER_SUBMISSION);
             recorder.pass(TRACE_PASS, |pass| {
                 for _ in 0..now {
                     self.dispatch(pass, buffers, &mut first, count)?;
@@ -380,7 +379,7 @@ impl RayTracer {
     /// Dispatches that go through `count` rays. Of a queue's none but the last leaves a workgroup with less than its quota.
     fn dispatches(&self, count: u32) -> u32 {
         match &self.kernel {
-            Kernel::ThreadARay(kernel) => kernel.groups_for(count).div_ceil(self.gpu.caps().max_workgroups),
+            Kernel::RayPerThread(kernel) => kernel.groups_for(count).div_ceil(self.gpu.caps().max_workgroups),
             Kernel::Queue(threads, _) => {
                 let crew = u64::from(threads.groups) * u64::from(threads.fetches);
                 u64::from(count.div_ceil(threads.batch)).div_ceil(crew) as u32
@@ -393,7 +392,7 @@ impl RayTracer {
             bvh2_quarters: &self.index,
         };
         match &self.kernel {
-            Kernel::ThreadARay(kernel) => {
+            Kernel::RayPerThread(kernel) => {
                 let most = u64::from(self.gpu.caps().max_workgroups) * u64::from(kernel.group_size());
                 let ray_count = u64::from(count - *first).min(most) as u32;
                 let set = trace_closest::Set0 {

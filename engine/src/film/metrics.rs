@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn formulas_on_numbers_done_by_hand() -> Result<()> {
+    fn formulas_give_what_hand_calculation_gives() -> Result<()> {
         let test = picture(&[1.0, 2.0, 3.0, 0.0, 0.0, 0.0])?;
         let reference = picture(&[1.0, 1.0, 1.0, 0.0, 0.0, 0.5])?;
         let report = compare(&test, &reference, &CompareOptions::default())?;

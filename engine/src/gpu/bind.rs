@@ -145,7 +145,7 @@ impl Pass<'_> {
                 if uniform && view.bytes > inner.caps.max_uniform_buffer_range {
                     return Err(Error::LimitExceeded {
                         name: view.buffer.name().into(),
-                        bytes: view.bytes,
+                        value: view.bytes,
                         limit_name: "maxUniformBufferRange",
                         limit: inner.caps.max_uniform_buffer_range,
                     });

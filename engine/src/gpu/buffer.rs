@@ -127,7 +127,7 @@ impl Gpu {
         let bytes = desc.bytes.max(16).next_multiple_of(4);
         let limit = |limit_name, limit| Error::LimitExceeded {
             name: desc.name.into(),
-            bytes,
+            value: bytes,
             limit_name,
             limit,
         };
@@ -240,7 +240,7 @@ impl Buffer {
     fn mapped(&self, offset: u64, bytes: u64) -> Result<*mut u8> {
         let error = |limit_name, limit| Error::LimitExceeded {
             name: self.inner.name.clone(),
-            bytes: offset.saturating_add(bytes),
+            value: offset.saturating_add(bytes),
             limit_name,
             limit,
         };
@@ -278,9 +278,9 @@ pub struct BufferView<'a> {
 impl BufferView<'_> {
     /// Fails when the range does not lie in the buffer or does not begin at a multiple of `alignment`.
     pub(super) fn check(&self, alignment: u64) -> Result<()> {
-        let error = |bytes, limit_name, limit| Error::LimitExceeded {
+        let error = |value, limit_name, limit| Error::LimitExceeded {
             name: self.buffer.name().into(),
-            bytes,
+            value,
             limit_name,
             limit,
         };

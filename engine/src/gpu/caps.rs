@@ -4,6 +4,10 @@ use ash::vk;
 
 use super::options::Lesser;
 
+/// Iterations of all loops of an invocation together after which software drivers end loops in silence; the test that ends a loop counts
+/// too.
+pub const SOFTWARE_LOOP_CAP: u32 = 65_535;
+
 /// Capabilities and limits of a device, as far as techniques and kernels ask.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Caps {

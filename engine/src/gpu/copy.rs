@@ -43,7 +43,7 @@ impl Pass<'_> {
         if bytes.len() as u64 > limit || !bytes.len().is_multiple_of(4) {
             return Err(Error::LimitExceeded {
                 name: view.buffer.name().into(),
-                bytes: bytes.len() as u64,
+                value: bytes.len() as u64,
                 limit_name: "size of an inline update, in whole words",
                 limit,
             });
@@ -73,7 +73,7 @@ impl Pass<'_> {
         if from.bytes > to.bytes {
             return Err(Error::LimitExceeded {
                 name: to.buffer.name().into(),
-                bytes: from.bytes,
+                value: from.bytes,
                 limit_name: "size",
                 limit: to.bytes,
             });
@@ -165,7 +165,7 @@ fn image_rows(image: &Image, view: BufferView<'_>) -> Result<()> {
     if rows.bytes > view.bytes {
         return Err(Error::LimitExceeded {
             name: view.buffer.name().into(),
-            bytes: rows.bytes,
+            value: rows.bytes,
             limit_name: "size of the part",
             limit: view.bytes,
         });

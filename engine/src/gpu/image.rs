@@ -158,7 +158,7 @@ impl Inner {
             None => Ok(()),
             Some((wanted, limit, limit_name)) => Err(Error::LimitExceeded {
                 name: desc.name.into(),
-                bytes: u64::from(*wanted),
+                value: u64::from(*wanted),
                 limit_name,
                 limit: u64::from(*limit),
             }),

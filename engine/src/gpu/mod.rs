@@ -48,7 +48,7 @@ pub use barrier::{
     transfer_to_compute,
 };
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
-pub use caps::{Caps, DescriptorLimits, DeviceKind, SubgroupOperations};
+pub use caps::{Caps, DescriptorLimits, DeviceKind, SOFTWARE_LOOP_CAP, SubgroupOperations};
 pub use device::{Gpu, QueueGuard};
 pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
 pub use host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures};

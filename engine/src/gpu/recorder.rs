@@ -107,7 +107,7 @@ impl Recorder {
         if index == MAX_PASSES {
             return Err(Error::LimitExceeded {
                 name: self.name.clone(),
-                bytes: index as u64 + 1,
+                value: index as u64 + 1,
                 limit_name: "passes of a recorder",
                 limit: MAX_PASSES as u64,
             });
@@ -321,7 +321,7 @@ impl Pass<'_> {
         if let Some(count) = groups.iter().find(|count| **count > limit) {
             return Err(Error::LimitExceeded {
                 name: pipeline.inner.info.name.into(),
-                bytes: u64::from(*count),
+                value: u64::from(*count),
                 limit_name: "maxComputeWorkGroupCount",
                 limit: u64::from(limit),
             });

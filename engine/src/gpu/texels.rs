@@ -82,7 +82,7 @@ impl Gpu {
         if texels > limit {
             return Err(Error::LimitExceeded {
                 name: name.into(),
-                bytes: texels,
+                value: texels,
                 limit_name: "maxTexelBufferElements",
                 limit,
             });

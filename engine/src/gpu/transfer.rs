@@ -61,7 +61,7 @@ impl Gpu {
         if bytes > view.bytes {
             return Err(Error::LimitExceeded {
                 name: view.buffer.name().into(),
-                bytes,
+                value: bytes,
                 limit_name: "size",
                 limit: view.bytes,
             });

@@ -102,7 +102,7 @@ impl Permute {
             if words > 1 << 32 {
                 return Err(Error::LimitExceeded {
                     name: view.buffer.name().into(),
-                    bytes: words,
+                    value: words,
                     limit_name: "words that kernels can number",
                     limit: 1 << 32,
                 });

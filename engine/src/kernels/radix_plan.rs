@@ -3,8 +3,11 @@
 use std::ops::Range;
 
 use super::radix_sort::{RadixSortOptions, SortBuffers};
-use super::stream::{self, Form, SERIAL_QUOTA, Shape, Stream};
+use super::stream::{
+    self, BLOCK_ITERATIONS, Form, SERIAL_LANES, SERIAL_TEAMS, SERIAL_TILE, Shape, Stream, WORKGROUP_TEAMS,
+};
 use crate::Result;
+use crate::gpu::shaders::constants::KEYS_PER_READ;
 use crate::gpu::shaders::kernels::{
     radix_count_serial, radix_count_subgroup, radix_scan, radix_scatter_serial, radix_scatter_subgroup,
 };
@@ -46,26 +49,37 @@ pub(super) struct Tuning {
     reads_ahead: bool,
 }
 
-/// Keys that a lane of the subgroup form holds at once.
-const KEYS_A_LANE: u32 = 8;
+/// Keys that an invocation of the subgroup form holds at once.
+const KEYS_PER_INVOCATION: u32 = 8;
 /// Subgroups that have a row of counters each in the subgroup form.
 const SUBGROUP_ROWS: u32 = 16;
+/// The smallest subgroups that devices of larger ones may form.
+const LEAST_SUBGROUP: u32 = 8;
+
+/// Bits of a digit; fewer in the serial form on devices with lanes of their own, each of which then keeps fewer counters.
+const DIGIT_BITS: u32 = 8;
+const SERIAL_DIGIT_BITS: u32 = 4;
+
+/// On software devices: the most keys that count as few, and keys that blocks are a multiple of, by measurement.
+const FEW_KEYS: u32 = 1 << 17;
+const FEW_KEYS_TILE: u32 = 128;
+const MANY_KEYS_TILE: u32 = 2048;
 
 impl Tuning {
     /// For few keys, and for many.
     pub fn of(caps: &Caps, form: Form) -> [Self; 2] {
         if form == Form::Subgroup {
             // Subgroups may turn out smaller than the device's size: at least 8 lanes where that is 8 or more.
-            let lanes = SUBGROUP_ROWS * caps.subgroup_size.min(8);
-            let tile = lanes * KEYS_A_LANE;
+            let lanes = SUBGROUP_ROWS * caps.subgroup_size.min(LEAST_SUBGROUP);
+            let tile = lanes * KEYS_PER_INVOCATION;
             let tuning = Self {
                 up_to: u32::MAX,
-                digit_bits: 8,
+                digit_bits: DIGIT_BITS,
                 shape: Shape {
                     tile,
                     quota: u32::MAX / tile * tile,
-                    teams_a_group: 1,
-                    teams: 1024,
+                    teams_per_group: 1,
+                    teams: WORKGROUP_TEAMS,
                 },
                 lanes,
                 reads_ahead: false,
@@ -77,8 +91,8 @@ impl Tuning {
             digit_bits,
             shape: Shape {
                 tile,
-                quota: SERIAL_QUOTA * 4,
-                teams_a_group: lanes,
+                quota: BLOCK_ITERATIONS * KEYS_PER_READ,
+                teams_per_group: lanes,
                 teams,
             },
             lanes,
@@ -88,8 +102,8 @@ impl Tuning {
             let lanes = caps.subgroup_size.max(1);
             let teams = stream::serial_groups() * lanes;
             // Few counters for few keys; and for many, groups that end at about the same time on a busy machine.
-            let few = serial(1 << 17, 8, 128, (teams / 2).max(1), lanes);
-            let many = serial(u32::MAX, 8, 2048, 2 * teams, lanes);
+            let few = serial(FEW_KEYS, DIGIT_BITS, FEW_KEYS_TILE, (teams / 2).max(1), lanes);
+            let many = serial(u32::MAX, DIGIT_BITS, MANY_KEYS_TILE, 2 * teams, lanes);
             [
                 few,
                 Self {
@@ -98,7 +112,7 @@ impl Tuning {
                 },
             ]
         } else {
-            [serial(u32::MAX, 4, 64, 1 << 14, 64); 2]
+            [serial(u32::MAX, SERIAL_DIGIT_BITS, SERIAL_TILE, SERIAL_TEAMS, SERIAL_LANES); 2]
         }
     }
 }
@@ -140,7 +154,7 @@ impl Plan {
                     bins,
                     key_words,
                     has_values,
-                    keys_a_lane: KEYS_A_LANE,
+                    keys_per_invocation: KEYS_PER_INVOCATION,
                     max_subgroups: SUBGROUP_ROWS,
                 })?,
             }

@@ -80,7 +80,7 @@ impl RadixSortOptions {
 
 /// Where keys and values are: two sides each, of buffers made by [`RadixSort::keys`] and [`RadixSort::values`].
 ///
-/// The input is on side 0. Each digit goes from one side to the other, so both sides are written, and [`RadixSort::side`] says where
+/// The input is on side 0. Each digit goes from one side to the other, so both sides are written, and [`RadixSort::result_side`] says where
 /// the result is.
 #[derive(Debug, Clone, Copy)]
 pub struct SortBuffers<'a> {
@@ -182,7 +182,7 @@ impl RadixSort {
     }
 
     /// The side of the buffers that holds the result of a sort of up to `capacity` keys.
-    pub fn side(&self, capacity: u32) -> usize {
+    pub fn result_side(&self, capacity: u32) -> usize {
         match self.small(capacity) {
             Some(_) => 1,
             None => self.plan(capacity).digits(&self.options.bits).len() % 2,
@@ -209,7 +209,7 @@ impl RadixSort {
         let capacity = count.capacity();
         self.check(buffers, capacity, scratch)?;
         if matches!(count, Count::Host(0)) {
-            return Ok(self.side(0));
+            return Ok(self.result_side(0));
         }
         if let Some(small) = self.small(capacity) {
             small.record(pass, &self.options, buffers, count, scratch)?;

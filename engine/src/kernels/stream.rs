@@ -10,16 +10,56 @@ use crate::gpu::shaders::constants::{
 use crate::gpu::shaders::kernels::stream_prepare;
 use crate::gpu::shaders::types::StreamPlan;
 use crate::gpu::{
-    Access, Buffer, BufferBarrier, BufferView, Caps, ComputePipeline, DeviceKind, Gpu, Pass, compute_to_indirect,
-    rw_compute_to_compute,
+    Access, Buffer, BufferBarrier, BufferView, Caps, ComputePipeline, DeviceKind, Gpu, Pass, SOFTWARE_LOOP_CAP,
+    compute_to_indirect, rw_compute_to_compute,
 };
 use crate::{Error, Result};
 
 /// The most elements of a stream.
 pub(super) const MAX_COUNT: u32 = 1 << 31;
 
-/// Elements that one invocation of the serial form walks at most: software drivers end loops in silence after 65,535 iterations.
-pub(super) const SERIAL_QUOTA: u32 = 1 << 15;
+/// Iterations that the loop over a block takes at most, on any device: half of what software drivers allow, as the tests that end loops and
+/// the loops beside it count too. A power of two, as tiles are.
+pub(super) const BLOCK_ITERATIONS: u32 = SOFTWARE_LOOP_CAP.div_ceil(2);
+
+/// Loops of a scan that take each element: one combines a lane's items, one writes them.
+const SCAN_LOOPS: u32 = 2;
+
+/// Tiles of a block whose team is a workgroup, at most. A lane takes about 20 iterations a tile: [`SCAN_LOOPS`] times the items, and the
+/// steps of the scan over the lanes.
+const WORKGROUP_TILES: u32 = 1 << 11;
+
+/// Invocations of a workgroup, where the device takes so many: more only lengthen the scan over them.
+const WORKGROUP_LANES: u32 = 256;
+
+/// Teams that are workgroups: enough to fill large devices, few enough that a workgroup scans what they found in a few steps.
+pub(super) const WORKGROUP_TEAMS: u32 = 1024;
+
+/// Invocations of a workgroup that share nothing, on devices with lanes of their own: the widest subgroup of common devices.
+pub(super) const SERIAL_LANES: u32 = 64;
+
+/// Teams that are invocations, on devices with lanes of their own: enough to fill them, few enough to be scanned by a workgroup.
+pub(super) const SERIAL_TEAMS: u32 = 1 << 14;
+
+/// Elements that blocks of single invocations are a multiple of, so that short streams do not go to a team an element; on software
+/// devices, which have few threads, more.
+pub(super) const SERIAL_TILE: u32 = 64;
+const SERIAL_TILE_ON_SOFTWARE: u32 = 256;
+
+/// Invocations of workgroups that share memory, on software devices.
+const SOFTWARE_WORKGROUP_LANES: u32 = 64;
+
+/// Elements that each lane takes of a tile in kernels whose lanes take turns.
+const ITEMS_IN_TURN: u32 = 4;
+
+/// Workgroups for each thread of a software driver, so that a thread that falls behind leaves one to others.
+const GROUPS_PER_THREAD: u32 = 2;
+
+/// Times as many workgroups where teams leave nothing to be scanned: shorter blocks end at about the same time.
+const UNSCANNED_TEAMS: u32 = 4;
+
+/// Threads that software drivers are thought to have at most.
+const SOFTWARE_THREADS_MAX: u32 = 64;
 
 /// Bytes of shared memory that the subgroup forms take at most: a row of counters for each subgroup of a scatter, the next place of each digit,
 /// and a scan's words.
@@ -140,7 +180,7 @@ pub(super) struct Shape {
     /// Elements of a block at most; a multiple of `tile`.
     pub quota: u32,
     /// Teams of a workgroup.
-    pub teams_a_group: u32,
+    pub teams_per_group: u32,
     /// Teams at most, as long as the quota allows.
     pub teams: u32,
 }
@@ -167,32 +207,32 @@ impl Teams {
     pub fn new(caps: &Caps, form: Form, kernel: &str) -> Result<Self> {
         let form = form.on(caps, kernel)?;
         if form != Form::Serial {
-            let lanes = caps.max_workgroup_invocations.min(256);
+            let lanes = caps.max_workgroup_invocations.min(WORKGROUP_LANES);
             let tile = lanes * SCAN_ITEMS;
             return Ok(Self {
                 form,
                 lanes,
                 shape: Shape {
                     tile,
-                    quota: tile << 11,
-                    teams_a_group: 1,
-                    teams: 1024,
+                    quota: tile * WORKGROUP_TILES,
+                    teams_per_group: 1,
+                    teams: WORKGROUP_TEAMS,
                 },
             });
         }
         let (lanes, teams, tile) = if caps.kind == DeviceKind::Cpu {
             let lanes = caps.subgroup_size.max(1);
-            (lanes, serial_groups() * lanes, 256)
+            (lanes, serial_groups() * lanes, SERIAL_TILE_ON_SOFTWARE)
         } else {
-            (64, 1 << 14, 64)
+            (SERIAL_LANES, SERIAL_TEAMS, SERIAL_TILE)
         };
         Ok(Self {
             form,
             lanes,
             shape: Shape {
                 tile,
-                quota: SERIAL_QUOTA / 2,
-                teams_a_group: lanes,
+                quota: BLOCK_ITERATIONS / SCAN_LOOPS,
+                teams_per_group: lanes,
                 teams,
             },
         })
@@ -201,22 +241,22 @@ impl Teams {
     /// Teams that are workgroups in any case, of kernels without barriers in their loops, with so many loop iterations an element.
     pub fn workgroups(caps: &Caps, iterations: u32) -> Self {
         let lanes = if caps.kind == DeviceKind::Cpu {
-            64
+            SOFTWARE_WORKGROUP_LANES
         } else {
-            caps.max_workgroup_invocations.min(256)
+            caps.max_workgroup_invocations.min(WORKGROUP_LANES)
         };
-        let tile = lanes * 4;
+        let tile = lanes * ITEMS_IN_TURN;
         Self {
             form: Form::Shared,
             lanes,
             shape: Shape {
                 tile,
-                quota: (lanes * SERIAL_QUOTA / iterations.max(1) / tile).max(1) * tile,
-                teams_a_group: 1,
+                quota: (lanes * BLOCK_ITERATIONS / iterations.max(1) / tile).max(1) * tile,
+                teams_per_group: 1,
                 teams: if caps.kind == DeviceKind::Cpu {
-                    4 * serial_groups()
+                    UNSCANNED_TEAMS * serial_groups()
                 } else {
-                    1024
+                    WORKGROUP_TEAMS
                 },
             },
         }
@@ -229,9 +269,10 @@ impl Teams {
 
 /// Workgroups that keep all threads of a software driver busy.
 pub(super) fn serial_groups() -> u32 {
-    2 * std::thread::available_parallelism()
-        .map_or(1, |n| n.get() as u32)
-        .min(64)
+    GROUPS_PER_THREAD
+        * std::thread::available_parallelism()
+            .map_or(1, |n| n.get() as u32)
+            .min(SOFTWARE_THREADS_MAX)
 }
 
 /// One kernel, without or with subgroup operations.
@@ -338,7 +379,7 @@ impl Prepare {
                 },
                 scratch,
                 // One at least: kernels write their results for no elements, too.
-                groups: Some(teams.div_ceil(shape.teams_a_group).max(1)),
+                groups: Some(teams.div_ceil(shape.teams_per_group).max(1)),
             });
         };
         let plan = StreamPlan {
@@ -353,7 +394,7 @@ impl Prepare {
         let push = stream_prepare::Push {
             plan,
             capacity,
-            teams_a_group: shape.teams_a_group,
+            teams_per_group: shape.teams_per_group,
         };
         pass.dispatch(&self.pipeline, &[&set], &push, [1, 1, 1])?;
         pass.barrier(&[compute_to_indirect(scratch)]);
@@ -399,7 +440,7 @@ pub(super) fn check_words(view: BufferView<'_>, words: u64) -> Result<()> {
     if view.bytes < 4 * words {
         return Err(Error::LimitExceeded {
             name: view.buffer.name().into(),
-            bytes: 4 * words,
+            value: 4 * words,
             limit_name: "size of the range",
             limit: view.bytes,
         });
@@ -417,7 +458,7 @@ pub(super) fn check_count(kernel: &str, count: u32) -> Result<()> {
     if count > MAX_COUNT {
         return Err(Error::LimitExceeded {
             name: kernel.into(),
-            bytes: count.into(),
+            value: count.into(),
             limit_name: "elements of a stream",
             limit: MAX_COUNT.into(),
         });
@@ -430,7 +471,7 @@ pub(super) fn check_size(buffer: &Buffer, bytes: u64) -> Result<()> {
     if buffer.bytes() < bytes {
         return Err(Error::LimitExceeded {
             name: buffer.name().into(),
-            bytes,
+            value: bytes,
             limit_name: "size",
             limit: buffer.bytes(),
         });
@@ -468,7 +509,7 @@ mod tests {
         let shape = Shape {
             tile: 64,
             quota: 4096,
-            teams_a_group: 8,
+            teams_per_group: 8,
             teams: 32,
         };
         for capacity in [0, 1, 64, 2048, 131_072, 131_073, 1 << 30] {

@@ -4,7 +4,7 @@ use clerestory::kernels::device_model::{DeviceModel, MAX_ITERATIONS, STRIDE, cyc
 use clerestory_tests::with_gpu;
 
 #[test]
-fn what_is_timed_is_what_was_done() {
+fn timed_runs_have_walked_copied_and_counted_what_was_asked() {
     with_gpu(|gpu| {
         let model = DeviceModel::new(gpu).unwrap();
         let places = 100;

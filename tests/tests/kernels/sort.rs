@@ -86,7 +86,7 @@ fn sorted(gpu: &Gpu, sort: &RadixSort, keys: &[u64], on_device: bool) -> (Vec<u3
         side = sort.record(pass, &buffers, count_given, &scratch)?;
         Ok(())
     });
-    assert_eq!(side, sort.side(capacity));
+    assert_eq!(side, sort.result_side(capacity));
     if on_device {
         let status = StreamStatus::read(gpu, &scratch).unwrap();
         assert_eq!((status.count, status.wanted), (count, count));
@@ -271,7 +271,7 @@ fn sixteen_million_keys_are_as_by_std() {
 }
 
 #[test]
-fn runs_give_the_same_bits() {
+fn repeated_sorts_give_the_same_bits_in_every_form() {
     with_gpu(|gpu| {
         let keys = random_keys(&mut Random(45), Pattern::FewBits, KeyWidth::Bits32, 20_000);
         let run_of = |form| {
@@ -375,7 +375,7 @@ fn what_does_not_fit_is_refused_before_it_is_recorded() {
         };
         assert!(matches!(
             record(none, 11, &scratch),
-            Err(Error::LimitExceeded { bytes: 88, .. })
+            Err(Error::LimitExceeded { value: 88, .. })
         ));
         assert!(matches!(record(none, 10, &small), Err(Error::LimitExceeded { .. })));
         assert!(matches!(
@@ -388,7 +388,7 @@ fn what_does_not_fit_is_refused_before_it_is_recorded() {
 }
 
 #[test]
-fn the_twin_is_as_std() {
+fn the_twin_sorts_as_std_does() {
     let mut random = Random(47);
     for (bits, order, digit_bits) in [
         (0..64, Order::Ascending, 11),

@@ -10,7 +10,7 @@ use clerestory_tests::with_gpu;
 use crate::{UNIT_EDGES, cases, check, direction, join, list, ulps, unit, v2, v3};
 
 #[test]
-fn warps_cones_and_bases() {
+fn warps_cones_and_bases_agree_with_their_twins() {
     with_gpu(|gpu| {
         let trig = trigonometric_error(gpu);
         let mut table = cases(2, |r| vec![unit(r), unit(r)]);

@@ -11,7 +11,7 @@ use glam::Vec3;
 use crate::{CASES, cases, direction, join, shift, twin_math, ulps, v3};
 
 #[test]
-fn surface_points_and_ray_starts() {
+fn surface_points_and_ray_starts_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(10, |r| {
             let size = r.choose(&[1e-4, 1.0, 1e5]);
@@ -66,7 +66,7 @@ fn surface_points_and_ray_starts() {
 }
 
 #[test]
-fn spheres() {
+fn spheres_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(11, |r| {
             join(&[
@@ -119,7 +119,7 @@ fn spheres() {
 }
 
 #[test]
-fn triangles() {
+fn triangles_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(12, |r| {
             let origin = r.vector();

@@ -15,7 +15,7 @@ use clerestory_tests::with_gpu;
 use crate::{cases, check, direction, join, list, shift, twin_math, ulps, unit, v2, v3};
 
 #[test]
-fn lights() {
+fn lights_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(6, |r| {
             let (inner, outer) = (r.range(0.5, 1.0), r.range(-1.0, 0.5));
@@ -58,7 +58,7 @@ fn phase(x: &[f64]) -> Phase {
 }
 
 #[test]
-fn phase_functions() {
+fn phase_functions_agree_with_their_twins() {
     with_gpu(|gpu| {
         let trig = trigonometric_error(gpu);
         let table = cases(7, |r| {
@@ -92,7 +92,7 @@ fn phase_functions() {
 }
 
 #[test]
-fn phase_functions_near_their_peaks() {
+fn phase_functions_near_their_peaks_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(8, |r| {
             let w = direction(r);

@@ -23,7 +23,7 @@ fn flag(on: bool) -> f64 {
 }
 
 #[test]
-fn free_flight() {
+fn free_flight_agrees_with_its_twin() {
     with_gpu(|gpu| {
         let table = cases(21, |r| {
             let sigma_t: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 1e-4, 0.3, 1.0, 7.0, 1e4]));
@@ -58,7 +58,7 @@ fn free_flight() {
 }
 
 #[test]
-fn equi_angular_samples_and_null_collisions() {
+fn equi_angular_samples_and_null_collisions_agree_with_their_twins() {
     with_gpu(|gpu| {
         let trig = trigonometric_error(gpu);
         let table = cases(22, |r| {

@@ -11,7 +11,7 @@ use glam::{DVec3, DVec4};
 use crate::{cases, check, direction, join, list, shift, twin_math, ulps, unit, upper, v2, v3};
 
 #[test]
-fn fresnel_factors() {
+fn fresnel_factors_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(4, |r| {
             let color = [r.unit(), r.unit(), r.choose(&[0.0, 1.0, 0.5])];
@@ -36,7 +36,7 @@ fn fresnel_factors() {
 }
 
 #[test]
-fn ggx() {
+fn ggx_agrees_with_its_twin() {
     with_gpu(|gpu| {
         let trig = trigonometric_error(gpu);
         let table = cases(5, |r| {
@@ -81,7 +81,7 @@ fn ggx() {
 }
 
 #[test]
-fn phong() {
+fn phong_agrees_with_its_twin() {
     with_gpu(|gpu| {
         let trig = trigonometric_error(gpu);
         // pow loses log2(exponent) bits.
@@ -123,7 +123,7 @@ fn phong() {
 }
 
 #[test]
-fn shading_normals() {
+fn shading_normals_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(9, |r| {
             let wo = direction(r);

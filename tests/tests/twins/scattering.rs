@@ -15,7 +15,7 @@ use crate::{cases, ulps, v3};
 twin_kernel!(twin_bsdf);
 
 #[test]
-fn the_scattering_function() {
+fn the_scattering_function_agrees_with_its_twin() {
     with_gpu(|gpu| {
         let metal = (DVec3::new(0.2, 0.4, 1.4), DVec3::new(4.0, 2.4, 1.6));
         let average = fresnel_conductor_average(metal.0, metal.1).as_vec3();

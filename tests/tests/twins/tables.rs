@@ -12,7 +12,7 @@ use crate::{cases, direction, join, ulps, unit, v2, v3};
 twin_kernel!(twin_tables);
 
 #[test]
-fn albedos() {
+fn albedos_agree_with_their_twins() {
     with_gpu(|gpu| {
         let albedos = AlbedoTable::shared();
         let table = cases(14, |r| {
@@ -38,7 +38,7 @@ fn albedos() {
 }
 
 #[test]
-fn distributions() {
+fn distributions_agree_with_their_twins() {
     with_gpu(|gpu| {
         let weights: Vec<f64> = (0..37)
             .map(|i| if i % 5 == 0 { 0.0 } else { f64::from(i * i % 11) + 1e-6 })
@@ -62,7 +62,7 @@ fn distributions() {
 }
 
 #[test]
-fn environments() {
+fn environments_agree_with_their_twins() {
     with_gpu(|gpu| {
         let size = UVec2::new(16, 8);
         let weights: Vec<f64> = (0..128).map(|i| f64::from((i * 7) % 13)).collect();

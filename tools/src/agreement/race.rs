@@ -12,7 +12,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use clerestory::gpu::Gpu;
 use clerestory::scene::Camera;
@@ -24,7 +23,7 @@ use super::peer::{Integrator, Peer, Request, Variant};
 use super::spread;
 use super::{AgreementOptions, Fault};
 use crate::experiments::watch::Watch;
-use crate::machine::median;
+use crate::timing::{median, timed};
 
 /// This engine's name as a contender.
 const OURS: &str = "clerestory";
@@ -269,12 +268,13 @@ impl Turns {
         let processor = cpu_seconds();
         let mut seconds = Vec::new();
         for index in 0..options.timing_pictures {
-            let clock = Instant::now();
-            tracer.restart(first_seed.wrapping_add(index))?;
-            tracer.render(options.timing_samples)?;
-            let (picture, _) = tracer.picture()?;
-            seconds.push(clock.elapsed().as_secs_f64());
-            self.pictures.push(picture.main_layer()?.values().to_vec());
+            let (picture, time) = timed(|| {
+                tracer.restart(first_seed.wrapping_add(index))?;
+                tracer.render(options.timing_samples)?;
+                tracer.picture()
+            });
+            seconds.push(time);
+            self.pictures.push(picture?.0.main_layer()?.values().to_vec());
         }
         self.seconds.push(seconds);
         let spent = processor.zip(cpu_seconds()).map(|(before, after)| after - before);

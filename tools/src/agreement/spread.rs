@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formulas_on_numbers_done_by_hand() {
+    fn formulas_give_what_hand_calculation_gives() {
         // Variances 1 and 0 over references 1 and 0.
         let pictures = [vec![1.0, 5.0], vec![2.0, 5.0], vec![3.0, 5.0]];
         let spread = measure(&pictures, &[1.0, 0.0]).unwrap();

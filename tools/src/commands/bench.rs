@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Args;
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Result, scene};
-use clerestory_tools::machine::{self, median};
+use clerestory_tools::machine;
 use clerestory_tools::page::Block;
+use clerestory_tools::timing::{Spread, timed};
 
 use super::{check_validation, index, index_peers, sort_rates};
 use crate::failure::{Failure, Outcome};
@@ -64,30 +64,6 @@ pub struct Arguments {
 const SCENES: [&str; 2] = ["builtin:cornell-box", "builtin:materials"];
 /// Rays of --peers.
 const PEER_RAYS: u32 = 100_000;
-
-/// Median and range of one quantity.
-#[derive(Debug, Clone, Copy, serde::Serialize)]
-pub(super) struct Spread {
-    pub(super) median: f64,
-    pub(super) least: f64,
-    pub(super) greatest: f64,
-}
-
-impl Spread {
-    pub(super) fn of(mut values: Vec<f64>) -> Self {
-        values.sort_by(f64::total_cmp);
-        Self {
-            least: values.first().copied().unwrap_or(f64::NAN),
-            greatest: values.last().copied().unwrap_or(f64::NAN),
-            median: median(values),
-        }
-    }
-
-    /// Half the range over the median.
-    pub(super) fn relative(&self) -> f64 {
-        0.5 * (self.greatest - self.least) / self.median
-    }
-}
 
 #[derive(Debug, serde::Serialize)]
 struct Measured {
@@ -252,24 +228,12 @@ fn measure(renderer: &Renderer, address: &str, options: &RenderOptions, repeat: 
 /// Seconds, GPU seconds, paths and rays of one run.
 fn once(renderer: &Renderer, options: &RenderOptions) -> Result<[f64; 4]> {
     let mut rendering = renderer.start(options)?;
-    let start = Instant::now();
-    while rendering.step()?.is_some() {}
-    let seconds = start.elapsed().as_secs_f64();
+    let (rendered, seconds) = timed(|| -> Result<()> {
+        while rendering.step()?.is_some() {}
+        Ok(())
+    });
+    rendered?;
     let report = rendering.finish()?.report;
     let count = |name: &str| report.counters.get(name).map_or(0.0, |count| *count as f64);
     Ok([seconds, report.gpu_seconds, count("paths"), count("rays")])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn spreads() {
-        let of = |values: &[f64]| Spread::of(values.to_vec());
-        let spread = of(&[4.0, 1.0, 2.0, 3.0]);
-        assert_eq!((spread.least, spread.median, spread.greatest), (1.0, 2.5, 4.0));
-        let one = of(&[5.0]);
-        assert_eq!((one.least, one.greatest, one.relative()), (5.0, 5.0, 0.0));
-    }
 }

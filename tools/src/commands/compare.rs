@@ -236,7 +236,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thresholds_parse_or_teach() {
+    fn thresholds_are_read_or_refused_with_what_is_expected() {
         assert!(parse_threshold("rmse=1e-3").is_ok_and(|t| t.metric == "rmse" && t.limit == 1e-3));
         for (text, word) in [
             ("rmse", "METRIC=LIMIT"),

@@ -2,14 +2,15 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clap::Args;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
-use clerestory::accel::{Ray, RayIndex, TraversalCounters};
+use clerestory::accel::{BuildStages, Ray, RayIndex, TraversalCounters};
 use clerestory::scene::Scene;
 use clerestory::{Result, scene};
+use clerestory_tools::random::Random;
+use clerestory_tools::timing::timed;
 use clerestory_tools::{geometry, machine};
 use glam::Vec3;
 
@@ -162,9 +163,9 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         "depth",
         "ms",
         "SAH cost",
-        "ratio",
+        "SAH ratio",
         "steps/ray",
-        "ratio",
+        "steps ratio",
     ];
     let mut table = Table::new(&head, &[1]);
     for one in &all {
@@ -197,12 +198,9 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
     let mut index = build(triangles)?;
     let mut builds = Vec::new();
     for _ in 0..repeat {
-        let begin = Instant::now();
-        let built = build(triangles)?;
-        let seconds = begin.elapsed().as_secs_f64();
-        index = built;
-        let stages = index.stages().named().into_iter().filter(|(_, ms)| *ms > 0.0);
-        builds.push((seconds, stages.map(|(name, ms)| (name.to_owned(), ms)).collect()));
+        let (built, seconds) = timed(|| build(triangles));
+        index = built?;
+        builds.push((seconds, used(&index.stages())));
     }
     Ok(measured(&index, rays, builds))
 }
@@ -212,14 +210,17 @@ fn measure_device(builder: &LbvhBuilder, triangles: &[[Vec3; 3]], rays: &[Ray], 
     let index = builder.build(triangles)?.index;
     let mut builds = Vec::new();
     for _ in 0..repeat {
-        let begin = Instant::now();
-        let resident = builder.build_resident(triangles)?;
-        let seconds = begin.elapsed().as_secs_f64();
-        let stages = resident.map(|resident| resident.stages).unwrap_or_default();
-        let stages = stages.named().into_iter().filter(|(_, ms)| *ms > 0.0);
-        builds.push((seconds, stages.map(|(name, ms)| (name.to_owned(), ms)).collect()));
+        let (resident, seconds) = timed(|| builder.build_resident(triangles));
+        let stages = resident?.map(|resident| resident.stages).unwrap_or_default();
+        builds.push((seconds, used(&stages)));
     }
     Ok(measured(&index, rays, builds))
+}
+
+/// The stages that a build has, with their milliseconds.
+fn used(stages: &BuildStages) -> Vec<(String, f64)> {
+    let stages = stages.named().into_iter().filter(|(_, ms)| *ms > 0.0);
+    stages.map(|(name, ms)| (name.to_owned(), ms)).collect()
 }
 
 /// Seconds of a build and its milliseconds by stage.
@@ -251,29 +252,21 @@ fn measured(index: &Bvh2, rays: &[Ray], mut builds: Vec<BuildTime>) -> Measured 
 
 /// Rays from the middle of the first camera's picture outwards, and from triangles' centres in random directions.
 fn rays_among(scene: &Scene, triangles: &[[Vec3; 3]], count: u32) -> Vec<Ray> {
-    let mut state = 1u64;
-    let mut random = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / 16_777_216.0
-    };
+    let mut random = Random::new(1);
     let eye = scene
         .cameras
         .first()
         .map(|camera| camera.transform.translation.as_vec3());
     (0..count)
         .map(|i| {
-            let z = 2.0 * random() - 1.0;
-            let (sine, cosine) = (std::f32::consts::TAU * random()).sin_cos();
-            let direction = Vec3::new(cosine * (1.0 - z * z).sqrt(), sine * (1.0 - z * z).sqrt(), z);
-            let centre = |place: f32| {
-                let chosen = (place * triangles.len() as f32) as usize;
+            let direction = random.direction().as_vec3();
+            let centre = |place: f64| {
+                let chosen = (place * triangles.len() as f64) as usize;
                 triangles
                     .get(chosen.min(triangles.len().saturating_sub(1)))
                     .map_or(Vec3::ZERO, |t| (t[0] + t[1] + t[2]) / 3.0)
             };
-            let target = centre(random());
+            let target = centre(random.unit());
             let (origin, direction, t_min) = match eye {
                 Some(eye) if i % 2 == 0 => (eye, (target - eye).normalize_or(direction), 0.0),
                 _ => (target, direction, 1e-3),

@@ -25,7 +25,7 @@ use super::check_validation;
 use super::compare::finite;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::{DeviceOptions, Size, parse_duration, parse_size};
-use crate::{output, pictures, statistics};
+use crate::{frame_report, output, pictures};
 use choice::ChoiceReport;
 use files::{Document, ErrorAgainst, Files};
 use progress::Interruptible;
@@ -433,7 +433,7 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
         Statistics::None => {}
         Statistics::Json => output::print_json(document)?,
         Statistics::Table => {
-            let mut text = statistics::text(document.report);
+            let mut text = frame_report::text(document.report);
             if let Some(error) = &document.error {
                 text += &format!(
                     "\n{}\n{}\n",

@@ -4,17 +4,15 @@
 //! the same random keys; sorters take turns, and medians count.
 
 use std::path::Path;
-use std::time::Instant;
 
 use clerestory::film::atomic;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
-use clerestory::transport::random::pcg3d;
 use clerestory::{Error, Result};
 use clerestory_tools::experiments::plot::{self, Curve, PlotPoint, Words};
 use clerestory_tools::experiments::table::Table as Sheet;
-use clerestory_tools::machine::median;
-use glam::UVec3;
+use clerestory_tools::random::Random;
+use clerestory_tools::timing::{median, timed};
 use rdst::{RadixKey, RadixSort as _};
 
 use crate::failure::Outcome;
@@ -103,9 +101,7 @@ impl<'a> Sorter<'a> {
     fn of<T: Element>(name: &'static str, data: &'a [T], sort: impl Fn(&mut [T]) + 'a) -> Self {
         let run = move |sorted: Option<&mut Vec<Pair>>| {
             let mut data = data.to_vec();
-            let start = Instant::now();
-            sort(&mut data);
-            let seconds = start.elapsed().as_secs_f64();
+            let ((), seconds) = timed(|| sort(&mut data));
             let data = std::hint::black_box(data);
             if let Some(sorted) = sorted {
                 sorted.extend(data.into_iter().map(Element::pair));
@@ -219,7 +215,8 @@ fn of_pairs(pairs: &[Pair], with_peers: bool) -> Vec<Sorter<'_>> {
 
 /// Hashes of their places.
 fn random_keys(count: u32) -> Vec<u32> {
-    (0..count).map(|place| pcg3d(UVec3::new(place, 0, 0)).x).collect()
+    let mut random = Random::new(0);
+    (0..count).map(|_| random.word()).collect()
 }
 
 fn by_kernel<'a>(gpu: &'a Gpu, keys: &'a [u32], load: Load) -> Result<Sorter<'a>> {
@@ -248,9 +245,8 @@ fn by_kernel<'a>(gpu: &'a Gpu, keys: &'a [u32], load: Load) -> Result<Sorter<'a>
             side = sort.record(pass, &buffers, Count::Host(count), &scratch)?;
             Ok(())
         })?;
-        let start = Instant::now();
-        recorder.submit()?.wait()?;
-        let seconds = start.elapsed().as_secs_f64();
+        let (waited, seconds) = timed(|| recorder.submit()?.wait());
+        waited?;
         if let Some(sorted) = sorted {
             let keys: Vec<u32> = gpu.read(sides[side].buffer().view(), keys.len())?;
             let values = if values {

@@ -9,7 +9,7 @@ use super::pareto;
 use super::results::{Point, Results, SceneResults, VariantResults};
 use super::slope::{self, Slope};
 use super::sweep::Budget;
-use crate::machine::median;
+use crate::timing::median;
 
 /// What work is counted in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -279,7 +279,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn slopes_costs_and_fronts_of_power_laws() {
+    fn slopes_costs_and_fronts_of_power_laws_are_exact() {
         let scene = scene(&made_up_scene());
         for series in &scene.series {
             for slope in [series.slope, series.absolute_slope, series.time_slope] {

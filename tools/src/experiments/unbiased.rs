@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formulas_on_numbers_done_by_hand() {
+    fn formulas_give_what_hand_calculation_gives() {
         let test = Picture::from_radiance(2, 1, vec![1.0, 2.0, 3.0, 0.0, f32::NAN, 0.0]).unwrap();
         let mut reference = Picture::from_radiance(2, 1, vec![1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).unwrap();
         assert!(measure(&test, &reference).is_err(), "without variance");

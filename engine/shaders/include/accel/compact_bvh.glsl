@@ -1,4 +1,4 @@
-// Queries by points and by rays on compact sibling pairs; twin of clerestory::accel::compact_bvh, to the bit where divisions are exact.
+// Queries by points and by rays on compact sibling pairs; twin of clerestory::accel::photon_map::compact_bvh, to the bit where divisions are exact.
 //
 // The includer defines, before this file,
 //   uvec4 compact_quarter(uint index);                     halves of pairs: lower planes and left reference, upper planes and right one

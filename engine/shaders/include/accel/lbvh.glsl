@@ -7,7 +7,7 @@
 
 const uint LBVH_GROUP_SIZE = 64u;
 // Triangles whose boxes an invocation makes: the more, the fewer atomic operations.
-const uint LBVH_BOXES_EACH = 16u;
+const uint LBVH_BOXES_PER_INVOCATION = 16u;
 // Quarters of a node between the stages: boxes of both children, their words, two that are unused.
 const uint LBVH_NODE_QUARTERS = 4u;
 // Quarters of a primitive's box, of which two words are unused.

@@ -9,7 +9,7 @@ const uint LBVH_NO_LEVEL = 127u;
 const uint LBVH_LEVEL_BITS = 7u;
 
 // What a child tells its parent besides its box.
-struct LbvhMail {
+struct LbvhSummary {
     float cost;
     // Height, and above it the level on the side away from the parent.
     uint height_level;
@@ -30,9 +30,9 @@ struct LbvhSubtree {
 };
 
 layout(set = 0, binding = 0, scalar) restrict coherent buffer LbvhNodes { int lbvh_nodes[]; };
-layout(set = 0, binding = 1, scalar) restrict coherent buffer LbvhMails { LbvhMail lbvh_mails[]; };
+layout(set = 0, binding = 1, scalar) restrict coherent buffer LbvhSummaries { LbvhSummary lbvh_summaries[]; };
 // 1 for nodes that stay, 0 for those inside of leaves.
-layout(set = 0, binding = 2, scalar) restrict coherent buffer LbvhKept { uint lbvh_kept[]; };
+layout(set = 0, binding = 2, scalar) restrict coherent buffer LbvhRetained { uint lbvh_retained[]; };
 layout(set = 0, binding = 3, scalar) restrict buffer LbvhStateBlock { LbvhState lbvh_state; };
 // Nodes that wait for what is below another run: how many of each run, then the first of each run, the second of each run, and so on.
 layout(set = 0, binding = 4, scalar) restrict buffer LbvhPending { uint lbvh_pending[]; };
@@ -63,10 +63,10 @@ void lbvh_store_child(uint node, uint side, LbvhSubtree own, uint slot) {
     lbvh_nodes[4u * LBVH_NODE_QUARTERS * node + 12u + side] = int(own.height == 0u ? leaf : slot << LBVH_COUNT_BITS);
 }
 
-void lbvh_store_mail(uint node, uint side, LbvhSubtree own) {
+void lbvh_store_summary(uint node, uint side, LbvhSubtree own) {
     uint level = side == 0u ? own.left_level : own.right_level;
-    lbvh_mails[2u * node + side] =
-        LbvhMail(own.cost, own.height << LBVH_LEVEL_BITS | level, side == 0u ? own.first : own.last);
+    lbvh_summaries[2u * node + side] =
+        LbvhSummary(own.cost, own.height << LBVH_LEVEL_BITS | level, side == 0u ? own.first : own.last);
 }
 
 LbvhSubtree lbvh_load_child(uint node, uint side) {
@@ -74,12 +74,12 @@ LbvhSubtree lbvh_load_child(uint node, uint side) {
     LbvhSubtree child;
     child.box = LbvhBox(ivec3(lbvh_nodes[word], lbvh_nodes[word + 1u], lbvh_nodes[word + 2u]),
                         ivec3(lbvh_nodes[word + 3u], lbvh_nodes[word + 4u], lbvh_nodes[word + 5u]));
-    LbvhMail mail = lbvh_mails[2u * node + side];
-    child.cost = mail.cost;
-    child.height = mail.height_level >> LBVH_LEVEL_BITS;
-    child.left_level = child.right_level = mail.height_level & ((1u << LBVH_LEVEL_BITS) - 1u);
-    child.first = side == 0u ? mail.end : node + 1u;
-    child.last = side == 0u ? node : mail.end;
+    LbvhSummary summary = lbvh_summaries[2u * node + side];
+    child.cost = summary.cost;
+    child.height = summary.height_level >> LBVH_LEVEL_BITS;
+    child.left_level = child.right_level = summary.height_level & ((1u << LBVH_LEVEL_BITS) - 1u);
+    child.first = side == 0u ? summary.end : node + 1u;
+    child.last = side == 0u ? node : summary.end;
     return child;
 }
 
@@ -102,11 +102,11 @@ LbvhSubtree lbvh_join(LbvhSubtree left, LbvhSubtree right, uint node) {
     uint below = max(left.height, right.height);
     both.height = is_leaf ? 0u : below + 1u;
     both.cost = is_leaf ? leaf_cost : split_cost;
-    lbvh_kept[node] = is_leaf ? 0u : 1u;
+    lbvh_retained[node] = is_leaf ? 0u : 1u;
     // What a leaf holds does not stay.
     if (is_leaf && below > 0u) {
         for (uint inside = both.first; inside < both.last; ++inside) {
-            lbvh_kept[inside] = 0u;
+            lbvh_retained[inside] = 0u;
         }
     }
     if (is_root) {

@@ -30,7 +30,7 @@ const uint OUTSIDE = 0xFFFFFFFFu;
 const uint PATH_STATE_QUARTERS = 3u;
 const uint SHADOW_RAY_QUARTERS = 3u;
 // Places whose flags one texel holds.
-const uint FLAGS_A_TEXEL = 4u;
+const uint FLAGS_PER_TEXEL = 4u;
 // Places of the queue that one invocation of the compaction kernels handles.
 const uint COMPACT_CHUNK = 32u;
 // Invocations of a workgroup of every stage.

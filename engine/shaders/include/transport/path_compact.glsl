@@ -7,13 +7,13 @@
 
 // The texels of the flags of a chunk.
 uvec2 chunk_texels(uint chunk, uint count) {
-    uint first = chunk * (COMPACT_CHUNK / FLAGS_A_TEXEL);
-    return uvec2(first, min(first + COMPACT_CHUNK / FLAGS_A_TEXEL, (count + FLAGS_A_TEXEL - 1u) / FLAGS_A_TEXEL));
+    uint first = chunk * (COMPACT_CHUNK / FLAGS_PER_TEXEL);
+    return uvec2(first, min(first + COMPACT_CHUNK / FLAGS_PER_TEXEL, (count + FLAGS_PER_TEXEL - 1u) / FLAGS_PER_TEXEL));
 }
 
 // Flags of the four places of a texel; none past the end of the queue.
 uvec4 load_flags(uint texel, uint count) {
-    uvec4 places = FLAGS_A_TEXEL * texel + uvec4(0u, 1u, 2u, 3u);
+    uvec4 places = FLAGS_PER_TEXEL * texel + uvec4(0u, 1u, 2u, 3u);
     return mix(uvec4(0u), texelFetch(path_flags_in, int(texel)), lessThan(places, uvec4(count)));
 }
 

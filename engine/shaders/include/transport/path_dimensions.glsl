@@ -4,9 +4,9 @@
 
 const uint DIMENSION_PIXEL = 0u;
 const uint DIMENSION_LENS = 1u;
-// From here on each bounce has DIMENSIONS_A_BOUNCE slots.
+// From here on each bounce has DIMENSIONS_PER_BOUNCE slots.
 const uint DIMENSION_FIRST_BOUNCE = 2u;
-const uint DIMENSIONS_A_BOUNCE = 5u;
+const uint DIMENSIONS_PER_BOUNCE = 5u;
 const uint DIMENSION_DIRECTION = 0u;    // direction within a lobe
 const uint DIMENSION_LOBE = 1u;         // lobe; Russian roulette
 const uint DIMENSION_LIGHT = 2u;        // which light; which side of an alpha-blended surface
@@ -15,7 +15,7 @@ const uint DIMENSION_LIGHT_WITHIN = 4u; // direction within the texel
 
 // Ways through media have slots of their own, far behind those of all bounces.
 const uint DIMENSION_FIRST_MEDIUM = 1u << 24;
-const uint DIMENSIONS_A_WAY = 2u;
+const uint DIMENSIONS_PER_WAY = 2u;
 const uint DIMENSION_AIRLIGHT = 1u;  // which light, and where on the way; the first is for the free flight
 
 // A distance beyond every scene: coordinates are below 2^30 m.

@@ -12,7 +12,7 @@ Sampler path_sampler(uint slot, uint dimension) {
 
 // Two numbers of a bounce.
 vec2 bounce_sample(uint slot, uint bounce, uint dimension) {
-    Sampler s = path_sampler(slot, DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_A_BOUNCE + dimension);
+    Sampler s = path_sampler(slot, DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_PER_BOUNCE + dimension);
     return sample_2d(s);
 }
 

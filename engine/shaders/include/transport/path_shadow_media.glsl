@@ -102,7 +102,7 @@ void main() {
         }
     }
     uint place = texelFetch(path_shadow_queue_in, int(queue_place)).x;
-    uint rays = texelFetch(path_flags_in, int(place / FLAGS_A_TEXEL))[place % FLAGS_A_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
+    uint rays = texelFetch(path_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
     if (RESUMES) {
         rays = path_shadow_states[queue_place].rays;
     }

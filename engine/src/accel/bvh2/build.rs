@@ -6,10 +6,11 @@
 //! leaves below it.
 
 use super::layout::Layout;
-use super::{Aabb, Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, MAX_TRIANGLES};
+use super::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, leaf_word};
+use crate::Result;
+use crate::accel::input::{Met, bounds_of, check_count, check_range};
 use crate::accel::stages::Stopwatch;
-use crate::accel::{BuildStages, IndexStatistics, MAX_COORDINATE};
-use crate::{Error, Result};
+use crate::accel::{Aabb, BuildStages};
 use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -79,87 +80,6 @@ struct Range<'a> {
     levels_left: u32,
 }
 
-enum Usable {
-    Yes,
-    OutOfRange,
-    Degenerate,
-}
-
-fn classify(triangle: &[Vec3; 3]) -> Usable {
-    // NaN fails the comparison.
-    if !triangle
-        .iter()
-        .all(|v| v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
-    {
-        return Usable::OutOfRange;
-    }
-    let [a, b, c] = triangle.map(|v| v.as_dvec3());
-    if (b - a).cross(c - a) == glam::DVec3::ZERO {
-        return Usable::Degenerate;
-    }
-    Usable::Yes
-}
-
-/// Whether rays can meet a triangle: in range, and of an area in f64.
-pub(in crate::accel) fn can_be_met(triangle: &[Vec3; 3]) -> bool {
-    matches!(classify(triangle), Usable::Yes)
-}
-
-/// The triangles that rays can meet, in order.
-pub(in crate::accel) struct Met<'a> {
-    triangles: &'a [[Vec3; 3]],
-    /// Their indices; `None` when that is every one.
-    indices: Option<Vec<u32>>,
-    /// How many there are and how many were left out.
-    pub(in crate::accel) statistics: IndexStatistics,
-}
-
-impl<'a> Met<'a> {
-    pub(in crate::accel) fn among(triangles: &'a [[Vec3; 3]]) -> Self {
-        let count = |[range, degenerate]: [u64; 2], triangle| match classify(triangle) {
-            Usable::Yes => [range, degenerate],
-            Usable::OutOfRange => [range + 1, degenerate],
-            Usable::Degenerate => [range, degenerate + 1],
-        };
-        let [excluded_range, excluded_degenerate] = triangles
-            .par_iter()
-            .fold(|| [0; 2], count)
-            .reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-        let excluded = excluded_range + excluded_degenerate;
-        let met = |i: &u32| can_be_met(&triangles[*i as usize]);
-        Self {
-            triangles,
-            indices: (excluded > 0).then(|| (0..triangles.len() as u32).into_par_iter().filter(met).collect()),
-            statistics: IndexStatistics {
-                triangles: triangles.len() as u64 - excluded,
-                excluded_range,
-                excluded_degenerate,
-                ..IndexStatistics::default()
-            },
-        }
-    }
-
-    /// Index of the triangle at a place.
-    pub(in crate::accel) fn index(&self, place: u32) -> u32 {
-        self.indices.as_ref().map_or(place, |indices| indices[place as usize])
-    }
-
-    /// The triangle at a place, as the kernels read it.
-    pub(in crate::accel) fn triangle(&self, place: u32) -> Bvh2Triangle {
-        let index = self.index(place);
-        Bvh2Triangle::new(self.triangles[index as usize], index)
-    }
-
-    /// Something of each, given its corners and its index.
-    pub(in crate::accel) fn map<T: Send>(&self, of: impl Fn(&[Vec3; 3], u32) -> T + Sync) -> Vec<T> {
-        let at = |i: u32| of(&self.triangles[i as usize], i);
-        match &self.indices {
-            None => (0..self.triangles.len() as u32).into_par_iter().map(at).collect(),
-            Some(indices) => indices.par_iter().map(|i| at(*i)).collect(),
-        }
-    }
-}
-
 pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<Bvh2> {
     check_range("bvh2.leaf_size", settings.leaf_size, 1, MAX_LEAF_SIZE)?;
     check_range("bvh2.bins", settings.bins, 2, MAX_BINS as u32)?;
@@ -198,38 +118,6 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
     let layout = Layout::of(&flatten(&slots), references.len(), triangle);
     stages.layout = watch.lap();
     Ok(layout.finish("bvh2", met.statistics, stages, watch))
-}
-
-pub(in crate::accel) fn bounds_of(triangle: &[Vec3; 3]) -> Aabb {
-    triangle.iter().fold(Aabb::EMPTY, |bounds, v| bounds.with_point(*v))
-}
-
-/// Refuses more triangles than child words can address.
-pub(in crate::accel) fn check_count(triangles: usize) -> Result<()> {
-    if triangles <= MAX_TRIANGLES {
-        return Ok(());
-    }
-    Err(Error::LimitExceeded {
-        name: "bvh2 triangles".into(),
-        bytes: triangles as u64,
-        limit_name: "accel::bvh2::MAX_TRIANGLES",
-        limit: MAX_TRIANGLES as u64,
-    })
-}
-
-pub(in crate::accel) fn check_range(name: &str, value: u32, least: u32, most: u32) -> Result<()> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(Error::Setting {
-        name: name.into(),
-        value: value.to_string(),
-        cause: format!("is outside {least}..={most}"),
-    })
-}
-
-pub(in crate::accel) fn leaf_word(first: u32, count: u32) -> u32 {
-    first << COUNT_BITS | count
 }
 
 fn ceil_log2(n: usize) -> u32 {

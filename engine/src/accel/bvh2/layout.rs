@@ -3,10 +3,10 @@
 //! Guarantee: everything is filled and summed in parts that depend on the nodes alone, so bytes and statistics are the same whatever the
 //! number of threads.
 
-use super::build::{bounds_of, leaf_word};
-use super::{Aabb, Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, NODE_QUARTERS, TRIANGLE_QUARTERS};
+use super::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, NODE_QUARTERS, TRIANGLE_QUARTERS, leaf_word};
+use crate::accel::input::bounds_of;
 use crate::accel::stages::Stopwatch;
-use crate::accel::{BuildStages, IndexStatistics, NO_HIT};
+use crate::accel::{Aabb, BuildStages, IndexStatistics, NO_HIT};
 use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;

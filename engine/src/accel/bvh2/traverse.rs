@@ -6,9 +6,9 @@
 //! sibling that comes after the walk in the order, which rebuilds the stack, less what the hit so far has culled. Nothing is lost, and nothing
 //! is tested twice.
 
-use super::{Aabb, BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
+use super::{BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
-use crate::accel::{CandidateFilter, Hit, Ray, TraversalCounters};
+use crate::accel::{Aabb, CandidateFilter, Hit, Ray, TraversalCounters};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 

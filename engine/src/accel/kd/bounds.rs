@@ -1,6 +1,6 @@
 //! Axis-aligned boxes in f64, in which construction weighs and clips.
 
-use crate::accel::bvh2::Aabb;
+use crate::accel::Aabb;
 use glam::DVec3;
 
 /// A box.

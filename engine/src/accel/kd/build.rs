@@ -11,8 +11,8 @@ use super::bounds::Bounds;
 use super::clip::clipped_bounds;
 use super::probability::{Heuristic, InteriorOrigin};
 use super::{KdSettings, MAX_DEPTH};
-use crate::accel::bvh2::Aabb;
-use crate::accel::bvh2::build::bounds_of;
+use crate::accel::Aabb;
+use crate::accel::input::bounds_of;
 use glam::Vec3;
 use rayon::prelude::*;
 

@@ -4,7 +4,7 @@
 //! "Reentrant Polygon Clipping", CACM 17(1), 1974.
 
 use super::bounds::Bounds;
-use crate::accel::bvh2::Aabb;
+use crate::accel::Aabb;
 use glam::{DVec3, Vec3};
 
 /// A triangle has three corners and gains one at most with each of six planes.

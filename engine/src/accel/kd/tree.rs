@@ -7,8 +7,8 @@ use super::bounds::Bounds;
 use super::build::Built;
 use super::probability::Heuristic;
 use super::{KdTree, MAX_DEPTH};
-use crate::accel::IndexStatistics;
-use crate::accel::bvh2::{Aabb, Bvh2Triangle};
+use crate::accel::bvh2::Bvh2Triangle;
+use crate::accel::{Aabb, IndexStatistics};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -122,7 +122,7 @@ impl KdTree {
             if nodes.len().max(references.len()) as u64 >= MAX_INDEX {
                 return Err(Error::LimitExceeded {
                     name: "kd-tree".into(),
-                    bytes: nodes.len().max(references.len()) as u64,
+                    value: nodes.len().max(references.len()) as u64,
                     limit_name: "2^30 nodes and references",
                     limit: MAX_INDEX,
                 });

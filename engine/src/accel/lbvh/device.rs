@@ -1,24 +1,24 @@
 //! The linear hierarchy built by the device: bounds, codes, sort, tree, ranks and layout, each a pass of its own with its time.
 //!
-//! Sources: see [`radix`](super::radix) for the tree, [`RadixSort`] for the sort. The stages are `shaders/accel/lbvh_*.comp`.
+//! Sources: see [`radix_tree`](super::radix_tree) for the tree, [`RadixSort`] for the sort. The stages are `shaders/accel/lbvh_*.comp`.
 //!
 //! Guarantees: the same bytes as [`build`](super::build) of quality [`Fast`](super::BuildQuality::Fast), on every device that keeps
 //! subnormal numbers, and on all where no box has an area below the smallest normal one (boxes of 10⁻¹⁹ m); no invocation ever waits for
 //! another.
 
 use super::device_buffers::LbvhBuffers;
-use super::radix::next_skipped;
+use super::radix_tree::next_skipped;
 use super::ray_index::{LbvhSettings, check_moved, moved_corners};
-use crate::accel::bvh2::build::{Met, check_count};
 use crate::accel::bvh2::layout::Layout;
 use crate::accel::bvh2::{Bvh2, MAX_DEPTH, NODE_QUARTERS, TRIANGLE_QUARTERS};
+use crate::accel::input::{Met, check_count};
 use crate::accel::morton::MORTON_30_AXIS_BITS;
 use crate::accel::stages::Stopwatch;
 use crate::accel::{BuildStages, IndexStatistics, RayIndex};
 use crate::gpu::shaders::accel::{
     lbvh_boxes, lbvh_climb, lbvh_codes, lbvh_emit, lbvh_grid, lbvh_hierarchy, lbvh_refit, lbvh_refit_triangles,
 };
-use crate::gpu::shaders::constants::{LBVH_BOXES_EACH, LBVH_GROUP_SIZE};
+use crate::gpu::shaders::constants::{LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE};
 use crate::gpu::shaders::types::LbvhState;
 use crate::gpu::{Access, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings};
 use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, Scan, ScanBuffers, ScanOptions, SortBuffers};
@@ -154,7 +154,7 @@ impl LbvhBuilder {
                 lbvh_boxes: buffers.boxes.buffer().view(),
                 lbvh_state_block: buffers.state.view(),
             };
-            let groups = [count.div_ceil(LBVH_GROUP_SIZE * LBVH_BOXES_EACH), 1, 1];
+            let groups = [count.div_ceil(LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION), 1, 1];
             pass.dispatch(&self.boxes, &[&set], &lbvh_boxes::Push { count }, groups)?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             Ok(())
@@ -192,15 +192,15 @@ impl LbvhBuilder {
     /// Records the stages after the sort, without the lowest `skipped` bits of the codes.
     fn record_tree(&self, recorder: &mut Recorder, buffers: &LbvhBuffers, skipped: u32) -> Result<()> {
         let count = buffers.count;
-        let side = self.sort.side(count);
+        let side = self.sort.result_side(count);
         let runs = count.div_ceil(self.run);
         recorder.pass("lbvh: hierarchy", |pass| {
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
-            pass.fill(buffers.arrivals.view(), 0)?;
+            pass.fill(buffers.arrival_counters.view(), 0)?;
             let set = lbvh_hierarchy::Set0 {
                 lbvh_nodes: buffers.nodes.buffer().view(),
-                lbvh_mails: buffers.mails.view(),
-                lbvh_kept: buffers.kept.buffer().view(),
+                lbvh_summaries: buffers.summaries.view(),
+                lbvh_retained: buffers.retained.buffer().view(),
                 lbvh_state_block: buffers.state.view(),
                 lbvh_pending: buffers.pending.view(),
                 lbvh_boxes: &buffers.boxes,
@@ -220,11 +220,11 @@ impl LbvhBuilder {
         recorder.pass("lbvh: climb", |pass| {
             let set = lbvh_climb::Set0 {
                 lbvh_nodes: buffers.nodes.buffer().view(),
-                lbvh_mails: buffers.mails.view(),
-                lbvh_kept: buffers.kept.buffer().view(),
+                lbvh_summaries: buffers.summaries.view(),
+                lbvh_retained: buffers.retained.buffer().view(),
                 lbvh_state_block: buffers.state.view(),
                 lbvh_pending: buffers.pending.view(),
-                lbvh_arrivals: buffers.arrivals.view(),
+                lbvh_arrival_counters: buffers.arrival_counters.view(),
             };
             let push = lbvh_climb::Push {
                 count,
@@ -239,7 +239,7 @@ impl LbvhBuilder {
         })?;
         recorder.pass("lbvh: ranks", |pass| {
             let words = ScanBuffers {
-                input: buffers.kept.buffer().view(),
+                input: buffers.retained.buffer().view(),
                 heads: None,
                 output: buffers.ranks.buffer().view(),
             };
@@ -251,7 +251,7 @@ impl LbvhBuilder {
         recorder.pass("lbvh: emit", |pass| {
             let set = lbvh_emit::Set0 {
                 lbvh_nodes: &buffers.nodes,
-                lbvh_kept: &buffers.kept,
+                lbvh_retained: &buffers.retained,
                 lbvh_ranks: &buffers.ranks,
                 lbvh_order: &buffers.order[side],
                 lbvh_corners: buffers.corners.view(),
@@ -273,11 +273,11 @@ impl LbvhBuilder {
     /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
     pub fn record_refit(&self, recorder: &mut Recorder, buffers: &LbvhBuffers) -> Result<()> {
         let count = buffers.count;
-        let order = &buffers.order[self.sort.side(count)];
+        let order = &buffers.order[self.sort.result_side(count)];
         let words = buffers.quarters.buffer().view();
         recorder.pass("lbvh: refit triangles", |pass| {
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
-            pass.fill(buffers.arrivals.view(), 0)?;
+            pass.fill(buffers.arrival_counters.view(), 0)?;
             let set = lbvh_refit_triangles::Set0 {
                 lbvh_order: order.buffer().view(),
                 lbvh_corners: buffers.corners.view(),
@@ -297,7 +297,7 @@ impl LbvhBuilder {
         recorder.pass("lbvh: refit boxes", |pass| {
             let set = lbvh_refit::Set0 {
                 lbvh_words: words,
-                lbvh_arrivals: buffers.arrivals.view(),
+                lbvh_arrival_counters: buffers.arrival_counters.view(),
                 lbvh_state_block: buffers.state.view(),
             };
             pass.dispatch(

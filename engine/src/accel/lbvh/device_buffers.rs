@@ -25,10 +25,10 @@ pub struct LbvhBuffers {
     pub(super) order: [TexelView; 2],
     pub(super) sort_scratch: Buffer,
     pub(super) nodes: TexelView,
-    pub(super) mails: Buffer,
+    pub(super) summaries: Buffer,
     pub(super) pending: Buffer,
-    pub(super) arrivals: Buffer,
-    pub(super) kept: TexelView,
+    pub(super) arrival_counters: Buffer,
+    pub(super) retained: TexelView,
     pub(super) ranks: TexelView,
     pub(super) scan_scratch: Buffer,
 }
@@ -55,10 +55,10 @@ impl LbvhBuffers {
             ],
             sort_scratch: buffer("lbvh sort", sort.scratch_bytes(count))?,
             nodes: quarters("lbvh nodes", u64::from(LBVH_NODE_QUARTERS) * inner)?,
-            mails: buffer("lbvh mails", 24 * inner)?,
+            summaries: buffer("lbvh summaries", 24 * inner)?,
             pending: buffer("lbvh pending", 4 * runs * u64::from(1 + run))?,
-            arrivals: buffer("lbvh arrivals", 4 * inner)?,
-            kept: words("lbvh kept", inner)?,
+            arrival_counters: buffer("lbvh arrival counters", 4 * inner)?,
+            retained: words("lbvh retained", inner)?,
             ranks: words("lbvh ranks", inner)?,
             scan_scratch: buffer("lbvh scan", ranks.scratch_bytes(count))?,
         })
@@ -66,15 +66,15 @@ impl LbvhBuffers {
 
     /// Bytes of everything.
     pub fn bytes(&self) -> u64 {
-        let texels = [&self.quarters, &self.boxes, &self.nodes, &self.kept, &self.ranks];
+        let texels = [&self.quarters, &self.boxes, &self.nodes, &self.retained, &self.ranks];
         let buffers = [
             &self.corners,
             &self.indices,
             &self.state,
             &self.sort_scratch,
-            &self.mails,
+            &self.summaries,
             &self.pending,
-            &self.arrivals,
+            &self.arrival_counters,
             &self.scan_scratch,
         ];
         let texels = texels.into_iter().chain(&self.keys).chain(&self.order);

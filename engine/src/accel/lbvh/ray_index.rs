@@ -1,15 +1,15 @@
 //! The linear hierarchy as a ray index: over triangles, in the node layout that the path tracer traverses.
 
-use super::radix::{Codes, LeafRule, SortedCodes, Splits, hierarchy};
-use super::tree::{BoxTree, Child};
+use super::radix_tree::{Codes, LeafRule, SortedCodes, Splits, hierarchy};
 use crate::Result;
-use crate::accel::bvh2::build::{Met, bounds_of, can_be_met, check_count, check_range, leaf_word};
+use crate::accel::box_tree::{BoxTree, Child};
 use crate::accel::bvh2::layout::{Layout, fill_triangles};
-use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE};
+use crate::accel::bvh2::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, leaf_word};
+use crate::accel::input::{Met, bounds_of, can_be_met, check_count, check_range};
 use crate::accel::morton::{MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS};
 use crate::accel::optimise::{MAX_TREELET, Optimisation, optimise};
 use crate::accel::stages::Stopwatch;
-use crate::accel::{BuildStages, MAX_COORDINATE, RayIndex};
+use crate::accel::{Aabb, BuildStages, MAX_COORDINATE, RayIndex};
 use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;

@@ -1,9 +1,9 @@
-use super::radix::{LeafRule, SortedCodes, half_area, hierarchy, next_skipped};
-use super::tree::{BoxTree, Child, TreeShape};
+use super::radix_tree::{LeafRule, SortedCodes, half_area, hierarchy, next_skipped};
 use super::*;
-use crate::accel::bvh2::{Aabb, Bvh2, Bvh2Settings, MAX_DEPTH};
+use crate::accel::box_tree::{BoxTree, Child, TreeShape};
+use crate::accel::bvh2::{Bvh2, Bvh2Settings, MAX_DEPTH};
 use crate::accel::test_support::{Random, ray};
-use crate::accel::{Ray, RayIndex};
+use crate::accel::{Aabb, Ray, RayIndex};
 use glam::Vec3;
 
 /// Boxes around points, of random sizes up to `size`.
@@ -64,7 +64,7 @@ const RULES: [LeafRule; 5] = [
     LeafRule::Area(8),
 ];
 
-pub(super) fn valid(name: &str, tree: &BoxTree, boxes: &[Aabb]) -> TreeShape {
+pub(crate) fn valid(name: &str, tree: &BoxTree, boxes: &[Aabb]) -> TreeShape {
     tree.shape(boxes).unwrap_or_else(|fault| panic!("{name}: {fault:?}"))
 }
 
@@ -77,7 +77,7 @@ fn climbed(
     leaves: &[usize],
 ) -> (Vec<[u32; 2]>, u32, usize) {
     let end = boxes.len() - 1;
-    let mut arrivals = vec![None; end];
+    let mut waiting = vec![None; end];
     let mut words = vec![[0; 2]; end];
     let (mut height_of_all, mut root) = (0, 0);
     for &leaf in leaves {
@@ -92,7 +92,7 @@ fn climbed(
             let (parent, side) = if is_left { (last, 0) } else { (first - 1, 1) };
             words[parent][side] = word;
             let mine = (if is_left { first } else { last }, bounds, cost, height);
-            let Some((other, sibling, sibling_cost, sibling_height)) = arrivals[parent].replace(mine) else {
+            let Some((other, sibling, sibling_cost, sibling_height)) = waiting[parent].replace(mine) else {
                 break;
             };
             (first, last) = if is_left { (first, other) } else { (other, last) };

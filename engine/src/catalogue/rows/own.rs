@@ -191,7 +191,7 @@ pub(super) const ROWS: &[Row] = &[
             "Rousselle, Knaus and Zwicker 2011; Andersson et al. 2020",
             "engine/src/film/metrics.rs",
             &[
-                "engine/src/film/metrics.rs::formulas_on_numbers_done_by_hand",
+                "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
                 "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
             ],
         ),
@@ -378,7 +378,7 @@ pub(super) const ROWS: &[Row] = &[
             "CL-LBVH",
             "linear hierarchy as ray index, on the host and on the device, with refitting",
             "Apetrei 2014; Karras 2012",
-            "engine/src/accel/lbvh/radix.rs",
+            "engine/src/accel/lbvh/radix_tree.rs",
             &[
                 "engine/src/accel/lbvh/tests.rs::trees_are_valid_on_hard_boxes",
                 "engine/src/accel/lbvh/tests.rs::the_order_of_climbing_never_shows",

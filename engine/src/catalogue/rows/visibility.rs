@@ -39,7 +39,7 @@ const FREE_FLIGHT: &[&str] = &[
     "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
     "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
     "engine/src/transport/medium.rs::equi_angular_samples_follow_their_density",
-    "tests/tests/twins/media.rs::free_flight",
+    "tests/tests/twins/media.rs::free_flight_agrees_with_its_twin",
     "tests/tests/media/homogeneous.rs::single_scattering_is_the_airlight_integral",
     "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
     "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",

@@ -12,7 +12,7 @@ use crate::gpu::{Category, Gpu, TexelView};
 use crate::scene::{MajorantGrid, Medium, Phase, Scene};
 
 /// Blocks along the longest side of a grid, about, and the least number of cells along a side of one.
-const BLOCKS_A_SIDE: u32 = 32;
+const BLOCKS_PER_SIDE: u32 = 32;
 const BLOCK_MIN: u32 = 4;
 /// Tentative collisions on the way through a grid that emits, at least.
 const EMISSION_DEPTH: f64 = 4.0;
@@ -82,7 +82,7 @@ fn record(medium: &Medium, densities: &mut Vec<f32>, majorants: &mut Vec<f32>) -
     let to_cube = grid.to_world.inverse();
     let rows = DMat3::from_diagonal(cells) * to_cube.matrix3;
     let row = |i| rows.row(i).as_vec3().to_array();
-    let block = (grid.size.into_iter().max().unwrap_or(1) / BLOCKS_A_SIDE).max(BLOCK_MIN);
+    let block = (grid.size.into_iter().max().unwrap_or(1) / BLOCKS_PER_SIDE).max(BLOCK_MIN);
     let bounds = MajorantGrid::new(grid, block);
     if medium.emission != Vec3::ZERO {
         let diagonal = grid.to_world.transform_vector3(DVec3::ONE).length();

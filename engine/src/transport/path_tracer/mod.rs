@@ -36,7 +36,7 @@ use crate::{Error, Result};
 use glam::DVec3;
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
-const BOUNCES_A_SUBMISSION: usize = 12;
+const BOUNCES_PER_SUBMISSION: usize = 12;
 /// Device time that a submission may take where a driver watches: they end what runs for some seconds.
 const SUBMISSION_SECONDS: f64 = 0.25;
 /// Loop iterations that a ray may take in all before the tracer gives up, since no index of 2²⁸ triangles has as many: submissions in a row
@@ -347,13 +347,13 @@ impl PathTracer {
     fn bounces_for(&self, paths: u32) -> usize {
         // Software drivers end nothing, and there the passes are the same on every run.
         if self.gpu.caps().kind == DeviceKind::Cpu {
-            return BOUNCES_A_SUBMISSION;
+            return BOUNCES_PER_SUBMISSION;
         }
         let Some(seconds_a_ray) = self.seconds_a_ray else {
             return 1;
         };
         let bounces = SUBMISSION_SECONDS / (seconds_a_ray * f64::from(paths.max(1)));
-        (bounces as usize).clamp(1, BOUNCES_A_SUBMISSION)
+        (bounces as usize).clamp(1, BOUNCES_PER_SUBMISSION)
     }
 
     /// Adds the last wave to the film.

@@ -13,7 +13,7 @@ use crate::transport::GpuScene;
 use crate::transport::camera_frame::CameraFrame;
 
 /// Iterations after which a ray among surfaces with alpha goes on in a later dispatch, at most: a software driver's subgroup of 16 then
-/// stays below the 65,535 iterations after which it silently ends loops, even if its lanes take turns.
+/// stays below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP), even if its lanes take turns.
 const ALPHA_QUOTA_MAX: u32 = 2048;
 
 /// The same where shadow rays pass boundaries of media, up to eight in a dispatch, and with alpha besides, up to two.

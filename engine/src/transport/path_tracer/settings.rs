@@ -9,8 +9,8 @@ use crate::{Error, Result};
 /// Bounds of the roulette's settings, so that every path ends.
 const ROULETTE_CAP_MAX: f32 = 0.999;
 const ROULETTE_START_MAX: u32 = 4096;
-/// A traversal makes progress only with a quota above twice the depth of the deepest tree, and software drivers end loops in silence
-/// after 65,535 iterations.
+/// A traversal makes progress only with a quota above twice the depth of the deepest tree, and must stay below
+/// [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
 const RAY_QUOTAS: RangeInclusive<u32> = 128..=60_000;
 /// Most paths in flight.
 pub(super) const SLOTS_MAX: u32 = 1 << 22;

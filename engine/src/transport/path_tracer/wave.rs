@@ -16,9 +16,9 @@ use crate::gpu::shaders::types::{
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
 use crate::{Error, Result};
 
-/// Samples of a pixel in one wave: the resolve stage loops over them, and software drivers silently end a kernel's loops after 65,535
-/// iterations in all.
-const SAMPLES_A_WAVE: u32 = 1024;
+/// Samples of a pixel in one wave: the resolve stage loops over them, which must stay below
+/// [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
+const SAMPLES_PER_WAVE: u32 = 1024;
 /// Samples of a pixel that are best under way together, in neighbouring lanes.
 const SAMPLES_TOGETHER: u32 = 8;
 /// Slots below which a lack of memory is an error.
@@ -104,7 +104,7 @@ impl Cursor {
             let whole = if bands.len() == 1 { slots / band.pixels() } else { 0 };
             c.samples = whole
                 .max(c.sample.clamp(1, SAMPLES_TOGETHER))
-                .min(SAMPLES_A_WAVE)
+                .min(SAMPLES_PER_WAVE)
                 .min(samples - c.sample);
         }
         let pixels = (band.pixels() - c.pixel_in_band).min(slots / c.samples);
@@ -141,7 +141,7 @@ pub(super) fn slots_of_device(gpu: &Gpu) -> u32 {
 
 /// Slots that waves of a picture can fill, in whole workgroups.
 pub(super) fn slots_of_picture([width, height]: [u32; 2]) -> u32 {
-    let paths = u64::from(width) * u64::from(height) * u64::from(SAMPLES_A_WAVE);
+    let paths = u64::from(width) * u64::from(height) * u64::from(SAMPLES_PER_WAVE);
     paths.next_multiple_of(u64::from(PATH_GROUP)).min(u64::from(SLOTS_MAX)) as u32
 }
 

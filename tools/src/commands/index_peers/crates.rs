@@ -22,7 +22,7 @@ use obvhs::ray::{Ray as PeerRay, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-use super::{BASE, Contender, Met, in_parallel, timed};
+use super::{BASE, Contender, Met, built_in, in_parallel};
 
 /// Rays of both kinds as obvhs has them.
 pub type PeerRays = [Vec<PeerRay>; 2];
@@ -78,14 +78,14 @@ pub fn of_obvhs<'a>(triangles: &[Triangle], rays: &'a PeerRays, repeat: u32) -> 
         (["obvhs BVH2, fast", "obvhs CWBVH, fast"], BvhBuildParams::fast_build()),
         (["obvhs BVH2, medium", BASE], BvhBuildParams::medium_build()),
     ] {
-        let (tree, build) = timed(repeat, || Ok(build_bvh2(triangles, settings, &mut Duration::default())))?;
+        let (tree, build) = built_in(repeat, || Ok(build_bvh2(triangles, settings, &mut Duration::default())))?;
         contenders.push(Contender {
             name: names[0].into(),
             build,
             sah_cost: Some(cost_of_obvhs(&tree)),
             trace: by_bvh2(tree, triangles, rays),
         });
-        let (tree, build) = timed(repeat, || {
+        let (tree, build) = built_in(repeat, || {
             Ok(build_cwbvh(triangles, settings, &mut Duration::default()))
         })?;
         contenders.push(Contender {
@@ -163,7 +163,7 @@ pub fn of_bvh<'a>(
     repeat: u32,
 ) -> Result<Contender<'a>> {
     let mut shapes = shapes(triangles);
-    let (tree, build) = timed(repeat, || Ok(Bvh::build_with_executor(&mut shapes, rayon_executor)))?;
+    let (tree, build) = built_in(repeat, || Ok(Bvh::build_with_executor(&mut shapes, rayon_executor)))?;
     let tested: Vec<RtTriangle> = tested.iter().map(RtTriangle::from).collect();
     let boxed = |ray: &Ray| {
         let ([x, y, z], [u, v, w]) = (ray.origin, ray.direction);
@@ -276,7 +276,8 @@ mod tests {
 
     #[test]
     fn the_walk_over_nodes_equals_trying_all_triangles() {
-        let mut random = crate::commands::index_peers::tests::stream();
+        let mut stream = clerestory_tools::random::Random::new(7);
+        let mut random = || stream.unit() as f32;
         let triangles: Vec<[Vec3; 3]> = (0..200)
             .map(|_| {
                 let centre = Vec3::new(random(), random(), random());

@@ -10,10 +10,10 @@
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::mem::ManuallyDrop;
-use std::time::Instant;
 
 use clerestory::accel::Ray;
 use clerestory::{Error, Result};
+use clerestory_tools::timing::timed;
 use glam::Vec3;
 use libloading::Library;
 
@@ -239,16 +239,14 @@ impl Embree {
         let filled = self
             .fill(geometry, BUFFER_TYPE_VERTEX, FORMAT_FLOAT3, &corners)
             .and_then(|()| self.fill(geometry, BUFFER_TYPE_INDEX, FORMAT_UINT3, &indices));
-        let start = Instant::now();
         // SAFETY: scene and geometry live; the scene keeps its own reference to the geometry, so that ours is given back here.
-        unsafe {
+        let ((), seconds) = timed(|| unsafe {
             (self.functions.set_scene_flags)(scene, if robust { SCENE_FLAG_ROBUST } else { 0 });
             (self.functions.commit_geometry)(geometry);
             (self.functions.attach_geometry)(scene, geometry);
             (self.functions.release_geometry)(geometry);
             (self.functions.commit_scene)(scene);
-        }
-        let seconds = start.elapsed().as_secs_f64();
+        });
         filled?;
         self.check("build")?;
         Ok((tree, seconds))

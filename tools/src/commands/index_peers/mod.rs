@@ -16,7 +16,6 @@ pub use files::{markdown, write};
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::Instant;
 
 use clerestory::accel::bvh2::{BOX_SLACK, Bvh2};
 use clerestory::accel::{NO_HIT, Ray, RayIndex};
@@ -26,12 +25,12 @@ use clerestory::transport::warp::square_to_sphere;
 use clerestory::{Error, Result, scene};
 use clerestory_tools::geometry::{camera_rays, triangles};
 use clerestory_tools::machine;
+use clerestory_tools::timing::{Spread, repeated, timed};
 use glam::{DVec2, UVec3, Vec3};
 use rayon::prelude::*;
 
 use self::embree::Embree;
 use self::work::Work;
-use super::bench::Spread;
 use super::check_validation;
 use crate::failure::{Failure, Outcome};
 use crate::output;
@@ -226,16 +225,11 @@ pub fn run(gpu: Gpu, settings: &Settings<'_>) -> Outcome<ExitCode> {
 }
 
 /// What a build gives, and the seconds of those after one that warms up.
-fn timed<T>(repeat: u32, mut build: impl FnMut() -> Result<T>) -> Result<(T, Spread)> {
-    let mut built = build()?;
-    let mut seconds = Vec::new();
-    for _ in 0..repeat {
-        let start = Instant::now();
-        let next = build()?;
-        seconds.push(start.elapsed().as_secs_f64());
-        // Freed outside of the time.
-        built = next;
-    }
+fn built_in<T>(repeat: u32, mut build: impl FnMut() -> Result<T>) -> Result<(T, Spread)> {
+    let (built, seconds) = repeated(repeat as usize, || {
+        let (built, seconds) = timed(&mut build);
+        built.map(|built| (built, seconds))
+    })?;
     Ok((built, Spread::of(seconds)))
 }
 
@@ -354,15 +348,14 @@ fn in_parallel<R: Sync, S>(
     trace: impl Fn(&mut S, &R) -> Met + Sync,
 ) -> (f64, Vec<Met>) {
     let mut met = vec![Met::NOTHING; rays.len()];
-    let start = Instant::now();
-    met.par_chunks_mut(CHUNK)
-        .zip(rays.par_chunks(CHUNK))
-        .for_each_init(state, |state, (met, rays)| {
-            for (met, ray) in met.iter_mut().zip(rays) {
-                *met = trace(state, ray);
-            }
-        });
-    (start.elapsed().as_secs_f64(), met)
+    let chunks = met.par_chunks_mut(CHUNK).zip(rays.par_chunks(CHUNK));
+    let trace_all = |state: &mut S, (met, rays): (&mut [Met], &[R])| {
+        for (met, ray) in met.iter_mut().zip(rays) {
+            *met = trace(state, ray);
+        }
+    };
+    let ((), seconds) = timed(|| chunks.for_each_init(state, trace_all));
+    (seconds, met)
 }
 
 fn by_embree<'a>(
@@ -372,13 +365,7 @@ fn by_embree<'a>(
     robust: bool,
     repeat: u32,
 ) -> Result<Contender<'a>> {
-    let (mut tree, _) = embree.build(triangles, robust)?;
-    let mut seconds = Vec::new();
-    for _ in 0..repeat {
-        let (built, time) = embree.build(triangles, robust)?;
-        tree = built;
-        seconds.push(time);
-    }
+    let (tree, seconds) = repeated(repeat as usize, || embree.build(triangles, robust))?;
     let form = if robust { ", robust" } else { "" };
     Ok(Contender {
         name: format!("Embree {}{form}", embree.version()),
@@ -397,15 +384,6 @@ fn by_embree<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers of a fixed stream, uniform in [0, 1).
-    pub fn stream() -> impl FnMut() -> f32 {
-        let mut drawn = 0;
-        move || {
-            drawn += 1;
-            unit_float(pcg3d(UVec3::new(drawn, 0, 7)).x) as f32
-        }
-    }
 
     #[test]
     fn disagreements_are_told_apart() {

@@ -1,7 +1,5 @@
 //! Our indexes in the comparison: built on the processor, traced by the device's kernel with an invocation a ray.
 
-use std::time::Instant;
-
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::{Hit, Ray, RayIndex};
@@ -12,9 +10,10 @@ use clerestory::gpu::{
     Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, rw_compute_to_compute, transfer_to_compute,
 };
 use clerestory::{Error, Result};
+use clerestory_tools::timing::timed;
 use glam::Vec3;
 
-use super::{Contender, Met, Spread, timed};
+use super::{Contender, Met, Spread, built_in};
 
 /// Steps of a ray in one dispatch: few enough for software devices, which end long loops, and more than these rays need.
 const QUOTA: u32 = 50_000;
@@ -51,7 +50,7 @@ pub struct Built {
 /// Builds all of them.
 pub fn build_all(triangles: &[[Vec3; 3]], repeat: u32) -> Result<Vec<Built>> {
     let built = INDEXES.iter().map(|(name, build)| {
-        let (index, build) = timed(repeat, || build(triangles))?;
+        let (index, build) = built_in(repeat, || build(triangles))?;
         Ok(Built { name, index, build })
     });
     built.collect()
@@ -131,9 +130,8 @@ impl<'a> Kernel<'a> {
             pass.barrier(&[rw_compute_to_compute(&buffers.hits)]);
             Ok(())
         })?;
-        let start = Instant::now();
-        recorder.submit()?.wait()?;
-        let seconds = start.elapsed().as_secs_f64();
+        let (waited, seconds) = timed(|| recorder.submit()?.wait());
+        waited?;
         let status = self.gpu.read::<trace_closest::TraceStatus>(buffers.status.view(), 1)?;
         match status.first().map_or(0, |status| status.unfinished) {
             0 => Ok(seconds),

@@ -246,7 +246,8 @@ mod tests {
 
     #[test]
     fn steps_are_those_that_the_traversal_counts() {
-        let mut random = super::super::tests::stream();
+        let mut stream = clerestory_tools::random::Random::new(7);
+        let mut random = || stream.unit() as f32;
         let triangles: Vec<[Vec3; 3]> = (0..300)
             .map(|_| {
                 let centre = Vec3::new(random(), random(), random());

@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_left() {
+    fn times_left_round_up_and_drop_leading_units() {
         let shown = [0.2, 59.1, 185.0, 7385.0].map(time);
         assert_eq!(shown, ["1 s", "1:00", "3:05", "2:03:05"]);
     }

@@ -37,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_of_a_hundred() {
+    fn quantiles_are_of_sizes_and_not_a_number_is_the_worst() {
         let mut errors = Errors::default();
         assert_eq!(errors.worst(), 0.0);
         (0..=100).rev().for_each(|i| errors.add(-f64::from(i)));

@@ -1,39 +1,15 @@
-//! Measures: numbers that experiments take of functions and kernels, with the error of each before its speed.
+//! Measures: numbers that experiments take of functions and kernels, with the error of each before its speed; by topic, beside what they
+//! share: a clock, sizes of errors, pictures and numbers of twice the precision.
 
-mod absorption;
-mod alpha;
-mod automatic_choice;
-mod barriers;
 mod clock;
-mod compact_map;
-mod compact_rays;
-mod coupled_reflection;
-mod device_model;
-mod energy;
+mod device;
 mod errors;
-mod free_flight;
-mod inputs;
-mod leaf_sizes;
-mod map_construction;
-mod map_quality;
-mod merge_example;
-mod mitsuba;
-mod multiple_scattering;
-mod path_sets;
-mod persistent_threads;
-mod phase_functions;
-mod photon_kernels;
-mod photon_scenes;
-mod picture_formats;
+mod media;
+mod photon_maps;
 mod pictures;
-mod ray_offsets;
-mod sample_sums;
-mod scene_profile;
-mod shading_normals;
-mod sphere_tests;
-mod tangents;
-mod tree_quality;
-mod triangle_tests;
+mod rays;
+mod rendering;
+mod surfaces;
 mod wide;
 
 use std::path::Path;
@@ -82,35 +58,35 @@ const fn on_device(name: &'static str, run: fn(&Context<'_>) -> Result<Vec<Table
     }
 }
 
-/// All measures, each called as its experiment and, with underscores, its module.
+/// All measures, each called as its experiment and, with underscores, its module in the folder of its topic.
 pub const MEASURES: &[Measure] = &[
-    on_device("absorption", absorption::measure),
-    on_device("alpha", alpha::measure),
-    on_device("automatic-choice", automatic_choice::measure),
-    on_device("barriers", barriers::measure),
-    on_host("compact-map", compact_map::measure),
-    on_host("compact-rays", compact_rays::measure),
-    on_host("coupled-reflection", coupled_reflection::measure),
-    on_device("device-model", device_model::measure),
-    on_host("free-flight", free_flight::measure),
-    on_host("leaf-sizes", leaf_sizes::measure),
-    on_device("map-construction", map_construction::measure),
-    on_host("map-quality", map_quality::measure),
-    on_host("merge-example", merge_example::measure),
-    on_device("mitsuba", mitsuba::measure),
-    on_host("multiple-scattering", multiple_scattering::measure),
-    on_device("path-sets", path_sets::measure),
-    on_device("persistent-threads", persistent_threads::measure),
-    on_host("phase-functions", phase_functions::measure),
-    on_host("picture-formats", picture_formats::measure),
-    on_host("ray-offsets", ray_offsets::measure),
-    on_host("sample-sums", sample_sums::measure),
-    on_device("scene-profile", scene_profile::measure),
-    on_host("shading-normals", shading_normals::measure),
-    on_host("sphere-tests", sphere_tests::measure),
-    on_host("tangents", tangents::measure),
-    on_host("tree-quality", tree_quality::measure),
-    on_host("triangle-tests", triangle_tests::measure),
+    on_device("absorption", media::absorption::measure),
+    on_device("alpha", surfaces::alpha::measure),
+    on_device("automatic-choice", rendering::automatic_choice::measure),
+    on_device("barriers", device::barriers::measure),
+    on_host("compact-map", photon_maps::compact_map::measure),
+    on_host("compact-rays", photon_maps::compact_rays::measure),
+    on_host("coupled-reflection", surfaces::coupled_reflection::measure),
+    on_device("device-model", device::device_model::measure),
+    on_host("free-flight", media::free_flight::measure),
+    on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
+    on_device("map-construction", photon_maps::map_construction::measure),
+    on_host("map-quality", photon_maps::map_quality::measure),
+    on_host("merge-example", photon_maps::merge_example::measure),
+    on_device("mitsuba", rendering::mitsuba::measure),
+    on_host("multiple-scattering", surfaces::multiple_scattering::measure),
+    on_device("path-sets", rendering::path_sets::measure),
+    on_device("persistent-threads", rays::persistent_threads::measure),
+    on_host("phase-functions", media::phase_functions::measure),
+    on_host("picture-formats", rendering::picture_formats::measure),
+    on_host("ray-offsets", rays::ray_offsets::measure),
+    on_host("sample-sums", rendering::sample_sums::measure),
+    on_device("scene-profile", rendering::scene_profile::measure),
+    on_host("shading-normals", surfaces::shading_normals::measure),
+    on_host("sphere-tests", rays::sphere_tests::measure),
+    on_host("tangents", surfaces::tangents::measure),
+    on_host("tree-quality", rays::tree_quality::measure),
+    on_host("triangle-tests", rays::triangle_tests::measure),
 ];
 
 /// The measure of that name.
@@ -164,12 +140,14 @@ mod tests {
 
     #[test]
     fn experiment_measure_and_module_have_one_name() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/experiments/measures");
         for measure in MEASURES {
             let experiment = crate::experiments::find(measure.name).unwrap();
             assert_eq!(experiment.measure.as_deref(), Some(measure.name));
-            let module = format!("src/experiments/measures/{}.rs", measure.name.replace('-', "_"));
-            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(&module);
-            assert!(path.is_file(), "no {module}");
+            let module = format!("{}.rs", measure.name.replace('-', "_"));
+            let topics = std::fs::read_dir(&folder).unwrap();
+            let mut places = topics.map(|topic| topic.unwrap().path().join(&module));
+            assert!(places.any(|place| place.is_file()), "no {module}");
         }
         for name in crate::experiments::names() {
             if let Some(measure) = crate::experiments::find(name).unwrap().measure {

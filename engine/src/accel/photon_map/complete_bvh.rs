@@ -1,0 +1,302 @@
+//! A tree whose nodes hold their whole boxes, for queries by points and by rays: the baseline that compact nodes are measured against.
+//!
+//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.2 and §6.2.4: nodes of 32 bytes for point
+//! queries, sibling pairs of 56 bytes for rays. Slabs test: T. Kay and J. Kajiya, SIGGRAPH 1986.
+//!
+//! Guarantee: twins of the kernels' traversals with exact counters of what these read; every leaf whose box holds a point in its interior,
+//! or that a ray meets before its end, is visited, once.
+
+use crate::accel::Aabb;
+use crate::accel::box_tree::{BoxTree, Child};
+use crate::gpu::shaders::constants;
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Bits of a reference that hold an index.
+pub const INDEX_BITS: u32 = constants::COMPACT_INDEX_BITS;
+
+/// The bit of a reference that says that it names the first record of a leaf, not a pair.
+pub const LEAF_BIT: u32 = 1 << INDEX_BITS;
+
+/// Most entries of a traversal's stack: deeper trees are refused.
+pub const STACK_SIZE: usize = constants::COMPACT_STACK_SIZE as usize;
+
+/// Bytes of a complete node.
+pub const COMPLETE_NODE_BYTES: u64 = size_of::<CompleteNode>() as u64;
+
+/// Bytes of a stack entry of a point query: a node's index.
+pub const POINT_STACK_ENTRY_BYTES: u64 = 4;
+
+/// Bytes of a stack entry of a ray query: reference and entry distance.
+pub const RAY_STACK_ENTRY_BYTES: u64 = 8;
+
+/// A node as a point query reads it (32 bytes).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct CompleteNode {
+    /// Lower corner.
+    pub lower: Vec3,
+    /// First record of a leaf with [`LEAF_BIT`], or index of a pair of nodes.
+    pub reference: u32,
+    /// Upper corner.
+    pub upper: Vec3,
+    /// Fills the size.
+    pub padding: u32,
+}
+
+/// Two siblings as a ray query reads them (56 bytes).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RayPair {
+    /// Boxes of the left and the right child.
+    pub bounds: [Aabb; 2],
+    /// Their references, as in [`CompleteNode`].
+    pub references: [u32; 2],
+}
+
+/// Where queries begin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RootDescriptor {
+    /// Box of everything.
+    pub bounds: Aabb,
+    /// Reference of the root, which may be a leaf; `None` when there is nothing at all.
+    pub reference: Option<u32>,
+}
+
+/// Exact work of queries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct QueryCounters {
+    /// Nodes fetched, two a pair.
+    pub nodes: u64,
+    /// Leaves visited.
+    pub leaves: u64,
+    /// Stack entries written.
+    pub pushes: u64,
+    /// Bytes of the nodes fetched and the stack entries written.
+    pub bytes: u64,
+}
+
+/// Pairs of siblings in depth-first order, with their boxes; the other layouts are made of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompleteBvh {
+    /// Where queries begin.
+    pub root: RootDescriptor,
+    /// Sibling pairs, for ray queries.
+    pub pairs: Vec<RayPair>,
+    /// The same nodes for point queries, two a pair.
+    pub nodes: Vec<CompleteNode>,
+    /// Primitive of each record.
+    pub order: Vec<u32>,
+    /// Whether a record ends its leaf.
+    pub ends: Vec<bool>,
+}
+
+impl CompleteBvh {
+    /// Lays a tree out.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] past 2²⁸ primitives or for a tree deeper than a traversal's stack.
+    pub fn new(tree: &BoxTree) -> Result<Self> {
+        let limit = |what: &str, value: u64, limit_name, limit: u64| {
+            let error = || Error::LimitExceeded {
+                name: what.into(),
+                value,
+                limit_name,
+                limit,
+            };
+            if value > limit { Err(error()) } else { Ok(()) }
+        };
+        limit(
+            "records of a complete tree",
+            tree.order.len() as u64,
+            "INDEX_BITS",
+            1 << INDEX_BITS,
+        )?;
+        let mut places = vec![0; tree.nodes.len()];
+        let mut depth = 0;
+        for (place, (node, level)) in tree.preorder().enumerate() {
+            places[node as usize] = place as u32;
+            depth = depth.max(level);
+        }
+        limit(
+            "levels of a complete tree",
+            u64::from(depth),
+            "STACK_SIZE",
+            STACK_SIZE as u64 - 1,
+        )?;
+        let mut ends = vec![false; tree.order.len()];
+        let mut reference = |child| match child {
+            Child::Inner(node) => places[node as usize],
+            Child::Leaf { first, count } => {
+                ends[(first + count - 1) as usize] = true;
+                first | LEAF_BIT
+            }
+        };
+        let nodes = tree.preorder().map(|(node, _)| &tree.nodes[node as usize]);
+        let pairs: Vec<RayPair> = nodes
+            .map(|node| RayPair {
+                bounds: node.bounds.map(Aabb::without_negative_zero),
+                references: node.children.map(&mut reference),
+            })
+            .collect();
+        let root = RootDescriptor {
+            bounds: tree.bounds.without_negative_zero(),
+            reference: (!tree.order.is_empty()).then(|| reference(tree.root)),
+        };
+        let node = |bounds: Aabb, reference| CompleteNode {
+            lower: bounds.lower,
+            reference,
+            upper: bounds.upper,
+            padding: 0,
+        };
+        let of_pair = |pair: &RayPair| [0, 1].map(|i| node(pair.bounds[i], pair.references[i]));
+        Ok(Self {
+            root,
+            nodes: pairs.iter().flat_map(of_pair).collect(),
+            pairs,
+            order: tree.order.clone(),
+            ends,
+        })
+    }
+
+    /// Visits the leaves whose boxes hold a point in their interior: a stack of nodes, each fetched and tested when it is taken.
+    pub fn point_query(&self, point: Vec3, counters: &mut QueryCounters, mut visit: impl FnMut(u32)) {
+        let mut next = self.root.reference.filter(|_| holds_inside(&self.root.bounds, point));
+        let mut stack = [0; STACK_SIZE];
+        let mut top = 0;
+        while let Some(reference) = next {
+            if reference & LEAF_BIT != 0 {
+                counters.leaves += 1;
+                visit(reference ^ LEAF_BIT);
+            } else {
+                for node in [2 * reference, 2 * reference + 1] {
+                    stack[top] = node;
+                    top += 1;
+                }
+                counters.pushes += 2;
+                counters.bytes += 2 * POINT_STACK_ENTRY_BYTES;
+            }
+            next = None;
+            while next.is_none() && top > 0 {
+                top -= 1;
+                let node = &self.nodes[stack[top] as usize];
+                counters.nodes += 1;
+                counters.bytes += COMPLETE_NODE_BYTES;
+                let bounds = Aabb {
+                    lower: node.lower,
+                    upper: node.upper,
+                };
+                next = holds_inside(&bounds, point).then_some(node.reference);
+            }
+        }
+    }
+
+    /// Visits the leaves that a ray meets, nearer child first; `visit` gets a leaf's first record and may draw the ray's end nearer.
+    /// Stack entries are of 8 bytes.
+    pub fn ray_query(&self, ray: &SlabRay, counters: &mut QueryCounters, mut visit: impl FnMut(u32, &mut f32)) {
+        let mut t_max = ray.t_max;
+        let Some(root) = self.root.reference else {
+            return;
+        };
+        let span = ray.span(&self.root.bounds, [ray.t_min, t_max]);
+        let mut stack = [(0, 0.0); STACK_SIZE];
+        let mut top = 0;
+        let mut next = met(span).then_some(root);
+        while let Some(reference) = next {
+            next = None;
+            if reference & LEAF_BIT != 0 {
+                counters.leaves += 1;
+                visit(reference ^ LEAF_BIT, &mut t_max);
+            } else {
+                let pair = &self.pairs[reference as usize];
+                counters.nodes += 2;
+                counters.bytes += size_of::<RayPair>() as u64;
+                let spans = pair.bounds.map(|b| ray.span(&b, [ray.t_min, t_max]));
+                let near = usize::from(spans[1][0] < spans[0][0]);
+                for side in [1 - near, near] {
+                    if met(spans[side])
+                        && let Some(other) = next.replace(pair.references[side])
+                    {
+                        stack[top] = (other, spans[1 - side][0]);
+                        top += 1;
+                        counters.pushes += 1;
+                        counters.bytes += RAY_STACK_ENTRY_BYTES;
+                    }
+                }
+            }
+            while next.is_none() && top > 0 {
+                top -= 1;
+                let (reference, entry) = stack[top];
+                next = met([entry, t_max]).then_some(reference);
+            }
+        }
+    }
+}
+
+/// Whether a point lies in the interior of a box; on its faces kernels vanish.
+pub fn holds_inside(bounds: &Aabb, point: Vec3) -> bool {
+    bounds.lower.cmplt(point).all() && point.cmplt(bounds.upper).all()
+}
+
+/// Direction components below this are decided by the origin's place between the planes.
+pub const PARALLEL_COMPONENT: f32 = constants::COMPACT_PARALLEL_COMPONENT;
+
+/// What a span's end is widened by when it is compared, relative: rounding of both distances, so that flat boxes are met. On the host three
+/// units in the last place would do; devices may divide 2½ units less exactly.
+pub const SPAN_SLACK: f32 = constants::COMPACT_SPAN_SLACK;
+
+/// Beyond every plane; products with the largest reciprocal, 1 / [`PARALLEL_COMPONENT`], stay finite.
+pub const NO_PLANE: f32 = constants::COMPACT_NO_PLANE;
+
+/// A ray made ready for slabs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlabRay {
+    origin: Vec3,
+    inverse: Vec3,
+    parallel: [bool; 3],
+    t_min: f32,
+    t_max: f32,
+}
+
+impl SlabRay {
+    /// A ray from `origin`; distances beyond [`NO_PLANE`] are cut to it.
+    pub fn new(origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Self {
+        let parallel = direction.to_array().map(|d| d.abs() <= PARALLEL_COMPONENT);
+        Self {
+            origin,
+            inverse: Vec3::from_array([0, 1, 2].map(|i| if parallel[i] { 0.0 } else { 1.0 / direction[i] })),
+            parallel,
+            t_min,
+            t_max: t_max.min(NO_PLANE),
+        }
+    }
+
+    /// Least and greatest distance.
+    pub fn ends(&self) -> [f32; 2] {
+        [self.t_min, self.t_max]
+    }
+
+    /// Entry and exit distance of a box within a given span.
+    pub fn span(&self, bounds: &Aabb, [mut enter, mut leave]: [f32; 2]) -> [f32; 2] {
+        for axis in 0..3 {
+            let (lower, upper, origin) = (bounds.lower[axis], bounds.upper[axis], self.origin[axis]);
+            if self.parallel[axis] {
+                if !(lower <= origin && origin <= upper) {
+                    return [NO_PLANE, -NO_PLANE];
+                }
+                continue;
+            }
+            let t0 = (lower - origin) * self.inverse[axis];
+            let t1 = (upper - origin) * self.inverse[axis];
+            enter = enter.max(t0.min(t1));
+            leave = leave.min(t0.max(t1));
+        }
+        [enter, leave]
+    }
+}
+
+/// Whether a span is one.
+pub fn met([enter, leave]: [f32; 2]) -> bool {
+    enter <= leave + leave.abs() * SPAN_SLACK
+}

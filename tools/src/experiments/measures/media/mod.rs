@@ -1,0 +1,5 @@
+//! Participating media: absorption, free flight and phase functions.
+
+pub mod absorption;
+pub mod free_flight;
+pub mod phase_functions;

@@ -1,0 +1,12 @@
+//! Photon maps: construction of their trees, leaf sizes, and queries of every layout, beside the figures of their source.
+//!
+//! [`photon_scenes`] and [`photon_kernels`] make what is measured; the other modules are measures.
+
+pub mod compact_map;
+pub mod compact_rays;
+pub mod leaf_sizes;
+pub mod map_construction;
+pub mod map_quality;
+pub mod merge_example;
+pub mod photon_kernels;
+pub mod photon_scenes;

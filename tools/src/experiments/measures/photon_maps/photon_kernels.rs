@@ -1,0 +1,402 @@
+//! Stand-ins for photon maps: kernels about the second and third hits of photons that walk through a scene, and the surface points that
+//! cameras see.
+//!
+//! Source of what they stand for: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6. Photons
+//! leave a point evenly, surfaces but mirrors scatter them by the cosine with probability [`SURVIVAL`], and hits two and three are kept.
+//! Radii go by the fourth root of the photon's way, the source's dampening; their scale is set so that a point of the scene's surfaces
+//! lies in a given number of kernels on average. The source's kernels are ellipsoids that lie on the surface; [`Shape`] has them stretched as
+//! the footprint of a beam is by its incidence, and spheres of the same area beside them.
+//!
+//! Guarantee: deterministic.
+
+use clerestory::accel::Aabb;
+use clerestory::accel::box_tree::BoxTree;
+use clerestory::accel::lbvh::radix_tree::SortedCodes;
+use clerestory::accel::morton::MORTON_30_AXIS_BITS;
+use clerestory::accel::photon_map::compact_bvh::CompactBvh;
+use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};
+use clerestory::accel::photon_map::merge::merged_hierarchy;
+use clerestory::accel::photon_map::vvh::{Heuristic, sweep_tree};
+use clerestory::{Error, Result};
+use glam::{Vec3, Vec4};
+
+use super::photon_scenes::{CASES, Case, Surfaces};
+use crate::experiments::measures::Context;
+use crate::random::Random;
+
+/// Probability that a diffuse surface scatters a photon.
+const SURVIVAL: f64 = 0.7;
+/// Hits after which a photon ends.
+const HITS: u32 = 3;
+
+/// What kernels look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// Spheres.
+    Spheres,
+    /// Ellipsoids whose semi-axes on the surface are in the ratio of one to the cosine of incidence, at most [`MOST_STRETCHED`], and have the
+    /// product that the sphere's have; as thick as wide.
+    Ellipsoids,
+}
+
+impl Shape {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Spheres, Self::Ellipsoids];
+
+    /// For a table's cell.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Spheres => "spheres",
+            Self::Ellipsoids => "ellipsoids",
+        }
+    }
+}
+
+/// The shape that is nearest to the source's.
+pub const SOURCE_SHAPE: Shape = Shape::Ellipsoids;
+
+/// The source's bound on the ratio of a kernel's semi-axes.
+const MOST_STRETCHED: f64 = 20.0;
+
+/// An ellipsoid: the points whose way from the centre has products with the three vectors that lie in the unit ball.
+#[derive(Debug, Clone, Copy)]
+struct Ellipsoid {
+    centre: Vec3,
+    inverse: [Vec3; 3],
+}
+
+#[derive(Debug, Clone)]
+enum Records {
+    /// Centre and radius.
+    Spheres(Vec<Vec4>),
+    Ellipsoids(Vec<Ellipsoid>),
+}
+
+/// Kernels about hits of photons.
+pub struct Kernels {
+    records: Records,
+    /// Areas on the surface, m².
+    areas: Vec<f64>,
+    /// Ratios of semi-axes on the surface.
+    stretches: Vec<f64>,
+    /// Their boxes.
+    pub boxes: Vec<Aabb>,
+}
+
+/// Where a photon's kernel goes.
+#[derive(Debug, Clone, Copy)]
+struct Deposit {
+    point: Vec3,
+    normal: Vec3,
+    direction: Vec3,
+    /// Length of the photon's way, metres.
+    way: f32,
+}
+
+impl Deposit {
+    /// Semi-axes of an ellipsoid whose sphere has the radius: along the incidence, across, along the normal.
+    fn axes(&self, radius: f64) -> [Vec3; 3] {
+        let stretch = self.stretch();
+        let normal = self.normal.as_dvec3();
+        let along = self.direction.as_dvec3().reject_from(normal);
+        let along = along.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let across = normal.cross(along);
+        let (long, short) = (radius * stretch.sqrt(), radius / stretch.sqrt());
+        [long * along, short * across, short * normal].map(|axis| axis.as_vec3())
+    }
+
+    fn stretch(&self) -> f64 {
+        let cosine = f64::from(self.normal.dot(self.direction).abs());
+        (1.0 / cosine.max(1.0 / MOST_STRETCHED)).max(1.0)
+    }
+}
+
+impl Kernels {
+    /// The kernels of `photons` photons, of which `cover` lie about a surface point on average.
+    pub fn trace(surfaces: &Surfaces, light: Vec3, photons: u32, cover: f64, shape: Shape) -> Self {
+        let mut random = Random::new(12);
+        let mut hits = Vec::new();
+        for _ in 0..photons {
+            walk(surfaces, light, &mut random, &mut hits);
+        }
+        // Radius = scale · (way / 1 m)^(1/4).
+        let squares: f64 = hits.iter().map(|hit| f64::from(hit.way).sqrt()).sum();
+        let scale = (cover * surfaces.area / (std::f64::consts::PI * squares)).sqrt();
+        let radius = |hit: &Deposit| scale * f64::from(hit.way).powf(0.25);
+        let around = |centre: Vec3, extent: Vec3| Aabb {
+            lower: centre - extent,
+            upper: centre + extent,
+        };
+        let disc = |radius: f64| std::f64::consts::PI * radius.powi(2);
+        match shape {
+            Shape::Spheres => {
+                let spheres: Vec<Vec4> = hits.iter().map(|hit| hit.point.extend(radius(hit) as f32)).collect();
+                Self {
+                    boxes: spheres.iter().map(|s| around(s.truncate(), Vec3::splat(s.w))).collect(),
+                    areas: spheres.iter().map(|s| disc(f64::from(s.w))).collect(),
+                    stretches: vec![1.0; spheres.len()],
+                    records: Records::Spheres(spheres),
+                }
+            }
+            Shape::Ellipsoids => {
+                let axes: Vec<[Vec3; 3]> = hits.iter().map(|hit| hit.axes(radius(hit))).collect();
+                let extent = |axes: &[Vec3; 3]| axes.iter().map(|axis| axis * axis).sum::<Vec3>().map(f32::sqrt);
+                let record = |(hit, axes): (&Deposit, &[Vec3; 3])| Ellipsoid {
+                    centre: hit.point,
+                    inverse: axes.map(|axis| axis / axis.length_squared()),
+                };
+                let pairs = hits.iter().zip(&axes);
+                Self {
+                    boxes: pairs
+                        .clone()
+                        .map(|(hit, axes)| around(hit.point, extent(axes)))
+                        .collect(),
+                    areas: hits.iter().map(|hit| disc(radius(hit))).collect(),
+                    stretches: hits.iter().map(Deposit::stretch).collect(),
+                    records: Records::Ellipsoids(pairs.map(record).collect()),
+                }
+            }
+        }
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.boxes.len()
+    }
+
+    /// Their areas on the surface, m².
+    pub fn areas(&self) -> impl Iterator<Item = f64> + '_ {
+        self.areas.iter().copied()
+    }
+
+    /// Mean ratio of their semi-axes on the surface.
+    pub fn mean_stretch(&self) -> f64 {
+        self.stretches.iter().sum::<f64>() / self.stretches.len().max(1) as f64
+    }
+
+    /// The tree of the voxel volume heuristic.
+    pub fn by_volume(&self, leaf_size: u32) -> BoxTree {
+        sweep_tree(&self.boxes, leaf_size, Heuristic::Volume)
+    }
+
+    /// The linear hierarchy by merging.
+    pub fn linear(&self, leaf_size: u32) -> BoxTree {
+        let sorted = SortedCodes::of_boxes(&self.boxes, MORTON_30_AXIS_BITS);
+        merged_hierarchy(&self.boxes, &sorted, leaf_size, |_| {})
+    }
+}
+
+/// Follows one photon and keeps its second and third hits on diffuse surfaces with the length of its way.
+fn walk(surfaces: &Surfaces, light: Vec3, random: &mut Random, hits: &mut Vec<Deposit>) {
+    let (mut origin, mut direction) = (light, random.direction().as_vec3());
+    let mut way = 0.0;
+    for hit in 1..=HITS {
+        let Some(meeting) = surfaces.meet(origin, direction) else {
+            return;
+        };
+        way += meeting.distance;
+        if meeting.is_mirror {
+            direction = direction.reflect(meeting.normal);
+        } else {
+            if hit > 1 {
+                hits.push(Deposit {
+                    point: meeting.point,
+                    normal: meeting.normal,
+                    direction,
+                    way,
+                });
+            }
+            if random.unit() >= SURVIVAL {
+                return;
+            }
+            // Cosine about the normal: a point of the unit sphere that touches the surface.
+            let cosine = meeting.normal.as_dvec3() + random.direction();
+            direction = cosine.as_vec3().normalize_or(meeting.normal);
+        }
+        origin = meeting.point + surfaces.offset * meeting.normal;
+    }
+}
+
+/// Work of queries.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Of the tree.
+    pub tree: QueryCounters,
+    /// Kernels tested.
+    pub tests: u64,
+    /// Kernels that hold the point.
+    pub contributions: u64,
+}
+
+/// A photon map in both layouts, records in leaf order.
+pub struct Map {
+    /// Complete nodes.
+    pub complete: CompleteBvh,
+    /// Compact pairs.
+    pub compact: CompactBvh,
+    records: Records,
+}
+
+impl Map {
+    /// Lays a tree over kernels out.
+    pub fn new(kernels: &Kernels, tree: &BoxTree) -> Result<Self> {
+        let complete = CompleteBvh::new(tree)?;
+        let compact = CompactBvh::encode(&complete)
+            .map_err(|fault| Error::setting("tree", "compact", format!("is not tight: {fault:?}")))?;
+        let order = || complete.order.iter().map(|i| *i as usize);
+        let records = match &kernels.records {
+            Records::Spheres(all) => Records::Spheres(order().map(|i| all[i]).collect()),
+            Records::Ellipsoids(all) => Records::Ellipsoids(order().map(|i| all[i]).collect()),
+        };
+        Ok(Self {
+            records,
+            complete,
+            compact,
+        })
+    }
+
+    fn leaf(&self, point: Vec3, first: u32, work: &mut Work) {
+        match &self.records {
+            Records::Spheres(all) => self.test(all, first, work, |sphere| {
+                (sphere.truncate() - point).length_squared() < sphere.w * sphere.w
+            }),
+            Records::Ellipsoids(all) => self.test(all, first, work, |ellipsoid| {
+                let way = point - ellipsoid.centre;
+                let [a, b, c] = ellipsoid.inverse.map(|axis| axis.dot(way));
+                a * a + b * b + c * c < 1.0
+            }),
+        }
+    }
+
+    fn test<T>(&self, records: &[T], first: u32, work: &mut Work, holds: impl Fn(&T) -> bool) {
+        for (record, is_last) in records.iter().zip(&self.complete.ends).skip(first as usize) {
+            work.tests += 1;
+            work.contributions += u64::from(holds(record));
+            if *is_last {
+                break;
+            }
+        }
+    }
+
+    /// Gathers at a point by complete nodes.
+    pub fn gather_complete(&self, point: Vec3, work: &mut Work) {
+        let mut tree = work.tree;
+        self.complete
+            .point_query(point, &mut tree, |first| self.leaf(point, first, work));
+        work.tree = tree;
+    }
+
+    /// As [`Self::gather_complete`], without the kernels.
+    pub fn visit_complete(&self, point: Vec3, work: &mut Work) {
+        self.complete.point_query(point, &mut work.tree, |_| {});
+    }
+
+    /// As [`Self::gather_compact`], without the kernels.
+    pub fn visit_compact(&self, point: Vec3, work: &mut Work) {
+        self.compact.point_query(point, &mut work.tree, |_| {});
+    }
+
+    /// Gathers at a point by compact pairs.
+    pub fn gather_compact(&self, point: Vec3, work: &mut Work) {
+        let mut tree = work.tree;
+        self.compact
+            .point_query(point, &mut tree, |first| self.leaf(point, first, work));
+        work.tree = tree;
+    }
+}
+
+/// A case with its photons and what its camera sees.
+pub struct Prepared {
+    /// The case.
+    pub case: &'static Case,
+    /// Its scene.
+    pub surfaces: Surfaces,
+    /// Kernels of the photons.
+    pub kernels: Kernels,
+    /// Their shape.
+    pub shape: Shape,
+    /// Points that the camera sees.
+    pub points: Vec<Vec3>,
+    /// As many points anywhere on the surfaces, by area.
+    pub anywhere: Vec<Vec3>,
+}
+
+/// The cases that a measure takes, in each shape, each made when its turn comes, until the measure is stopped.
+pub fn prepared<'a>(context: &'a Context<'_>, shapes: &'a [Shape]) -> impl Iterator<Item = Result<Prepared>> + 'a {
+    // Photons sent out, and pixels on a side of the camera.
+    let (photons, side) = if context.smoke { (1 << 9, 8) } else { (1 << 17, 96) };
+    let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
+    let all = cases
+        .iter()
+        .flat_map(move |case| shapes.iter().map(move |shape| (case, *shape)));
+    let count = cases.len() * shapes.len();
+    let going_on = all.enumerate().take_while(|_| !context.watch.stopped());
+    going_on.map(move |(done, (case, shape))| {
+        context.watch.begin(case.name(), done, count);
+        let surfaces = Surfaces::load(case.scene)?;
+        let points = surfaces.seen(side)?;
+        Ok(Prepared {
+            case,
+            shape,
+            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover, shape),
+            anywhere: surfaces.anywhere(points.len()),
+            points,
+            surfaces,
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_lie_in_as_many_kernels_as_asked_for() {
+        let case = &CASES[0];
+        let surfaces = Surfaces::load(case.scene).unwrap();
+        let seen = surfaces.seen(16).unwrap();
+        assert_eq!(seen.len(), 256);
+        for shape in Shape::ALL {
+            let kernels = Kernels::trace(&surfaces, case.light, 2000, 50.0, shape);
+            let cover = kernels.areas().sum::<f64>() / surfaces.area;
+            // Radii of spheres are rounded to f32.
+            assert!((cover / 50.0 - 1.0).abs() < 1e-6, "{cover}");
+            assert!(kernels.len() > 0 && kernels.len() <= 2 * 2000);
+            assert_eq!(kernels.mean_stretch() > 1.0, shape == Shape::Ellipsoids);
+            let map = Map::new(&kernels, &kernels.linear(8)).unwrap();
+            let one_leaf = Map::new(&kernels, &kernels.linear(u32::MAX)).unwrap();
+            let (mut complete, mut compact, mut brute) = (Work::default(), Work::default(), Work::default());
+            for point in &seen {
+                map.gather_complete(*point, &mut complete);
+                map.gather_compact(*point, &mut compact);
+                one_leaf.leaf(*point, 0, &mut brute);
+            }
+            assert_eq!(brute.tests, (seen.len() * kernels.len()) as u64);
+            let found = [complete, compact, brute].map(|work| work.contributions);
+            assert_eq!(found, [found[0]; 3]);
+            assert_eq!(complete.tests, compact.tests);
+            assert!(found[0] > 0 && compact.tree.bytes < complete.tree.bytes);
+        }
+    }
+
+    #[test]
+    fn ellipsoids_reach_their_boxes_and_have_the_area_of_their_discs() {
+        let deposit = Deposit {
+            point: Vec3::new(1.0, 2.0, 3.0),
+            normal: Vec3::new(0.6, 0.0, 0.8),
+            direction: Vec3::new(0.3, -0.5, -0.8).normalize(),
+            way: 2.0,
+        };
+        let axes = deposit.axes(0.5);
+        let lengths = axes.map(|axis| axis.length());
+        // f32 axes: a few roundings.
+        assert!((lengths[0] * lengths[1] - 0.25).abs() < 1e-6 && lengths[1] == lengths[2]);
+        assert!((f64::from(lengths[0] / lengths[1]) / deposit.stretch() - 1.0).abs() < 1e-5);
+        assert!(axes[0].dot(axes[1]).abs() < 1e-6 && axes[0].dot(deposit.normal).abs() < 1e-6);
+        let grazing = Deposit {
+            direction: Vec3::new(0.8, 0.0, -0.6),
+            ..deposit
+        };
+        assert_eq!(grazing.stretch(), MOST_STRETCHED);
+    }
+}

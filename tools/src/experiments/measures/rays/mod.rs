@@ -1,0 +1,7 @@
+//! Rays: tests against primitives, origins, trees and models of execution.
+
+pub mod persistent_threads;
+pub mod ray_offsets;
+pub mod sphere_tests;
+pub mod tree_quality;
+pub mod triangle_tests;

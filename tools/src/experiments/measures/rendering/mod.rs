@@ -1,0 +1,8 @@
+//! Whole pictures: whether they are what was asked for, what they cost, their sums and files, and agreement with Mitsuba 3.
+
+pub mod automatic_choice;
+pub mod mitsuba;
+pub mod path_sets;
+pub mod picture_formats;
+pub mod sample_sums;
+pub mod scene_profile;

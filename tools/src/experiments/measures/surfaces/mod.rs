@@ -1,0 +1,10 @@
+//! Surfaces: scattering functions and their energy, shading normals, tangents and alpha.
+//!
+//! [`energy`] has what the measures of energy share.
+
+pub mod alpha;
+pub mod coupled_reflection;
+pub mod energy;
+pub mod multiple_scattering;
+pub mod shading_normals;
+pub mod tangents;
