@@ -17,6 +17,8 @@
 //!   vertex from the ray's origin and |d| the largest component of the direction (derivation at [`BOX_SLACK`](crate::accel::bvh2::BOX_SLACK)).
 //! - Two-sided. A triangle of which two vertices coincide, or that is seen exactly edge-on, is missed. NaN anywhere is a miss.
 
+pub mod wald;
+
 use super::Ray;
 use crate::gpu::shaders::constants;
 use glam::{DVec3, Vec3};

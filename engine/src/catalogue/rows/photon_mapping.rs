@@ -127,6 +127,16 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory report triangle-tests",
+        part(
+            "PM-I-3",
+            "projected triangle test, made ready beforehand (measured, not in the kernels)",
+            "Wald 2004, 7.1",
+            "engine/src/accel/triangle/wald.rs",
+            &["engine/src/accel/triangle/wald.rs::hits_differ_from_the_oracle_only_near_edges"],
+        ),
+    ),
+    measured(
         "clerestory report free-flight",
         unbiased(part(
             "PM-VOL-1",
