@@ -2,15 +2,22 @@
 //! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included.
 
 use clerestory::accel::IndexKind;
+use std::sync::Arc;
+
 use clerestory::accel::bvh2::Bvh2Settings;
+use clerestory::accel::kd::KdSettings;
 use clerestory::film::picture::{NORMAL, VARIANCE};
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Rendered, Renderer};
-use clerestory::scene::{Instance, Scene};
+use clerestory::scene::{AlphaMode, Instance, Scene};
+use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
-use clerestory_tests::render::builtin;
+use clerestory_tests::render::{builtin, finish};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
+
+/// Iterations at which rays of a city stop.
+const SMALL_QUOTA: u32 = 128;
 
 fn render(gpu: &Gpu, scene: &Scene, index: &IndexKind) -> Result<Rendered> {
     let mut rendering = Renderer::with_index(gpu, scene, index)?.start(&RenderOptions {
@@ -79,6 +86,48 @@ fn pictures_are_the_same_to_the_bit_with_every_index() {
                 assert!(
                     !["lbvh", "lbvh-device", "kd"].contains(&name) || *sah_cost != index.statistics.sah_cost,
                     "{what}: {name} is the same tree"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn alpha_media_and_quotas_leave_pictures_of_kd_trees_the_same() {
+    with_gpu(|gpu| {
+        let of = |scene: &Scene, index: &IndexKind, ray_quota| {
+            let settings = PathTracerSettings {
+                ray_quota,
+                ..PathTracerSettings::default()
+            };
+            let scene_there = Arc::new(GpuScene::with_index(gpu, scene, index).unwrap());
+            let mut tracer = PathTracer::new(gpu, scene_there, &scene.cameras[0], [24, 16], settings).unwrap();
+            finish(&mut tracer, 2)
+        };
+        let thin = |address: &str| {
+            let mut scene = builtin(address);
+            for material in scene.materials.iter_mut().filter(|material| !material.boundary) {
+                material.base_color.w = 0.5;
+                material.alpha_mode = AlphaMode::Blend;
+            }
+            scene
+        };
+        let kd = IndexKind::Kd(KdSettings::default());
+        for (what, scene) in [
+            ("city", builtin("builtin:box-city?n=60")),
+            ("thin city", thin("builtin:box-city?n=60")),
+            ("smoke", builtin("builtin:smoke")),
+            ("smoke between thin walls", thin("builtin:smoke")),
+        ] {
+            let truth = of(&scene, &IndexKind::default(), 32_768);
+            assert!(truth.mean()[0].0 > 0.0, "{what}: dark");
+            for ray_quota in [32_768, SMALL_QUOTA] {
+                let picture = of(&scene, &kd, ray_quota);
+                assert_eq!(picture.bits(), truth.bits(), "{what}, quota {ray_quota}");
+                let stalls = picture.counters.stalls;
+                assert!(
+                    what.contains("smoke") || (stalls > 0) == (ray_quota == SMALL_QUOTA),
+                    "{what}, quota {ray_quota}: {stalls} stalls"
                 );
             }
         }
