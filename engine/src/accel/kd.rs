@@ -14,6 +14,7 @@ mod build;
 mod clip;
 mod counters;
 pub mod probability;
+pub mod shifted_restart;
 mod traverse;
 mod tree;
 
@@ -227,5 +228,7 @@ impl RayIndex for KdTree {
     }
 }
 
+#[cfg(test)]
+mod shifted_restart_tests;
 #[cfg(test)]
 mod tests;

@@ -198,6 +198,19 @@ impl KdTraversal {
         filter: CandidateFilter<'_>,
         counters: &mut KdCounters,
     ) {
+        self.run_watched(tree, ray, quota, filter, counters, &mut |_| {});
+    }
+
+    /// As [`Self::run`]; `watch` sees the node of each leaf, in order.
+    pub fn run_watched(
+        &mut self,
+        tree: &KdTree,
+        ray: &Ray,
+        quota: u64,
+        filter: CandidateFilter<'_>,
+        counters: &mut KdCounters,
+        watch: &mut dyn FnMut(u32),
+    ) {
         if self.resume == FINISHED {
             return;
         }
@@ -232,6 +245,7 @@ impl KdTraversal {
             let nodes = counters.nodes;
             if let Some(references) = walk.descend(self.hit.t, counters) {
                 counters.leaves += 1;
+                watch(walk.at.node);
                 for place in references {
                     iterations += 1;
                     counters.triangles += 1;
