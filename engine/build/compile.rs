@@ -42,7 +42,7 @@ pub struct Compiler {
 
 /// One compiled entry file.
 pub struct Shader {
-    /// Path below the folder of shaders, with forward slashes: `accel/trace_closest.comp`.
+    /// Path below the folder of shaders, with forward slashes: `accel/trace_rays.comp`.
     pub name: String,
     /// First comment block of the file, one string a line.
     pub head: Vec<String>,

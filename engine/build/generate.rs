@@ -91,7 +91,7 @@ fn write_folder(folder: &Folder, text: &mut String) {
     }
 }
 
-/// `trace_closest.comp` → `trace_closest`; graphics stages keep their stage as a suffix.
+/// `trace_rays.comp` → `trace_rays`; graphics stages keep their stage as a suffix.
 fn module_name(file: &str) -> String {
     let (stem, stage) = file.rsplit_once('.').unwrap_or((file, ""));
     if stage == "comp" {

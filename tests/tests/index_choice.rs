@@ -1,16 +1,23 @@
 //! A picture does not depend on the ray index: every index reports the hit of least distance, of equal ones the triangle of least index,
 //! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included.
 
+use clerestory::accel::IndexKind;
+use std::sync::Arc;
+
 use clerestory::accel::bvh2::Bvh2Settings;
-use clerestory::accel::{IndexKind, RayIndex};
+use clerestory::accel::kd::KdSettings;
 use clerestory::film::picture::{NORMAL, VARIANCE};
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Rendered, Renderer};
-use clerestory::scene::{Instance, Scene};
+use clerestory::scene::{AlphaMode, Instance, Scene};
+use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
-use clerestory_tests::render::builtin;
+use clerestory_tests::render::{builtin, finish};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
+
+/// Iterations at which rays of a city stop.
+const SMALL_QUOTA: u32 = 128;
 
 fn render(gpu: &Gpu, scene: &Scene, index: &IndexKind) -> Result<Rendered> {
     let mut rendering = Renderer::with_index(gpu, scene, index)?.start(&RenderOptions {
@@ -77,8 +84,50 @@ fn pictures_are_the_same_to_the_bit_with_every_index() {
                 assert!(*truth == bits, "{what}: the picture differs with {name}");
                 // Of few triangles the optimised tree is the binned one.
                 assert!(
-                    !["lbvh", "lbvh-device"].contains(&name) || *sah_cost != index.statistics.sah_cost,
+                    !["lbvh", "lbvh-device", "kd"].contains(&name) || *sah_cost != index.statistics.sah_cost,
                     "{what}: {name} is the same tree"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn alpha_media_and_quotas_leave_pictures_of_kd_trees_the_same() {
+    with_gpu(|gpu| {
+        let of = |scene: &Scene, index: &IndexKind, ray_quota| {
+            let settings = PathTracerSettings {
+                ray_quota,
+                ..PathTracerSettings::default()
+            };
+            let scene_there = Arc::new(GpuScene::with_index(gpu, scene, index).unwrap());
+            let mut tracer = PathTracer::new(gpu, scene_there, &scene.cameras[0], [24, 16], settings).unwrap();
+            finish(&mut tracer, 2)
+        };
+        let thin = |address: &str| {
+            let mut scene = builtin(address);
+            for material in scene.materials.iter_mut().filter(|material| !material.boundary) {
+                material.base_color.w = 0.5;
+                material.alpha_mode = AlphaMode::Blend;
+            }
+            scene
+        };
+        let kd = IndexKind::Kd(KdSettings::default());
+        for (what, scene) in [
+            ("city", builtin("builtin:box-city?n=60")),
+            ("thin city", thin("builtin:box-city?n=60")),
+            ("smoke", builtin("builtin:smoke")),
+            ("smoke between thin walls", thin("builtin:smoke")),
+        ] {
+            let truth = of(&scene, &IndexKind::default(), 32_768);
+            assert!(truth.mean()[0].0 > 0.0, "{what}: dark");
+            for ray_quota in [32_768, SMALL_QUOTA] {
+                let picture = of(&scene, &kd, ray_quota);
+                assert_eq!(picture.bits(), truth.bits(), "{what}, quota {ray_quota}");
+                let stalls = picture.counters.stalls;
+                assert!(
+                    what.contains("smoke") || (stalls > 0) == (ray_quota == SMALL_QUOTA),
+                    "{what}, quota {ray_quota}: {stalls} stalls"
                 );
             }
         }
@@ -91,10 +140,11 @@ fn what_the_device_cannot_build_the_host_does_and_says_so() {
         let kind: IndexKind = "lbvh-device".parse().unwrap();
         let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let two = [triangle, triangle.map(|v| v + Vec3::Z)];
-        let (_, report) = kind.build_for(gpu, &two).unwrap();
+        let report = kind.build_for(gpu, &two).unwrap().report;
         assert_eq!((report.kind, report.host_because), ("lbvh-device", None));
         for few in [&two[..0], &two[..1], &[[Vec3::NAN; 3], triangle]] {
-            let (quarters, report) = kind.build_for(gpu, few).unwrap();
+            let built = kind.build_for(gpu, few).unwrap();
+            let report = built.report;
             let host = kind.build(few).unwrap();
             assert!(
                 report
@@ -102,7 +152,7 @@ fn what_the_device_cannot_build_the_host_does_and_says_so() {
                     .is_some_and(|cause| cause.contains("fewer than two"))
             );
             assert_eq!(report.statistics, host.statistics());
-            let there: Vec<[u32; 4]> = gpu.read(quarters.buffer().view(), host.texels().len()).unwrap();
+            let there: Vec<[u32; 4]> = gpu.read(built.texels.buffer().view(), host.texels().len()).unwrap();
             assert!(there == host.texels());
         }
     });

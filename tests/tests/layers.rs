@@ -2,8 +2,8 @@
 
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::accel::trace_closest;
-use clerestory::gpu::shaders::sets::Bvh2Set;
+use clerestory::gpu::shaders::accel::trace_rays;
+use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{Access, BufferDesc, Category, Gpu, GpuOptions, TexelView, Validation, ValidationMessage};
 use clerestory_tests::shaders::out_of_bounds;
 use clerestory_tests::{assert_no_messages, gpu_with};
@@ -145,9 +145,7 @@ fn the_recorder_remembers_earlier_reads_when_a_command_reads_and_writes() {
 #[cfg(debug_assertions)]
 fn the_recorder_catches_a_dispatch_that_reads_by_texels_what_it_writes() {
     let gpu = validated(Validation::Core);
-    let pipeline = gpu
-        .compute_pipeline::<trace_closest::Kernel>(&Default::default())
-        .unwrap();
+    let pipeline = gpu.compute_pipeline::<trace_rays::Kernel>(&Default::default()).unwrap();
     let texels = |name| {
         gpu.storage_texels(name, Category::Work, vk::Format::R32G32B32A32_UINT, 64)
             .unwrap()
@@ -156,13 +154,13 @@ fn the_recorder_catches_a_dispatch_that_reads_by_texels_what_it_writes() {
     let buffer = |name| gpu.buffer(&BufferDesc::storage(name, 1024, Category::Work)).unwrap();
     let (rays, resume, status) = (buffer("rays"), buffer("resume"), buffer("status"));
     let record = |hits: &TexelView| {
-        let set = trace_closest::Set0 {
+        let set = trace_rays::Set0 {
             trace_rays: rays.view(),
             trace_hits: hits.buffer().view(),
             trace_resume: resume.view(),
             trace_status: status.view(),
         };
-        let bvh = Bvh2Set { bvh2_quarters: &one };
+        let bvh = IndexSet { index_texels: &one };
         let mut recorder = gpu.recorder("texels")?;
         // No group runs: it is about the bindings.
         recorder.pass("trace", |pass| {
@@ -172,9 +170,9 @@ fn the_recorder_catches_a_dispatch_that_reads_by_texels_what_it_writes() {
     record(&other).unwrap();
     match record(&one) {
         Err(Error::Shader { name, message }) => {
-            assert_eq!(name, "accel/trace_closest.comp");
+            assert_eq!(name, "accel/trace_rays.comp");
             assert!(
-                message.contains("bvh2_quarters") && message.contains("hits"),
+                message.contains("index_texels") && message.contains("hits"),
                 "{message}"
             );
         }

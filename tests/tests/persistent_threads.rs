@@ -10,8 +10,8 @@ use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
 use clerestory::accel::trace::{Execution, PersistentThreads, RayTracer, TraceSettings, Traced};
 use clerestory::accel::{Hit, Ray, TraversalCounters, lbvh};
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::accel::trace_closest_queue;
-use clerestory::gpu::shaders::sets::Bvh2Set;
+use clerestory::gpu::shaders::accel::trace_queue;
+use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{Category, DeviceKind, Gpu, SOFTWARE_LOOP_CAP};
 use clerestory_hard_cases::misses;
 use clerestory_tests::random::Random;
@@ -136,14 +136,15 @@ fn both_models_trace_every_ray_once_and_find_what_the_twin_finds() {
 
 /// The kernel alone, in one dispatch of one workgroup that is to empty the queue, without any quota: rays that are not done at the end.
 fn left_by_an_unbounded_queue(gpu: &Gpu, bvh: &Bvh2, rays: &[Ray]) -> usize {
-    let spec = trace_closest_queue::Spec {
+    let spec = trace_queue::Spec {
         local_size_x: gpu.caps().subgroup_size,
         trace_fetches: 0,
         trace_batch: gpu.caps().subgroup_size,
-        bvh2_quota: u32::MAX,
-        bvh2_count: false,
+        index_quota: u32::MAX,
+        index_count: false,
+        ..Default::default()
     };
-    let pipeline = gpu.compute_pipeline::<trace_closest_queue::Kernel>(&spec).unwrap();
+    let pipeline = gpu.compute_pipeline::<trace_queue::Kernel>(&spec).unwrap();
     let quarters = gpu
         .texels_with("index", Category::Index, vk::Format::R32G32B32A32_UINT, bvh.texels())
         .unwrap();
@@ -154,17 +155,17 @@ fn left_by_an_unbounded_queue(gpu: &Gpu, bvh: &Bvh2, rays: &[Ray]) -> usize {
     let mut recorder = gpu.recorder("unbounded").unwrap();
     recorder
         .pass("unbounded", |pass| {
-            let set = trace_closest_queue::Set0 {
+            let set = trace_queue::Set0 {
                 trace_rays: ray_buffer.view(),
                 trace_hits: hits.view(),
                 trace_resume: resume.view(),
                 trace_status: status.view(),
                 trace_queue: queue.view(),
             };
-            let index = Bvh2Set {
-                bvh2_quarters: &quarters,
+            let index = IndexSet {
+                index_texels: &quarters,
             };
-            let push = trace_closest_queue::Push {
+            let push = trace_queue::Push {
                 first_ray: 0,
                 ray_count: rays.len() as u32,
             };

@@ -6,8 +6,8 @@
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
 use clerestory::accel::trace::wide_counter;
 use clerestory::accel::{Hit, Ray, RayIndex, TraversalCounters};
-use clerestory::gpu::shaders::accel::{trace_any, trace_closest};
-use clerestory::gpu::shaders::sets::Bvh2Set;
+use clerestory::gpu::shaders::accel::trace_rays;
+use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{Category, DeviceKind, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute};
 use clerestory_hard_cases::misses;
 use clerestory_tests::random::Random;
@@ -21,83 +21,86 @@ struct Traced {
     dispatches: u32,
 }
 
-/// Runs one kernel with a quota until every ray is finished. Macro, since each shader has types of its own.
-macro_rules! trace {
-    ($shader:ident, $gpu:expr, $bvh:expr, $rays:expr, $quota:expr) => {{
-        let (gpu, rays): (&Gpu, &[Ray]) = ($gpu, $rays);
-        let spec = $shader::Spec {
-            bvh2_quota: $quota,
-            bvh2_count: true,
-        };
-        let pipeline = gpu.compute_pipeline::<$shader::Kernel>(&spec).unwrap();
-        let format = clerestory::gpu::ash::vk::Format::R32G32B32A32_UINT;
-        let quarters = gpu
-            .texels_with($bvh.name(), Category::Index, format, $bvh.texels())
+/// Runs the kernel with a quota until every ray is finished.
+fn trace(gpu: &Gpu, bvh: &Bvh2, rays: &[Ray], index_quota: u32, trace_any: bool) -> Traced {
+    let spec = trace_rays::Spec {
+        index_quota,
+        index_count: true,
+        trace_any,
+        ..Default::default()
+    };
+    let pipeline = gpu.compute_pipeline::<trace_rays::Kernel>(&spec).unwrap();
+    let format = clerestory::gpu::ash::vk::Format::R32G32B32A32_UINT;
+    let quarters = gpu
+        .texels_with(bvh.name(), Category::Index, format, bvh.texels())
+        .unwrap();
+    let index = IndexSet {
+        index_texels: &quarters,
+    };
+    let ray_buffer = gpu.buffer_with("rays", Category::Work, rays).unwrap();
+    let hits = gpu
+        .buffer_with("hits", Category::Work, &vec![0u32; rays.len() * 4])
+        .unwrap();
+    let resume = gpu
+        .buffer_with("resume", Category::Work, &vec![0u32; rays.len()])
+        .unwrap();
+    let status = gpu
+        .buffer_with(
+            "status",
+            Category::Work,
+            &[0u32; size_of::<trace_rays::TraceStatus>() / 4],
+        )
+        .unwrap();
+    let set = trace_rays::Set0 {
+        trace_rays: ray_buffer.view(),
+        trace_hits: hits.view(),
+        trace_resume: resume.view(),
+        trace_status: status.view(),
+    };
+    let mut traced = Traced {
+        hits: Vec::new(),
+        counters: TraversalCounters::default(),
+        dispatches: 0,
+    };
+    loop {
+        let mut recorder = gpu.recorder("trace").unwrap();
+        recorder
+            .pass("trace", |pass| {
+                pass.fill(status.view(), 0)?;
+                pass.barrier(&[transfer_to_compute(&status)]);
+                // Two dispatches, so that `first_ray` is used.
+                let half = rays.len() as u32 / 2;
+                for (first_ray, ray_count) in [(0, half), (half, rays.len() as u32 - half)] {
+                    let push = trace_rays::Push { first_ray, ray_count };
+                    pass.dispatch(
+                        &pipeline,
+                        &[&set, &index],
+                        &push,
+                        [pipeline.groups_for(ray_count), 1, 1],
+                    )?;
+                    pass.barrier(&[
+                        rw_compute_to_compute(&hits),
+                        rw_compute_to_compute(&resume),
+                        rw_compute_to_compute(&status),
+                    ]);
+                }
+                pass.barrier(&[compute_to_transfer(&status)]);
+                Ok(())
+            })
             .unwrap();
-        let index = Bvh2Set {
-            bvh2_quarters: &quarters,
-        };
-        let ray_buffer = gpu.buffer_with("rays", Category::Work, rays).unwrap();
-        let hits = gpu
-            .buffer_with("hits", Category::Work, &vec![0u32; rays.len() * 4])
-            .unwrap();
-        let resume = gpu
-            .buffer_with("resume", Category::Work, &vec![0u32; rays.len()])
-            .unwrap();
-        let status = gpu
-            .buffer_with("status", Category::Work, &[0u32; size_of::<$shader::TraceStatus>() / 4])
-            .unwrap();
-        let set = $shader::Set0 {
-            trace_rays: ray_buffer.view(),
-            trace_hits: hits.view(),
-            trace_resume: resume.view(),
-            trace_status: status.view(),
-        };
-        let mut traced = Traced {
-            hits: Vec::new(),
-            counters: TraversalCounters::default(),
-            dispatches: 0,
-        };
-        loop {
-            let mut recorder = gpu.recorder("trace").unwrap();
-            recorder
-                .pass("trace", |pass| {
-                    pass.fill(status.view(), 0)?;
-                    pass.barrier(&[transfer_to_compute(&status)]);
-                    // Two dispatches, so that `first_ray` is used.
-                    let half = rays.len() as u32 / 2;
-                    for (first_ray, ray_count) in [(0, half), (half, rays.len() as u32 - half)] {
-                        let push = $shader::Push { first_ray, ray_count };
-                        pass.dispatch(
-                            &pipeline,
-                            &[&set, &index],
-                            &push,
-                            [pipeline.groups_for(ray_count), 1, 1],
-                        )?;
-                        pass.barrier(&[
-                            rw_compute_to_compute(&hits),
-                            rw_compute_to_compute(&resume),
-                            rw_compute_to_compute(&status),
-                        ]);
-                    }
-                    pass.barrier(&[compute_to_transfer(&status)]);
-                    Ok(())
-                })
-                .unwrap();
-            recorder.submit().unwrap().wait().unwrap();
-            let s = gpu.read::<$shader::TraceStatus>(status.view(), 1).unwrap()[0];
-            traced.counters.nodes += wide_counter(s.node_visits);
-            traced.counters.triangles += wide_counter(s.triangle_tests);
-            traced.counters.iterations += wide_counter(s.iterations);
-            traced.dispatches += 1;
-            if s.unfinished == 0 {
-                break;
-            }
-            assert!(traced.dispatches < 10_000, "rays never end");
+        recorder.submit().unwrap().wait().unwrap();
+        let s = gpu.read::<trace_rays::TraceStatus>(status.view(), 1).unwrap()[0];
+        traced.counters.nodes += wide_counter(s.node_visits);
+        traced.counters.triangles += wide_counter(s.triangle_tests);
+        traced.counters.iterations += wide_counter(s.iterations);
+        traced.dispatches += 1;
+        if s.unfinished == 0 {
+            break;
         }
-        traced.hits = gpu.read::<Hit>(hits.view(), rays.len()).unwrap();
-        traced
-    }};
+        assert!(traced.dispatches < 10_000, "rays never end");
+    }
+    traced.hits = gpu.read::<Hit>(hits.view(), rays.len()).unwrap();
+    traced
 }
 
 /// The twin, with the same quota.
@@ -138,8 +141,8 @@ fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[Ray], quotas: &
     let bvh = Bvh2::build(triangles, &Bvh2Settings::default()).unwrap();
     let mut first: Option<Vec<[u32; 4]>> = None;
     for quota in quotas {
-        let closest = trace!(trace_closest, gpu, bvh, rays, *quota);
-        let any = trace!(trace_any, gpu, bvh, rays, *quota);
+        let closest = trace(gpu, &bvh, rays, *quota, false);
+        let any = trace(gpu, &bvh, rays, *quota, true);
         let same = first.get_or_insert_with(|| closest.hits.iter().map(bits).collect());
         for (i, ray) in rays.iter().enumerate() {
             assert_eq!(

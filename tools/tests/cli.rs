@@ -318,9 +318,9 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     refuse(&["render", "--size", "0x4"], 2, &["WIDTHxHEIGHT"])?;
     refuse(&["render", "--spp", "0"], 2, &["--spp"])?;
     refuse(
-        &["render", "--index", "kd"],
+        &["render", "--index", "octree"],
         2,
-        &["kd", "there is: bvh2, lbvh, lbvh-high"],
+        &["octree", "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd"],
     )?;
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;
     refuse(&["scenes", "nothing"], 2, &["ring"])?;

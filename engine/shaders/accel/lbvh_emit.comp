@@ -1,4 +1,4 @@
-// Last stage of the linear hierarchy: nodes and triangles in the layout that rays traverse (accel/bvh2_bindings.glsl), the root first and
+// Last stage of the linear hierarchy: nodes and triangles in the layout that rays traverse (accel/index_bindings.glsl), the root first and
 // the others in the order of their splits, without those inside of leaves.
 #version 460
 #extension GL_GOOGLE_include_directive : require

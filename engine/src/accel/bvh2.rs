@@ -16,7 +16,9 @@ pub(super) mod traverse;
 pub use build::Bvh2Settings;
 pub use traverse::{FINISHED, Step, Traversal};
 
-use super::{Aabb, BuildStages, CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
+use super::{
+    Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
+};
 use crate::Result;
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
@@ -49,10 +51,10 @@ pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);
 ///
 /// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. A
 /// relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013) would cover the last item only.
-pub const BOX_SLACK: f32 = constants::BVH2_BOX_SLACK;
+pub const BOX_SLACK: f32 = constants::BOX_SLACK;
 
 /// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).
-pub const MIN_RELATIVE_COMPONENT: f32 = constants::BVH2_MIN_RELATIVE_COMPONENT;
+pub const MIN_RELATIVE_COMPONENT: f32 = constants::MIN_RELATIVE_COMPONENT;
 
 /// Quarters of a node, the unit in which kernels read.
 pub(super) const NODE_QUARTERS: usize = size_of::<Bvh2Node>() / size_of::<[u32; 4]>();
@@ -134,11 +136,6 @@ impl Bvh2 {
     pub fn triangles(&self) -> &[Bvh2Triangle] {
         bytemuck::cast_slice(&self.quarters[NODE_QUARTERS * self.nodes..])
     }
-
-    /// Times of the stages that built it; all zero where they are not known.
-    pub fn stages(&self) -> BuildStages {
-        self.stages
-    }
 }
 
 impl RayIndex for Bvh2 {
@@ -150,8 +147,16 @@ impl RayIndex for Bvh2 {
         self.statistics
     }
 
+    fn stages(&self) -> BuildStages {
+        self.stages
+    }
+
     fn texels(&self) -> &[[u32; 4]] {
         &self.quarters
+    }
+
+    fn device_traversal(&self) -> DeviceTraversal {
+        DeviceTraversal::Bvh2
     }
 
     fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit {

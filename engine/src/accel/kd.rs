@@ -12,21 +12,28 @@
 pub mod bounds;
 mod build;
 mod clip;
+mod counters;
 pub mod probability;
+pub mod shifted_restart;
 mod traverse;
 mod tree;
 
+pub use counters::KdCounters;
 pub use probability::Heuristic;
-pub use traverse::{KdCounters, MAX_SHORT_STACK, Scheme};
+pub use traverse::{KdTraversal, MAX_SHORT_STACK, Scheme};
 pub use tree::{KdFault, KdNode};
 
 use super::input::{Met, check_count, check_range};
-use super::{Aabb, CandidateFilter, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters};
+use super::stages::Stopwatch;
+use super::{
+    Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
+};
+use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use glam::Vec3;
 
 /// Most inner nodes on a way from the root: the bits of the word of flags.
-pub const MAX_DEPTH: u32 = 32;
+pub const MAX_DEPTH: u32 = constants::KD_MAX_DEPTH;
 
 /// Largest number of triangles that settings may ask a leaf to be left at.
 pub const MAX_LEAF_SIZE: u32 = 64;
@@ -100,7 +107,9 @@ pub struct KdTree {
     indices: Vec<u32>,
     /// What kernels read.
     packed: Vec<[u32; 4]>,
+    longest_leaf: u32,
     statistics: IndexStatistics,
+    stages: BuildStages,
 }
 
 impl KdTree {
@@ -112,20 +121,23 @@ impl KdTree {
     pub fn build(triangles: &[[Vec3; 3]], settings: &KdSettings) -> Result<Self> {
         settings.check()?;
         check_count(triangles.len())?;
+        let mut watch = Stopwatch::start();
+        let mut stages = BuildStages::default();
         let met = Met::among(triangles);
         let indices: Vec<u32> = met.map(|_, index| index);
         let positions: Vec<[Vec3; 3]> = met.map(|triangle, _| *triangle);
         let statistics = met.statistics;
-        let bounds = positions
-            .iter()
-            .flatten()
-            .fold(Aabb::EMPTY, |b, p| b.with_point(*p))
-            .without_negative_zero();
+        let bounds = tree::bounds_of_all(&positions);
+        stages.triangles = watch.lap();
         let built = match positions.is_empty() {
             true => build::Built::Leaf(Vec::new()),
             false => build::build(&positions, bounds, settings),
         };
-        Self::lay_out(&built, bounds, positions, indices, statistics)
+        stages.hierarchy = watch.lap();
+        let mut tree = Self::lay_out(&built, bounds, positions, indices, statistics)?;
+        tree.stages.triangles = stages.triangles;
+        tree.stages.hierarchy = stages.hierarchy;
+        Ok(tree)
     }
 
     /// Box of all triangles; empty when there are none.
@@ -153,6 +165,11 @@ impl KdTree {
         &self.indices
     }
 
+    /// Most triangles in a leaf.
+    pub fn longest_leaf(&self) -> u32 {
+        self.longest_leaf
+    }
+
     /// Closest hit by a scheme of traversal.
     pub fn closest_hit_by(
         &self,
@@ -161,12 +178,16 @@ impl KdTree {
         filter: CandidateFilter<'_>,
         counters: &mut KdCounters,
     ) -> Hit {
-        traverse::traverse(self, scheme, ray, false, filter, counters)
+        let mut traversal = KdTraversal::closest(scheme, ray);
+        traversal.run(self, ray, u64::MAX, filter, counters);
+        traversal.hit
     }
 
     /// The first accepted candidate that a scheme of traversal finds; occluded once the hit has a triangle.
     pub fn any_hit_by(&self, scheme: Scheme, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut KdCounters) -> Hit {
-        traverse::traverse(self, scheme, ray, true, filter, counters)
+        let mut traversal = KdTraversal::any(scheme, ray);
+        traversal.run(self, ray, u64::MAX, filter, counters);
+        traversal.hit
     }
 }
 
@@ -179,8 +200,18 @@ impl RayIndex for KdTree {
         self.statistics
     }
 
+    fn stages(&self) -> BuildStages {
+        self.stages
+    }
+
     fn texels(&self) -> &[[u32; 4]] {
         &self.packed
+    }
+
+    fn device_traversal(&self) -> DeviceTraversal {
+        DeviceTraversal::Kd {
+            longest_leaf: self.longest_leaf,
+        }
     }
 
     fn closest_hit_filtered(&self, ray: &Ray, filter: CandidateFilter<'_>, counters: &mut TraversalCounters) -> Hit {
@@ -198,5 +229,7 @@ impl RayIndex for KdTree {
     }
 }
 
+#[cfg(test)]
+mod shifted_restart_tests;
 #[cfg(test)]
 mod tests;

@@ -8,8 +8,9 @@ use std::str::FromStr;
 use std::time::Instant;
 
 use super::bvh2::{Bvh2, Bvh2Settings};
+use super::kd::{KdSettings, KdTree};
 use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
-use super::{BuildStages, IndexStatistics, RayIndex};
+use super::{BuildStages, DeviceTraversal, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::{Category, Gpu, TexelView};
 use crate::{Error, Result};
@@ -18,7 +19,7 @@ use glam::Vec3;
 /// A ray index that the path tracer can traverse, with the settings of its build. The binned surface area heuristic by default.
 ///
 /// As text, by [`FromStr`] and [`Display`](fmt::Display), it is one of [`IndexKind::NAMES`] with default settings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IndexKind {
     /// Binary hierarchy by the binned surface area heuristic.
     Bvh2(Bvh2Settings),
@@ -27,6 +28,8 @@ pub enum IndexKind {
     Lbvh(LbvhSettings),
     /// The same, built by the device where a scene is uploaded, and left there. Of the settings those of quality are not used.
     LbvhOnDevice(LbvhSettings),
+    /// kd-tree: the longest build, and leaves in the order of the ray.
+    Kd(KdSettings),
 }
 
 impl Default for IndexKind {
@@ -36,9 +39,9 @@ impl Default for IndexKind {
 }
 
 impl IndexKind {
-    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, and the former built by
-    /// the device.
-    pub const NAMES: [&'static str; 4] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device"];
+    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
+    /// the device, and the kd-tree.
+    pub const NAMES: [&'static str; 5] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd"];
 
     /// The linear hierarchy with default settings.
     pub fn lbvh(quality: BuildQuality) -> Self {
@@ -57,6 +60,7 @@ impl IndexKind {
                 BuildQuality::High => "lbvh-high",
             },
             Self::LbvhOnDevice(_) => "lbvh-device",
+            Self::Kd(_) => "kd",
         }
     }
 
@@ -64,26 +68,27 @@ impl IndexKind {
     /// place in it. Deterministic whatever the number of threads.
     ///
     /// # Errors
-    /// As [`Bvh2::build`] and [`lbvh::build`].
-    pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
-        match self {
-            Self::Bvh2(settings) => Bvh2::build(triangles, settings),
-            Self::Lbvh(settings) => lbvh::build(triangles, settings),
+    /// As [`Bvh2::build`], [`lbvh::build`] and [`KdTree::build`].
+    pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<Box<dyn RayIndex>> {
+        Ok(match self {
+            Self::Bvh2(settings) => Box::new(Bvh2::build(triangles, settings)?),
+            Self::Lbvh(settings) => Box::new(lbvh::build(triangles, settings)?),
             Self::LbvhOnDevice(settings) => {
                 let settings = LbvhSettings {
                     quality: BuildQuality::Fast,
                     ..*settings
                 };
-                lbvh::build(triangles, &settings)
+                Box::new(lbvh::build(triangles, &settings)?)
             }
-        }
+            Self::Kd(settings) => Box::new(KdTree::build(triangles, settings)?),
+        })
     }
 
     /// Builds, where the kind says and the device can, and says how long that took.
     ///
     /// # Errors
     /// As [`IndexKind::build`], and those of uploads and of submissions; [`Error::LimitExceeded`] for an index that the device cannot bind.
-    pub fn build_for(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<(TexelView, IndexReport)> {
+    pub fn build_for(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<IndexOnDevice> {
         let mut fallback = None;
         if let Self::LbvhOnDevice(settings) = self {
             let builder = LbvhBuilder::new(gpu, settings)?;
@@ -97,7 +102,11 @@ impl IndexKind {
                         host_because: None,
                         statistics: built.statistics,
                     };
-                    return Ok((built.quarters, report));
+                    return Ok(IndexOnDevice {
+                        texels: built.quarters,
+                        traversal: DeviceTraversal::Bvh2,
+                        report,
+                    });
                 }
                 Ok(None) => fallback = Some("fewer than two triangles that rays can meet"),
                 // What the build needs is more than what remains of it.
@@ -109,13 +118,16 @@ impl IndexKind {
         }
         let (index, report) = self.build_timed(triangles)?;
         let format = vk::Format::R32G32B32A32_UINT;
-        let quarters = gpu.texels_with(index.name(), Category::Index, format, index.texels())?;
         let host_because = fallback;
-        Ok((quarters, IndexReport { host_because, ..report }))
+        Ok(IndexOnDevice {
+            texels: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
+            traversal: index.device_traversal(),
+            report: IndexReport { host_because, ..report },
+        })
     }
 
     /// Builds on the host, and says how long that took.
-    fn build_timed(&self, triangles: &[[Vec3; 3]]) -> Result<(Bvh2, IndexReport)> {
+    fn build_timed(&self, triangles: &[[Vec3; 3]]) -> Result<(Box<dyn RayIndex>, IndexReport)> {
         let begin = Instant::now();
         let index = self.build(triangles)?;
         let report = IndexReport {
@@ -146,6 +158,7 @@ impl FromStr for IndexKind {
             Self::lbvh(BuildQuality::Fast),
             Self::lbvh(BuildQuality::High),
             Self::LbvhOnDevice(LbvhSettings::default()),
+            Self::Kd(KdSettings::default()),
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
@@ -154,6 +167,17 @@ impl FromStr for IndexKind {
             Error::setting("index", name, format!("is not known; there is: {known}"))
         })
     }
+}
+
+/// A ray index in device memory.
+#[derive(Debug)]
+pub struct IndexOnDevice {
+    /// What kernels read, as [`RayIndex::texels`] has it.
+    pub texels: TexelView,
+    /// How they traverse it.
+    pub traversal: DeviceTraversal,
+    /// How it was built.
+    pub report: IndexReport,
 }
 
 /// The ray index of a scene, as frame reports have it.
@@ -198,7 +222,7 @@ mod tests {
                 [corner, corner + Vec3::X, corner + Vec3::Y]
             })
             .collect();
-        for (name, builder) in IndexKind::NAMES.into_iter().zip(["bvh2", "lbvh", "lbvh", "lbvh"]) {
+        for (name, builder) in IndexKind::NAMES.into_iter().zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd"]) {
             let (index, report) = name.parse::<IndexKind>().unwrap().build_timed(&triangles).unwrap();
             assert_eq!(index.name(), builder);
             assert_eq!(report.statistics, index.statistics());

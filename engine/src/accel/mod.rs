@@ -7,22 +7,22 @@
 //!
 //! # How to add an index
 //!
-//! Beside its [`RayIndex`] it has an include `accel/<name>.glsl`, which declares set 1 in `accel/<name>_bindings.glsl` (one texel buffer) and
-//! the functions that trace kernels and path tracer call,
+//! Beside its [`RayIndex`] it has an include `accel/<name>.glsl` with a function over the texel buffer of set 1
+//! (`accel/index_bindings.glsl`),
 //!
 //! ```glsl
-//! uint closest_hit(Ray ray, uint resume, inout Hit hit);
-//! uint any_hit(Ray ray, uint resume, inout Hit hit);
+//! uint <name>_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit);
 //! ```
 //!
-//! both of which return its constant `…_FINISHED`, or where to go on when the quota has stopped the ray; `resume` is `…_START` at first and
-//! `hit` is `no_hit(ray.t_max)`. With `CLERESTORY_CANDIDATE_FILTER` defined they ask `accept_candidate` before a hit counts, and the
-//! constant `…_RESUMES` leaves the bookkeeping out where rays never stop. The kernels that include it are `accel/trace_ray.glsl` and
-//! `transport/path_candidates.glsl`, `path_extend.glsl` and `path_shadow.glsl`, where the names of the index's constants stand.
+//! which returns `INDEX_FINISHED`, or where to go on when the quota `INDEX_QUOTA` has stopped the ray; `resume` is `INDEX_START` at first and
+//! `hit` is `no_hit(ray.t_max)`. With `CLERESTORY_CANDIDATE_FILTER` defined it asks `accept_candidate` before a hit counts, and where
+//! `INDEX_RESUMES` is false no call goes on with a ray. It has a number of its own in `accel/index.glsl`, by which kernels are specialized
+//! ([`DeviceTraversal::kind`]): every kernel that traverses any index traverses this one, too.
 
 mod aabb;
 pub mod box_tree;
 pub mod bvh2;
+mod device_traversal;
 mod input;
 pub mod kd;
 mod kind;
@@ -40,7 +40,8 @@ pub mod triangle;
 mod test_support;
 
 pub use aabb::Aabb;
-pub use kind::{IndexKind, IndexReport};
+pub use device_traversal::DeviceTraversal;
+pub use kind::{IndexKind, IndexOnDevice, IndexReport};
 pub use stages::BuildStages;
 
 use crate::gpu::shaders::constants;
@@ -156,6 +157,12 @@ pub trait RayIndex: Send + Sync {
 
     /// Size and quality.
     fn statistics(&self) -> IndexStatistics;
+
+    /// Times of the stages that built it; all zero where they are not known.
+    fn stages(&self) -> BuildStages;
+
+    /// How kernels traverse it.
+    fn device_traversal(&self) -> DeviceTraversal;
 
     /// What kernels read: the texels, four words each (`R32G32B32A32_UINT`), of the uniform texel buffer that is set 1; never empty.
     fn texels(&self) -> &[[u32; 4]];

@@ -1,21 +1,22 @@
-//! Closest hits of a buffer of rays on the device, in either model of execution: one invocation a ray, or persistent threads that fetch
+//! Closest hits of a buffer of rays on the device, or whether they meet anything, in either model of execution: one invocation a ray, or persistent threads that fetch
 //! rays from a queue.
 //!
 //! Sources: T. Aila and S. Laine, "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009 (persistent threads); "Interactive
 //! Manycore Photon Mapping", 2011, §2.2.3.4 and appendix A.1 (both models beside each other). The kernels are
-//! `shaders/accel/trace_closest.comp` and `trace_closest_queue.comp`.
+//! `shaders/accel/trace_rays.comp` and `trace_queue.comp`.
 //!
-//! Guarantees: both give the hits and the exact work of [`Traversal`](super::bvh2::Traversal); no ray is lost and none is traced twice,
+//! Guarantees: both give the hits and the exact work of [`Traversal`](super::bvh2::Traversal) and [`KdTraversal`](super::kd::KdTraversal); no ray is lost and none is traced twice,
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
 //! differs from run to run, and shows in nothing but the time.
 
-use super::bvh2::{Bvh2, MAX_DEPTH, MAX_LEAF_SIZE};
+use super::bvh2::{MAX_DEPTH, MAX_LEAF_SIZE};
 use super::input::check_range;
-use super::{Hit, Ray, RayIndex, TraversalCounters};
+use super::kd::{KdCounters, Scheme};
+use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::accel::trace_closest;
-use crate::gpu::shaders::accel::trace_closest_queue::{self, TraceQueue, TraceStatus};
-use crate::gpu::shaders::sets::Bvh2Set;
+use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
+use crate::gpu::shaders::accel::trace_rays;
+use crate::gpu::shaders::sets::IndexSet;
 use crate::gpu::{
     Access, Buffer, BufferDesc, Caps, Category, ComputePipeline, DeviceKind, Gpu, SOFTWARE_LOOP_CAP, TexelView, Timings,
 };
@@ -23,6 +24,9 @@ use crate::{Error, Result};
 
 /// Most rays of one call.
 pub const MAX_RAYS: usize = 1 << 31;
+
+/// Batches of a dispatch where quotas are fitted to a cap.
+const FITTED_FETCHES: u32 = 4;
 
 /// Dispatches of one submission, so that none takes seconds.
 const DISPATCHES_PER_SUBMISSION: u32 = 1024;
@@ -64,41 +68,85 @@ impl PersistentThreads {
     }
 }
 
+/// What is asked of rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Query {
+    /// The closest hit.
+    #[default]
+    Closest,
+    /// Whether there is a hit; that which is returned may be any of a ray's hits.
+    Any,
+}
+
 /// Settings of a [`RayTracer`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct TraceSettings {
+    /// What is asked of rays. Default the closest hit.
+    pub query: Query,
     /// How rays are dealt out.
     pub execution: Execution,
     /// Iterations after which a ray stops and waits for the next dispatch, above [`MAX_DEPTH`].
     pub ray_quota: u32,
     /// Whether work is counted, which costs a little time.
     pub count: bool,
+    /// How kd-trees are traversed.
+    pub scheme: Scheme,
 }
 
 impl TraceSettings {
     /// One invocation a ray.
     pub fn ray_per_thread() -> Self {
         Self {
+            query: Query::Closest,
             execution: Execution::RayPerThread,
             ray_quota: 32_768,
             count: false,
+            scheme: Scheme::Stack,
         }
     }
 
     /// Persistent threads with the quotas that suit the device.
     pub fn persistent(caps: &Caps) -> Self {
         Self {
+            query: Query::Closest,
             execution: Execution::Persistent(PersistentThreads::on(caps)),
             ray_quota: if caps.kind == DeviceKind::Cpu { 512 } else { 32_768 },
             count: false,
+            scheme: Scheme::Stack,
         }
     }
 
+    /// The same with such quotas that a software device loses no ray in an index of this kind, as far as that is possible.
+    pub fn fitted(mut self, caps: &Caps, traversal: DeviceTraversal) -> Self {
+        if caps.kind != DeviceKind::Cpu || self.iterations(caps, traversal) <= u64::from(SOFTWARE_LOOP_CAP) {
+            return self;
+        }
+        let mut fetches = 1;
+        if let Execution::Persistent(threads) = &mut self.execution {
+            threads.batch = threads.batch.min(group_size(caps));
+            fetches = threads.fetches.clamp(1, FITTED_FETCHES);
+            threads.fetches = fetches;
+        }
+        let unstopped = Self { ray_quota: 0, ..self }.iterations(caps, traversal);
+        let left = u64::from(SOFTWARE_LOOP_CAP).saturating_sub(unstopped);
+        let share = left / u64::from(fetches * lanes_in_sum(caps, traversal));
+        self.ray_quota = self.ray_quota.min(share as u32).max(MAX_DEPTH + 1);
+        self
+    }
+
     /// Iterations of all loops of an invocation together in one dispatch, at most. The test that ends a loop counts too.
-    pub fn iterations(&self, caps: &Caps) -> u64 {
-        let leaves_on_the_stack = (MAX_DEPTH + 1) * MAX_LEAF_SIZE;
-        let walk_back = MAX_DEPTH + 1;
-        let ray = u64::from(self.ray_quota) + u64::from(leaves_on_the_stack + walk_back);
+    pub fn iterations(&self, caps: &Caps, traversal: DeviceTraversal) -> u64 {
+        let ray = match traversal {
+            DeviceTraversal::Bvh2 => {
+                let leaves_on_the_stack = (MAX_DEPTH + 1) * MAX_LEAF_SIZE;
+                let walk_back = MAX_DEPTH + 1;
+                u64::from(self.ray_quota) + u64::from(leaves_on_the_stack + walk_back)
+            }
+            DeviceTraversal::Kd { longest_leaf } => {
+                DeviceTraversal::kd_iterations(longest_leaf, self.ray_quota, lanes_in_sum(caps, traversal))
+            }
+        };
         match self.execution {
             Execution::RayPerThread => ray,
             Execution::Persistent(threads) => {
@@ -108,14 +156,14 @@ impl TraceSettings {
         }
     }
 
-    fn check(&self, caps: &Caps) -> Result<()> {
+    fn check(&self, caps: &Caps, traversal: DeviceTraversal) -> Result<()> {
         check_range("trace.ray_quota", self.ray_quota, MAX_DEPTH + 1, u32::MAX)?;
         if let Execution::Persistent(threads) = self.execution {
             check_range("trace.groups", threads.groups, 1, 65_535)?;
             check_range("trace.batch", threads.batch, 1, 16_384)?;
             check_range("trace.fetches", threads.fetches, 1, u32::MAX)?;
         }
-        let iterations = self.iterations(caps);
+        let iterations = self.iterations(caps, traversal);
         if caps.kind == DeviceKind::Cpu && iterations > u64::from(SOFTWARE_LOOP_CAP) {
             let cause = format!(
                 "lets an invocation run {iterations} iterations; software devices end loops after {SOFTWARE_LOOP_CAP}"
@@ -139,6 +187,14 @@ fn group_size(caps: &Caps) -> u32 {
     caps.subgroup_size.clamp(1, 128)
 }
 
+/// Lanes whose loop iterations add up in a subgroup.
+fn lanes_in_sum(caps: &Caps, traversal: DeviceTraversal) -> u32 {
+    match traversal {
+        DeviceTraversal::Bvh2 => 1,
+        DeviceTraversal::Kd { .. } => caps.subgroup_size.max(1),
+    }
+}
+
 /// What rays met, and the work it took.
 #[derive(Debug, Clone, Default)]
 pub struct Traced {
@@ -146,6 +202,8 @@ pub struct Traced {
     pub hits: Vec<Hit>,
     /// Exact work, when it was counted.
     pub work: TraversalCounters,
+    /// The same in more detail, of kd-trees.
+    pub kd_work: KdCounters,
     /// Batches that were fetched, all rounds together, when work was counted; 0 without a queue.
     pub batches: u64,
     /// Rays that were fetched, all rounds together, when work was counted; 0 without a queue.
@@ -175,8 +233,8 @@ const TRACE_PASS: &str = "trace";
 
 #[derive(Debug)]
 enum Kernel {
-    RayPerThread(ComputePipeline<trace_closest::Kernel>),
-    Queue(PersistentThreads, ComputePipeline<trace_closest_queue::Kernel>),
+    RayPerThread(ComputePipeline<trace_rays::Kernel>),
+    Queue(PersistentThreads, ComputePipeline<trace_queue::Kernel>),
 }
 
 /// An index on a device and the kernel that traces rays in it.
@@ -185,6 +243,7 @@ pub struct RayTracer {
     gpu: Gpu,
     kernel: Kernel,
     index: TexelView,
+    traversal: DeviceTraversal,
     settings: TraceSettings,
 }
 
@@ -202,10 +261,10 @@ impl RayTracer {
     /// # Errors
     /// [`Error::Setting`] for settings out of range, or with which a software device could lose rays; [`Error::LimitExceeded`] for an index
     /// that does not fit the device; [`Error::OutOfMemory`].
-    pub fn new(gpu: &Gpu, index: &Bvh2, settings: &TraceSettings) -> Result<Self> {
+    pub fn new(gpu: &Gpu, index: &dyn RayIndex, settings: &TraceSettings) -> Result<Self> {
         let format = vk::Format::R32G32B32A32_UINT;
         let texels = gpu.texels_with(index.name(), Category::Index, format, index.texels())?;
-        Self::with_texels(gpu, texels, settings)
+        Self::with_texels(gpu, texels, index.device_traversal(), settings)
     }
 
     /// The same for an index that is on the device, such as [`ResidentLbvh::quarters`](super::lbvh::ResidentLbvh::quarters): texels as
@@ -213,20 +272,39 @@ impl RayTracer {
     ///
     /// # Errors
     /// As [`RayTracer::new`].
-    pub fn with_texels(gpu: &Gpu, index: TexelView, settings: &TraceSettings) -> Result<Self> {
-        settings.check(gpu.caps())?;
-        let (bvh2_quota, bvh2_count) = (settings.ray_quota, settings.count);
+    pub fn with_texels(
+        gpu: &Gpu,
+        index: TexelView,
+        traversal: DeviceTraversal,
+        settings: &TraceSettings,
+    ) -> Result<Self> {
+        settings.check(gpu.caps(), traversal)?;
+        let (index_quota, index_count) = (settings.ray_quota, settings.count);
+        let index_kind = traversal.kind();
+        let trace_any = settings.query == Query::Any;
+        let (kd_flags, kd_push_down, kd_short_stack) = settings.scheme.specialization();
         let kernel = match settings.execution {
-            Execution::RayPerThread => {
-                Kernel::RayPerThread(gpu.compute_pipeline(&trace_closest::Spec { bvh2_quota, bvh2_count })?)
-            }
+            Execution::RayPerThread => Kernel::RayPerThread(gpu.compute_pipeline(&trace_rays::Spec {
+                index_quota,
+                index_count,
+                index_kind,
+                trace_any,
+                kd_flags,
+                kd_push_down,
+                kd_short_stack,
+            })?),
             Execution::Persistent(threads) => {
-                let spec = trace_closest_queue::Spec {
+                let spec = trace_queue::Spec {
                     local_size_x: group_size(gpu.caps()),
                     trace_fetches: threads.fetches,
                     trace_batch: threads.batch,
-                    bvh2_quota,
-                    bvh2_count,
+                    index_quota,
+                    index_count,
+                    index_kind,
+                    trace_any,
+                    kd_flags,
+                    kd_push_down,
+                    kd_short_stack,
                 };
                 Kernel::Queue(threads, gpu.compute_pipeline(&spec)?)
             }
@@ -235,6 +313,7 @@ impl RayTracer {
             gpu: gpu.clone(),
             kernel,
             index,
+            traversal,
             settings: *settings,
         })
     }
@@ -327,6 +406,10 @@ impl RayTracer {
                 traced.work.nodes += wide_counter(status.node_visits);
                 traced.work.triangles += wide_counter(status.triangle_tests);
                 traced.work.iterations += wide_counter(status.iterations);
+                traced.kd_work.leaves += wide_counter(status.kd_leaves);
+                traced.kd_work.pushes += wide_counter(status.kd_pushes);
+                traced.kd_work.pops += wide_counter(status.kd_pops);
+                traced.kd_work.restarts += wide_counter(status.kd_restarts);
             }
             traced.batches += u64::from(queue.batches);
             traced.fetched_rays += u64::from(queue.fetched_rays);
@@ -334,6 +417,11 @@ impl RayTracer {
             if status.unfinished == 0 {
                 break;
             }
+        }
+        if let DeviceTraversal::Kd { .. } = self.traversal {
+            traced.kd_work.nodes = traced.work.nodes;
+            traced.kd_work.triangles = traced.work.triangles;
+            traced.kd_work.iterations = traced.work.iterations;
         }
         traced.hits = self.gpu.read(buffers.hits.view(), rays.len())?;
         Ok(traced)
@@ -388,20 +476,20 @@ impl RayTracer {
     }
 
     fn dispatch(&self, pass: &mut crate::gpu::Pass<'_>, buffers: &Buffers, first: &mut u32, count: u32) -> Result<()> {
-        let index = Bvh2Set {
-            bvh2_quarters: &self.index,
+        let index = IndexSet {
+            index_texels: &self.index,
         };
         match &self.kernel {
             Kernel::RayPerThread(kernel) => {
                 let most = u64::from(self.gpu.caps().max_workgroups) * u64::from(kernel.group_size());
                 let ray_count = u64::from(count - *first).min(most) as u32;
-                let set = trace_closest::Set0 {
+                let set = trace_rays::Set0 {
                     trace_rays: buffers.rays.view(),
                     trace_hits: buffers.hits.view(),
                     trace_resume: buffers.resume.view(),
                     trace_status: buffers.status.view(),
                 };
-                let push = trace_closest::Push {
+                let push = trace_rays::Push {
                     first_ray: *first,
                     ray_count,
                 };
@@ -409,14 +497,14 @@ impl RayTracer {
                 pass.dispatch(kernel, &[&set, &index], &push, [kernel.groups_for(ray_count), 1, 1])
             }
             Kernel::Queue(threads, kernel) => {
-                let set = trace_closest_queue::Set0 {
+                let set = trace_queue::Set0 {
                     trace_rays: buffers.rays.view(),
                     trace_hits: buffers.hits.view(),
                     trace_resume: buffers.resume.view(),
                     trace_status: buffers.status.view(),
                     trace_queue: buffers.queue.view(),
                 };
-                let push = trace_closest_queue::Push {
+                let push = trace_queue::Push {
                     first_ray: 0,
                     ray_count: count,
                 };

@@ -2,6 +2,7 @@
 
 use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::kd::{KdSettings, KdTree};
 use clerestory::accel::lbvh::{self, LbvhSettings};
 use clerestory::accel::triangle::{intersect_triangle, moller_trumbore, ray_shear};
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
@@ -30,6 +31,10 @@ pub const INDEXES: &[IndexKind] = &[
     IndexKind {
         name: "lbvh",
         build: |triangles| Ok(Box::new(lbvh::build(triangles, &LbvhSettings::default())?)),
+    },
+    IndexKind {
+        name: "kd",
+        build: |triangles| Ok(Box::new(KdTree::build(triangles, &KdSettings::default())?)),
     },
 ];
 

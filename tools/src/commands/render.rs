@@ -91,8 +91,8 @@ pub struct Arguments {
     /// Sequence of random numbers; by default as the settings say, else sobol
     #[arg(long, value_enum)]
     sampler: Option<Sampler>,
-    /// Index of the rays: bvh2 by binned SAH, lbvh along the Morton curve (least build, slower rays), lbvh-high optimised, lbvh-device as lbvh but built by the device. The picture is the same
-    #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device", default_value_t, value_parser = parse_index)]
+    /// Index of the rays: bvh2 by binned SAH, lbvh along the Morton curve (least build, slower rays), lbvh-high optimised, lbvh-device as lbvh but built by the device, kd a kd-tree (longest build). The picture is the same
+    #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd", default_value_t, value_parser = parse_index)]
     index: IndexKind,
     /// The technique's settings as JSON, or @FILE that holds them
     #[arg(long, value_name = "JSON|@FILE")]

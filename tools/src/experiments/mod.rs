@@ -47,8 +47,9 @@ pub struct Experiment {
     pub about: String,
     /// Ids of the catalogue's rows that it measures.
     pub systems: Vec<String>,
-    /// Another name that it is found by: its number in the document that the comparison comes from.
-    pub alias: Option<String>,
+    /// Other names that it is found by: its numbers in the document that the comparison comes from.
+    #[serde(default)]
+    pub aliases: Vec<String>,
     measure: Option<String>,
     sweep: Option<Sweep>,
 }
@@ -104,10 +105,8 @@ pub fn find(name: &str) -> Result<Experiment> {
     let by_alias = || {
         let mut all = FILES.iter().filter_map(|(known, text)| parse(known, text).ok());
         all.find(|experiment| {
-            experiment
-                .alias
-                .as_ref()
-                .is_some_and(|alias| alias.eq_ignore_ascii_case(name))
+            let mut aliases = experiment.aliases.iter();
+            aliases.any(|alias| alias.eq_ignore_ascii_case(name))
         })
     };
     let named = FILES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
@@ -157,7 +156,7 @@ mod tests {
             assert!((2..=3).contains(&sentences) && about.ends_with('.'), "{name}: {about}");
             assert!(!about.contains(['\n', '\\']), "{name}: {about}");
             assert!(about.starts_with(experiment.about_in_short()) && experiment.about_in_short().ends_with('.'));
-            if let Some(alias) = &experiment.alias {
+            for alias in &experiment.aliases {
                 assert_eq!(find(&alias.to_lowercase()).unwrap().name, name, "{alias}");
             }
             for id in &experiment.systems {

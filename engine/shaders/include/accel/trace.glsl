@@ -1,4 +1,4 @@
-// The trace kernels, a ray an invocation: TRACE, defined by the includer, is closest_hit or any_hit.
+// The trace kernel, a ray an invocation.
 #ifndef CLERESTORY_ACCEL_TRACE_GLSL
 #define CLERESTORY_ACCEL_TRACE_GLSL
 

@@ -25,6 +25,10 @@ layout(set = 0, binding = 3, scalar) restrict buffer TraceStatus {
     uint node_visits[2];
     uint triangle_tests[2];
     uint iterations[2];
+    uint kd_leaves[2];
+    uint kd_pushes[2];
+    uint kd_pops[2];
+    uint kd_restarts[2];
 } trace_status;
 
 layout(push_constant, scalar) uniform TraceConstants {

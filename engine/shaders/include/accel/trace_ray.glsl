@@ -1,25 +1,31 @@
-// One ray of the buffer by TRACE, which the entry file defines as closest_hit or any_hit.
+// One ray of the buffer: its closest hit, or, specialized so, any of its hits.
 #ifndef CLERESTORY_ACCEL_TRACE_RAY_GLSL
 #define CLERESTORY_ACCEL_TRACE_RAY_GLSL
 
 #include "accel/trace_interface.glsl"
-#include "accel/bvh2.glsl"
+#include "accel/index.glsl"
+
+layout(constant_id = 106) const bool TRACE_ANY = false;
 
 // Begins a ray or goes on with it, unless it is finished. Returns 1 when its quota has stopped it, else 0.
 uint trace_ray(uint index) {
     uint resume = trace_resume[index];
-    if (resume == BVH2_FINISHED) {
+    if (resume == INDEX_FINISHED) {
         return 0u;
     }
     Ray ray = trace_rays[index];
     Hit hit = no_hit(ray.t_max);
-    if (resume != BVH2_START) {
+    if (resume != INDEX_START) {
         hit = trace_hits[index];
     }
-    resume = TRACE(ray, resume, hit);
+    if (TRACE_ANY) {
+        resume = any_hit(ray, resume, hit);
+    } else {
+        resume = closest_hit(ray, resume, hit);
+    }
     trace_hits[index] = hit;
     trace_resume[index] = resume;
-    return resume == BVH2_FINISHED ? 0u : 1u;
+    return resume == INDEX_FINISHED ? 0u : 1u;
 }
 
 // Adds to a counter of two words: whoever carries the low word over adds the carry.
@@ -33,10 +39,16 @@ void trace_account(uint unfinished) {
     if (unfinished > 0u) {
         atomicAdd(trace_status.unfinished, unfinished);
     }
-    if (BVH2_COUNT) {
-        TRACE_ADD_WIDE(trace_status.node_visits, bvh2_counters.x);
-        TRACE_ADD_WIDE(trace_status.triangle_tests, bvh2_counters.y);
-        TRACE_ADD_WIDE(trace_status.iterations, bvh2_counters.z);
+    if (INDEX_COUNT) {
+        TRACE_ADD_WIDE(trace_status.node_visits, index_counters.nodes);
+        TRACE_ADD_WIDE(trace_status.triangle_tests, index_counters.triangles);
+        TRACE_ADD_WIDE(trace_status.iterations, index_counters.iterations);
+        if (INDEX_KIND == INDEX_KD) {
+            TRACE_ADD_WIDE(trace_status.kd_leaves, index_counters.leaves);
+            TRACE_ADD_WIDE(trace_status.kd_pushes, index_counters.pushes);
+            TRACE_ADD_WIDE(trace_status.kd_pops, index_counters.pops);
+            TRACE_ADD_WIDE(trace_status.kd_restarts, index_counters.restarts);
+        }
     }
 }
 

@@ -75,7 +75,7 @@ bool accept_candidate(uint triangle, vec2 barycentrics) {
 
 #endif
 
-#define BVH2_RESUMES RESUMES
-#include "accel/bvh2.glsl"
+#define INDEX_RESUMES RESUMES
+#include "accel/index.glsl"
 
 #endif

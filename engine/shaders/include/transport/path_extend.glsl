@@ -20,7 +20,7 @@ void main() {
     PathState path = load_path(slot);
     BEGIN_CANDIDATES(slot, path.bounce, CANDIDATES_EXTEND)
     Hit hit = no_hit(FAR_AWAY);
-    uint resume = BVH2_START;
+    uint resume = INDEX_START;
     if (RESUMES) {
         hit = path_hits_out[place];
         resume = path_resume[place];
@@ -33,7 +33,7 @@ void main() {
     resume = closest_hit(Ray(path.origin, t_min, path.direction, FAR_AWAY), resume, hit);
     path_hits_out[place] = hit;
     path_resume[place] = resume;
-    if (resume != BVH2_FINISHED) {
+    if (resume != INDEX_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_EXTEND);
     }

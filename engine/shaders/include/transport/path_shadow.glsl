@@ -14,14 +14,14 @@ void main() {
     ShadowRay s = load_shadow_ray(texelFetch(path_shadow_queue_in, int(place)).x);
     BEGIN_CANDIDATES(s.slot, s.bounce, CANDIDATES_SHADOW)
     Hit hit = no_hit(s.t_max);
-    uint resume = BVH2_START;
+    uint resume = INDEX_START;
     if (RESUMES) {
         resume = path_resume[place];
     }
-    bool ended = resume == BVH2_FINISHED;
+    bool ended = resume == INDEX_FINISHED;
     resume = any_hit(Ray(s.origin, 0.0, s.direction, s.t_max), resume, hit);
     path_resume[place] = resume;
-    if (resume != BVH2_FINISHED) {
+    if (resume != INDEX_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_SHADOW);
     } else if (!ended && hit.triangle == NO_HIT) {

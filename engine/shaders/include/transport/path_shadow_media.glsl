@@ -94,10 +94,10 @@ void main() {
     if (status.stalled == STALLED_EXTEND || queue_place >= status.shadow_count) {
         return;
     }
-    uint resume = BVH2_START;
+    uint resume = INDEX_START;
     if (RESUMES) {
         resume = path_resume[queue_place];
-        if (resume == BVH2_FINISHED) {
+        if (resume == INDEX_FINISHED) {
             return;
         }
     }
@@ -116,9 +116,9 @@ void main() {
     uint iterations = GRID_WALK_QUOTA;
     for (uint surface = 0u; surface < SHADOW_SURFACES_MAX && state.rays != 0u && !stopped; ++surface) {
         resume = closest_hit(Ray(s.origin, search_start(state.start), s.direction, s.t_max), resume, state.hit);
-        stopped = resume != BVH2_FINISHED;
+        stopped = resume != INDEX_FINISHED;
         if (!stopped) {
-            resume = BVH2_START;
+            resume = INDEX_START;
             uint outcome;
             if (pass_surface(s, state, iterations, outcome)) {
                 if (state.transmittance != vec3(0.0)) {
@@ -136,7 +136,7 @@ void main() {
         }
     }
     if (state.rays == 0u) {
-        path_resume[queue_place] = BVH2_FINISHED;
+        path_resume[queue_place] = INDEX_FINISHED;
         return;
     }
     path_resume[queue_place] = resume;

@@ -13,7 +13,7 @@ use crate::gpu::shaders::constants;
 use glam::Vec3;
 
 /// [`Traversal::resume`] of a traversal that is done.
-pub const FINISHED: u32 = constants::BVH2_FINISHED;
+pub const FINISHED: u32 = constants::INDEX_FINISHED;
 
 const COUNT_MASK: u32 = constants::BVH2_COUNT_MASK;
 

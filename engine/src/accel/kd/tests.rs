@@ -1,5 +1,6 @@
 use super::tree::KdKind;
 use super::*;
+use crate::accel::bvh2::FINISHED;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
 use crate::accel::test_support::{Random, brute_force, ray};
 
@@ -77,6 +78,30 @@ fn every_scheme_returns_what_trying_all_triangles_returns() {
                     );
                     let any = tree.any_hit_by(scheme, &ray, &mut |_, _| true, &mut KdCounters::default());
                     assert_eq!(any.is_hit(), expected.is_hit(), "{name} {scheme:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn traversals_that_a_quota_stops_go_on_where_they_were() {
+    let mut random = Random(67);
+    let triangles = soup(&mut random, 800, 0.1, 1.0, Vec3::ZERO);
+    let (deep, chained) = (build(&triangles, &settings_of_all_kinds()[3]), chain(32));
+    for (tree, triangles) in [(&deep, &triangles), (&chained.0, &chained.1)] {
+        for ray in hard_rays(&mut random, triangles, 200) {
+            let (expected, whole) = tested(tree, Scheme::Stack, &ray);
+            for scheme in SCHEMES {
+                for quota in [1, 40] {
+                    let mut work = KdCounters::default();
+                    let mut traversal = KdTraversal::closest(scheme, &ray);
+                    while traversal.resume != FINISHED {
+                        traversal.run(tree, &ray, quota, &mut |_, _| true, &mut work);
+                    }
+                    assert!(same_bits(&traversal.hit, &expected), "{scheme:?} {quota} {ray:?}");
+                    assert_eq!((work.leaves, work.triangles), (whole.leaves, whole.triangles));
+                    assert!(work.nodes >= whole.nodes);
                 }
             }
         }

@@ -7,11 +7,13 @@
 //! left but the child that the way takes. Adding the lowest bit of the way carries to the deepest node with something left, or out of the
 //! word. A subtree that begins beyond the best hit is skipped by the same addition.
 
-use super::KdTree;
 use super::tree::KdKind;
+use super::{KdCounters, KdTree, MAX_DEPTH};
+use crate::accel::bvh2::FINISHED;
 use crate::accel::bvh2::traverse::BoxTest;
-use crate::accel::triangle::{intersect_triangle, ray_shear};
-use crate::accel::{CandidateFilter, Hit, Ray, TraversalCounters};
+use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
+use crate::accel::{CandidateFilter, Hit, Ray};
+use crate::gpu::shaders::constants;
 use glam::Vec3;
 
 /// Most entries of a short stack.
@@ -32,34 +34,22 @@ pub enum Scheme {
     },
 }
 
-/// Exact work.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct KdCounters {
-    /// Inner nodes visited.
-    pub nodes: u64,
-    /// Leaves visited, empty ones included.
-    pub leaves: u64,
-    /// Triangle tests.
-    pub triangles: u64,
-    /// Entries written to the stack or the ring.
-    pub pushes: u64,
-    /// Entries read from it.
-    pub pops: u64,
-    /// Descents that began anew.
-    pub restarts: u64,
-}
-
-impl KdCounters {
-    /// Adds to the counters that all indexes share.
-    pub fn add_to(&self, counters: &mut TraversalCounters) {
-        counters.nodes += self.nodes;
-        counters.triangles += self.triangles;
-        counters.iterations += self.nodes + self.triangles;
+impl Scheme {
+    /// What kernels are specialized by: whether by flags, whether restarts are pushed down, entries of the ring.
+    pub(in crate::accel) fn specialization(self) -> (bool, bool, u32) {
+        match self {
+            Self::Stack => (false, false, 0),
+            Self::Flags { push_down, short_stack } => (true, push_down, short_stack.min(MAX_SHORT_STACK as u32)),
+        }
     }
 }
 
-/// What planes are met by: the box test's ray and slack.
-struct PlaneTest(BoxTest);
+/// The box test along one axis.
+struct PlaneTest {
+    origin: f32,
+    inverse: f32,
+    slack: f32,
+}
 
 /// Which children of a node a ray meets within its span.
 enum Met {
@@ -69,27 +59,34 @@ enum Met {
     Both(f32),
 }
 
-impl PlaneTest {
-    /// Which of the two is near: 0 for that below the plane.
-    fn near(&self, axis: usize) -> u32 {
-        u32::from(self.0.inverse[axis] < 0.0)
+fn plane_test(boxes: &BoxTest, axis: usize) -> PlaneTest {
+    PlaneTest {
+        origin: boxes.origin[axis],
+        inverse: boxes.inverse[axis],
+        slack: boxes.slack[axis],
     }
+}
 
-    fn met(&self, axis: usize, plane: f32, [enter, leave]: [f32; 2]) -> Met {
-        let t = (plane - self.0.origin[axis]) * self.0.inverse[axis];
-        if t - self.0.slack[axis] > leave {
-            Met::Near
-        } else if t + self.0.slack[axis] < enter {
-            Met::Far
-        } else {
-            Met::Both(leave.min(t + self.0.slack[axis]))
-        }
-    }
+/// Which of the two children is near: 0 for that below the plane.
+fn near_child(test: &PlaneTest) -> u32 {
+    u32::from(test.inverse < 0.0)
+}
 
-    /// Where the far child begins when the near one has ended at `leave`. A function of this alone, so that stack entries need not hold it.
-    fn far_begins(&self, axis: usize, leave: f32, t_min: f32) -> f32 {
-        (leave - 2.0 * self.0.slack[axis]).max(t_min)
+fn children_met(test: &PlaneTest, plane: f32, [enter, leave]: [f32; 2]) -> Met {
+    let t = (plane - test.origin) * test.inverse;
+    let (early, late) = (t - test.slack, t + test.slack);
+    if early > leave {
+        Met::Near
+    } else if late < enter {
+        Met::Far
+    } else {
+        Met::Both(leave.min(late))
     }
+}
+
+/// Where the far child begins when the near one has ended. A function of this alone, so that stack entries need not hold it.
+fn far_begins(slack: f32, near_ended: f32, t_min: f32) -> f32 {
+    (near_ended - 2.0 * slack).max(t_min)
 }
 
 /// A subtree to go on with.
@@ -100,13 +97,11 @@ struct Entry {
     axis: usize,
     /// End of its span.
     leave: f32,
-    /// Bit of the node above it.
-    parent: u32,
 }
 
 /// Far children that are left: a stack, or a ring that forgets the oldest.
 struct Entries {
-    entries: [Entry; super::MAX_DEPTH as usize],
+    entries: [Entry; MAX_DEPTH as usize],
     capacity: usize,
     front: usize,
     size: usize,
@@ -115,7 +110,7 @@ struct Entries {
 impl Entries {
     fn new(capacity: usize) -> Self {
         Self {
-            entries: [Entry::default(); super::MAX_DEPTH as usize],
+            entries: [Entry::default(); MAX_DEPTH as usize],
             capacity,
             front: 0,
             size: 0,
@@ -148,84 +143,205 @@ struct Descent {
     parent: u32,
 }
 
-/// Closest hit, or the first candidate of all.
-pub fn traverse(
-    tree: &KdTree,
-    scheme: Scheme,
-    ray: &Ray,
+impl Descent {
+    fn at_root(boxes: &BoxTest, tree: &KdTree, ray: &Ray) -> Self {
+        let (enter, leave) = boxes.span(tree.bounds.lower, tree.bounds.upper);
+        Self {
+            node: 0,
+            span: [enter.max(ray.t_min), leave.min(ray.t_max)],
+            bit: constants::KD_ROOT_BIT,
+            parent: 0,
+        }
+    }
+}
+
+/// A traversal between two runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KdTraversal {
+    /// Best hit so far.
+    pub hit: Hit,
+    /// Flags of what is left, 0 at the start, or [`FINISHED`](crate::accel::bvh2::FINISHED).
+    pub resume: u32,
     any: bool,
-    filter: CandidateFilter<'_>,
-    counters: &mut KdCounters,
-) -> Hit {
-    let mut hit = Hit::none(ray.t_max);
-    if !ray.is_traceable() || tree.positions.is_empty() {
-        return hit;
+    scheme: Scheme,
+}
+
+impl KdTraversal {
+    /// Starts a closest-hit query.
+    pub fn closest(scheme: Scheme, ray: &Ray) -> Self {
+        Self {
+            hit: Hit::none(ray.t_max),
+            resume: 0,
+            any: false,
+            scheme,
+        }
     }
-    let boxes = BoxTest::new(&tree.bounds, ray);
-    let (enter, leave) = boxes.span(tree.bounds.lower, tree.bounds.upper);
-    let span = [enter.max(ray.t_min), leave.min(ray.t_max)];
-    let planes = PlaneTest(boxes);
-    let shear = ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction));
-    if span[0] > span[1] {
-        return hit;
+
+    /// Starts an any-hit query: the first accepted candidate ends it.
+    pub fn any(scheme: Scheme, ray: &Ray) -> Self {
+        Self {
+            any: true,
+            ..Self::closest(scheme, ray)
+        }
     }
-    let root = Descent {
-        node: 0,
-        span,
-        bit: 1 << 31,
-        parent: 0,
-    };
-    let (uses_flags, push_down, capacity) = match scheme {
-        Scheme::Stack => (false, false, super::MAX_DEPTH as usize),
-        Scheme::Flags { push_down, short_stack } => (true, push_down, (short_stack as usize).min(MAX_SHORT_STACK)),
-    };
-    let mut entries = Entries::new(capacity);
-    let mut flags = 0u32;
-    let mut restart = root;
-    let mut can_push_down = push_down;
-    let mut at = root;
-    loop {
-        // Down to a leaf, or to a far child that begins beyond the hit.
-        let mut leaf = None;
+
+    /// Runs for about `quota` iterations; [`Self::resume`] says whether it is done. Any quota makes progress.
+    ///
+    /// It stops between leaves: a round may come on top of the quota, which is [`MAX_DEPTH`] nodes, a leaf and [`MAX_DEPTH`] skipped subtrees
+    /// at most. It goes on from the root, by the flags and with the same hit, so nothing is lost and no triangle is tested twice for it; the
+    /// nodes of the way back are visited again, and what lies beside it pushed again.
+    pub fn run(
+        &mut self,
+        tree: &KdTree,
+        ray: &Ray,
+        quota: u64,
+        filter: CandidateFilter<'_>,
+        counters: &mut KdCounters,
+    ) {
+        self.run_watched(tree, ray, quota, filter, counters, &mut |_| {});
+    }
+
+    /// As [`Self::run`]; `watch` sees the node of each leaf, in order.
+    pub fn run_watched(
+        &mut self,
+        tree: &KdTree,
+        ray: &Ray,
+        quota: u64,
+        filter: CandidateFilter<'_>,
+        counters: &mut KdCounters,
+        watch: &mut dyn FnMut(u32),
+    ) {
+        if self.resume == FINISHED {
+            return;
+        }
+        let flags = std::mem::replace(&mut self.resume, FINISHED);
+        if !ray.is_traceable() || tree.positions.is_empty() {
+            return;
+        }
+        let boxes = BoxTest::new(&tree.bounds, ray);
+        let root = Descent::at_root(&boxes, tree, ray);
+        if root.span[0] > root.span[1] {
+            return;
+        }
+        let (push_down, capacity) = match self.scheme {
+            Scheme::Stack => (false, MAX_DEPTH as usize),
+            Scheme::Flags { push_down, short_stack } => (push_down, (short_stack as usize).min(MAX_SHORT_STACK)),
+        };
+        let mut walk = Walk {
+            tree,
+            ray,
+            boxes,
+            push_down,
+            entries: Entries::new(capacity),
+            flags,
+            restart: root,
+            can_push_down: push_down,
+            at: root,
+        };
+        let shear = ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction));
+        let mut iterations = 0;
         loop {
-            let (axis, plane, children) = match tree.nodes[at.node as usize].kind() {
+            iterations += u64::from(constants::KD_ROUND_ITERATIONS);
+            let nodes = counters.nodes;
+            if let Some(references) = walk.descend(self.hit.t, counters) {
+                counters.leaves += 1;
+                watch(walk.at.node);
+                for place in references {
+                    iterations += 1;
+                    counters.triangles += 1;
+                    if self.test(tree, *place as usize, &shear, ray.t_min, filter) && self.any {
+                        counters.iterations += iterations + counters.nodes - nodes;
+                        return;
+                    }
+                }
+            }
+            iterations += counters.nodes - nodes;
+            if !walk.next(self.hit.t, counters, &mut iterations) {
+                break;
+            }
+            // Flags that read as the end say that one leaf is left, at the lowest level.
+            if iterations >= quota && walk.flags != FINISHED {
+                self.resume = walk.flags;
+                break;
+            }
+        }
+        counters.iterations += iterations;
+    }
+
+    /// Tests one triangle; true when it is the best hit now.
+    fn test(&mut self, tree: &KdTree, place: usize, shear: &RayShear, t_min: f32, filter: CandidateFilter<'_>) -> bool {
+        let Some(candidate) = intersect_triangle(shear, &tree.positions[place], t_min, self.hit.t) else {
+            return false;
+        };
+        let triangle = tree.indices[place];
+        let barycentrics = [candidate.u, candidate.v];
+        // A triangle of several leaves is met again with the same hit, which is not better.
+        let better = candidate.t < self.hit.t || triangle < self.hit.triangle;
+        if !better || !filter(triangle, barycentrics) {
+            return false;
+        }
+        self.hit = Hit {
+            t: candidate.t,
+            barycentrics,
+            triangle,
+        };
+        true
+    }
+}
+
+/// The way of a ray through the leaves.
+struct Walk<'a> {
+    tree: &'a KdTree,
+    ray: &'a Ray,
+    boxes: BoxTest,
+    push_down: bool,
+    entries: Entries,
+    flags: u32,
+    restart: Descent,
+    can_push_down: bool,
+    at: Descent,
+}
+
+impl<'a> Walk<'a> {
+    /// Down to a leaf, whose references are returned, or to a far child that begins beyond the hit.
+    fn descend(&mut self, hit: f32, counters: &mut KdCounters) -> Option<&'a [u32]> {
+        loop {
+            let at = &mut self.at;
+            let (axis, plane, children) = match self.tree.nodes[at.node as usize].kind() {
                 KdKind::Leaf { first, count } => {
-                    leaf = Some((first, count));
-                    break;
+                    return Some(&self.tree.references[first as usize..][..count as usize]);
                 }
                 KdKind::Inner { axis, plane, children } => (axis, plane, children),
             };
             counters.nodes += 1;
-            let near = planes.near(axis);
-            let side = match planes.met(axis, plane, at.span) {
+            let test = plane_test(&self.boxes, axis);
+            let near = near_child(&test);
+            let mut goes_on = true;
+            let side = match children_met(&test, plane, at.span) {
                 Met::Near => {
-                    flags |= at.bit;
+                    self.flags |= at.bit;
                     near
                 }
                 Met::Far => {
-                    flags |= at.bit;
+                    self.flags |= at.bit;
                     1 - near
                 }
-                Met::Both(end) if uses_flags && flags & at.bit != 0 => {
-                    at.span[0] = planes.far_begins(axis, end, ray.t_min);
-                    if at.span[0] > hit.t {
-                        at.parent = at.bit;
-                        break;
-                    }
+                Met::Both(end) if self.flags & at.bit != 0 => {
+                    at.span[0] = far_begins(test.slack, end, self.ray.t_min);
+                    goes_on = at.span[0] <= hit;
                     1 - near
                 }
                 Met::Both(end) => {
-                    if can_push_down {
-                        restart = at;
-                        can_push_down = false;
+                    if self.can_push_down {
+                        self.restart = *at;
+                        self.can_push_down = false;
                     }
-                    if capacity > 0 {
+                    if self.entries.capacity > 0 {
                         counters.pushes += 1;
-                        entries.push(Entry {
+                        self.entries.push(Entry {
                             node: children + 1 - near,
                             axis,
                             leave: at.span[1],
-                            parent: at.bit,
                         });
                     }
                     at.span[1] = end;
@@ -235,59 +351,40 @@ pub fn traverse(
             at.node = children + side;
             at.parent = at.bit;
             at.bit >>= 1;
-        }
-        if let Some((first, count)) = leaf {
-            counters.leaves += 1;
-            for reference in &tree.references[first as usize..][..count as usize] {
-                counters.triangles += 1;
-                let place = *reference as usize;
-                let Some(candidate) = intersect_triangle(&shear, &tree.positions[place], ray.t_min, hit.t) else {
-                    continue;
-                };
-                let triangle = tree.indices[place];
-                let barycentrics = [candidate.u, candidate.v];
-                // A triangle of several leaves is met again with the same hit, which is not better.
-                let better = candidate.t < hit.t || triangle < hit.triangle;
-                if better && filter(triangle, barycentrics) {
-                    hit = Hit {
-                        t: candidate.t,
-                        barycentrics,
-                        triangle,
-                    };
-                    if any {
-                        return hit;
-                    }
-                }
+            if !goes_on {
+                return None;
             }
         }
-        // On to what is left, skipping what begins beyond the hit.
+    }
+
+    /// On to what is left, an iteration for each subtree that is skipped since it begins beyond the hit; false at the end.
+    fn next(&mut self, hit: f32, counters: &mut KdCounters, iterations: &mut u64) -> bool {
         loop {
-            if uses_flags {
-                flags = flags.wrapping_add(at.parent);
-                if flags == 0 {
-                    return hit;
-                }
+            self.flags = self.flags.wrapping_add(self.at.parent);
+            if self.flags == 0 {
+                return false;
             }
-            let Some(entry) = entries.pop() else {
-                if !uses_flags {
-                    return hit;
-                }
+            let Some(entry) = self.entries.pop() else {
                 counters.restarts += 1;
-                at = restart;
-                can_push_down = push_down;
-                break;
+                self.at = self.restart;
+                self.can_push_down = self.push_down;
+                return true;
             };
             counters.pops += 1;
-            at = Descent {
+            // The carry has set the bit of the node above.
+            let parent = self.flags & self.flags.wrapping_neg();
+            let slack = self.boxes.slack[entry.axis];
+            self.at = Descent {
                 node: entry.node,
-                span: [planes.far_begins(entry.axis, at.span[1], ray.t_min), entry.leave],
-                bit: entry.parent >> 1,
-                parent: entry.parent,
+                span: [far_begins(slack, self.at.span[1], self.ray.t_min), entry.leave],
+                bit: parent >> 1,
+                parent,
             };
-            if at.span[0] <= hit.t {
-                can_push_down = false;
-                break;
+            self.can_push_down = false;
+            if self.at.span[0] <= hit {
+                return true;
             }
+            *iterations += 1;
         }
     }
 }

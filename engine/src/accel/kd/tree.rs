@@ -8,14 +8,19 @@ use super::build::Built;
 use super::probability::Heuristic;
 use super::{KdTree, MAX_DEPTH};
 use crate::accel::bvh2::Bvh2Triangle;
-use crate::accel::{Aabb, IndexStatistics};
+use crate::accel::input::{Met, check_count};
+use crate::accel::stages::Stopwatch;
+use crate::accel::{Aabb, BuildStages, IndexStatistics};
+use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Low bits of a node's word: the axis, or this for a leaf.
-const LEAF: u32 = 3;
-const KIND_BITS: u32 = 2;
+const LEAF: u32 = constants::KD_LEAF;
+const KIND_BITS: u32 = constants::KD_KIND_BITS;
+
+const REFERENCES_PER_TEXEL: usize = constants::KD_REFERENCES_PER_TEXEL as usize;
 
 /// Most references, and most nodes.
 const MAX_INDEX: u64 = 1 << (32 - KIND_BITS);
@@ -41,15 +46,16 @@ pub enum KdKind {
 }
 
 impl KdNode {
-    /// A plane.
-    fn inner(axis: u8, plane: f32, children: u32) -> Self {
+    /// A plane across an axis (0 to 2), and the index of the child below it.
+    pub fn inner(axis: u8, plane: f32, children: u32) -> Self {
         Self {
             value: plane.to_bits(),
             word: children << KIND_BITS | u32::from(axis),
         }
     }
 
-    fn leaf(first: u32, count: u32) -> Self {
+    /// A leaf: the first of its references, and their number.
+    pub fn leaf(first: u32, count: u32) -> Self {
         Self {
             value: count,
             word: first << KIND_BITS | LEAF,
@@ -93,6 +99,15 @@ pub enum KdFault {
     },
 }
 
+/// Box of all triangles; empty when there are none.
+pub(super) fn bounds_of_all(positions: &[[Vec3; 3]]) -> Aabb {
+    positions
+        .iter()
+        .flatten()
+        .fold(Aabb::EMPTY, |b, p| b.with_point(*p))
+        .without_negative_zero()
+}
+
 impl KdTree {
     /// Lays out what was built.
     pub(super) fn lay_out(
@@ -128,6 +143,49 @@ impl KdTree {
                 });
             }
         }
+        Ok(Self::complete(
+            bounds, nodes, references, positions, indices, statistics,
+        ))
+    }
+
+    /// A tree that something else has built over `triangles`: the root, a pad, and pairs of siblings, each behind the node above them;
+    /// references name triangles by their place among those that rays can meet, which keep their order.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for what is not a tree of [`MAX_DEPTH`] at most whose leaves hold every triangle.
+    pub fn from_nodes(triangles: &[[Vec3; 3]], nodes: Vec<KdNode>, references: Vec<u32>) -> Result<Self> {
+        check_count(triangles.len())?;
+        let met = Met::among(triangles);
+        let indices: Vec<u32> = met.map(|_, index| index);
+        let positions: Vec<[Vec3; 3]> = met.map(|triangle, _| *triangle);
+        let sound = |(place, node): (usize, &KdNode)| match node.kind() {
+            KdKind::Inner { children, .. } => {
+                children % 2 == 0 && children as usize > place && (children as usize) < nodes.len() - 1
+            }
+            KdKind::Leaf { first, count } => u64::from(first) + u64::from(count) <= references.len() as u64,
+        };
+        let places = references.iter().all(|place| (*place as usize) < positions.len());
+        if nodes.len() < 2 || !nodes.len().is_multiple_of(2) || !places || !nodes.iter().enumerate().all(sound) {
+            return Err(Error::setting("kd.nodes", nodes.len(), "are no tree"));
+        }
+        let bounds = bounds_of_all(&positions);
+        let tree = Self::complete(bounds, nodes, references, positions, indices, met.statistics);
+        match tree.validate() {
+            Ok(()) => Ok(tree),
+            Err(fault) => Err(Error::setting("kd.nodes", tree.nodes.len(), format!("{fault:?}"))),
+        }
+    }
+
+    fn complete(
+        bounds: Aabb,
+        nodes: Vec<KdNode>,
+        references: Vec<u32>,
+        positions: Vec<[Vec3; 3]>,
+        indices: Vec<u32>,
+        statistics: IndexStatistics,
+    ) -> Self {
+        let mut watch = Stopwatch::start();
+        let mut stages = BuildStages::default();
         let mut tree = Self {
             bounds,
             nodes,
@@ -135,26 +193,31 @@ impl KdTree {
             positions,
             indices,
             packed: Vec::new(),
+            longest_leaf: 0,
             statistics,
+            stages: BuildStages::default(),
         };
         tree.packed = tree.pack();
+        stages.layout = watch.lap();
         tree.measure();
-        Ok(tree)
+        stages.statistics = watch.lap();
+        tree.stages = stages;
+        tree
     }
 
     /// Box and where nodes, references and triangles begin, then these: a pair of nodes a texel, four references a texel, three texels a
     /// triangle.
     fn pack(&self) -> Vec<[u32; 4]> {
-        const HEADER: usize = 2;
+        const HEADER: usize = constants::KD_HEADER_TEXELS as usize;
         let references = HEADER + self.nodes.len() / 2;
-        let triangles = references + self.references.len().div_ceil(4);
+        let triangles = references + self.references.len().div_ceil(REFERENCES_PER_TEXEL);
         let corner = |v: Vec3, word: usize| [v.x.to_bits(), v.y.to_bits(), v.z.to_bits(), word as u32];
         let mut packed = vec![
             corner(self.bounds.lower, references),
             corner(self.bounds.upper, triangles),
         ];
         packed.extend_from_slice(bytemuck::cast_slice(&self.nodes));
-        packed.extend(self.references.chunks(4).map(|chunk| {
+        packed.extend(self.references.chunks(REFERENCES_PER_TEXEL).map(|chunk| {
             let mut texel = [0; 4];
             texel[..chunk.len()].copy_from_slice(chunk);
             texel
@@ -168,6 +231,7 @@ impl KdTree {
     /// Nodes, leaves, depth, cost by surface areas.
     fn measure(&mut self) {
         let mut statistics = self.statistics;
+        let mut longest_leaf = 0;
         let scene = Bounds::from(self.bounds);
         let mut tests_and_visits = 0.0;
         self.walk(|_, kind, bounds, depth| {
@@ -184,6 +248,7 @@ impl KdTree {
                 }
                 KdKind::Leaf { count, .. } => {
                     statistics.leaves += u64::from(count > 0);
+                    longest_leaf = longest_leaf.max(count);
                     tests_and_visits += share * f64::from(count);
                 }
             }
@@ -192,6 +257,7 @@ impl KdTree {
         statistics.triangles = self.positions.len() as u64;
         statistics.bytes = size_of_val(self.packed.as_slice()) as u64;
         self.statistics = statistics;
+        self.longest_leaf = longest_leaf;
     }
 
     /// Every node with its box and the number of inner nodes above it.

@@ -137,61 +137,6 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report free-flight",
-        unbiased(part(
-            "PM-VOL-1",
-            "transmittance: analytic and by ratio tracking; ray marching as their baseline",
-            "Jensen and Christensen 1998; Novák et al. 2014",
-            "engine/src/transport/medium.rs",
-            &[
-                "tests/tests/media/absorption.rs::beers_law_is_exact",
-                "tests/tests/media/absorption.rs::shadow_rays_are_attenuated_exactly",
-                "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
-                "engine/src/transport/free_flight.rs::marched_transmittance_errs_by_the_step_and_in_the_middle_by_its_square",
-                "engine/src/transport/free_flight.rs::ratio_tracking_is_unbiased_however_loose_the_majorant",
-            ],
-        )),
-    ),
-    measured(
-        "clerestory report free-flight",
-        unbiased(part(
-            "PM-VOL-2",
-            "free flight through homogeneous media",
-            "Jensen and Christensen 1998; Wilkie et al. 2014",
-            "engine/src/transport/medium.rs",
-            &[
-                "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
-                "engine/src/transport/medium.rs::extremes_stay_finite",
-            ],
-        )),
-    ),
-    Row {
-        bias: Some(Bias::Consistent("the step")),
-        experiment: "clerestory report free-flight",
-        ..part(
-            "PM-VOL-3",
-            "free flight by ray marching, steps fixed or adaptive (baseline)",
-            "Jensen and Christensen 1998",
-            "engine/src/transport/free_flight.rs",
-            &["engine/src/transport/free_flight.rs::marched_flights_are_biased_by_their_step"],
-        )
-    },
-    measured(
-        "clerestory report free-flight",
-        unbiased(part(
-            "PM-VOL-4",
-            "free flight by delta tracking",
-            "Woodcock et al. 1965; Coleman 1968",
-            "engine/src/transport/medium.rs",
-            &[
-                "engine/src/transport/free_flight.rs::tracked_flights_follow_their_distribution_however_loose_the_majorant",
-                "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
-                "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
-                "tests/tests/media/heterogeneous.rs::emptiness_and_loose_majorants_cost_noise_only",
-            ],
-        )),
-    ),
-    measured(
         "clerestory report compact-rays",
         part(
             "PM-I-4",
@@ -212,6 +157,56 @@ pub(super) const ROWS: &[Row] = &[
             "Interactive Manycore Photon Mapping, 2011, §3.2.4.2",
             "engine/src/accel/photon_map/complete_bvh.rs",
             &["engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order"],
+        ),
+    ),
+    measured(
+        "clerestory report kd-heuristics",
+        part(
+            "PM-KD-1",
+            "kd-trees by the surface area heuristic, O(n log n), with perfect splits",
+            "Wald and Havran 2006",
+            "engine/src/accel/kd/build.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_point_of_a_triangle_lies_in_a_leaf_that_holds_it",
+                "engine/src/accel/kd/tests.rs::a_wall_ends_in_a_leaf_without_volume",
+                "engine/src/accel/kd/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-probability",
+        part(
+            "PM-KD-2",
+            "exact probability of a visit from inside the scene, in closed form",
+            "Interactive Manycore Photon Mapping 2011, §4.1.1; Hoer and Love 1965",
+            "engine/src/accel/kd/probability.rs",
+            &[
+                "engine/src/accel/kd/probability/tests.rs::the_closed_form_is_the_integral_of_solid_angles",
+                "engine/src/accel/kd/probability/tests.rs::probabilities_are_those_of_the_reference_table",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-probability",
+        part(
+            "PM-KD-3",
+            "the same by 26 regions",
+            "Interactive Manycore Photon Mapping 2011, §4.1.2",
+            "engine/src/accel/kd/probability.rs",
+            &["engine/src/accel/kd/probability/tests.rs::probabilities_are_those_of_the_reference_table"],
+        ),
+    ),
+    measured(
+        "clerestory report kd-heuristics",
+        part(
+            "PM-KD-4",
+            "the same by overlapping slabs (SIROH), incrementally",
+            "Interactive Manycore Photon Mapping 2011, §4.1.3",
+            "engine/src/accel/kd/probability.rs",
+            &[
+                "engine/src/accel/kd/probability/tests.rs::parts_handed_down_are_those_of_the_children",
+                "engine/src/accel/kd/probability/tests.rs::every_heuristic_gives_the_scene_itself_one",
+            ],
         ),
     ),
     measured(
@@ -318,6 +313,137 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
             ],
         ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-1",
+            "traversal of kd-trees with a stack",
+            "Wald 2004, 7.1",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            ],
+        ),
+    ),
+    part(
+        "PM-TR-2",
+        "restart behind a leaf in three forms, each shown to fail",
+        "Foley and Sugerman 2005",
+        "engine/src/accel/kd/shifted_restart.rs",
+        &[
+            "engine/src/accel/kd/shifted_restart_tests.rs::restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not",
+        ],
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-3",
+            "the same without a stack, by a word of flags",
+            "Interactive Manycore Photon Mapping 2011, §4.2.2",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-4",
+            "flags with push-down",
+            "Horn et al. 2007",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-5",
+            "flags with a short stack",
+            "Horn et al. 2007",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-6",
+            "flags with both",
+            "Horn et al. 2007",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "engine/src/accel/kd/tests.rs::work_is_in_the_order_of_the_schemes",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-1",
+            "transmittance: analytic and by ratio tracking; ray marching as their baseline",
+            "Jensen and Christensen 1998; Novák et al. 2014",
+            "engine/src/transport/medium.rs",
+            &[
+                "tests/tests/media/absorption.rs::beers_law_is_exact",
+                "tests/tests/media/absorption.rs::shadow_rays_are_attenuated_exactly",
+                "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
+                "engine/src/transport/free_flight.rs::marched_transmittance_errs_by_the_step_and_in_the_middle_by_its_square",
+                "engine/src/transport/free_flight.rs::ratio_tracking_is_unbiased_however_loose_the_majorant",
+            ],
+        )),
+    ),
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-2",
+            "free flight through homogeneous media",
+            "Jensen and Christensen 1998; Wilkie et al. 2014",
+            "engine/src/transport/medium.rs",
+            &[
+                "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
+                "engine/src/transport/medium.rs::extremes_stay_finite",
+            ],
+        )),
+    ),
+    Row {
+        bias: Some(Bias::Consistent("the step")),
+        experiment: "clerestory report free-flight",
+        ..part(
+            "PM-VOL-3",
+            "free flight by ray marching, steps fixed or adaptive (baseline)",
+            "Jensen and Christensen 1998",
+            "engine/src/transport/free_flight.rs",
+            &["engine/src/transport/free_flight.rs::marched_flights_are_biased_by_their_step"],
+        )
+    },
+    measured(
+        "clerestory report free-flight",
+        unbiased(part(
+            "PM-VOL-4",
+            "free flight by delta tracking",
+            "Woodcock et al. 1965; Coleman 1968",
+            "engine/src/transport/medium.rs",
+            &[
+                "engine/src/transport/free_flight.rs::tracked_flights_follow_their_distribution_however_loose_the_majorant",
+                "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
+                "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
+                "tests/tests/media/heterogeneous.rs::emptiness_and_loose_majorants_cost_noise_only",
+            ],
+        )),
     ),
     measured(
         "clerestory report device-model",

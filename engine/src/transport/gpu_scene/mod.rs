@@ -21,9 +21,9 @@ use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
 use crate::Result;
-use crate::accel::{IndexKind, IndexReport, IndexStatistics};
+use crate::accel::{DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::sets::{Bvh2Set, MediaSet, SceneSet};
+use crate::gpu::shaders::sets::{IndexSet, MediaSet, SceneSet};
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::gpu::{Category, Gpu, TexelView};
 use crate::scene::{Material, Scene, SceneProfile};
@@ -33,10 +33,9 @@ use crate::scene::{Material, Scene, SceneProfile};
 pub struct GpuScene {
     profile: SceneProfile,
     bsdf: BsdfFeatures,
-    index_report: IndexReport,
     bounds: [Vec3; 2],
     light_kinds: LightKinds,
-    index: TexelView,
+    index: IndexOnDevice,
     buffers: SceneBuffers,
     media: Option<GpuMedia>,
 }
@@ -86,7 +85,7 @@ impl GpuScene {
         let mut geometry = Geometry::flatten(scene, &profile)?;
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
-        let (index, index_report) = kind.build_for(gpu, &geometry.corners())?;
+        let index = kind.build_for(gpu, &geometry.corners())?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
         let placed = materials
@@ -109,7 +108,6 @@ impl GpuScene {
         Ok(Self {
             profile,
             bsdf,
-            index_report,
             bounds,
             light_kinds: lights.kinds(),
             index,
@@ -130,12 +128,17 @@ impl GpuScene {
 
     /// Size and quality of its ray index.
     pub fn index_statistics(&self) -> IndexStatistics {
-        self.index_report.statistics
+        self.index.report.statistics
     }
 
     /// Which ray index it has and how long its build took, with size and quality.
     pub fn index_report(&self) -> IndexReport {
-        self.index_report
+        self.index.report
+    }
+
+    /// How kernels traverse its ray index.
+    pub fn index_traversal(&self) -> DeviceTraversal {
+        self.index.traversal
     }
 
     /// Least and greatest corner, world space, metres.
@@ -176,9 +179,9 @@ impl GpuScene {
     }
 
     /// Set 1.
-    pub fn index_set(&self) -> Bvh2Set<'_> {
-        Bvh2Set {
-            bvh2_quarters: &self.index,
+    pub fn index_set(&self) -> IndexSet<'_> {
+        IndexSet {
+            index_texels: &self.index.texels,
         }
     }
 

@@ -238,7 +238,7 @@ impl PathTracer {
             ..Status::default()
         };
         let mut timings = vec![self.submit_bounces(wave, &mut status, true)?];
-        let quota = u64::from(ray_quota(&self.scene, &self.settings));
+        let quota = u64::from(ray_quota(&self.gpu, &self.scene, &self.settings)?);
         let mut iterations = 0;
         while status.active_count > 0 || status.stalled != STALLED_NOT {
             let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);

@@ -2,6 +2,8 @@
 
 use super::settings::PathTracerSettings;
 use crate::Result;
+use crate::gpu::SOFTWARE_LOOP_CAP;
+use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::transport::{
     path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_extend_alpha,
     path_extend_media, path_extend_media_alpha, path_medium, path_resolve, path_shade, path_shadow, path_shadow_alpha,
@@ -21,14 +23,19 @@ const MEDIA_QUOTA_MAX: u32 = 2048;
 const MEDIA_ALPHA_QUOTA_MAX: u32 = 512;
 
 /// Loop iterations after which a ray goes on in a later dispatch.
-pub(super) fn ray_quota(scene: &GpuScene, settings: &PathTracerSettings) -> u32 {
-    let most = match (scene.profile().has_alpha(), scene.profile().media.any()) {
-        (false, false) => u32::MAX,
-        (true, false) => ALPHA_QUOTA_MAX,
-        (false, true) => MEDIA_QUOTA_MAX,
-        (true, true) => MEDIA_ALPHA_QUOTA_MAX,
+///
+/// # Errors
+/// As [`DeviceTraversal::quota_within`](crate::accel::DeviceTraversal).
+pub(super) fn ray_quota(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettings) -> Result<u32> {
+    // With media half of the iterations are for walks through grids.
+    let (most, iterations) = match (scene.profile().has_alpha(), scene.profile().media.any()) {
+        (false, false) => (u32::MAX, SOFTWARE_LOOP_CAP),
+        (true, false) => (ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP),
+        (false, true) => (MEDIA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES),
+        (true, true) => (MEDIA_ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES_ALPHA),
     };
-    settings.ray_quota.min(most)
+    let quota = settings.ray_quota.min(most);
+    scene.index_traversal().quota_within(gpu.caps(), quota, iterations)
 }
 
 /// One kernel a stage.
@@ -175,18 +182,21 @@ impl Pipelines {
 impl TracePipelines {
     pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettings, resumes: bool) -> Result<Self> {
         let profile = scene.profile();
-        let bvh2_quota = ray_quota(scene, settings);
+        let index_quota = ray_quota(gpu, scene, settings)?;
+        let index_kind = scene.index_traversal().kind();
         let (has_textures, has_vertex_colors) = (profile.has_textures, profile.has_vertex_colors);
         let (has_grids, has_homogeneous) = (profile.media.heterogeneous, profile.media.homogeneous);
         if profile.media.any() && !profile.has_alpha() {
             return Ok(Self::Media {
                 extend: gpu.compute_pipeline(&path_extend_media::Spec {
-                    bvh2_quota,
+                    index_quota,
+                    index_kind,
                     resumes,
                     ..Default::default()
                 })?,
                 shadow: gpu.compute_pipeline(&path_shadow_media::Spec {
-                    bvh2_quota,
+                    index_quota,
+                    index_kind,
                     resumes,
                     has_absorption: profile.has_absorption,
                     has_grids,
@@ -200,14 +210,16 @@ impl TracePipelines {
                 extend: gpu.compute_pipeline(&path_extend_media_alpha::Spec {
                     has_textures,
                     has_vertex_colors,
-                    bvh2_quota,
+                    index_quota,
+                    index_kind,
                     resumes,
                     ..Default::default()
                 })?,
                 shadow: gpu.compute_pipeline(&path_shadow_media_alpha::Spec {
                     has_textures,
                     has_vertex_colors,
-                    bvh2_quota,
+                    index_quota,
+                    index_kind,
                     resumes,
                     has_absorption: profile.has_absorption,
                     has_grids,
@@ -219,12 +231,14 @@ impl TracePipelines {
         if !profile.has_alpha() {
             return Ok(Self::Opaque {
                 extend: gpu.compute_pipeline(&path_extend::Spec {
-                    bvh2_quota,
+                    index_quota,
+                    index_kind,
                     resumes,
                     ..Default::default()
                 })?,
                 shadow: gpu.compute_pipeline(&path_shadow::Spec {
-                    bvh2_quota,
+                    index_quota,
+                    index_kind,
                     resumes,
                     ..Default::default()
                 })?,
@@ -233,14 +247,16 @@ impl TracePipelines {
         let extend = path_extend_alpha::Spec {
             has_textures,
             has_vertex_colors,
-            bvh2_quota,
+            index_quota,
+            index_kind,
             resumes,
             ..Default::default()
         };
         let shadow = path_shadow_alpha::Spec {
             has_textures,
             has_vertex_colors,
-            bvh2_quota,
+            index_quota,
+            index_kind,
             resumes,
             ..Default::default()
         };

@@ -4,8 +4,8 @@ use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::{Hit, Ray, RayIndex};
 use clerestory::gpu::ash::vk::Format;
-use clerestory::gpu::shaders::accel::trace_closest;
-use clerestory::gpu::shaders::sets::Bvh2Set;
+use clerestory::gpu::shaders::accel::trace_rays;
+use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{
     Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, rw_compute_to_compute, transfer_to_compute,
 };
@@ -67,7 +67,7 @@ struct Buffers {
 /// An index and rays of several sets on the device.
 pub struct Kernel<'a> {
     gpu: &'a Gpu,
-    pipeline: ComputePipeline<trace_closest::Kernel>,
+    pipeline: ComputePipeline<trace_rays::Kernel>,
     quarters: TexelView,
     sets: Vec<Buffers>,
 }
@@ -75,9 +75,10 @@ pub struct Kernel<'a> {
 impl<'a> Kernel<'a> {
     /// Uploads them.
     pub fn new(gpu: &'a Gpu, index: &Bvh2, sets: &[&[Ray]]) -> Result<Self> {
-        let spec = trace_closest::Spec {
-            bvh2_quota: QUOTA,
-            bvh2_count: false,
+        let spec = trace_rays::Spec {
+            index_quota: QUOTA,
+            index_count: false,
+            ..Default::default()
         };
         let buffers = |rays: &&[Ray]| {
             Ok(Buffers {
@@ -86,7 +87,7 @@ impl<'a> Kernel<'a> {
                 resume: gpu.buffer_with("resume", Category::Work, &vec![0_u32; rays.len()])?,
                 status: gpu.buffer(&BufferDesc::storage(
                     "status",
-                    size_of::<trace_closest::TraceStatus>() as u64,
+                    size_of::<trace_rays::TraceStatus>() as u64,
                     Category::Work,
                 ))?,
                 count: rays.len() as u32,
@@ -95,7 +96,7 @@ impl<'a> Kernel<'a> {
         let format = Format::R32G32B32A32_UINT;
         Ok(Self {
             gpu,
-            pipeline: gpu.compute_pipeline::<trace_closest::Kernel>(&spec)?,
+            pipeline: gpu.compute_pipeline::<trace_rays::Kernel>(&spec)?,
             quarters: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
             sets: sets.iter().map(buffers).collect::<Result<_>>()?,
         })
@@ -104,14 +105,14 @@ impl<'a> Kernel<'a> {
     /// Traces a set; seconds by wall clock from submission to the end of waiting.
     pub fn trace(&self, set: usize) -> Result<f64> {
         let buffers = &self.sets[set];
-        let set = trace_closest::Set0 {
+        let set = trace_rays::Set0 {
             trace_rays: buffers.rays.view(),
             trace_hits: buffers.hits.view(),
             trace_resume: buffers.resume.view(),
             trace_status: buffers.status.view(),
         };
-        let bvh2 = Bvh2Set {
-            bvh2_quarters: &self.quarters,
+        let bvh2 = IndexSet {
+            index_texels: &self.quarters,
         };
         let mut recorder = self.gpu.recorder("trace")?;
         recorder.pass("trace", |pass| {
@@ -121,7 +122,7 @@ impl<'a> Kernel<'a> {
                 transfer_to_compute(&buffers.status),
                 transfer_to_compute(&buffers.resume),
             ]);
-            let push = trace_closest::Push {
+            let push = trace_rays::Push {
                 first_ray: 0,
                 ray_count: buffers.count,
             };
@@ -132,7 +133,7 @@ impl<'a> Kernel<'a> {
         })?;
         let (waited, seconds) = timed(|| recorder.submit()?.wait());
         waited?;
-        let status = self.gpu.read::<trace_closest::TraceStatus>(buffers.status.view(), 1)?;
+        let status = self.gpu.read::<trace_rays::TraceStatus>(buffers.status.view(), 1)?;
         match status.first().map_or(0, |status| status.unfinished) {
             0 => Ok(seconds),
             unfinished => Err(Error::setting("rays", unfinished, "did not end in one dispatch")),

@@ -160,11 +160,14 @@ fn list() -> Outcome<ExitCode> {
     let mut text = String::new();
     for name in experiments::names() {
         let experiment = experiments::find(name)?;
-        let alias = experiment.alias.as_ref().map(|alias| format!(", also {alias}"));
+        let aliases = match experiment.aliases.as_slice() {
+            [] => String::new(),
+            aliases => format!(", also {}", aliases.join(", ")),
+        };
         text += &format!(
             "{}{} ({})\n  {}\n  {}\n",
             output::bold(&experiment.name),
-            alias.unwrap_or_default(),
+            aliases,
             experiment.systems.join(", "),
             experiment.title,
             experiment.about_in_short()

@@ -4,6 +4,7 @@
 mod clock;
 mod device;
 mod errors;
+mod kd;
 mod media;
 mod photon_maps;
 mod pictures;
@@ -69,6 +70,10 @@ pub const MEASURES: &[Measure] = &[
     on_host("coupled-reflection", surfaces::coupled_reflection::measure),
     on_device("device-model", device::device_model::measure),
     on_host("free-flight", media::free_flight::measure),
+    on_device("kd-heuristics", kd::kd_heuristics::measure),
+    on_device("kd-or-bvh", kd::kd_or_bvh::measure),
+    on_host("kd-probability", kd::kd_probability::measure),
+    on_device("kd-traversal", kd::kd_traversal::measure),
     on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
     on_device("map-construction", photon_maps::map_construction::measure),
     on_host("map-quality", photon_maps::map_quality::measure),

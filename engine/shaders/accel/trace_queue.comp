@@ -1,5 +1,5 @@
-// Closest hits of a buffer of rays by workgroups that stay: each fetches batches of rays from a counter until there are none, or until it
-// has fetched TRACE_FETCHES batches. Twin in its hits and counters of trace_closest.comp; clerestory::accel::trace::RayTracer dispatches it.
+// What rays of a buffer meet, by workgroups that stay: each fetches batches of rays from a counter until there are none, or until it
+// has fetched TRACE_FETCHES batches. Twin in its hits and counters of trace_rays.comp; clerestory::accel::trace::RayTracer dispatches it.
 //
 // No workgroup waits for another. Best where a workgroup is one subgroup, so that no lane waits for other subgroups' rays.
 #version 460
@@ -8,7 +8,6 @@
 
 layout(local_size_x_id = 0) in;
 
-#define TRACE closest_hit
 #include "accel/trace_ray.glsl"
 
 // Batches that a workgroup fetches in one dispatch; 0 sets no end. Software drivers end loops in silence after so many iterations of all
@@ -42,7 +41,7 @@ void main() {
         // Read by all before the next is fetched.
         barrier();
         uint batch_end = min(first + TRACE_BATCH, end);
-        if (BVH2_COUNT && gl_LocalInvocationIndex == 0u && first < end) {
+        if (INDEX_COUNT && gl_LocalInvocationIndex == 0u && first < end) {
             atomicAdd(trace_queue.batches, 1u);
             atomicAdd(trace_queue.fetched_rays, batch_end - first);
         }

@@ -1,0 +1,166 @@
+//! Ways through a kd-tree: with a stack, and without one by a word of flags, with push-down, a short stack or both.
+//!
+//! Oracle: all give the same hits to the bit. Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College
+//! Dublin, 2011, tables 4.5 and 4.6.
+
+use clerestory::Result;
+use clerestory::accel::kd::{KdCounters, KdSettings, KdTree, Scheme};
+use clerestory::accel::trace::TraceSettings;
+
+use super::flights::{self, Raced, cases, fly, race};
+use super::kd_heuristics::work;
+use crate::experiments::measures::Context;
+use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
+use crate::experiments::table::{Cell, Table};
+
+const REPEATS: usize = 5;
+/// Entries of the source's short stack.
+const SHORT_STACK: u32 = 4;
+
+const fn flags(push_down: bool, short_stack: u32) -> Scheme {
+    Scheme::Flags { push_down, short_stack }
+}
+
+/// The one that others are compared with first.
+const SCHEMES: [(&str, Scheme); 5] = [
+    ("stack", Scheme::Stack),
+    ("flags", flags(false, 0)),
+    ("flags, push-down", flags(true, 0)),
+    ("flags, short stack of 4", flags(false, SHORT_STACK)),
+    ("flags, both", flags(true, SHORT_STACK)),
+];
+
+/// What the source says of a scene: inner nodes a ray with a stack, what the other schemes change in them and in frames a second, in per cent.
+struct Published {
+    counterpart: &'static str,
+    visits: f64,
+    changes: [f64; 4],
+    speeds: [f64; 4],
+}
+
+const PUBLISHED: [Published; 5] = [
+    Published {
+        counterpart: "Scene 6",
+        visits: 7.31,
+        changes: [35.7, 21.1, 0.0, 0.0],
+        speeds: [-5.3, -2.6, -1.3, -2.5],
+    },
+    Published {
+        counterpart: "Sponza",
+        visits: 29.81,
+        changes: [136.7, 97.1, 0.3, 0.2],
+        speeds: [-37.1, -30.6, -8.7, -12.2],
+    },
+    Published {
+        counterpart: "Sibenik",
+        visits: 37.63,
+        changes: [151.5, 107.2, 0.8, 0.8],
+        speeds: [-43.5, -35.8, -10.2, -13.8],
+    },
+    Published {
+        counterpart: "Fairy",
+        visits: 37.43,
+        changes: [182.7, 98.2, 0.6, 0.6],
+        speeds: [-41.6, -29.8, -11.6, -14.9],
+    },
+    Published {
+        counterpart: "Conference",
+        visits: 19.57,
+        changes: [108.1, 59.4, 0.3, 0.3],
+        speeds: [-18.1, -11.4, -4.6, -7.2],
+    },
+];
+
+/// The measure.
+pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
+    let gpu = (context.gpu)()?;
+    let mut table = Table::new(
+        "Ways through a kd-tree",
+        &[
+            "scene",
+            "counterpart",
+            "scheme",
+            "hits that differ",
+            "inner nodes a ray",
+            "change (%)",
+            "source: inner nodes",
+            "source: change (%)",
+            "leaves a ray",
+            "restarts a ray",
+            "stack entries a ray",
+            "bytes a ray",
+            "closest hits (M rays/s)",
+            "any hits (M rays/s)",
+            "speed, change (%)",
+            "source: speed, change (%)",
+        ],
+    );
+    let all = cases(context);
+    for (done, case) in all.iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(case.name(), done, all.len());
+        let surfaces = Surfaces::load(case.scene)?;
+        let flight = fly(case.scene, &surfaces, case.light, flights::size(context))?;
+        // As the source's trees.
+        let settings = KdSettings {
+            clip: false,
+            ..KdSettings::default()
+        };
+        let tree = KdTree::build(&surfaces.triangles, &settings)?;
+        let closest = flight.closest();
+        let of = |(_, scheme): (&str, Scheme)| {
+            let settings = TraceSettings {
+                scheme,
+                ..TraceSettings::ray_per_thread()
+            };
+            Raced::new(&gpu, &tree, settings)
+        };
+        let mut raced = SCHEMES.into_iter().map(of).collect::<Result<Vec<_>>>()?;
+        race(&mut raced, &flight, if context.smoke { 1 } else { REPEATS })?;
+        let rates: Vec<[f64; 3]> = raced.iter().map(|one| one.rates(&flight)).collect();
+        let works = SCHEMES.map(|(_, scheme)| work(&tree, scheme, &closest, &flight.shadow));
+        let hits = |scheme| {
+            let mut counters = KdCounters::default();
+            let hit = |ray| tree.closest_hit_by(scheme, ray, &mut |_, _| true, &mut counters);
+            closest.iter().map(hit).collect::<Vec<_>>()
+        };
+        let expected = hits(Scheme::Stack);
+        let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
+        let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
+        for (i, (name, scheme)) in SCHEMES.into_iter().enumerate() {
+            let differ = hits(scheme).iter().zip(&expected).filter(|(a, b)| a != b).count();
+            let change = |value: f64, first: f64| 100.0 * (value / first - 1.0);
+            let of_source = |of: fn(&Published) -> &[f64; 4]| {
+                let value = published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]);
+                value.map_or(Cell::from("none"), Into::into)
+            };
+            table.row([
+                case.name().into(),
+                case.counterpart.into(),
+                name.into(),
+                (differ as u64).into(),
+                each(works[i].nodes).into(),
+                change(works[i].nodes as f64, works[0].nodes as f64).into(),
+                published.map_or(Cell::from("none"), |row| row.visits.into()),
+                of_source(|row| &row.changes),
+                each(works[i].leaves).into(),
+                each(works[i].restarts).into(),
+                each(works[i].pushes + works[i].pops).into(),
+                each(works[i].bytes()).into(),
+                rates[i][0].into(),
+                rates[i][1].into(),
+                change(rates[i][2], rates[0][2]).into(),
+                of_source(|row| &row.speeds),
+            ]);
+        }
+    }
+    table.note(
+        "Flights as in `kd-heuristics`, SIROH trees over boxes as the source's. Counts are exact and the same on every machine: inner nodes, \
+         entries of stacks written and read, and bytes by the source's model of 8 for each of these. Visits are hardware independent, so \
+         their changes can be held against the source's; stand-ins for its models differ in depth. Times are medians of runs that take \
+         turns, one invocation a ray.",
+    );
+    Ok(vec![table])
+}
