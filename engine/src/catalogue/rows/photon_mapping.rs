@@ -327,14 +327,17 @@ pub(super) const ROWS: &[Row] = &[
             ],
         ),
     ),
-    part(
-        "PM-TR-2",
-        "restart behind a leaf in three forms, each shown to fail",
-        "Foley and Sugerman 2005",
-        "engine/src/accel/kd/shifted_restart.rs",
-        &[
-            "engine/src/accel/kd/shifted_restart_tests.rs::restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not",
-        ],
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-2",
+            "restart behind a leaf in three forms, each shown to fail",
+            "Foley and Sugerman 2005",
+            "engine/src/accel/kd/shifted_restart.rs",
+            &[
+                "engine/src/accel/kd/shifted_restart_tests.rs::restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not",
+            ],
+        ),
     ),
     measured(
         "clerestory report kd-traversal",
