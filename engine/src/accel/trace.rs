@@ -11,7 +11,7 @@
 
 use super::bvh2::build::check_range;
 use super::bvh2::{MAX_DEPTH, MAX_LEAF_SIZE};
-use super::kd::{KdCounters, Scheme};
+use super::kd::{KdCaches, KdCounters, Scheme};
 use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
@@ -25,6 +25,9 @@ pub const SOFTWARE_LOOP_CAP: u32 = 65_535;
 
 /// Most rays of one call.
 pub const MAX_RAYS: usize = 1 << 31;
+
+/// Loop iterations in which a lane loads a cached node and its box, at most.
+const LOAD_ITERATIONS: u64 = 16;
 
 /// Batches of a dispatch where quotas are fitted to a cap.
 const FITTED_FETCHES: u32 = 4;
@@ -45,16 +48,23 @@ pub enum Execution {
 /// The size of a queue's crew and its quota.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct PersistentThreads {
-    /// Workgroups of a dispatch, each one subgroup, 1..=65,535; best as many as stay resident, which only a measurement tells (see
+    /// Workgroups of a dispatch, 1..=65,535; best as many as stay resident, which only a measurement tells (see
     /// [`RayTracer::tune`]).
     pub groups: u32,
     /// Rays that a workgroup fetches at once, 1..=16,384.
     pub batch: u32,
     /// Batches that a workgroup fetches in one dispatch, from 1 on.
     pub fetches: u32,
+    /// Subgroups of a workgroup, which share caches and wait for each other at each fetch, 1..=32; best one without caches.
+    pub subgroups: u32,
 }
 
 impl PersistentThreads {
+    /// Invocations of a workgroup.
+    fn lanes(&self, caps: &Caps) -> u32 {
+        group_size(caps) * self.subgroups
+    }
+
     /// What suits a device before anything is measured: batches of a subgroup; on software devices batches of four, two workgroups for each
     /// thread of the host, and quotas below [`SOFTWARE_LOOP_CAP`].
     pub fn on(caps: &Caps) -> Self {
@@ -65,6 +75,7 @@ impl PersistentThreads {
             // Software devices run each barrier lane by lane: fewer fetches are fewer barriers.
             batch: group_size(caps) * if software { 4 } else { 1 },
             fetches: if software { 16 } else { 4096 },
+            subgroups: 1,
         }
     }
 }
@@ -93,6 +104,8 @@ pub struct TraceSettings {
     pub count: bool,
     /// How kd-trees are traversed.
     pub scheme: Scheme,
+    /// The caches of kd-trees, of persistent threads that traverse by a stack. Default none.
+    pub caches: KdCaches,
 }
 
 impl TraceSettings {
@@ -104,6 +117,7 @@ impl TraceSettings {
             ray_quota: 32_768,
             count: false,
             scheme: Scheme::Stack,
+            caches: KdCaches::default(),
         }
     }
 
@@ -115,6 +129,7 @@ impl TraceSettings {
             ray_quota: if caps.kind == DeviceKind::Cpu { 512 } else { 32_768 },
             count: false,
             scheme: Scheme::Stack,
+            caches: KdCaches::default(),
         }
     }
 
@@ -125,7 +140,7 @@ impl TraceSettings {
         }
         let mut fetches = 1;
         if let Execution::Persistent(threads) = &mut self.execution {
-            threads.batch = threads.batch.min(group_size(caps));
+            threads.batch = threads.batch.min(threads.lanes(caps));
             fetches = threads.fetches.clamp(1, FITTED_FETCHES);
             threads.fetches = fetches;
         }
@@ -144,15 +159,25 @@ impl TraceSettings {
                 let walk_back = MAX_DEPTH + 1;
                 u64::from(self.ray_quota) + u64::from(leaves_on_the_stack + walk_back)
             }
-            DeviceTraversal::Kd { longest_leaf } => {
+            DeviceTraversal::Kd { mut longest_leaf } => {
+                if self.caches.postpone {
+                    longest_leaf = longest_leaf.saturating_mul(2);
+                }
                 DeviceTraversal::kd_iterations(longest_leaf, self.ray_quota, lanes_in_sum(caps, traversal))
             }
         };
         match self.execution {
             Execution::ThreadARay => ray,
             Execution::Persistent(threads) => {
-                let rays = u64::from(threads.batch.div_ceil(group_size(caps)));
-                u64::from(threads.fetches).saturating_mul(rays * (ray + 1) + 2)
+                let lanes = threads.lanes(caps);
+                let rays = u64::from(threads.batch.div_ceil(lanes));
+                let loads = match self.caches.node_levels {
+                    0 => 0,
+                    levels => (1u64 << levels).div_ceil(u64::from(lanes)) * LOAD_ITERATIONS,
+                };
+                u64::from(threads.fetches)
+                    .saturating_mul(rays * (ray + 1) + 2)
+                    .saturating_add(loads)
             }
         }
     }
@@ -163,6 +188,15 @@ impl TraceSettings {
             check_range("trace.groups", threads.groups, 1, 65_535)?;
             check_range("trace.batch", threads.batch, 1, 16_384)?;
             check_range("trace.fetches", threads.fetches, 1, u32::MAX)?;
+            check_range("trace.subgroups", threads.subgroups, 1, 32)?;
+        }
+        self.caches.check()?;
+        if !matches!(traversal, DeviceTraversal::Kd { .. }) {
+            self.caches.check_absent("are of kd-trees")?;
+        } else if self.scheme != Scheme::Stack {
+            self.caches.check_absent("are of traversals by a stack")?;
+        } else if self.execution == Execution::ThreadARay {
+            self.caches.check_absent("are of persistent threads")?;
         }
         let iterations = self.iterations(caps, traversal);
         if caps.kind == DeviceKind::Cpu && iterations > u64::from(SOFTWARE_LOOP_CAP) {
@@ -296,7 +330,7 @@ impl RayTracer {
             })?),
             Execution::Persistent(threads) => {
                 let spec = trace_queue::Spec {
-                    local_size_x: group_size(gpu.caps()),
+                    local_size_x: threads.lanes(gpu.caps()),
                     trace_fetches: threads.fetches,
                     trace_batch: threads.batch,
                     index_quota,
@@ -306,6 +340,9 @@ impl RayTracer {
                     kd_flags,
                     kd_push_down,
                     kd_short_stack,
+                    kd_cache_levels: settings.caches.node_levels,
+                    kd_stack_cache: settings.caches.stack_specialization(),
+                    kd_postpones: settings.caches.postpone,
                 };
                 Kernel::Queue(threads, gpu.compute_pipeline(&spec)?)
             }
@@ -411,6 +448,9 @@ impl RayTracer {
                 traced.kd_work.pushes += wide_counter(status.kd_pushes);
                 traced.kd_work.pops += wide_counter(status.kd_pops);
                 traced.kd_work.restarts += wide_counter(status.kd_restarts);
+                traced.kd_work.cached_nodes += wide_counter(status.kd_cached_nodes);
+                traced.kd_work.register_pushes += wide_counter(status.kd_register_pushes);
+                traced.kd_work.register_pops += wide_counter(status.kd_register_pops);
             }
             traced.batches += u64::from(queue.batches);
             traced.fetched_rays += u64::from(queue.fetched_rays);
