@@ -20,7 +20,7 @@ const SHORT: Scheme = flags(false, 4);
 const BOTH: Scheme = flags(true, 4);
 
 /// Stops none of the rays here.
-const QUOTA: u32 = 4000;
+const QUOTA: u32 = 3000;
 /// Stops many.
 const SMALL_QUOTA: u32 = 60;
 
@@ -244,7 +244,7 @@ fn persistent_threads_trace_every_ray_once() {
         let threads = PersistentThreads {
             groups: 3,
             batch: gpu.caps().subgroup_size,
-            fetches: 5,
+            fetches: 3,
             subgroups: 1,
         };
         let with_queue = |query, ray_quota| TraceSettings {
@@ -264,7 +264,7 @@ fn caches_are_those_of_the_twin_and_change_no_hit() {
         let cases = cases();
         let threads = PersistentThreads {
             groups: 3,
-            batch: 3 * gpu.caps().subgroup_size,
+            batch: 2 * gpu.caps().subgroup_size,
             fetches: 2,
             subgroups: 2,
         };

@@ -140,7 +140,8 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
                 float near_ends;
                 uint met = children_met(test, uintBitsToFloat(node.x), at.span, near_ends);
                 bool both = met == KD_MET_BOTH;
-                bool far_is_left = KD_KEEPS_FLAGS && both && (flags & at.bit) != 0u;
+                // Of a stack only on the way back to where a ray has stopped.
+                bool far_is_left = (KD_FLAGS || KD_KEEPS_FLAGS && INDEX_RESUMES) && both && (flags & at.bit) != 0u;
                 bool takes_near = met == KD_MET_NEAR || both && !far_is_left;
                 if (both && !far_is_left) {
                     if (KD_PUSH_DOWN && can_push_down) {
