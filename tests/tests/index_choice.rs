@@ -7,7 +7,7 @@ use std::sync::Arc;
 use clerestory::accel::bvh2::Bvh2Settings;
 use clerestory::accel::kd::KdSettings;
 use clerestory::film::picture::{NORMAL, VARIANCE};
-use clerestory::gpu::Gpu;
+use clerestory::gpu::{DeviceKind, Gpu};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{AlphaMode, Instance, Scene};
 use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
@@ -154,6 +154,27 @@ fn what_the_device_cannot_build_the_host_does_and_says_so() {
             assert_eq!(report.statistics, host.statistics());
             let there: Vec<[u32; 4]> = gpu.read(built.texels.buffer().view(), host.texels().len()).unwrap();
             assert!(there == host.texels());
+        }
+    });
+}
+
+#[test]
+fn leaves_that_software_devices_cannot_end_are_refused() {
+    with_gpu(|gpu| {
+        // In one place, so that no plane parts them.
+        let mut scene = builtin("builtin:cornell-box");
+        let mut heap = scene.meshes[0].clone();
+        heap.triangles = vec![heap.triangles[0]; 20_000];
+        scene.place(heap);
+        let kd = IndexKind::Kd(KdSettings::default());
+        for (kind, refused) in [(IndexKind::default(), false), (kd, gpu.caps().kind == DeviceKind::Cpu)] {
+            match render(gpu, &scene, &kind) {
+                Ok(_) => assert!(!refused, "{kind}"),
+                Err(Error::LimitExceeded { name, bytes, .. }) => {
+                    assert!(refused && name.contains("leaf") && bytes >= 20_000, "{name}: {bytes}");
+                }
+                Err(error) => panic!("{kind}: {error}"),
+            }
         }
     });
 }

@@ -5,7 +5,7 @@
 
 use clerestory::Error;
 use clerestory::accel::bvh2::FINISHED;
-use clerestory::accel::kd::{KdCounters, KdNode, KdSettings, KdTraversal, KdTree, Scheme};
+use clerestory::accel::kd::{KdCaches, KdCounters, KdNode, KdSettings, KdTraversal, KdTree, MAX_BYTE_LEVELS, Scheme};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
 use clerestory::accel::{Hit, Ray, RayIndex};
 use clerestory::gpu::{DeviceKind, Gpu};
@@ -20,7 +20,7 @@ const SHORT: Scheme = flags(false, 4);
 const BOTH: Scheme = flags(true, 4);
 
 /// Stops none of the rays here.
-const QUOTA: u32 = 4000;
+const QUOTA: u32 = 3000;
 /// Stops many.
 const SMALL_QUOTA: u32 = 60;
 
@@ -157,7 +157,8 @@ fn twin(case: &Case, settings: &TraceSettings) -> (Vec<Hit>, KdCounters, u64) {
         let mut traversal = match settings.query {
             Query::Closest => KdTraversal::closest(settings.scheme, ray),
             Query::Any => KdTraversal::any(settings.scheme, ray),
-        };
+        }
+        .with_caches(settings.caches);
         let quota = u64::from(settings.ray_quota);
         loop {
             traversal.run(&case.tree, ray, quota, &mut |_, _| true, &mut counters);
@@ -243,7 +244,8 @@ fn persistent_threads_trace_every_ray_once() {
         let threads = PersistentThreads {
             groups: 3,
             batch: gpu.caps().subgroup_size,
-            fetches: 5,
+            fetches: 3,
+            subgroups: 1,
         };
         let with_queue = |query, ray_quota| TraceSettings {
             execution: Execution::Persistent(threads),
@@ -253,6 +255,38 @@ fn persistent_threads_trace_every_ray_once() {
         let cases = [0, 1, 31, 32, 33, rays.len()].map(|count| tree(&rays[..count]));
         check(gpu, &cases, &with_queue(Query::Closest, 1000));
         assert!(check(gpu, &cases[5..], &with_queue(Query::Any, SMALL_QUOTA)) > 0);
+    });
+}
+
+#[test]
+fn caches_are_those_of_the_twin_and_change_no_hit() {
+    with_gpu(|gpu| {
+        let cases = cases();
+        let threads = PersistentThreads {
+            groups: 3,
+            batch: 2 * gpu.caps().subgroup_size,
+            fetches: 2,
+            subgroups: 2,
+        };
+        let with = |caches, query, ray_quota| TraceSettings {
+            execution: Execution::Persistent(threads),
+            caches,
+            ..settings(Scheme::Stack, query, ray_quota)
+        };
+        for caches in KdCaches::COMPARED {
+            assert_eq!(check(gpu, &cases, &with(caches, Query::Closest, 1000)), 0, "{caches:?}");
+        }
+        let [.., bytes, postpone] = KdCaches::COMPARED;
+        let few_levels = KdCaches {
+            node_levels: 3,
+            ..bytes
+        };
+        for caches in [few_levels, postpone] {
+            assert!(
+                check(gpu, &cases, &with(caches, Query::Any, SMALL_QUOTA)) > 1000,
+                "{caches:?}"
+            );
+        }
     });
 }
 
@@ -272,6 +306,29 @@ fn settings_that_could_lose_rays_are_refused_and_can_be_fitted() {
                 ..settings.fitted(gpu.caps(), traversal)
             };
             check(gpu, std::slice::from_ref(&case), &fitted);
+        }
+        let persistent = TraceSettings::persistent(gpu.caps()).fitted(gpu.caps(), traversal);
+        let [_, nodes, head, .., bytes, _] = KdCaches::COMPARED;
+        for wrong in [
+            TraceSettings {
+                caches: head,
+                ..settings(Scheme::Stack, Query::Closest, 100)
+            },
+            TraceSettings {
+                caches: nodes,
+                scheme: BOTH,
+                ..persistent
+            },
+            TraceSettings {
+                caches: KdCaches {
+                    node_levels: MAX_BYTE_LEVELS + 1,
+                    ..bytes
+                },
+                ..persistent
+            },
+        ] {
+            let refused = RayTracer::new(gpu, &case.tree, &wrong);
+            assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
         }
     });
 }

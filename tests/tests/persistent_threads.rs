@@ -99,7 +99,12 @@ fn both_models_trace_every_ray_once_and_find_what_the_twin_finds() {
                     assert!(one.unfinished > 0 && one.rounds > 1, "{what}: the quota stops nothing");
                 }
                 for (groups, batch, fetches) in [(4, 8, 32), (3, 20, 5), (1, 64, 1)] {
-                    let threads = PersistentThreads { groups, batch, fetches };
+                    let threads = PersistentThreads {
+                        groups,
+                        batch,
+                        fetches,
+                        subgroups: 1,
+                    };
                     let settings = TraceSettings {
                         execution: Execution::Persistent(threads),
                         ..ray_per_thread

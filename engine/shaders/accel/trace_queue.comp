@@ -8,6 +8,7 @@
 
 layout(local_size_x_id = 0) in;
 
+#define KD_CACHES
 #include "accel/trace_ray.glsl"
 
 // Batches that a workgroup fetches in one dispatch; 0 sets no end. Software drivers end loops in silence after so many iterations of all
@@ -32,6 +33,9 @@ void main() {
     uint end = trace_constants.first_ray + trace_constants.ray_count;
     uint fetches = 0u;
     bool more = true;
+    if (INDEX_KIND == INDEX_KD && KD_CACHE_LEVELS > 0u) {
+        kd_load_cache();
+    }
     while (more) {
         if (gl_LocalInvocationIndex == 0u) {
             fetched = trace_constants.first_ray + atomicAdd(trace_queue.next_ray, TRACE_BATCH);

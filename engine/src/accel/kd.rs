@@ -11,13 +11,16 @@
 
 pub mod bounds;
 mod build;
+mod cache;
 mod clip;
 mod counters;
+mod entries;
 pub mod probability;
 pub mod shifted_restart;
 mod traverse;
 mod tree;
 
+pub use cache::{KdCaches, MAX_BYTE_LEVELS, MAX_CACHED_LEVELS, StackCache};
 pub use counters::KdCounters;
 pub use probability::Heuristic;
 pub use traverse::{KdTraversal, MAX_SHORT_STACK, Scheme};
@@ -98,7 +101,7 @@ impl KdSettings {
 #[derive(Debug, Clone)]
 pub struct KdTree {
     bounds: Aabb,
-    /// The root, a pad, and pairs of siblings in depth-first order.
+    /// The root, a pad, and pairs of siblings: the top levels as a heap, what is below in depth-first order.
     nodes: Vec<KdNode>,
     /// Triangles of leaves, as places in `positions`, ascending in each leaf.
     references: Vec<u32>,
@@ -145,7 +148,8 @@ impl KdTree {
         self.bounds
     }
 
-    /// The root, a pad, and pairs of siblings.
+    /// The root, a pad, and pairs of siblings. The top levels, as many as there are up to [`MAX_CACHED_LEVELS`], are a heap with holes: the
+    /// children of the node at i are at 2i and 2i + 1, those of the root at 2 and 3; so are what caches hold. Holes are leaves of nothing.
     pub fn nodes(&self) -> &[KdNode] {
         &self.nodes
     }

@@ -9,190 +9,28 @@
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
 //! differs from run to run, and shows in nothing but the time.
 
-use super::bvh2::{MAX_DEPTH, MAX_LEAF_SIZE};
-use super::input::check_range;
-use super::kd::{KdCounters, Scheme};
+mod settings;
+
+pub use settings::{Execution, PersistentThreads, Query, TraceSettings};
+
+use super::kd::KdCounters;
 use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::trace_rays;
 use crate::gpu::shaders::sets::IndexSet;
-use crate::gpu::{
-    Access, Buffer, BufferDesc, Caps, Category, ComputePipeline, DeviceKind, Gpu, SOFTWARE_LOOP_CAP, TexelView, Timings,
-};
+use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, Timings};
 use crate::{Error, Result};
 
 /// Most rays of one call.
 pub const MAX_RAYS: usize = 1 << 31;
 
-/// Batches of a dispatch where quotas are fitted to a cap.
-const FITTED_FETCHES: u32 = 4;
-
 /// Dispatches of one submission, so that none takes seconds.
 const DISPATCHES_PER_SUBMISSION: u32 = 1024;
-
-/// How rays are dealt out to invocations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Execution {
-    /// As many invocations as rays; the driver's scheduler deals them out.
-    RayPerThread,
-    /// As many workgroups as stay on the device, which fetch batches of rays from a counter.
-    Persistent(PersistentThreads),
-}
-
-/// The size of a queue's crew and its quota.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct PersistentThreads {
-    /// Workgroups of a dispatch, each one subgroup, 1..=65,535; best as many as stay resident, which only a measurement tells (see
-    /// [`RayTracer::tune`]).
-    pub groups: u32,
-    /// Rays that a workgroup fetches at once, 1..=16,384.
-    pub batch: u32,
-    /// Batches that a workgroup fetches in one dispatch, from 1 on.
-    pub fetches: u32,
-}
-
-impl PersistentThreads {
-    /// What suits a device before anything is measured: batches of a subgroup; on software devices batches of four, two workgroups for each
-    /// thread of the host, and quotas below [`SOFTWARE_LOOP_CAP`].
-    pub fn on(caps: &Caps) -> Self {
-        let software = caps.kind == DeviceKind::Cpu;
-        let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
-        Self {
-            groups: if software { 2 * threads.min(512) } else { 1024 },
-            // Software devices run each barrier lane by lane: fewer fetches are fewer barriers.
-            batch: group_size(caps) * if software { 4 } else { 1 },
-            fetches: if software { 16 } else { 4096 },
-        }
-    }
-}
-
-/// What is asked of rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Query {
-    /// The closest hit.
-    #[default]
-    Closest,
-    /// Whether there is a hit; that which is returned may be any of a ray's hits.
-    Any,
-}
-
-/// Settings of a [`RayTracer`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct TraceSettings {
-    /// What is asked of rays. Default the closest hit.
-    pub query: Query,
-    /// How rays are dealt out.
-    pub execution: Execution,
-    /// Iterations after which a ray stops and waits for the next dispatch, above [`MAX_DEPTH`].
-    pub ray_quota: u32,
-    /// Whether work is counted, which costs a little time.
-    pub count: bool,
-    /// How kd-trees are traversed.
-    pub scheme: Scheme,
-}
-
-impl TraceSettings {
-    /// One invocation a ray.
-    pub fn ray_per_thread() -> Self {
-        Self {
-            query: Query::Closest,
-            execution: Execution::RayPerThread,
-            ray_quota: 32_768,
-            count: false,
-            scheme: Scheme::Stack,
-        }
-    }
-
-    /// Persistent threads with the quotas that suit the device.
-    pub fn persistent(caps: &Caps) -> Self {
-        Self {
-            query: Query::Closest,
-            execution: Execution::Persistent(PersistentThreads::on(caps)),
-            ray_quota: if caps.kind == DeviceKind::Cpu { 512 } else { 32_768 },
-            count: false,
-            scheme: Scheme::Stack,
-        }
-    }
-
-    /// The same with such quotas that a software device loses no ray in an index of this kind, as far as that is possible.
-    pub fn fitted(mut self, caps: &Caps, traversal: DeviceTraversal) -> Self {
-        if caps.kind != DeviceKind::Cpu || self.iterations(caps, traversal) <= u64::from(SOFTWARE_LOOP_CAP) {
-            return self;
-        }
-        let mut fetches = 1;
-        if let Execution::Persistent(threads) = &mut self.execution {
-            threads.batch = threads.batch.min(group_size(caps));
-            fetches = threads.fetches.clamp(1, FITTED_FETCHES);
-            threads.fetches = fetches;
-        }
-        let unstopped = Self { ray_quota: 0, ..self }.iterations(caps, traversal);
-        let left = u64::from(SOFTWARE_LOOP_CAP).saturating_sub(unstopped);
-        let share = left / u64::from(fetches * lanes_in_sum(caps, traversal));
-        self.ray_quota = self.ray_quota.min(share as u32).max(MAX_DEPTH + 1);
-        self
-    }
-
-    /// Iterations of all loops of an invocation together in one dispatch, at most. The test that ends a loop counts too.
-    pub fn iterations(&self, caps: &Caps, traversal: DeviceTraversal) -> u64 {
-        let ray = match traversal {
-            DeviceTraversal::Bvh2 => {
-                let leaves_on_the_stack = (MAX_DEPTH + 1) * MAX_LEAF_SIZE;
-                let walk_back = MAX_DEPTH + 1;
-                u64::from(self.ray_quota) + u64::from(leaves_on_the_stack + walk_back)
-            }
-            DeviceTraversal::Kd { longest_leaf } => {
-                DeviceTraversal::kd_iterations(longest_leaf, self.ray_quota, lanes_in_sum(caps, traversal))
-            }
-        };
-        match self.execution {
-            Execution::RayPerThread => ray,
-            Execution::Persistent(threads) => {
-                let rays = u64::from(threads.batch.div_ceil(group_size(caps)));
-                u64::from(threads.fetches).saturating_mul(rays * (ray + 1) + 2)
-            }
-        }
-    }
-
-    fn check(&self, caps: &Caps, traversal: DeviceTraversal) -> Result<()> {
-        check_range("trace.ray_quota", self.ray_quota, MAX_DEPTH + 1, u32::MAX)?;
-        if let Execution::Persistent(threads) = self.execution {
-            check_range("trace.groups", threads.groups, 1, 65_535)?;
-            check_range("trace.batch", threads.batch, 1, 16_384)?;
-            check_range("trace.fetches", threads.fetches, 1, u32::MAX)?;
-        }
-        let iterations = self.iterations(caps, traversal);
-        if caps.kind == DeviceKind::Cpu && iterations > u64::from(SOFTWARE_LOOP_CAP) {
-            let cause = format!(
-                "lets an invocation run {iterations} iterations; software devices end loops after {SOFTWARE_LOOP_CAP}"
-            );
-            return Err(match self.execution {
-                Execution::RayPerThread => Error::setting("trace.ray_quota", self.ray_quota, cause),
-                Execution::Persistent(threads) => Error::setting("trace.fetches", threads.fetches, cause),
-            });
-        }
-        Ok(())
-    }
-}
 
 /// A counter of the kernels: two words, the low one first.
 pub fn wide_counter([low, high]: [u32; 2]) -> u64 {
     u64::from(high) << 32 | u64::from(low)
-}
-
-/// Lanes of a queue's workgroup: a subgroup, so that no lane waits for the rays of another one.
-fn group_size(caps: &Caps) -> u32 {
-    caps.subgroup_size.clamp(1, 128)
-}
-
-/// Lanes whose loop iterations add up in a subgroup.
-fn lanes_in_sum(caps: &Caps, traversal: DeviceTraversal) -> u32 {
-    match traversal {
-        DeviceTraversal::Bvh2 => 1,
-        DeviceTraversal::Kd { .. } => caps.subgroup_size.max(1),
-    }
 }
 
 /// What rays met, and the work it took.
@@ -295,7 +133,7 @@ impl RayTracer {
             })?),
             Execution::Persistent(threads) => {
                 let spec = trace_queue::Spec {
-                    local_size_x: group_size(gpu.caps()),
+                    local_size_x: threads.lanes(gpu.caps()),
                     trace_fetches: threads.fetches,
                     trace_batch: threads.batch,
                     index_quota,
@@ -305,6 +143,9 @@ impl RayTracer {
                     kd_flags,
                     kd_push_down,
                     kd_short_stack,
+                    kd_cache_levels: settings.caches.node_levels,
+                    kd_stack_cache: settings.caches.stack_specialization(),
+                    kd_postpones: settings.caches.postpone,
                 };
                 Kernel::Queue(threads, gpu.compute_pipeline(&spec)?)
             }
@@ -410,6 +251,9 @@ impl RayTracer {
                 traced.kd_work.pushes += wide_counter(status.kd_pushes);
                 traced.kd_work.pops += wide_counter(status.kd_pops);
                 traced.kd_work.restarts += wide_counter(status.kd_restarts);
+                traced.kd_work.cached_nodes += wide_counter(status.kd_cached_nodes);
+                traced.kd_work.register_pushes += wide_counter(status.kd_register_pushes);
+                traced.kd_work.register_pops += wide_counter(status.kd_register_pops);
             }
             traced.batches += u64::from(queue.batches);
             traced.fetched_rays += u64::from(queue.fetched_rays);

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::kd::{KdSettings, KdTree};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::{BuildStages, Ray, RayIndex, TraversalCounters};
 use clerestory::scene::Scene;
@@ -30,7 +31,7 @@ Examples:
 
 Build times are medians by wall clock from triangles on the host to an index where it was built, by stage those of the median build; on \
 the device with the copies to it. Steps are nodes and triangles that a ray visits, exact counts of the same \
-rays for every index: half of them leave the camera, half leave surfaces in random directions.")]
+rays for every index, though a node of a kd-tree is one plane, not two boxes: half of them leave the camera, half leave surfaces in random directions.")]
 pub struct Arguments {
     /// A scene; may be given several times
     #[arg(long = "scene", value_name = "SCENE", default_values = SCENES)]
@@ -85,15 +86,22 @@ struct Measured {
 }
 
 /// Builds an index.
-type Build = fn(&[[Vec3; 3]]) -> Result<Bvh2>;
+type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
 
 /// The indexes, the one that others are compared with first.
-const INDEXES: [(&str, Build); 5] = [
-    ("bvh2, binned", |t| Bvh2::build(t, &Bvh2Settings::default())),
-    ("lbvh, fast", |t| lbvh::build(t, &fast(30))),
-    ("lbvh, fast, 63 bits", |t| lbvh::build(t, &fast(63))),
-    ("lbvh, high", |t| lbvh::build(t, &LbvhSettings::default())),
-    ("lbvh, high, 3 reinsertions", |t| lbvh::build(t, &reinserted(3))),
+const INDEXES: [(&str, Build); 6] = [
+    ("bvh2, binned", |t| {
+        Ok(Box::new(Bvh2::build(t, &Bvh2Settings::default())?))
+    }),
+    ("lbvh, fast", |t| Ok(Box::new(lbvh::build(t, &fast(30))?))),
+    ("lbvh, fast, 63 bits", |t| Ok(Box::new(lbvh::build(t, &fast(63))?))),
+    ("lbvh, high", |t| {
+        Ok(Box::new(lbvh::build(t, &LbvhSettings::default())?))
+    }),
+    ("lbvh, high, 3 reinsertions", |t| {
+        Ok(Box::new(lbvh::build(t, &reinserted(3))?))
+    }),
+    ("kd", |t| Ok(Box::new(KdTree::build(t, &KdSettings::default())?))),
 ];
 
 fn fast(code_bits: u32) -> LbvhSettings {
@@ -202,7 +210,7 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
         index = built?;
         builds.push((seconds, used(&index.stages())));
     }
-    Ok(measured(&index, rays, builds))
+    Ok(measured(index.as_ref(), rays, builds))
 }
 
 /// Of the build on the device that leaves the index there; what rays visit is counted in one that is read back.
@@ -226,7 +234,7 @@ fn used(stages: &BuildStages) -> Vec<(String, f64)> {
 /// Seconds of a build and its milliseconds by stage.
 type BuildTime = (f64, Vec<(String, f64)>);
 
-fn measured(index: &Bvh2, rays: &[Ray], mut builds: Vec<BuildTime>) -> Measured {
+fn measured(index: &dyn RayIndex, rays: &[Ray], mut builds: Vec<BuildTime>) -> Measured {
     builds.sort_by(|a, b| a.0.total_cmp(&b.0));
     let middle = builds.len() / 2;
     let (seconds, stages) = builds.into_iter().nth(middle).unwrap_or_default();

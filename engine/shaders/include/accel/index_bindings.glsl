@@ -23,7 +23,7 @@ const uint INDEX_FINISHED = 0xFFFFFFFFu;
 #define INDEX_RESUMES true
 #endif
 
-// Exact work of an invocation, filled when INDEX_COUNT is set. The last four are those of kd-trees.
+// Exact work of an invocation, filled when INDEX_COUNT is set. Those from the leaves on are of kd-trees.
 struct IndexCounters {
     uint nodes;
     uint triangles;
@@ -32,9 +32,12 @@ struct IndexCounters {
     uint pushes;
     uint pops;
     uint restarts;
+    uint cached_nodes;
+    uint register_pushes;
+    uint register_pops;
 };
 
-IndexCounters index_counters = IndexCounters(0u, 0u, 0u, 0u, 0u, 0u, 0u);
+IndexCounters index_counters = IndexCounters(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
 
 #define INDEX_COUNT_ONE(counter) \
     if (INDEX_COUNT) { \

@@ -16,6 +16,7 @@
 
 #include "accel/box_test.glsl"
 #include "accel/index_bindings.glsl"
+#include "accel/kd_cache.glsl"
 #include "accel/triangle.glsl"
 
 // The scheme: a stack, or flags with restarts at the root or at the lowest node that holds all that is left, and a ring of entries.
@@ -24,14 +25,13 @@ layout(constant_id = 104) const bool KD_PUSH_DOWN = false;
 layout(constant_id = 105) const uint KD_SHORT_STACK = 0u;
 
 const uint KD_MAX_DEPTH = 32u;
-const uint KD_KIND_BITS = 2u;
-const uint KD_LEAF = 3u;  // in place of an axis
-const uint KD_HEADER_TEXELS = 2u;
 const uint KD_REFERENCES_PER_TEXEL = 4u;
 const uint KD_TRIANGLE_TEXELS = 3u;
 const uint KD_ROOT_BIT = 0x80000000u;
-// Iterations of a round beside its nodes, triangles and skipped subtrees: the round, the leaf, what is left, and the ends of three loops.
-const uint KD_ROUND_ITERATIONS = 6u;
+// Iterations of a round beside its nodes, triangles and skipped subtrees: the round, the leaf, what is left, and the ends of all loops.
+const uint KD_ROUND_ITERATIONS = 8u;
+// The same of rounds that test two leaves.
+const uint KD_PAIR_ITERATIONS = 10u;
 
 const uint KD_MET_NEAR = 0u;
 const uint KD_MET_FAR = 1u;
@@ -106,40 +106,65 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     uint size = 0u;
     uint reference = 0u;
     uint reference_end = 0u;
+    // Of caches: the last entry; the last cached nodes, four bytes a word, the older word first; a leaf that waits, its references and their end.
+    uvec2 head = uvec2(0u);
+    uvec2 bytes = uvec2(0u);
+    uvec2 postponed = uvec2(0u);
+    bool waits = false;
+    bool ends_waiting = false;
     uint iterations = 0u;
     bool done = false;
     do {
-        iterations += KD_ROUND_ITERATIONS;
+        iterations += KD_POSTPONES ? KD_PAIR_ITERATIONS : KD_ROUND_ITERATIONS;
         // Down to a leaf, or to a far child that begins beyond the hit; unless a candidate has interrupted a leaf.
-        bool descends = reference == reference_end;
+        bool descends = reference == reference_end && !ends_waiting;
+        bool reached = false;
         while (descends) {
-            uvec4 pair = index_texel(KD_HEADER_TEXELS + (at.node >> 1));
-            uvec2 node = (at.node & 1u) == 0u ? pair.xy : pair.zw;
+            uvec2 node = kd_node(at.node);
             uint axis = node.y & KD_LEAF;
             uint children = node.y >> KD_KIND_BITS;
             if (axis == KD_LEAF) {
                 reference = children;
                 reference_end = children + node.x;
                 descends = false;
+                reached = true;
                 INDEX_COUNT_ONE(leaves)
             } else {
                 ++iterations;
                 INDEX_COUNT_ONE(nodes)
+                if (at.node < KD_CACHED_NODES && KD_CACHE_LEVELS > 0u) {
+                    INDEX_COUNT_ONE(cached_nodes)
+                }
                 PlaneTest test = plane_test(boxes, axis);
                 uint near = near_child(test);
                 float near_ends;
                 uint met = children_met(test, uintBitsToFloat(node.x), at.span, near_ends);
                 bool both = met == KD_MET_BOTH;
-                bool far_is_left = KD_KEEPS_FLAGS && both && (flags & at.bit) != 0u;
+                // Of a stack only on the way back to where a ray has stopped.
+                bool far_is_left = (KD_FLAGS || KD_KEEPS_FLAGS && INDEX_RESUMES) && both && (flags & at.bit) != 0u;
                 bool takes_near = met == KD_MET_NEAR || both && !far_is_left;
                 if (both && !far_is_left) {
                     if (KD_PUSH_DOWN && can_push_down) {
                         restart = at;
                         can_push_down = false;
                     }
-                    if (KD_CAPACITY > 0u) {
-                        entries[KD_FLAGS ? top % KD_CAPACITY : top] =
-                            uvec2((children + 1u - near) << KD_KIND_BITS | axis, floatBitsToUint(at.span.y));
+                    uint far = children + 1u - near;
+                    uvec2 entry = uvec2(far << KD_KIND_BITS | axis, floatBitsToUint(at.span.y));
+                    bool to_stack = KD_CAPACITY > 0u;
+                    if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD) {
+                        uvec2 spilled = head;
+                        head = entry;
+                        entry = spilled;
+                        to_stack = spilled.x != 0u;
+                        INDEX_COUNT_ONE(register_pushes)
+                    } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && far < KD_CACHED_NODES) {
+                        bool has_room = bytes.x < 1u << 24;
+                        bytes = has_room ? uvec2(bytes.x << 8 | far, bytes.y) : uvec2(bytes.x, bytes.y << 8 | far);
+                        to_stack = false;
+                        INDEX_COUNT_ONE(register_pushes)
+                    }
+                    if (to_stack) {
+                        entries[KD_FLAGS ? top % KD_CAPACITY : top] = entry;
                         ++top;
                         size = min(size + 1u, KD_CAPACITY);
                         INDEX_COUNT_ONE(pushes)
@@ -156,27 +181,44 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         }
         bool awaiting = false;
         Hit awaited;
-        while (reference != reference_end && !awaiting && !done) {
-            ++iterations;
-            INDEX_COUNT_ONE(triangles)
-            uint place = index_texel(header0.w + reference / KD_REFERENCES_PER_TEXEL)[reference % KD_REFERENCES_PER_TEXEL];
-            uint texel = header1.w + KD_TRIANGLE_TEXELS * place;
-            vec4 q0 = uintBitsToFloat(index_texel(texel));
-            vec4 q1 = uintBitsToFloat(index_texel(texel + 1u));
-            uvec4 q2 = index_texel(texel + 2u);
-            ++reference;
-            TriangleHit candidate;
-            // A triangle of several leaves is met again with the same hit, which is not better.
-            if (intersect_triangle(shear, q0.xyz, vec3(q0.w, q1.xy), vec3(q1.zw, uintBitsToFloat(q2.x)), ray.t_min, hit.t, candidate)
-                && (candidate.t < hit.t || q2.y < hit.triangle)) {
-                awaited = Hit(candidate.t, candidate.barycentrics, q2.y);
+        // The second of two leaves, tested if it begins before what is met in the first.
+        uvec2 second = uvec2(0u);
+        if (KD_POSTPONES && reached) {
+            second = uvec2(reference, reference_end);
+            uvec2 first = waits ? postponed : uvec2(0u);
+            postponed = second;
+            second = waits ? second : uvec2(0u);
+            reference = first.x;
+            reference_end = first.y;
+            waits = !waits;
+        }
+        for (uint leaf = 0u; leaf < (KD_POSTPONES ? 2u : 1u); ++leaf) {
+            while (reference != reference_end && !awaiting && !done) {
+                ++iterations;
+                INDEX_COUNT_ONE(triangles)
+                uint place = index_texel(header0.w + reference / KD_REFERENCES_PER_TEXEL)[reference % KD_REFERENCES_PER_TEXEL];
+                uint texel = header1.w + KD_TRIANGLE_TEXELS * place;
+                vec4 q0 = uintBitsToFloat(index_texel(texel));
+                vec4 q1 = uintBitsToFloat(index_texel(texel + 1u));
+                uvec4 q2 = index_texel(texel + 2u);
+                ++reference;
+                TriangleHit candidate;
+                // A triangle of several leaves is met again with the same hit, which is not better.
+                if (intersect_triangle(shear, q0.xyz, vec3(q0.w, q1.xy), vec3(q1.zw, uintBitsToFloat(q2.x)), ray.t_min, hit.t, candidate)
+                    && (candidate.t < hit.t || q2.y < hit.triangle)) {
+                    awaited = Hit(candidate.t, candidate.barycentrics, q2.y);
 #ifdef CLERESTORY_CANDIDATE_FILTER
-                awaiting = true;
+                    awaiting = true;
 #else
-                hit = awaited;
-                done = any_hit;
+                    hit = awaited;
+                    done = any_hit;
 #endif
-            }
+                }
+        }
+        if (KD_POSTPONES && leaf == 0u && !done) {
+            reference = second.x;
+            reference_end = at.span.x <= hit.t ? second.y : second.x;
+        }
         }
 #ifdef CLERESTORY_CANDIDATE_FILTER
         // Outside of the loop, where lanes wait for each other with their candidates.
@@ -186,22 +228,38 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         }
 #endif
         // On to what is left, skipping what begins beyond the hit.
-        bool leaves = !done && reference == reference_end;
+        bool leaves = !done && reference == reference_end && !ends_waiting;
+        done = done || ends_waiting;
         while (leaves) {
             flags += KD_KEEPS_FLAGS ? at.parent : 0u;
-            bool empty = KD_CAPACITY == 0u || size == 0u;
+            bool empty = (KD_CAPACITY == 0u || size == 0u) && head.x == 0u && bytes.x == 0u;
             if (KD_KEEPS_FLAGS ? flags == 0u : empty) {
-                done = true;
+                ends_waiting = KD_POSTPONES && waits;
+                done = !ends_waiting;
                 leaves = false;
+                reference = postponed.x;
+                reference_end = ends_waiting ? postponed.y : postponed.x;
             } else if (empty) {
                 at = restart;
                 can_push_down = KD_PUSH_DOWN;
                 leaves = false;
                 INDEX_COUNT_ONE(restarts)
             } else {
-                --top;
-                --size;
-                uvec2 entry = entries[KD_FLAGS ? top % KD_CAPACITY : top];
+                uvec2 entry;
+                if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD && head.x != 0u) {
+                    entry = head;
+                    head.x = 0u;
+                    INDEX_COUNT_ONE(register_pops)
+                } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && size == 0u) {
+                    entry = kd_cached_entry(boxes, (bytes.y != 0u ? bytes.y : bytes.x) & 0xFFu, ray.t_max);
+                    bytes = bytes.y != 0u ? uvec2(bytes.x, bytes.y >> 8) : uvec2(bytes.x >> 8, 0u);
+                    INDEX_COUNT_ONE(register_pops)
+                } else {
+                    --top;
+                    --size;
+                    entry = entries[KD_FLAGS ? top % KD_CAPACITY : top];
+                    INDEX_COUNT_ONE(pops)
+                }
                 uint axis = entry.x & KD_LEAF;
                 float begins = far_begins(along_axis(boxes.slack, axis), at.span.y, ray.t_min);
                 // The carry has set the bit of the node above.
@@ -210,11 +268,11 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
                 leaves = begins > hit.t;
                 iterations += leaves ? 1u : 0u;
                 can_push_down = false;
-                INDEX_COUNT_ONE(pops)
             }
         }
         // Flags that read as the end say that one leaf is left, at the lowest level: not worth stopping at.
-    } while (!done && (iterations < INDEX_QUOTA || flags == INDEX_FINISHED || reference != reference_end));
+        // Neither does a ray stop while a leaf waits, or within one.
+    } while (!done && (iterations < INDEX_QUOTA || flags == INDEX_FINISHED || waits || reference != reference_end));
     if (INDEX_COUNT) {
         index_counters.iterations += iterations;
     }

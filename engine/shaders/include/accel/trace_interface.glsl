@@ -29,6 +29,9 @@ layout(set = 0, binding = 3, scalar) restrict buffer TraceStatus {
     uint kd_pushes[2];
     uint kd_pops[2];
     uint kd_restarts[2];
+    uint kd_cached_nodes[2];
+    uint kd_register_pushes[2];
+    uint kd_register_pops[2];
 } trace_status;
 
 layout(push_constant, scalar) uniform TraceConstants {

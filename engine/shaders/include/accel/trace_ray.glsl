@@ -48,6 +48,9 @@ void trace_account(uint unfinished) {
             TRACE_ADD_WIDE(trace_status.kd_pushes, index_counters.pushes);
             TRACE_ADD_WIDE(trace_status.kd_pops, index_counters.pops);
             TRACE_ADD_WIDE(trace_status.kd_restarts, index_counters.restarts);
+            TRACE_ADD_WIDE(trace_status.kd_cached_nodes, index_counters.cached_nodes);
+            TRACE_ADD_WIDE(trace_status.kd_register_pushes, index_counters.register_pushes);
+            TRACE_ADD_WIDE(trace_status.kd_register_pops, index_counters.register_pops);
         }
     }
 }

@@ -12,14 +12,20 @@ const WORD_PAIR: u64 = 8;
 pub struct KdCounters {
     /// Inner nodes visited.
     pub nodes: u64,
+    /// Those of them that came from a cache.
+    pub cached_nodes: u64,
     /// Leaves visited, empty ones included.
     pub leaves: u64,
     /// Triangle tests.
     pub triangles: u64,
-    /// Entries written to the stack or the ring.
+    /// Entries written to the stack or the ring in memory.
     pub pushes: u64,
     /// Entries read from it.
     pub pops: u64,
+    /// Entries put in registers.
+    pub register_pushes: u64,
+    /// Entries taken from there to go on with.
+    pub register_pops: u64,
     /// Descents that began anew at the restart node; those that go on after a quota are not among them.
     pub restarts: u64,
     /// Loop iterations as kernels count them against their quota.
@@ -27,9 +33,10 @@ pub struct KdCounters {
 }
 
 impl KdCounters {
-    /// Bytes by the traffic model of the source: 8 for each inner node fetched, and 8 for each entry of the stack written or read.
+    /// Bytes by the traffic model of the source: 8 for each inner node fetched from memory, and 8 for each entry of the stack written or
+    /// read there.
     pub fn bytes(&self) -> u64 {
-        WORD_PAIR * (self.nodes + self.pushes + self.pops)
+        WORD_PAIR * (self.nodes - self.cached_nodes + self.pushes + self.pops)
     }
 
     /// Adds to the counters that all indexes share.

@@ -109,6 +109,59 @@ fn traversals_that_a_quota_stops_go_on_where_they_were() {
 }
 
 #[test]
+fn the_top_of_a_tree_is_a_heap() {
+    let triangles = soup(&mut Random(68), 3000, 0.05, 1.0, Vec3::ZERO);
+    let heap = 1 << MAX_CACHED_LEVELS;
+    for tree in [build(&triangles, &KdSettings::default()), chain(32).0, chain(3).0] {
+        let mut pending = vec![(0u32, 1u64, 1)];
+        while let Some((node, name, depth)) = pending.pop() {
+            assert_eq!(node < heap, depth <= MAX_CACHED_LEVELS, "{node} at level {depth}");
+            assert!(node >= heap || u64::from(node) == name || name == 1);
+            if let KdKind::Inner { children, .. } = tree.nodes()[node as usize].kind() {
+                pending.extend([0, 1].map(|side| (children + side, 2 * name + u64::from(side), depth + 1)));
+            }
+        }
+    }
+}
+
+#[test]
+fn caches_change_where_work_is_done_and_no_hit() {
+    let mut random = Random(69);
+    let triangles = soup(&mut random, 2000, 0.05, 1.0, Vec3::ZERO);
+    let (soup, chained) = (build(&triangles, &settings_of_all_kinds()[3]), chain(32));
+    for (tree, triangles) in [(&soup, &triangles), (&chained.0, &chained.1)] {
+        let rays = hard_rays(&mut random, triangles, 500);
+        let [none, nodes, head, postpone, nodes_head, bytes, nodes_postpone] = KdCaches::COMPARED.map(|caches| {
+            let mut work = KdCounters::default();
+            for ray in &rays {
+                let mut traversal = KdTraversal::closest(Scheme::Stack, ray).with_caches(caches);
+                traversal.run(tree, ray, u64::MAX, &mut |_, _| true, &mut work);
+                assert!(same_bits(&traversal.hit, &tree.closest_hit(ray)), "{caches:?} {ray:?}");
+            }
+            work
+        });
+        println!(
+            "bytes: {:?}",
+            [none, nodes, head, postpone, nodes_head, bytes, nodes_postpone].map(|w| w.bytes())
+        );
+        for same in [nodes, head, nodes_head, bytes] {
+            assert_eq!(
+                (same.nodes, same.leaves, same.triangles, same.pops + same.register_pops),
+                (none.nodes, none.leaves, none.triangles, none.pops)
+            );
+        }
+        assert!(none.cached_nodes == 0 && head.cached_nodes == 0 && nodes.cached_nodes > none.nodes / 3);
+        assert!(nodes.cached_nodes == nodes_head.cached_nodes && bytes.cached_nodes < nodes.cached_nodes);
+        assert_eq!((nodes.pushes, nodes.register_pushes), (none.pushes, 0));
+        assert_eq!(head.register_pushes, none.pushes);
+        assert!(head.pushes < none.pushes && bytes.pushes + bytes.register_pushes == none.pushes);
+        assert!(postpone.nodes >= none.nodes && postpone.triangles >= none.triangles);
+        assert_eq!(postpone.nodes, nodes_postpone.nodes);
+        assert!(nodes_head.bytes() < nodes.bytes().min(head.bytes()) && nodes.bytes().max(head.bytes()) < none.bytes());
+    }
+}
+
+#[test]
 fn every_point_of_a_triangle_lies_in_a_leaf_that_holds_it() {
     let mut random = Random(62);
     for (name, triangles) in hard_scenes() {

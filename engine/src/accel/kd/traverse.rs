@@ -7,8 +7,9 @@
 //! left but the child that the way takes. Adding the lowest bit of the way carries to the deepest node with something left, or out of the
 //! word. A subtree that begins beyond the best hit is skipped by the same addition.
 
+use super::entries::{Entries, Entry};
 use super::tree::KdKind;
-use super::{KdCounters, KdTree, MAX_DEPTH};
+use super::{KdCaches, KdCounters, KdTree, MAX_DEPTH};
 use crate::accel::bvh2::FINISHED;
 use crate::accel::bvh2::traverse::BoxTest;
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
@@ -89,49 +90,6 @@ fn far_begins(slack: f32, near_ended: f32, t_min: f32) -> f32 {
     (near_ended - 2.0 * slack).max(t_min)
 }
 
-/// A subtree to go on with.
-#[derive(Debug, Clone, Copy, Default)]
-struct Entry {
-    node: u32,
-    /// Axis of the plane above it.
-    axis: usize,
-    /// End of its span.
-    leave: f32,
-}
-
-/// Far children that are left: a stack, or a ring that forgets the oldest.
-struct Entries {
-    entries: [Entry; MAX_DEPTH as usize],
-    capacity: usize,
-    front: usize,
-    size: usize,
-}
-
-impl Entries {
-    fn new(capacity: usize) -> Self {
-        Self {
-            entries: [Entry::default(); MAX_DEPTH as usize],
-            capacity,
-            front: 0,
-            size: 0,
-        }
-    }
-
-    fn push(&mut self, entry: Entry) {
-        self.entries[(self.front + self.size) % self.capacity] = entry;
-        if self.size < self.capacity {
-            self.size += 1;
-        } else {
-            self.front = (self.front + 1) % self.capacity;
-        }
-    }
-
-    fn pop(&mut self) -> Option<Entry> {
-        self.size = self.size.checked_sub(1)?;
-        Some(self.entries[(self.front + self.size) % self.capacity])
-    }
-}
-
 /// A place to descend from.
 #[derive(Debug, Clone, Copy)]
 struct Descent {
@@ -164,6 +122,7 @@ pub struct KdTraversal {
     pub resume: u32,
     any: bool,
     scheme: Scheme,
+    caches: KdCaches,
 }
 
 impl KdTraversal {
@@ -174,6 +133,7 @@ impl KdTraversal {
             resume: 0,
             any: false,
             scheme,
+            caches: KdCaches::default(),
         }
     }
 
@@ -183,6 +143,12 @@ impl KdTraversal {
             any: true,
             ..Self::closest(scheme, ray)
         }
+    }
+
+    /// The same with caches, in a traversal by a stack.
+    pub fn with_caches(mut self, caches: KdCaches) -> Self {
+        self.caches = caches;
+        self
     }
 
     /// Runs for about `quota` iterations; [`Self::resume`] says whether it is done. Any quota makes progress.
@@ -232,52 +198,82 @@ impl KdTraversal {
             ray,
             boxes,
             push_down,
-            entries: Entries::new(capacity),
+            entries: Entries::new(capacity, self.caches),
             flags,
             restart: root,
             can_push_down: push_down,
             at: root,
+            cached_nodes: self.caches.cached_nodes(),
         };
-        let shear = ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction));
+        let round = u64::from(match self.caches.postpone {
+            true => constants::KD_PAIR_ITERATIONS,
+            false => constants::KD_ROUND_ITERATIONS,
+        });
+        let begun = counters.nodes + counters.triangles;
         let mut iterations = 0;
+        let mut waiting: Option<&[u32]> = None;
+        let mut tests = LeafTests {
+            tree,
+            shear: ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction)),
+            t_min: ray.t_min,
+            filter,
+        };
         loop {
-            iterations += u64::from(constants::KD_ROUND_ITERATIONS);
-            let nodes = counters.nodes;
-            if let Some(references) = walk.descend(self.hit.t, counters) {
+            iterations += round;
+            if let Some(leaf) = walk.descend(self.hit.t, counters) {
                 counters.leaves += 1;
                 watch(walk.at.node);
-                for place in references {
-                    iterations += 1;
-                    counters.triangles += 1;
-                    if self.test(tree, *place as usize, &shear, ray.t_min, filter) && self.any {
-                        counters.iterations += iterations + counters.nodes - nodes;
-                        return;
+                let [first, second]: [&[u32]; 2] = match (self.caches.postpone, waiting.take()) {
+                    (false, _) => [leaf, &[]],
+                    (true, Some(first)) => [first, leaf],
+                    (true, None) => {
+                        waiting = Some(leaf);
+                        [&[], &[]]
                     }
+                };
+                // The second only if it begins before what is met in the first.
+                if self.test_leaf(&mut tests, first, counters)
+                    || walk.at.span[0] <= self.hit.t && self.test_leaf(&mut tests, second, counters)
+                {
+                    break;
                 }
             }
-            iterations += counters.nodes - nodes;
             if !walk.next(self.hit.t, counters, &mut iterations) {
+                if let Some(leaf) = waiting {
+                    iterations += round;
+                    self.test_leaf(&mut tests, leaf, counters);
+                }
                 break;
             }
             // Flags that read as the end say that one leaf is left, at the lowest level.
-            if iterations >= quota && walk.flags != FINISHED {
+            let all = iterations + counters.nodes + counters.triangles - begun;
+            if all >= quota && walk.flags != FINISHED && waiting.is_none() {
                 self.resume = walk.flags;
                 break;
             }
         }
-        counters.iterations += iterations;
+        counters.iterations += iterations + counters.nodes + counters.triangles - begun;
+    }
+
+    /// Tests the triangles of a leaf; true when that answers the query.
+    fn test_leaf(&mut self, tests: &mut LeafTests<'_, '_>, leaf: &[u32], counters: &mut KdCounters) -> bool {
+        leaf.iter().any(|place| {
+            counters.triangles += 1;
+            self.test(tests, *place as usize) && self.any
+        })
     }
 
     /// Tests one triangle; true when it is the best hit now.
-    fn test(&mut self, tree: &KdTree, place: usize, shear: &RayShear, t_min: f32, filter: CandidateFilter<'_>) -> bool {
-        let Some(candidate) = intersect_triangle(shear, &tree.positions[place], t_min, self.hit.t) else {
+    fn test(&mut self, tests: &mut LeafTests<'_, '_>, place: usize) -> bool {
+        let tree = tests.tree;
+        let Some(candidate) = intersect_triangle(&tests.shear, &tree.positions[place], tests.t_min, self.hit.t) else {
             return false;
         };
         let triangle = tree.indices[place];
         let barycentrics = [candidate.u, candidate.v];
         // A triangle of several leaves is met again with the same hit, which is not better.
         let better = candidate.t < self.hit.t || triangle < self.hit.triangle;
-        if !better || !filter(triangle, barycentrics) {
+        if !better || !(tests.filter)(triangle, barycentrics) {
             return false;
         }
         self.hit = Hit {
@@ -286,6 +282,36 @@ impl KdTraversal {
             triangle,
         };
         true
+    }
+}
+
+/// What triangles of leaves are tested by.
+struct LeafTests<'a, 'f> {
+    tree: &'a KdTree,
+    shear: RayShear,
+    t_min: f32,
+    filter: CandidateFilter<'f>,
+}
+
+/// The entry of a node at the top of the tree as kernels find it in their caches: the axis of the plane above it, and where the ray leaves its box,
+/// which is where its span ends, since planes on the way to it bound both.
+fn cached_entry(tree: &KdTree, boxes: &BoxTest, t_max: f32, place: u32) -> Entry {
+    let (mut node, mut axis_above, mut bounds) = (0, 0, tree.bounds);
+    for level in (0..place.ilog2()).rev() {
+        if let KdKind::Inner { axis, plane, children } = tree.nodes[node as usize].kind() {
+            let side = place >> level & 1;
+            match side {
+                0 => bounds.upper[axis] = plane,
+                _ => bounds.lower[axis] = plane,
+            }
+            axis_above = axis;
+            node = children + side;
+        }
+    }
+    Entry {
+        node: place,
+        axis: axis_above,
+        leave: boxes.span(bounds.lower, bounds.upper).1.min(t_max),
     }
 }
 
@@ -300,6 +326,7 @@ struct Walk<'a> {
     restart: Descent,
     can_push_down: bool,
     at: Descent,
+    cached_nodes: u32,
 }
 
 impl<'a> Walk<'a> {
@@ -314,6 +341,7 @@ impl<'a> Walk<'a> {
                 KdKind::Inner { axis, plane, children } => (axis, plane, children),
             };
             counters.nodes += 1;
+            counters.cached_nodes += u64::from(at.node < self.cached_nodes);
             let test = plane_test(&self.boxes, axis);
             let near = near_child(&test);
             let mut goes_on = true;
@@ -336,14 +364,12 @@ impl<'a> Walk<'a> {
                         self.restart = *at;
                         self.can_push_down = false;
                     }
-                    if self.entries.capacity > 0 {
-                        counters.pushes += 1;
-                        self.entries.push(Entry {
-                            node: children + 1 - near,
-                            axis,
-                            leave: at.span[1],
-                        });
-                    }
+                    let far = Entry {
+                        node: children + 1 - near,
+                        axis,
+                        leave: at.span[1],
+                    };
+                    self.entries.push(far, counters);
                     at.span[1] = end;
                     near
                 }
@@ -364,13 +390,14 @@ impl<'a> Walk<'a> {
             if self.flags == 0 {
                 return false;
             }
-            let Some(entry) = self.entries.pop() else {
+            let (tree, boxes, t_max) = (self.tree, self.boxes, self.ray.t_max);
+            let of_node = |node| cached_entry(tree, &boxes, t_max, node);
+            let Some(entry) = self.entries.pop(counters, of_node) else {
                 counters.restarts += 1;
                 self.at = self.restart;
                 self.can_push_down = self.push_down;
                 return true;
             };
-            counters.pops += 1;
             // The carry has set the bit of the node above.
             let parent = self.flags & self.flags.wrapping_neg();
             let slack = self.boxes.slack[entry.axis];

@@ -5,6 +5,7 @@
 
 use super::bounds::Bounds;
 use super::build::Built;
+use super::cache::MAX_CACHED_LEVELS;
 use super::probability::Heuristic;
 use super::{KdTree, MAX_DEPTH};
 use crate::accel::bvh2::Bvh2Triangle;
@@ -99,6 +100,45 @@ pub enum KdFault {
     },
 }
 
+/// The same tree with its top levels as a heap, and what is below in depth-first order.
+fn top_as_heap(nodes: &[KdNode]) -> Vec<KdNode> {
+    let mut levels = 1;
+    let mut level = vec![0];
+    while levels < MAX_CACHED_LEVELS {
+        let kinds = level.iter().map(|node| nodes[*node as usize].kind());
+        level = kinds
+            .filter_map(|kind| match kind {
+                KdKind::Inner { children, .. } => Some([children, children + 1]),
+                KdKind::Leaf { .. } => None,
+            })
+            .flatten()
+            .collect();
+        if level.is_empty() {
+            break;
+        }
+        levels += 1;
+    }
+    let mut placed = vec![KdNode::leaf(0, 0); 1 << levels];
+    // Index, place, and the name in the heap, 0 for nodes below it.
+    let mut pending = vec![(0, 0, 1)];
+    while let Some((node, place, name)) = pending.pop() {
+        let node: KdNode = nodes[node as usize];
+        let KdKind::Inner { axis, plane, children } = node.kind() else {
+            placed[place] = node;
+            continue;
+        };
+        let in_heap = name > 0 && 2 * name < 1 << levels;
+        let first = if in_heap { 2 * name } else { placed.len() };
+        if !in_heap {
+            placed.extend([KdNode::default(); 2]);
+        }
+        placed[place] = KdNode::inner(axis as u8, plane, first as u32);
+        let names = if in_heap { [first, first + 1] } else { [0; 2] };
+        pending.extend([(children + 1, first + 1, names[1]), (children, first, names[0])]);
+    }
+    placed
+}
+
 /// Box of all triangles; empty when there are none.
 pub(super) fn bounds_of_all(positions: &[[Vec3; 3]]) -> Aabb {
     positions
@@ -188,7 +228,7 @@ impl KdTree {
         let mut stages = BuildStages::default();
         let mut tree = Self {
             bounds,
-            nodes,
+            nodes: top_as_heap(&nodes),
             references,
             positions,
             indices,

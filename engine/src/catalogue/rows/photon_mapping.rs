@@ -59,6 +59,66 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory report kd-caches",
+        part(
+            "PM-CA-1",
+            "kd node cache I: the top of the tree in shared memory",
+            "Interactive Manycore Photon Mapping 2011, §4.3",
+            "engine/src/accel/kd/cache.rs",
+            &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        ),
+    ),
+    measured(
+        "clerestory report kd-caches",
+        part(
+            "PM-CA-2",
+            "node cache II: the same with boxes",
+            "Interactive Manycore Photon Mapping 2011, §4.3",
+            "engine/src/accel/kd/cache.rs",
+            &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        ),
+    ),
+    measured(
+        "clerestory report kd-caches",
+        part(
+            "PM-CA-3",
+            "stack cache I: the last entry in registers",
+            "Interactive Manycore Photon Mapping 2011, §4.3",
+            "engine/src/accel/kd/cache.rs",
+            &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        ),
+    ),
+    measured(
+        "clerestory report kd-caches",
+        part(
+            "PM-CA-4",
+            "stack cache II: entries as bytes in registers",
+            "Interactive Manycore Photon Mapping 2011, §4.3",
+            "engine/src/accel/kd/cache.rs",
+            &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        ),
+    ),
+    measured(
+        "clerestory report kd-caches",
+        part(
+            "PM-CA-5",
+            "stack cache III: a leaf that waits",
+            "Interactive Manycore Photon Mapping 2011, §4.3",
+            "engine/src/accel/kd/cache.rs",
+            &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        ),
+    ),
+    measured(
+        "clerestory report kd-caches",
+        part(
+            "PM-CA-7",
+            "caches of nodes and of the last entry together",
+            "Interactive Manycore Photon Mapping 2011, §4.3",
+            "engine/src/accel/kd/cache.rs",
+            &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        ),
+    ),
+    measured(
         "clerestory agreement --scene cornell-point,sphere-flake",
         part(
             "PM-F-1",

@@ -70,6 +70,7 @@ pub const MEASURES: &[Measure] = &[
     on_host("coupled-reflection", surfaces::coupled_reflection::measure),
     on_device("device-model", device::device_model::measure),
     on_host("free-flight", media::free_flight::measure),
+    on_device("kd-caches", kd::kd_caches::measure),
     on_device("kd-heuristics", kd::kd_heuristics::measure),
     on_device("kd-or-bvh", kd::kd_or_bvh::measure),
     on_host("kd-probability", kd::kd_probability::measure),

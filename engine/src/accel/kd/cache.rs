@@ -1,0 +1,114 @@
+//! Caches of kd-trees that kernels manage themselves: nodes in shared memory, entries of the stack in registers, a leaf that waits.
+//!
+//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §4.3. They change where nodes and entries come from,
+//! and, with a leaf that waits, how much is visited; never a hit.
+
+use crate::accel::input::check_range;
+use crate::gpu::shaders::constants;
+use crate::{Error, Result};
+
+/// Most levels of nodes in shared memory, which are as many as trees keep as a heap.
+pub const MAX_CACHED_LEVELS: u32 = constants::KD_HEAP_LEVELS;
+
+/// Most of them where entries of the stack are bytes that name nodes.
+pub const MAX_BYTE_LEVELS: u32 = constants::KD_BYTE_LEVELS;
+
+/// Which entries of the stack are in registers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StackCache {
+    /// None.
+    #[default]
+    None,
+    /// The last one ("stack cache I").
+    Head,
+    /// Those of cached nodes, each a byte, eight in two words ("stack cache II"); ends of their spans come from boxes beside the nodes
+    /// ("node cache II").
+    Bytes,
+}
+
+/// Which caches a traversal by a stack uses; none by default.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct KdCaches {
+    /// Levels of the tree in shared memory ("node cache I"): 0 for none, at most [`MAX_CACHED_LEVELS`], and 1..=[`MAX_BYTE_LEVELS`] with
+    /// [`StackCache::Bytes`].
+    pub node_levels: u32,
+    /// Entries of the stack in registers.
+    pub stack: StackCache,
+    /// Whether the first of two leaves waits until the second is found, so that both are tested together ("stack cache III").
+    pub postpone: bool,
+}
+
+impl KdCaches {
+    /// The forms that the source compares, in the order of its tables: none; nodes; the last entry; a leaf that waits; nodes and the last
+    /// entry, the best of them; nodes with boxes and bytes; nodes and a leaf that waits.
+    pub const COMPARED: [Self; 7] = {
+        let none = Self {
+            node_levels: 0,
+            stack: StackCache::None,
+            postpone: false,
+        };
+        let nodes = Self {
+            node_levels: MAX_CACHED_LEVELS,
+            ..none
+        };
+        [
+            none,
+            nodes,
+            Self {
+                stack: StackCache::Head,
+                ..none
+            },
+            Self { postpone: true, ..none },
+            Self {
+                stack: StackCache::Head,
+                ..nodes
+            },
+            Self {
+                node_levels: MAX_BYTE_LEVELS,
+                stack: StackCache::Bytes,
+                ..none
+            },
+            Self {
+                postpone: true,
+                ..nodes
+            },
+        ]
+    };
+
+    /// Nodes whose index is below this are in shared memory.
+    pub(super) fn cached_nodes(&self) -> u32 {
+        match self.node_levels {
+            0 => 0,
+            levels => 1 << levels,
+        }
+    }
+
+    /// What kernels are specialized by.
+    pub(in crate::accel) fn stack_specialization(&self) -> u32 {
+        match self.stack {
+            StackCache::None => constants::KD_STACK_CACHE_NONE,
+            StackCache::Head => constants::KD_STACK_CACHE_HEAD,
+            StackCache::Bytes => constants::KD_STACK_CACHE_BYTES,
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Setting`] for too many levels, or none for bytes to name.
+    pub(in crate::accel) fn check(&self) -> Result<()> {
+        match self.stack {
+            StackCache::Bytes => check_range("kd.node_levels", self.node_levels, 1, MAX_BYTE_LEVELS),
+            _ => check_range("kd.node_levels", self.node_levels, 0, MAX_CACHED_LEVELS),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Setting`] where there are caches.
+    pub(in crate::accel) fn check_absent(&self, because: &str) -> Result<()> {
+        if *self == Self::default() {
+            return Ok(());
+        }
+        Err(Error::setting("kd.caches", format!("{self:?}"), because))
+    }
+}
