@@ -312,6 +312,175 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory index",
+        part(
+            "PM-KD-1",
+            "kd-trees by the surface area heuristic, O(n log n), clipped",
+            "Wald and Havran 2006",
+            "engine/src/accel/kd/build.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_point_of_a_triangle_lies_in_a_leaf_that_holds_it",
+                "engine/src/accel/kd/tests.rs::a_wall_ends_in_a_leaf_without_volume",
+                "engine/src/accel/kd/tests.rs::small_and_empty_scenes_have_trees",
+                "engine/src/accel/kd/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-1",
+            "kd-trees by a stack",
+            "Wald 2004; Interactive Manycore Photon Mapping, 2011, §3.2.4.1",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-3",
+            "kd-trees without a stack, by a word of flags",
+            "Interactive Manycore Photon Mapping, 2011, §4.2.2",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+                "tests/tests/kd.rs::rays_that_a_quota_stops_go_on_by_their_flags",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-4",
+            "the same with restarts pushed down",
+            "Interactive Manycore Photon Mapping, 2011, §4.2.3",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+                "engine/src/accel/kd/tests.rs::work_is_in_the_order_of_the_schemes",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-5",
+            "the same with a short stack",
+            "Interactive Manycore Photon Mapping, 2011, §4.2.3",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+                "engine/src/accel/kd/tests.rs::work_is_in_the_order_of_the_schemes",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-TR-6",
+            "the same with both",
+            "Interactive Manycore Photon Mapping, 2011, §4.2.3",
+            "engine/src/accel/kd/traverse.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+                "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+                "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+                "engine/src/accel/kd/tests.rs::work_is_in_the_order_of_the_schemes",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-CA-1",
+            "node cache I: the top levels in shared memory",
+            "Interactive Manycore Photon Mapping, 2011, §4.3.1.1",
+            "engine/src/accel/kd/cache.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+                "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+                "engine/src/accel/kd/tests.rs::the_top_of_a_tree_is_a_heap",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-CA-2",
+            "node cache II: the same with boxes",
+            "Interactive Manycore Photon Mapping, 2011, §4.3.1.2",
+            "engine/src/accel/kd/cache.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+                "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-CA-3",
+            "stack cache I: the last entry in registers",
+            "Interactive Manycore Photon Mapping, 2011, §4.3.2.1",
+            "engine/src/accel/kd/cache.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+                "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-CA-4",
+            "stack cache II: entries as bytes in two registers",
+            "Interactive Manycore Photon Mapping, 2011, §4.3.2.2",
+            "engine/src/accel/kd/cache.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+                "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-CA-5",
+            "stack cache III: a leaf that waits",
+            "Interactive Manycore Photon Mapping, 2011, §4.3.2.3",
+            "engine/src/accel/kd/cache.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+                "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report kd-traversal",
+        part(
+            "PM-CA-7",
+            "combinations of the caches",
+            "Interactive Manycore Photon Mapping, 2011, §4.3.3",
+            "engine/src/accel/kd/cache.rs",
+            &[
+                "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+                "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+                "tests/tests/kd.rs::settings_that_could_lose_rays_are_refused_and_can_be_fitted",
+            ],
+        ),
+    ),
+    measured(
         "clerestory report device-model",
         part(
             "PM-X-0",

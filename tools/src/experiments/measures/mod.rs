@@ -13,6 +13,7 @@ mod energy;
 mod errors;
 mod free_flight;
 mod inputs;
+mod kd_traversal;
 mod leaf_sizes;
 mod map_construction;
 mod map_quality;
@@ -93,6 +94,7 @@ pub const MEASURES: &[Measure] = &[
     on_host("coupled-reflection", coupled_reflection::measure),
     on_device("device-model", device_model::measure),
     on_host("free-flight", free_flight::measure),
+    on_device("kd-traversal", kd_traversal::measure),
     on_host("leaf-sizes", leaf_sizes::measure),
     on_device("map-construction", map_construction::measure),
     on_host("map-quality", map_quality::measure),

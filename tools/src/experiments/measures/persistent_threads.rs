@@ -49,13 +49,13 @@ fn ray(origin: Vec3, direction: Vec3, t_min: f32) -> Ray {
 }
 
 /// A ray through the middle of each pixel, row by row.
-fn primary_rays(camera: &Camera, side: u32) -> Result<Vec<Ray>> {
+pub(super) fn primary_rays(camera: &Camera, side: u32) -> Result<Vec<Ray>> {
     let rays = geometry::camera_rays(camera, side)?.into_iter();
     Ok(rays.map(|(eye, direction)| ray(eye, direction, 0.0)).collect())
 }
 
 /// From where the rays end, in uniform directions.
-fn diffuse_rays(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
+pub(super) fn diffuse_rays(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
     let mut random = Random::new(1);
     let met = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit());
     met.map(|(from, hit)| {
@@ -106,7 +106,8 @@ fn count(gpu: &Gpu, index: &Bvh2, rays: &[Ray], form: &Form) -> Result<Traced> {
     RayTracer::new(gpu, index, &settings)?.trace(rays)
 }
 
-fn bits(hit: &Hit) -> [u32; 4] {
+/// Words of a hit, to compare.
+pub(super) fn bits(hit: &Hit) -> [u32; 4] {
     let [u, v] = hit.barycentrics.map(f32::to_bits);
     [hit.t.to_bits(), u, v, hit.triangle]
 }
