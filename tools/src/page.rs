@@ -28,13 +28,14 @@ impl Block<'_> {
             }
             Err(error) => return Err(Error::io(path, error)),
         };
-        let begin_mark = format!("<!-- begin: {}, written by {} -->", self.name, self.command);
+        let begin_mark = format!("<!-- begin: {}, written by ", self.name);
         let end_mark = format!("<!-- end: {} -->", self.name);
-        let marked = format!("{begin_mark}\n\n{}\n\n{end_mark}", text.trim_end());
-        let new = match (old.find(&begin_mark), old.find(&end_mark)) {
-            (Some(begin), Some(end)) if begin < end => {
-                format!("{}{marked}{}", &old[..begin], &old[end + end_mark.len()..])
-            }
+        let marked = format!("{begin_mark}{} -->\n\n{}\n\n{end_mark}", self.command, text.trim_end());
+        // Found by the name alone: what is measured by another command since is still the same part.
+        let begin = old.find(&begin_mark);
+        let end = begin.and_then(|begin| Some(begin + old[begin..].find(&end_mark)? + end_mark.len()));
+        let new = match (begin, end) {
+            (Some(begin), Some(end)) => format!("{}{marked}{}", &old[..begin], &old[end..]),
             _ => {
                 let (first, rest) = self.name.split_at(1);
                 let heading = format!("{}{rest}: `{}`", first.to_uppercase(), self.command);
@@ -65,6 +66,16 @@ mod tests {
         assert!(text.contains("second") && text.contains("other"), "{text}");
         assert!(
             !text.contains("first") && text.matches("begin: one").count() == 1,
+            "{text}"
+        );
+        let by_another = Block {
+            name: "one",
+            command: "test --other",
+        };
+        by_another.write(&path, "third\n")?;
+        let text = std::fs::read_to_string(&path)?;
+        assert!(
+            !text.contains("second") && text.matches("begin: one").count() == 1 && text.contains("third"),
             "{text}"
         );
         Ok(())

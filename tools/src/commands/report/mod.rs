@@ -113,7 +113,11 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         };
         let part = match block {
             Some(block) => page_of_all(arguments).map(|page| (block, page)),
-            None => arguments.page.clone().map(|page| (own, page)),
+            None => {
+                let known = DEFAULTS.iter().find(|(name, _)| *name == experiment.name);
+                let block = known.map_or(own, |(_, block)| *block);
+                arguments.page.clone().map(|page| (block, page))
+            }
         };
         let about = format!("{}: {}", experiment.name, experiment.title);
         let interrupted = match experiment.kind()? {

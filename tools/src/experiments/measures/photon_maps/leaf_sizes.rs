@@ -188,7 +188,7 @@ fn deviation(by: &str, seen: f64, anywhere: f64, in_frames: Option<f64>) -> &'st
         _ if anywhere >= AIM => "within 3 % anywhere on the surfaces: the camera sees other cover than the mean",
         Some(frames) if frames >= AIM => "within 3 % of frames, which hold more than queries",
         _ if by == LARGE => "beyond 3 %: twice the source's share",
-        _ => "beyond 3 % of queries alone",
+        _ => "beyond 3 %, not explained by frames or by what the camera sees",
     }
 }
 

@@ -93,14 +93,14 @@ fn deviation(ours: f64, theirs: f64) -> String {
     let word = if ours.signum() == theirs.signum() {
         "sign as there"
     } else {
-        "sign turned"
+        "sign turned: it depends on how kernels lie"
     };
     let within = if ours.abs() <= MOST_NODES {
         "within 8 %"
     } else {
         "beyond 8 %"
     };
-    format!("{word}, {within}; the source's kernels lie otherwise")
+    format!("{word}, {within}")
 }
 
 /// A triangle whose box is the given one: the device builds over triangles.
