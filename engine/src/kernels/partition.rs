@@ -4,7 +4,8 @@
 //! stable; equal to [`compact`] and [`split`], the twins, on every device and in every form.
 
 use super::scan::{ScanOptions, ScanTotals};
-use super::stream::{self, Count, Form, Variant};
+use super::form::{Form, Variant};
+use super::stream::{self, Count};
 use crate::gpu::shaders::kernels::{partition, partition_subgroup};
 use crate::gpu::shaders::sets::PartitionSet;
 use crate::gpu::{Buffer, BufferView, Gpu, Pass};
