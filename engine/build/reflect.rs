@@ -525,7 +525,8 @@ impl Reader {
     /// Whether any of the capabilities of subgroup operations is declared.
     fn has_subgroup_operations(&self) -> bool {
         let mut capabilities = self.module.capabilities.iter().flat_map(|declared| &declared.operands);
-        capabilities.any(|operand| matches!(operand, Operand::Capability(c) if format!("{c:?}").starts_with("GroupNonUniform")))
+        capabilities
+            .any(|operand| matches!(operand, Operand::Capability(c) if format!("{c:?}").starts_with("GroupNonUniform")))
     }
 
     fn local_size(&self, spec: &[SpecConstant]) -> [Result<u32, u32>; 3] {

@@ -327,7 +327,10 @@ fn the_capabilities_are_those_that_are_enabled() {
         assert_no_messages(&gpu);
         gpu
     };
-    assert_eq!(optional(enabling(Some(OptionalFeatures::NONE)).caps()), [false; OPTIONAL]);
+    assert_eq!(
+        optional(enabling(Some(OptionalFeatures::NONE)).caps()),
+        [false; OPTIONAL]
+    );
     let gpu = enabling(None);
     let devices = Gpu::list().unwrap();
     let mut offered = devices.iter().map(|(_, offered)| offered);
