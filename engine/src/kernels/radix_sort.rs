@@ -211,8 +211,8 @@ impl RadixSort {
     /// Records a sort of side 0 and returns the side that holds the result. With a count on the device, both depend on the capacity only.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when there are more than 2³¹ keys, which no device has room for, or a buffer is too small, [`Error::Setting`] when there are values and
-    /// the sort has none, or the other way round; and as [`Pass::dispatch`].
+    /// [`Error::LimitExceeded`] when there are more than 2³¹ keys, which no device has room for, or a buffer is too small,
+    /// [`Error::Setting`] when there are values and the sort has none, or the other way round; and as [`Pass::dispatch`].
     pub fn record(
         &self,
         pass: &mut Pass<'_>,

@@ -26,7 +26,8 @@ pub enum Count<'a> {
     Device {
         /// Where the word is; the range must be aligned as storage bindings are.
         view: BufferView<'a>,
-        /// The most that there may be, for which the buffers have room. With more, the kernel handles none, and [`StreamStatus`] says how many there were.
+        /// The most that there may be, for which the buffers have room. With more, the kernel handles none, and [`StreamStatus`] says how
+        /// many there were.
         capacity: u32,
     },
 }

@@ -134,9 +134,8 @@ impl LbvhBuilder {
     /// these buffers by compute shaders may come before it without a barrier.
     ///
     /// Passes: `lbvh: boxes`, `lbvh: codes`, `lbvh: sort`, `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks`, `lbvh: emit`. It ends with a
-    /// barrier: compute shaders and copies may read `quarters` after it. The tree may be deeper than rays can
-    /// go, which must then not traverse it: once it has run, [`LbvhBuilder::bits_to_skip`] says so, and [`LbvhBuilder::record_shallower`] records
-    /// what makes it again.
+    /// barrier: compute shaders and copies may read `quarters` after it. The tree may be deeper than rays can go, which must then not
+    /// traverse it: once it has run, [`LbvhBuilder::bits_to_skip`] says so, and [`LbvhBuilder::record_shallower`] makes it again.
     ///
     /// # Errors
     /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
@@ -191,8 +190,8 @@ impl LbvhBuilder {
         self.record_tree(recorder, buffers, 0)
     }
 
-    /// After a build whose tree is too deep: records its stages behind the sort once more, from the codes that stand in `buffers`, without the
-    /// lowest `skipped` bits of each. Passes `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks` and `lbvh: emit`, with the barriers of
+    /// After a build whose tree is too deep: records its stages behind the sort once more, from the codes that stand in `buffers`, without
+    /// the lowest `skipped` bits of each. Passes `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks` and `lbvh: emit`, with the barriers of
     /// [`LbvhBuilder::record`]; `corners` and `indices` must be those of the build.
     ///
     /// # Errors
@@ -328,9 +327,9 @@ impl LbvhBuilder {
     }
 
     /// After a build has run that left out the lowest `skipped` bits of the codes (0 for [`LbvhBuilder::record`]): `None` when rays can
-    /// traverse its tree, which is at most [`MAX_DEPTH`] inner nodes deep then; otherwise how many bits
-    /// [`LbvhBuilder::record_shallower`] must leave out. Each takes one level at most, so that a tree may have to be made more than twice; without any bits it
-    /// is ⌈log₂ n⌉ deep.
+    /// traverse its tree, which is at most [`MAX_DEPTH`] inner nodes deep then; otherwise how many bits [`LbvhBuilder::record_shallower`]
+    /// must leave out. Each takes one level at most, so that a tree may have to be made more than twice; without any bits it is ⌈log₂ n⌉
+    /// deep.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).

@@ -1,7 +1,8 @@
 //! The hierarchy of sorted Morton codes: at each node the codes split where their highest differing bit changes.
 //!
 //! Source: C. Apetrei, "Fast and Simple Agglomerative LBVH Construction", EG UK CGVC 2014: a node is named by the last place of its left
-//! child, and of the two places at its ends a range joins the one whose codes differ in the lower bit. Here the top of the same tree is made from the root down, so that threads need no atomic operations, and what is below is merged in one run over the
+//! child, and of the two places at its ends a range joins the one whose codes differ in the lower bit. Here the top of
+//! the same tree is made from the root down, so that threads need no atomic operations, and what is below is merged in one run over the
 //! places, on a stack; the kernels climb from the leaves, and tests hold both together.
 //!
 //! Guarantee: twin of the kernels `lbvh_hierarchy` and `lbvh_emit` to the bit; the same tree whatever the number of threads; depth as
