@@ -177,11 +177,12 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         text,
         "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
          spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    fingerprint: {},\n    local_size: [{}],\n    \
-         bindings: &[",
+         subgroups: {},\n    bindings: &[",
         shader.name,
         interface.stage,
         interface.fingerprint(),
         local_size.join(", "),
+        interface.subgroups,
     );
     for binding in &interface.bindings {
         let kind = match &binding.resource {

@@ -1,4 +1,5 @@
-//! Reads the interface of a SPIR-V module: bindings, blocks, push constants, specialization constants, workgroup size.
+//! Reads the interface of a SPIR-V module: bindings, blocks, push constants, specialization constants, workgroup size,
+//! subgroup operations.
 //!
 //! Rests on `rspirv`; `third_party_notes/crates.md` says why.
 
@@ -112,6 +113,8 @@ pub struct Interface {
     pub spec: Vec<SpecConstant>,
     /// Workgroup size; an entry that a specialization constant sets holds its id.
     pub local_size: [Result<u32, u32>; 3],
+    /// It has subgroup operations.
+    pub subgroups: bool,
 }
 
 struct Reader {
@@ -129,8 +132,8 @@ impl Interface {
     pub fn fingerprint(&self) -> u64 {
         let spec: Vec<_> = self.spec.iter().map(|c| (c.id, &c.name, c.kind)).collect();
         let text = format!(
-            "{} {:?} {:?} {spec:?} {:?}",
-            self.stage, self.bindings, self.push, self.local_size
+            "{} {:?} {:?} {spec:?} {:?} {}",
+            self.stage, self.bindings, self.push, self.local_size, self.subgroups
         );
         fnv1a(text.bytes())
     }
@@ -178,6 +181,7 @@ pub fn reflect(module: &[u8], optimized: &[u8]) -> Result<Interface, String> {
     }
     bindings.sort_by_key(|b| (b.set, b.binding));
     let local_size = reader.local_size(&spec);
+    let subgroups = reader.has_subgroup_operations();
     Ok(Interface {
         stage,
         bindings,
@@ -185,6 +189,7 @@ pub fn reflect(module: &[u8], optimized: &[u8]) -> Result<Interface, String> {
         push,
         spec,
         local_size,
+        subgroups,
     })
 }
 
@@ -515,6 +520,13 @@ impl Reader {
     fn unnamed_local_size(&self, id: u32) -> Option<String> {
         let axis = self.workgroup_size()?.iter().position(|part| *part == id)?;
         Some(format!("local_size_{}", ["x", "y", "z"][axis]))
+    }
+
+    /// Whether any of the capabilities of subgroup operations is declared.
+    fn has_subgroup_operations(&self) -> bool {
+        let mut capabilities = self.module.capabilities.iter().flat_map(|declared| &declared.operands);
+        capabilities
+            .any(|operand| matches!(operand, Operand::Capability(c) if format!("{c:?}").starts_with("GroupNonUniform")))
     }
 
     fn local_size(&self, spec: &[SpecConstant]) -> [Result<u32, u32>; 3] {

@@ -294,8 +294,11 @@ fn invocations_are_counted_from_where_it_was_asked_for() {
     });
 }
 
-/// Capabilities that rest on optional features.
-fn optional(caps: &Caps) -> [bool; 10] {
+/// How many capabilities rest on optional features.
+const OPTIONAL: usize = 11;
+
+/// Those capabilities.
+fn optional(caps: &Caps) -> [bool; OPTIONAL] {
     [
         caps.robust_buffer_access,
         caps.geometry_shader,
@@ -305,6 +308,7 @@ fn optional(caps: &Caps) -> [bool; 10] {
         caps.fragment_stores,
         caps.vertex_stores,
         caps.int64_atomics,
+        caps.full_subgroups,
         caps.ray_query,
         caps.descriptor_indexing,
     ]
@@ -323,13 +327,16 @@ fn the_capabilities_are_those_that_are_enabled() {
         assert_no_messages(&gpu);
         gpu
     };
-    assert_eq!(optional(enabling(Some(OptionalFeatures::NONE)).caps()), [false; 10]);
+    assert_eq!(
+        optional(enabling(Some(OptionalFeatures::NONE)).caps()),
+        [false; OPTIONAL]
+    );
     let gpu = enabling(None);
     let devices = Gpu::list().unwrap();
     let mut offered = devices.iter().map(|(_, offered)| offered);
     let offered = offered.find(|offered| offered.device == gpu.caps().device).unwrap();
     let [common @ .., ray_query, descriptor_indexing] = optional(gpu.caps());
-    assert_eq!(common, optional(offered)[..8]);
+    assert_eq!(common, optional(offered)[..OPTIONAL - 2]);
     // Offered or not, nothing enables these.
     assert!(!ray_query && !descriptor_indexing);
 }

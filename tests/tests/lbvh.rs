@@ -1,11 +1,12 @@
 //! The device's linear hierarchies and compact traversals against their Rust twins, bit for bit.
 
-use clerestory::accel::Aabb;
-use clerestory::accel::lbvh::radix_tree::{LeafRule, SortedCodes, hierarchy};
-use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, build, refit};
+use clerestory::Error;
+use clerestory::accel::bvh2::MAX_DEPTH;
+use clerestory::accel::lbvh::radix_tree::hierarchy;
+use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, SortedCodes, build, refit};
 use clerestory::accel::photon_map::compact_bvh::CompactBvh;
 use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
-use clerestory::accel::{Ray, RayIndex};
+use clerestory::accel::{Aabb, LeafRule, Ray, RayIndex};
 use clerestory::gpu::shaders::accel::{compact_points, compact_rays};
 use clerestory::gpu::shaders::types::{CompactRoot, CompactWork};
 use clerestory::gpu::{Category, DeviceKind, Gpu, transfer_to_compute};
@@ -73,10 +74,69 @@ fn device_builds_are_the_twins_on_hard_cases() {
         }
         let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
         check("identical", &vec![one; 20_000]);
-        // A tower of ever smaller triangles over many equal ones: too deep for all bits of the codes.
-        let mut ladder = vec![one.map(|v| v * 1e-6); 10_000];
-        ladder.extend((0..30).map(|i| one.map(|v| (v * 0.1 + 1.0) * 0.5f32.powi(i))));
-        check("ladder", &ladder);
+    });
+}
+
+/// Many equal triangles in the lowest cell, and for each bit of a code one whose highest bit it is: the way down to the equal ones parts with
+/// another triangle at each bit, and then goes on by places.
+fn ladder(equal: usize, axis_bits: i32) -> Vec<[Vec3; 3]> {
+    // Small in its cell, and large enough for corners that differ.
+    let at = |place: Vec3| {
+        let size = place.max_element().max(1e-6) / 4096.0;
+        [place, place + size * Vec3::X, place + size * Vec3::Y]
+    };
+    let mut triangles = vec![at(Vec3::ZERO); equal];
+    // The other end of the grid.
+    triangles.push(at(Vec3::ONE));
+    for halvings in 0..axis_bits {
+        // In the middle of the upper half of the lowest cells of this size.
+        triangles.extend(Vec3::AXES.map(|axis| at(0.75 * 0.5f32.powi(halvings) * axis)));
+    }
+    triangles
+}
+
+#[test]
+fn trees_that_are_too_deep_are_made_again_as_the_hosts() {
+    with_gpu(|gpu| {
+        // Ways of 30 and of 63 nodes above leaves of ten thousand equal triangles, of which eight levels at least remain.
+        for (code_bits, least_excess) in [(30, 30 + 8 - MAX_DEPTH), (63, 63 + 8 - MAX_DEPTH)] {
+            let settings = fast(code_bits, 4);
+            let builder = LbvhBuilder::new(gpu, &settings).unwrap();
+            let triangles = ladder(10_000, code_bits as i32 / 3);
+            let buffers = builder.buffers(triangles.len() as u32).unwrap();
+            gpu.upload(&buffers.corners, 0, &triangles).unwrap();
+            let indices: Vec<u32> = (0..triangles.len() as u32).collect();
+            gpu.upload(&buffers.indices, 0, &indices).unwrap();
+            let mut recorder = gpu.recorder("build").unwrap();
+            builder.record(&mut recorder, &buffers).unwrap();
+            recorder.submit().unwrap().wait().unwrap();
+            let first = builder.bits_to_skip(&buffers, 0).unwrap().unwrap_or(0);
+            assert!(first >= least_excess, "{code_bits}: {first}");
+            let (mut skipped, mut builds) = (first, 1);
+            loop {
+                let mut recorder = gpu.recorder("shallower").unwrap();
+                builder.record_shallower(&mut recorder, &buffers, skipped).unwrap();
+                recorder.submit().unwrap().wait().unwrap();
+                builds += 1;
+                match builder.bits_to_skip(&buffers, skipped).unwrap() {
+                    Some(more) => skipped = more,
+                    None => break,
+                }
+            }
+            let host = build(&triangles, &settings).unwrap();
+            let texels = host.texels();
+            let there: Vec<[u32; 4]> = gpu.read(buffers.quarters.buffer().view(), texels.len()).unwrap();
+            assert!(there == texels, "{code_bits}");
+            // The builder that does so by itself, and says how often.
+            let whole = builder.build(&triangles).unwrap();
+            assert_eq!(whole.timings.count("lbvh: hierarchy"), builds, "{code_bits}");
+            assert_eq!(whole.timings.count("lbvh: sort"), 1);
+            assert!(whole.index.texels() == texels && whole.index.statistics() == host.statistics());
+            assert!(host.statistics().max_depth <= MAX_DEPTH);
+            let mut recorder = gpu.recorder("refused").unwrap();
+            let refused = builder.record_shallower(&mut recorder, &buffers, code_bits + 1);
+            assert!(matches!(refused, Err(Error::Setting { .. })));
+        }
     });
 }
 

@@ -123,6 +123,26 @@ fn a_rendering_leaves_picture_preview_and_report() -> Tested {
 }
 
 #[test]
+fn indexes_are_compared_also_where_the_device_cannot_build_one() -> Tested {
+    let scenes = ["builtin:triangle-soup?n=1", "builtin:triangle-soup?n=500"];
+    let scenes = ["--scene", scenes[0], "--scene", scenes[1]];
+    let output = succeed(&[&["index", "--json", "--repeat", "2", "--rays", "100"][..], &scenes].concat())?;
+    let report = json(&output.stdout)?;
+    let rows = report["indexes"].as_array().map_or(0, Vec::len);
+    // Five of the host for each scene, and one of the device.
+    assert_eq!(rows, 11, "{}", said(&output));
+    let skipped = report["skipped"].as_array().cloned().unwrap_or_default();
+    assert_eq!(skipped.len(), 1);
+    assert_eq!(skipped[0]["index"], "lbvh, fast, device");
+    assert!(
+        skipped[0]["because"]
+            .as_str()
+            .is_some_and(|why| why.contains("two triangles"))
+    );
+    Ok(())
+}
+
+#[test]
 fn settings_reach_the_technique_and_the_reference_is_measured() -> Tested {
     let folder = tempfile::tempdir()?;
     let (reference, settings) = (folder.path().join("r.exr"), folder.path().join("settings.json"));

@@ -33,11 +33,11 @@ void lbvh_store(uint at, uvec3 v) {
 
 // The child's word, and in an inner child the parent's.
 void lbvh_store_child(uint to, uint side, uint word, uint root) {
-    bool is_leaf = (word & LBVH_COUNT_MASK) != 0u;
-    uint child = is_leaf ? 0u : lbvh_target(word >> LBVH_COUNT_BITS, root);
-    lbvh_words[LBVH_BVH2_NODE_WORDS * to + 12u + side] = is_leaf ? word : child << LBVH_COUNT_BITS;
+    bool is_leaf = (word & BVH2_COUNT_MASK) != 0u;
+    uint child = is_leaf ? 0u : lbvh_target(word >> BVH2_COUNT_BITS, root);
+    lbvh_words[BVH2_NODE_WORDS * to + 12u + side] = is_leaf ? word : child << BVH2_COUNT_BITS;
     if (!is_leaf) {
-        lbvh_words[LBVH_BVH2_NODE_WORDS * child + 14u] = to << 1 | side;
+        lbvh_words[BVH2_NODE_WORDS * child + 14u] = to << 1 | side;
     }
 }
 
@@ -50,14 +50,14 @@ void main() {
     uint root = lbvh_state.root;
     uint nodes = lbvh_rank(count - 2u) + texelFetch(lbvh_retained, int(count - 2u)).x;
     uint primitive = texelFetch(lbvh_order, int(place >> 2))[place & 3u];
-    uint triangle = LBVH_BVH2_NODE_WORDS * nodes + LBVH_BVH2_TRIANGLE_WORDS * place;
+    uint triangle = BVH2_NODE_WORDS * nodes + BVH2_TRIANGLE_WORDS * place;
     for (uint corner = 0u; corner < 3u; ++corner) {
         lbvh_store(triangle + 3u * corner, floatBitsToUint(lbvh_corners[3u * primitive + corner]));
     }
     lbvh_store(triangle + 9u, uvec3(lbvh_indices[primitive], 0u, 0u));
     if (place + 1u < count && texelFetch(lbvh_retained, int(place)).x != 0u) {
         uint to = lbvh_target(place, root);
-        uint at = LBVH_BVH2_NODE_WORDS * to;
+        uint at = BVH2_NODE_WORDS * to;
         ivec4 a = ivec4(texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place)));
         ivec4 b = ivec4(texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place + 1u)));
         ivec4 c = ivec4(texelFetch(lbvh_nodes, int(LBVH_NODE_QUARTERS * place + 2u)));
@@ -72,7 +72,7 @@ void main() {
         if (is_root) {
             lbvh_words[at + 14u] = 0u;
         }
-        lbvh_words[at + 15u] = is_root ? LBVH_NODE_QUARTERS * nodes : 0u;
+        lbvh_words[at + 15u] = is_root ? BVH2_NODE_QUARTERS * nodes : 0u;
     }
     if (place == 0u) {
         lbvh_state.nodes = nodes;

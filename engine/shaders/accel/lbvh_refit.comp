@@ -27,19 +27,19 @@ void main() {
     if (node >= nodes) {
         return;
     }
-    uint word = lbvh_words[LBVH_BVH2_NODE_WORDS * node + 12u + side];
-    uint count = word & LBVH_COUNT_MASK;
-    uint triangle = LBVH_BVH2_NODE_WORDS * nodes + LBVH_BVH2_TRIANGLE_WORDS * (word >> LBVH_COUNT_BITS);
+    uint word = lbvh_words[BVH2_NODE_WORDS * node + 12u + side];
+    uint count = word & BVH2_COUNT_MASK;
+    uint triangle = BVH2_NODE_WORDS * nodes + BVH2_TRIANGLE_WORDS * (word >> BVH2_COUNT_BITS);
     LbvhBox box = LbvhBox(ivec3(0x7FFFFFFF), ivec3(int(0x80000000u)));
     for (uint i = 0u; i < count; ++i) {
         for (uint corner = 0u; corner < 3u; ++corner) {
-            ivec3 place = lbvh_load(triangle + LBVH_BVH2_TRIANGLE_WORDS * i + 3u * corner);
+            ivec3 place = lbvh_load(triangle + BVH2_TRIANGLE_WORDS * i + 3u * corner);
             box = lbvh_union(box, LbvhBox(place, place));
         }
     }
     bool climbing = count > 0u;
     for (uint level = 0u; climbing && level < LBVH_MAX_ASCENT; ++level) {
-        uint at = LBVH_BVH2_NODE_WORDS * node;
+        uint at = BVH2_NODE_WORDS * node;
         uvec3 lower = floatBitsToUint(ordered_floats(box.lower));
         uvec3 upper = floatBitsToUint(ordered_floats(box.upper));
         uint own = at + 6u * side;

@@ -19,7 +19,7 @@ void main() {
     if (place >= lbvh_push.count) {
         return;
     }
-    uint at = LBVH_BVH2_NODE_WORDS * lbvh_state.nodes + LBVH_BVH2_TRIANGLE_WORDS * place;
+    uint at = BVH2_NODE_WORDS * lbvh_state.nodes + BVH2_TRIANGLE_WORDS * place;
     uint primitive = lbvh_order[place];
     for (uint corner = 0u; corner < 3u; ++corner) {
         uvec3 bits = floatBitsToUint(lbvh_corners[3u * primitive + corner]);

@@ -53,7 +53,7 @@ void main() {
     uint count = stream_size(push.plan);
     uvec2 range = stream_range(team, count, stream_block(count, push.plan.tile, push.plan.max_teams));
     first_places(team);
-    // Subgroups may be smaller than gl_SubgroupSize says, but they are full.
+    // Subgroups are full: the host asks for that.
     uint width = LANES / gl_NumSubgroups;
     uint row = gl_SubgroupID * BINS;
     for (uint tile = range.x; tile < range.y; tile += LANES * KEYS_PER_INVOCATION) {

@@ -4,7 +4,7 @@
 //! 7(5), 1987) for rays, its volume twin (the voxel volume heuristic of photon maps) for point queries, both with unit costs.
 //!
 //! Guarantee: [`BoxTree::shape`] accepts exactly the trees in which every primitive lies in one leaf and every box is the union of the
-//! primitives below it, to the bit.
+//! primitives below it, equal as numbers are: −0 is +0.
 
 use super::Aabb;
 
@@ -83,8 +83,15 @@ pub enum TreeFault {
     Box {
         /// The node that stores it; `None` for the root's box.
         node: Option<u32>,
-        /// Which child.
+        /// Which child: 0 left, 1 right; 0 for the root's box.
         side: u32,
+    },
+    /// A plane of a node's box is a plane of neither child.
+    Plane {
+        /// The node whose children these are.
+        node: u32,
+        /// 0, 1, 2 of the lower planes x, y, z; 3, 4, 5 of the upper ones.
+        plane: u32,
     },
 }
 

@@ -34,6 +34,9 @@ pub const MAX_LEAF_SIZE: u32 = 8;
 /// the bits above hold its first triangle.
 pub const COUNT_BITS: u32 = constants::BVH2_COUNT_BITS;
 
+/// These bits.
+pub const COUNT_MASK: u32 = constants::BVH2_COUNT_MASK;
+
 /// Most triangles that child words can address.
 pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);
 
@@ -61,6 +64,12 @@ pub(super) const NODE_QUARTERS: usize = size_of::<Bvh2Node>() / size_of::<[u32; 
 
 /// Quarters of a triangle.
 pub(super) const TRIANGLE_QUARTERS: usize = size_of::<Bvh2Triangle>() / size_of::<[u32; 4]>();
+
+const _: () = assert!(
+    NODE_QUARTERS == constants::BVH2_NODE_QUARTERS as usize
+        && TRIANGLE_QUARTERS == constants::BVH2_TRIANGLE_QUARTERS as usize,
+    "the kernels have another layout"
+);
 
 /// The child word of a leaf.
 pub(super) fn leaf_word(first: u32, count: u32) -> u32 {

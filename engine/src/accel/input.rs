@@ -9,34 +9,34 @@ use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-enum Usable {
+enum Usability {
     Yes,
     OutOfRange,
     Degenerate,
 }
 
-fn classify(triangle: &[Vec3; 3]) -> Usable {
+fn classify(triangle: &[Vec3; 3]) -> Usability {
     // NaN fails the comparison.
     if !triangle
         .iter()
         .all(|v| v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
     {
-        return Usable::OutOfRange;
+        return Usability::OutOfRange;
     }
     let [a, b, c] = triangle.map(|v| v.as_dvec3());
     if (b - a).cross(c - a) == DVec3::ZERO {
-        return Usable::Degenerate;
+        return Usability::Degenerate;
     }
-    Usable::Yes
+    Usability::Yes
 }
 
 /// Whether rays can meet a triangle: in range, and of an area in f64.
 pub(super) fn can_be_met(triangle: &[Vec3; 3]) -> bool {
-    matches!(classify(triangle), Usable::Yes)
+    matches!(classify(triangle), Usability::Yes)
 }
 
-/// The triangles that rays can meet, in order.
-pub(super) struct Met<'a> {
+/// The triangles that an index is built of: those that rays can meet, in order.
+pub(super) struct UsableTriangles<'a> {
     triangles: &'a [[Vec3; 3]],
     /// Their indices; `None` when that is every one.
     indices: Option<Vec<u32>>,
@@ -44,22 +44,22 @@ pub(super) struct Met<'a> {
     pub(super) statistics: IndexStatistics,
 }
 
-impl<'a> Met<'a> {
+impl<'a> UsableTriangles<'a> {
     pub(super) fn among(triangles: &'a [[Vec3; 3]]) -> Self {
         let count = |[range, degenerate]: [u64; 2], triangle| match classify(triangle) {
-            Usable::Yes => [range, degenerate],
-            Usable::OutOfRange => [range + 1, degenerate],
-            Usable::Degenerate => [range, degenerate + 1],
+            Usability::Yes => [range, degenerate],
+            Usability::OutOfRange => [range + 1, degenerate],
+            Usability::Degenerate => [range, degenerate + 1],
         };
         let [excluded_range, excluded_degenerate] = triangles
             .par_iter()
             .fold(|| [0; 2], count)
             .reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         let excluded = excluded_range + excluded_degenerate;
-        let met = |i: &u32| can_be_met(&triangles[*i as usize]);
+        let usable = |i: &u32| can_be_met(&triangles[*i as usize]);
         Self {
             triangles,
-            indices: (excluded > 0).then(|| (0..triangles.len() as u32).into_par_iter().filter(met).collect()),
+            indices: (excluded > 0).then(|| (0..triangles.len() as u32).into_par_iter().filter(usable).collect()),
             statistics: IndexStatistics {
                 triangles: triangles.len() as u64 - excluded,
                 excluded_range,
@@ -89,6 +89,9 @@ impl<'a> Met<'a> {
         }
     }
 }
+
+/// The name that kd-trees know it by.
+pub(super) type Met<'a> = UsableTriangles<'a>;
 
 /// The box of a triangle.
 pub(super) fn bounds_of(triangle: &[Vec3; 3]) -> Aabb {

@@ -185,8 +185,8 @@ pub struct IndexOnDevice {
 pub struct IndexReport {
     /// One of [`IndexKind::NAMES`].
     pub kind: &'static str,
-    /// Wall-clock milliseconds of its build, without the upload of what the host has built. A device's first build has the time in which
-    /// the driver compiles its kernels.
+    /// Wall-clock milliseconds of its build, without the upload of what the host has built. Pipelines are made
+    /// before it begins, but drivers that compile at the first dispatch, as Mesa's software driver does, do so within a device's first build.
     pub build_ms: f64,
     /// Where these went.
     pub stages: BuildStages,

@@ -27,6 +27,7 @@ mod input;
 pub mod kd;
 mod kind;
 pub mod lbvh;
+mod leaf_rule;
 pub mod morton;
 pub mod offset;
 pub mod optimise;
@@ -42,6 +43,7 @@ mod test_support;
 pub use aabb::Aabb;
 pub use device_traversal::DeviceTraversal;
 pub use kind::{IndexKind, IndexOnDevice, IndexReport};
+pub use leaf_rule::LeafRule;
 pub use stages::BuildStages;
 
 use crate::gpu::shaders::constants;

@@ -19,7 +19,7 @@ pub use treelets::MAX_TREELET;
 
 use super::Aabb;
 use super::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
-use super::lbvh::radix_tree::{LeafRule, half_area};
+use super::leaf_rule::{LeafRule, half_area};
 use leaves::{choose, with_leaves};
 
 /// How much to do.

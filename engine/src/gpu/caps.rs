@@ -21,8 +21,13 @@ pub struct Caps {
     pub kind: DeviceKind,
     /// Lanes of a subgroup.
     pub subgroup_size: u32,
+    /// `minSubgroupSize`: the fewest lanes that the device makes subgroups of; 0 where it does not say.
+    pub min_subgroup_size: u32,
     /// Subgroup operations usable in compute shaders.
     pub subgroup: SubgroupOperations,
+    /// `computeFullSubgroups` is enabled (of devices in a list: offered): compute shaders with subgroup operations run in subgroups without
+    /// inactive lanes.
+    pub full_subgroups: bool,
     /// `geometryShader`.
     pub geometry_shader: bool,
     /// `shaderInt64`.
@@ -207,12 +212,17 @@ impl Caps {
     pub(super) fn read(instance: &super::instance::Instance, device: vk::PhysicalDevice, queue_family: u32) -> Self {
         let summary = instance.summary(0, device);
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut sizes = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
         let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default()
             .push_next(&mut subgroup)
+            .push_next(&mut sizes)
             .push_next(&mut maintenance);
         let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
-        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan12);
+        let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut vulkan12)
+            .push_next(&mut vulkan13);
         // SAFETY: the physical device belongs to the instance, and the chained structs live on this stack.
         let (memory, families, extensions) = unsafe {
             instance.raw.get_physical_device_properties2(device, &mut properties);
@@ -248,6 +258,7 @@ impl Caps {
             api: summary.api,
             kind: summary.kind,
             subgroup_size: subgroup.subgroup_size,
+            min_subgroup_size: sizes.min_subgroup_size,
             subgroup: SubgroupOperations {
                 basic: operations.contains(vk::SubgroupFeatureFlags::BASIC),
                 vote: operations.contains(vk::SubgroupFeatureFlags::VOTE),
@@ -255,6 +266,7 @@ impl Caps {
                 ballot: operations.contains(vk::SubgroupFeatureFlags::BALLOT),
                 shuffle: operations.contains(vk::SubgroupFeatureFlags::SHUFFLE),
             },
+            full_subgroups: vulkan13.compute_full_subgroups != 0,
             geometry_shader: features.geometry_shader != 0,
             int64: features.shader_int64 != 0,
             float64: features.shader_float64 != 0,

@@ -68,6 +68,8 @@ pub struct OptionalFeatures {
     pub ray_query: bool,
     /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing`.
     pub descriptor_indexing: bool,
+    /// `VkPhysicalDeviceVulkan13Features::computeFullSubgroups`.
+    pub compute_full_subgroups: bool,
 }
 
 impl OptionalFeatures {
@@ -83,6 +85,7 @@ impl OptionalFeatures {
         shader_buffer_int64_atomics: false,
         ray_query: false,
         descriptor_indexing: false,
+        compute_full_subgroups: false,
     };
 
     /// What is in both.
@@ -99,6 +102,7 @@ impl OptionalFeatures {
             shader_buffer_int64_atomics: self.shader_buffer_int64_atomics && other.shader_buffer_int64_atomics,
             ray_query: self.ray_query && other.ray_query,
             descriptor_indexing: self.descriptor_indexing && other.descriptor_indexing,
+            compute_full_subgroups: self.compute_full_subgroups && other.compute_full_subgroups,
         }
     }
 }
@@ -137,6 +141,7 @@ impl EnabledFeatures {
         caps.int64_atomics &= optional.shader_buffer_int64_atomics;
         caps.ray_query &= optional.ray_query;
         caps.descriptor_indexing &= optional.descriptor_indexing;
+        caps.full_subgroups &= optional.compute_full_subgroups;
     }
 
     /// The Vulkan structs that switch these features on, for a host that creates a device. `ray_query` is an extension and has to be asked
@@ -161,7 +166,8 @@ impl EnabledFeatures {
                 .shader_sampled_image_array_non_uniform_indexing(optional.descriptor_indexing),
             vulkan13: vk::PhysicalDeviceVulkan13Features::default()
                 .synchronization2(self.synchronization2)
-                .dynamic_rendering(self.dynamic_rendering),
+                .dynamic_rendering(self.dynamic_rendering)
+                .compute_full_subgroups(optional.compute_full_subgroups),
         }
     }
 
@@ -191,6 +197,7 @@ impl EnabledFeatures {
                 ray_query: false,
                 descriptor_indexing: on(vulkan12.runtime_descriptor_array)
                     && on(vulkan12.shader_sampled_image_array_non_uniform_indexing),
+                compute_full_subgroups: on(vulkan13.compute_full_subgroups),
             },
         }
     }
@@ -267,6 +274,7 @@ mod tests {
             optional: OptionalFeatures {
                 shader_int64: set,
                 descriptor_indexing: set,
+                compute_full_subgroups: set,
                 ..OptionalFeatures::NONE
             },
             ..EnabledFeatures::REQUIRED

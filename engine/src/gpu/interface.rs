@@ -17,6 +17,9 @@ pub struct ShaderInfo {
     pub fingerprint: u64,
     /// Workgroup size (compute).
     pub local_size: [LocalSize; 3],
+    /// It has subgroup operations. Such a compute shader runs in full subgroups where [`Caps::full_subgroups`](crate::gpu::Caps) says so
+    /// and its workgroup along x is a multiple of a subgroup.
+    pub subgroups: bool,
     /// Bindings by set and number, those included that the shader declares and does not use.
     pub bindings: &'static [BindingInfo],
     /// Specialization constants by id.

@@ -288,6 +288,7 @@ mod tests {
             push_constant_bytes,
             fingerprint: 0,
             local_size: [LocalSize::Fixed(1); 3],
+            subgroups: false,
             bindings,
             spec_constants: &[],
         }

@@ -139,7 +139,16 @@ impl PipelineInner {
         let module = ShaderModule::new(gpu, info.name, spirv)?;
         let (entries, data) = specialization_data(&spec);
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+        // Widths that are no multiple of a subgroup cannot be asked for.
+        let is_full =
+            info.subgroups && gpu.caps.full_subgroups && local_size[0].is_multiple_of(gpu.caps.subgroup_size.max(1));
+        let flags = if is_full {
+            vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS
+        } else {
+            vk::PipelineShaderStageCreateFlags::empty()
+        };
         let stage = vk::PipelineShaderStageCreateInfo::default()
+            .flags(flags)
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module.raw)
             .name(c"main")

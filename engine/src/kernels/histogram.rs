@@ -5,7 +5,8 @@
 
 use std::ops::Range;
 
-use super::stream::{self, Count, Prepare, Teams};
+use super::form::Teams;
+use super::stream::{self, Count, Prepare};
 use crate::gpu::shaders::kernels::histogram as kernel;
 use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass};
 use crate::{Error, Result};

@@ -5,6 +5,9 @@
 //! shaders before, and what is written wants a barrier after; each kernel says which accesses. Between its own stages a kernel records its
 //! barriers itself. The number of elements is known to the host, or read from a buffer ([`Count`]).
 //!
+//! Kernels number up to 2³¹ elements, but a device's buffers end before: none holds 2³⁰ words, and `maxStorageBufferRange` says how many fit;
+//! for sorts see [`RadixSort::max_keys`].
+//!
 //! The twin of a kernel is a plain Rust function of the same result ([`scan()`], [`radix_sort()`] …); tests hold both together.
 //!
 //! ```no_run
@@ -39,7 +42,9 @@
 //! invocation ([`Form`]), owns a contiguous block of the stream, so results are the same bits whatever the device.
 
 pub mod device_model;
+mod form;
 mod histogram;
+mod operation;
 mod partition;
 mod permute;
 mod radix_plan;
@@ -49,7 +54,9 @@ mod reduce;
 mod scan;
 mod stream;
 
+pub use form::Form;
 pub use histogram::{Histogram, MAX_BINS, histogram};
+pub use operation::Operation;
 pub use partition::{Keep, Partition, PartitionBuffers, PartitionOptions, compact, split};
 pub use permute::{Direction, Permute, PermuteBuffers, gather, scatter};
 pub use radix_sort::{KeyWidth, Order, RadixSort, RadixSortOptions, SortBuffers, radix_sort};
@@ -57,4 +64,4 @@ pub use reduce::{
     BoxElements, ReduceBox, ReduceWords, float_of_ordered, nan_bits, ordered_float, reduce_box, reduce_words,
 };
 pub use scan::{Scan, ScanBuffers, ScanOptions, scan};
-pub use stream::{Count, Form, Operation, StreamStatus, stream_block, stream_range, stream_teams};
+pub use stream::{Count, StreamStatus, stream_block, stream_range, stream_teams};

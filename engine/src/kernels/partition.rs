@@ -3,8 +3,9 @@
 //! A scan of the flags says where elements go (Blelloch, "Prefix sums and their applications", 1990, sections 1.3 and 1.3.1). Guarantees:
 //! stable; equal to [`compact`] and [`split`], the twins, on every device and in every form.
 
+use super::form::{Form, Variant};
 use super::scan::{ScanOptions, ScanTotals};
-use super::stream::{self, Count, Form, Variant};
+use super::stream::{self, Count};
 use crate::gpu::shaders::kernels::{partition, partition_subgroup};
 use crate::gpu::shaders::sets::PartitionSet;
 use crate::gpu::{Buffer, BufferView, Gpu, Pass};

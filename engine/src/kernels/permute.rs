@@ -3,7 +3,8 @@
 //! Guarantees: equal to [`gather`] and [`scatter`], the twins. Indices out of range touch nothing and are counted. A scatter with equal indices
 //! is deterministic only when their elements are equal, too.
 
-use super::stream::{self, Count, Prepare, Teams};
+use super::form::Teams;
+use super::stream::{self, Count, Prepare};
 use crate::gpu::shaders::kernels::permute as kernel;
 use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass};
 use crate::{Error, Result};

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use super::radix_sort::{RadixSortOptions, SortBuffers};
-use super::stream::{
-    self, BLOCK_ITERATIONS, Form, SERIAL_LANES, SERIAL_TEAMS, SERIAL_TILE, Shape, Stream, WORKGROUP_TEAMS,
+use super::form::{
+    self, BLOCK_ITERATIONS, Form, LEAST_SUBGROUP, SERIAL_LANES, SERIAL_TEAMS, SERIAL_TILE, Shape, WORKGROUP_TEAMS,
 };
+use super::radix_sort::{RadixSortOptions, SortBuffers};
+use super::stream::Stream;
 use crate::Result;
 use crate::gpu::shaders::constants::KEYS_PER_READ;
 use crate::gpu::shaders::kernels::{
@@ -51,10 +52,8 @@ pub(super) struct Tuning {
 
 /// Keys that an invocation of the subgroup form holds at once.
 const KEYS_PER_INVOCATION: u32 = 8;
-/// Subgroups that have a row of counters each in the subgroup form.
+/// Subgroups of a workgroup at most: each has a row of counters in the subgroup form.
 const SUBGROUP_ROWS: u32 = 16;
-/// The smallest subgroups that devices of larger ones may form.
-const LEAST_SUBGROUP: u32 = 8;
 
 /// Bits of a digit; fewer in the serial form on devices with lanes of their own, each of which then keeps fewer counters.
 const DIGIT_BITS: u32 = 8;
@@ -69,7 +68,7 @@ impl Tuning {
     /// For few keys, and for many.
     pub fn of(caps: &Caps, form: Form) -> [Self; 2] {
         if form == Form::Subgroup {
-            // Subgroups may turn out smaller than the device's size: at least 8 lanes where that is 8 or more.
+            // As `Form::on` has it, no more subgroups than rows.
             let lanes = SUBGROUP_ROWS * caps.subgroup_size.min(LEAST_SUBGROUP);
             let tile = lanes * KEYS_PER_INVOCATION;
             let tuning = Self {
@@ -100,7 +99,7 @@ impl Tuning {
         };
         if caps.kind == DeviceKind::Cpu {
             let lanes = caps.subgroup_size.max(1);
-            let teams = stream::serial_groups() * lanes;
+            let teams = form::serial_groups() * lanes;
             // Few counters for few keys; and for many, groups that end at about the same time on a busy machine.
             let few = serial(FEW_KEYS, DIGIT_BITS, FEW_KEYS_TILE, (teams / 2).max(1), lanes);
             let many = serial(u32::MAX, DIGIT_BITS, MANY_KEYS_TILE, 2 * teams, lanes);

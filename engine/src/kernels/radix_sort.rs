@@ -6,13 +6,15 @@
 //! ballots (Ashkiani and others, "GPU multisplit", PPoPP 2016). Few keys are one workgroup's work in one dispatch.
 //!
 //! Guarantees: stable in either order; the same bits on every device and in every form; equal to [`radix_sort`], its twin. Keys are
-//! unsigned: those of other types want an order-preserving map first. Only the bits of [`RadixSortOptions::bits`] are compared.
+//! unsigned: those of other types want an order-preserving map first. Only the bits of [`RadixSortOptions::bits`] are compared. How many
+//! keys there may be is the device's choice: [`RadixSort::max_keys`].
 
 use std::ops::Range;
 
+use super::form::Form;
 use super::radix_plan::{Plan, Tuning};
 use super::radix_small::SmallSort;
-use super::stream::{self, Count, Form, Prepare};
+use super::stream::{self, Count, MAX_COUNT, Prepare};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::kernels::radix_scan;
 use crate::gpu::shaders::types::StreamPlan;
@@ -149,7 +151,7 @@ impl RadixSort {
     /// A buffer for one side of `count` keys.
     ///
     /// # Errors
-    /// As [`Gpu::storage_texels`].
+    /// As [`Gpu::storage_texels`]; [`RadixSort::max_keys`] says what is too many.
     pub fn keys(&self, name: &str, count: u32) -> Result<TexelView> {
         self.side_of(name, u64::from(count) * u64::from(self.options.key.words()))
     }
@@ -181,6 +183,18 @@ impl RadixSort {
         })
     }
 
+    /// The most keys that the device can sort, memory allowing: one side is read by texels of four words and written as a storage buffer, so
+    /// that `maxTexelBufferElements` or `maxStorageBufferRange` binds. Vulkan promises 2¹⁸ words; there are 2²⁵ on Mesa's software driver and
+    /// 2²⁹ on NVIDIA's devices.
+    pub fn max_keys(&self) -> u32 {
+        let caps = self.gpu.caps();
+        max_keys(
+            caps.max_texel_buffer_elements,
+            caps.max_storage_buffer_range,
+            self.options.key,
+        )
+    }
+
     /// The side of the buffers that holds the result of a sort of up to `capacity` keys.
     pub fn result_side(&self, capacity: u32) -> usize {
         match self.small(capacity) {
@@ -197,8 +211,8 @@ impl RadixSort {
     /// Records a sort of side 0 and returns the side that holds the result. With a count on the device, both depend on the capacity only.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when there are more than 2³¹ keys, or a buffer is too small, [`Error::Setting`] when there are values and
-    /// the sort has none, or the other way round; and as [`Pass::dispatch`].
+    /// [`Error::LimitExceeded`] when there are more than 2³¹ keys, which no device has room for, or a buffer is too small,
+    /// [`Error::Setting`] when there are values and the sort has none, or the other way round; and as [`Pass::dispatch`].
     pub fn record(
         &self,
         pass: &mut Pass<'_>,
@@ -268,6 +282,13 @@ impl RadixSort {
     }
 }
 
+/// Keys of one side, of so many texels of four words and so many bytes at most.
+fn max_keys(texels: u64, range: u64, key: KeyWidth) -> u32 {
+    // Whole texels are bound.
+    let texels = texels.min(range / 16);
+    (4 * texels / u64::from(key.words())).min(MAX_COUNT.into()) as u32
+}
+
 /// Twin of [`RadixSort`]: digits of `digit_bits` bits from the lowest of `bits` up, each by a stable counting sort. `values` is empty or as
 /// long as `keys`.
 pub fn radix_sort(keys: &mut [u64], values: &mut [u32], bits: Range<u32>, order: Order, digit_bits: u32) {
@@ -292,6 +313,27 @@ pub fn radix_sort(keys: &mut [u64], values: &mut [u32], bits: Range<u32>, order:
                 *target = *value;
             }
             *place += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_that_binds_first_says_how_many_keys_there_may_be() {
+        let full_range = u64::from(u32::MAX);
+        for (texels, range, key, most) in [
+            // What Vulkan promises, the software driver, NVIDIA's devices, and texels without a limit.
+            (1 << 16, 1 << 27, KeyWidth::Bits32, 1 << 18),
+            (1 << 27, 1 << 27, KeyWidth::Bits32, 1 << 25),
+            (1 << 27, full_range, KeyWidth::Bits32, 1 << 29),
+            (1 << 27, full_range, KeyWidth::Bits64, 1 << 28),
+            (1 << 31, full_range, KeyWidth::Bits32, (1 << 30) - 4),
+            (1 << 31, 1 << 40, KeyWidth::Bits32, 1 << 31),
+        ] {
+            assert_eq!(max_keys(texels, range, key), most, "{texels} {range} {key:?}");
         }
     }
 }

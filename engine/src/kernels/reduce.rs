@@ -4,7 +4,9 @@
 //! included, since floats are compared as integers of the same order (Herf, "Radix tricks", 2001); equal to [`reduce_words`] and
 //! [`reduce_box`], the twins, on every device and in every form.
 
-use super::stream::{self, Count, Form, Operation, Prepare, Teams};
+use super::form::{Form, Teams};
+use super::operation::Operation;
+use super::stream::{self, Count, Prepare};
 use crate::gpu::interface::{BindingSet, ComputeShader};
 use crate::gpu::shaders::constants::{FLOAT_INFINITY_BITS, FLOAT_SIGN_BIT};
 use crate::gpu::shaders::kernels::{reduce_box as box_kernel, reduce_words as words_kernel};

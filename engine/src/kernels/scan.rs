@@ -6,7 +6,9 @@
 //!
 //! Guarantees: equal to [`scan`], its twin, on every device and in every form; sums are modulo 2³².
 
-use super::stream::{self, Count, Form, Operation, Prepare, Stream, Teams, Variant};
+use super::form::{Form, Teams, Variant};
+use super::operation::Operation;
+use super::stream::{self, Count, Prepare, Stream};
 use crate::gpu::shaders::constants::STREAM_HEADER_WORDS;
 use crate::gpu::shaders::kernels::{scan_apply, scan_apply_subgroup, scan_reduce, scan_reduce_subgroup, scan_totals};
 use crate::gpu::shaders::sets::{ScanApplySet, ScanReduceSet};

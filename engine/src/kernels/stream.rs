@@ -3,110 +3,19 @@
 //! The arithmetic of blocks is that of `shaders/include/kernels/stream.glsl`. Guarantees: every element is in exactly one block, no team's
 //! block is longer than the quota that its form allows, and no more workgroups are dispatched than every device takes.
 
+use super::form::Shape;
 use crate::gpu::interface::{BindingSet, ComputeShader};
-use crate::gpu::shaders::constants::{
-    OPERATION_MAX, OPERATION_MIN, OPERATION_SUM, SCAN_ITEMS, STREAM_COUNT_ON_DEVICE, STREAM_HEADER_WORDS,
-};
+use crate::gpu::shaders::constants::{STREAM_COUNT_ON_DEVICE, STREAM_HEADER_WORDS};
 use crate::gpu::shaders::kernels::stream_prepare;
 use crate::gpu::shaders::types::StreamPlan;
 use crate::gpu::{
-    Access, Buffer, BufferBarrier, BufferView, Caps, ComputePipeline, DeviceKind, Gpu, Pass, SOFTWARE_LOOP_CAP,
-    compute_to_indirect, rw_compute_to_compute,
+    Access, Buffer, BufferBarrier, BufferView, ComputePipeline, Gpu, Pass, compute_to_indirect, rw_compute_to_compute,
 };
 use crate::{Error, Result};
 
-/// The most elements of a stream.
+/// The most elements that kernels can number. No device has as many: a binding's `maxStorageBufferRange` is less than 2³² bytes, so that a
+/// stream of words has fewer than 2³⁰, and what is read by texels is bound by `maxTexelBufferElements` too.
 pub(super) const MAX_COUNT: u32 = 1 << 31;
-
-/// Iterations that the loop over a block takes at most, on any device: half of what software drivers allow, as the tests that end loops and
-/// the loops beside it count too. A power of two, as tiles are.
-pub(super) const BLOCK_ITERATIONS: u32 = SOFTWARE_LOOP_CAP.div_ceil(2);
-
-/// Loops of a scan that take each element: one combines a lane's items, one writes them.
-const SCAN_LOOPS: u32 = 2;
-
-/// Tiles of a block whose team is a workgroup, at most. A lane takes about 20 iterations a tile: [`SCAN_LOOPS`] times the items, and the
-/// steps of the scan over the lanes.
-const WORKGROUP_TILES: u32 = 1 << 11;
-
-/// Invocations of a workgroup, where the device takes so many: more only lengthen the scan over them.
-const WORKGROUP_LANES: u32 = 256;
-
-/// Teams that are workgroups: enough to fill large devices, few enough that a workgroup scans what they found in a few steps.
-pub(super) const WORKGROUP_TEAMS: u32 = 1024;
-
-/// Invocations of a workgroup that share nothing, on devices with lanes of their own: the widest subgroup of common devices.
-pub(super) const SERIAL_LANES: u32 = 64;
-
-/// Teams that are invocations, on devices with lanes of their own: enough to fill them, few enough to be scanned by a workgroup.
-pub(super) const SERIAL_TEAMS: u32 = 1 << 14;
-
-/// Elements that blocks of single invocations are a multiple of, so that short streams do not go to a team an element; on software
-/// devices, which have few threads, more.
-pub(super) const SERIAL_TILE: u32 = 64;
-const SERIAL_TILE_ON_SOFTWARE: u32 = 256;
-
-/// Invocations of workgroups that share memory, on software devices.
-const SOFTWARE_WORKGROUP_LANES: u32 = 64;
-
-/// Elements that each lane takes of a tile in kernels whose lanes take turns.
-const ITEMS_IN_TURN: u32 = 4;
-
-/// Workgroups for each thread of a software driver, so that a thread that falls behind leaves one to others.
-const GROUPS_PER_THREAD: u32 = 2;
-
-/// Times as many workgroups where teams leave nothing to be scanned: shorter blocks end at about the same time.
-const UNSCANNED_TEAMS: u32 = 4;
-
-/// Threads that software drivers are thought to have at most.
-const SOFTWARE_THREADS_MAX: u32 = 64;
-
-/// Bytes of shared memory that the subgroup forms take at most: a row of counters for each subgroup of a scatter, the next place of each digit,
-/// and a scan's words.
-const SUBGROUP_SHARED_MEMORY: u32 = 20 << 10;
-
-/// What a team of a kernel is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Form {
-    /// The one that suits the device: serial on software drivers, else with subgroup operations where there are any.
-    #[default]
-    Auto,
-    /// Single invocations that walk their blocks alone: no barriers, no subgroup operations.
-    Serial,
-    /// Workgroups with shared memory, and no subgroup operations.
-    Shared,
-    /// Workgroups with subgroup operations (ballot and shuffle), of any subgroup size from 4 to 128.
-    Subgroup,
-}
-
-impl Form {
-    /// Resolves [`Form::Auto`].
-    ///
-    /// # Errors
-    /// [`Error::MissingFeature`] when subgroup operations are asked for that the device lacks, or that lack shared memory.
-    pub fn on(self, caps: &Caps, kernel: &str) -> Result<Self> {
-        let able = caps.subgroup.basic
-            && caps.subgroup.ballot
-            && caps.subgroup.shuffle
-            && (4..=128).contains(&caps.subgroup_size)
-            && caps.max_shared_memory >= SUBGROUP_SHARED_MEMORY;
-        match self {
-            Self::Auto if able && caps.kind != DeviceKind::Cpu => Ok(Self::Subgroup),
-            Self::Auto if caps.kind != DeviceKind::Cpu => Ok(Self::Shared),
-            Self::Auto | Self::Serial => Ok(Self::Serial),
-            Self::Shared => Ok(Self::Shared),
-            Self::Subgroup if able => Ok(Self::Subgroup),
-            Self::Subgroup => Err(Error::MissingFeature {
-                feature: format!(
-                    "subgroup ballot and shuffle in compute shaders, of 4 to 128 lanes, and {SUBGROUP_SHARED_MEMORY} bytes of shared memory"
-                ),
-                needed_by: kernel.into(),
-                device: caps.device.clone(),
-                instead: "choose Form::Shared or Form::Serial".into(),
-            }),
-        }
-    }
-}
 
 /// How many elements a kernel handles.
 #[derive(Debug, Clone, Copy)]
@@ -117,7 +26,8 @@ pub enum Count<'a> {
     Device {
         /// Where the word is; the range must be aligned as storage bindings are.
         view: BufferView<'a>,
-        /// The most that there may be. With more, the kernel handles none, and [`StreamStatus`] says how many there were.
+        /// The most that there may be, for which the buffers have room. With more, the kernel handles none, and [`StreamStatus`] says how
+        /// many there were.
         capacity: u32,
     },
 }
@@ -171,153 +81,6 @@ impl StreamStatus {
         })
     }
 }
-
-/// How a kernel cuts its stream.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shape {
-    /// Elements that blocks are a multiple of.
-    pub tile: u32,
-    /// Elements of a block at most; a multiple of `tile`.
-    pub quota: u32,
-    /// Teams of a workgroup.
-    pub teams_per_group: u32,
-    /// Teams at most, as long as the quota allows.
-    pub teams: u32,
-}
-
-impl Shape {
-    /// Teams for a number of elements.
-    pub fn max_teams(&self, capacity: u32) -> u32 {
-        let wanted = self.teams.min(capacity.div_ceil(self.tile));
-        wanted.max(capacity.div_ceil(self.quota)).max(1)
-    }
-}
-
-/// The teams of scans, reductions and what is built of them.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Teams {
-    pub form: Form,
-    /// Invocations of a workgroup.
-    pub lanes: u32,
-    pub shape: Shape,
-}
-
-impl Teams {
-    /// Teams of kernels whose lanes take some consecutive elements at once.
-    pub fn new(caps: &Caps, form: Form, kernel: &str) -> Result<Self> {
-        let form = form.on(caps, kernel)?;
-        if form != Form::Serial {
-            let lanes = caps.max_workgroup_invocations.min(WORKGROUP_LANES);
-            let tile = lanes * SCAN_ITEMS;
-            return Ok(Self {
-                form,
-                lanes,
-                shape: Shape {
-                    tile,
-                    quota: tile * WORKGROUP_TILES,
-                    teams_per_group: 1,
-                    teams: WORKGROUP_TEAMS,
-                },
-            });
-        }
-        let (lanes, teams, tile) = if caps.kind == DeviceKind::Cpu {
-            let lanes = caps.subgroup_size.max(1);
-            (lanes, serial_groups() * lanes, SERIAL_TILE_ON_SOFTWARE)
-        } else {
-            (SERIAL_LANES, SERIAL_TEAMS, SERIAL_TILE)
-        };
-        Ok(Self {
-            form,
-            lanes,
-            shape: Shape {
-                tile,
-                quota: BLOCK_ITERATIONS / SCAN_LOOPS,
-                teams_per_group: lanes,
-                teams,
-            },
-        })
-    }
-
-    /// Teams that are workgroups in any case, of kernels without barriers in their loops, with so many loop iterations an element.
-    pub fn workgroups(caps: &Caps, iterations: u32) -> Self {
-        let lanes = if caps.kind == DeviceKind::Cpu {
-            SOFTWARE_WORKGROUP_LANES
-        } else {
-            caps.max_workgroup_invocations.min(WORKGROUP_LANES)
-        };
-        let tile = lanes * ITEMS_IN_TURN;
-        Self {
-            form: Form::Shared,
-            lanes,
-            shape: Shape {
-                tile,
-                quota: (lanes * BLOCK_ITERATIONS / iterations.max(1) / tile).max(1) * tile,
-                teams_per_group: 1,
-                teams: if caps.kind == DeviceKind::Cpu {
-                    UNSCANNED_TEAMS * serial_groups()
-                } else {
-                    WORKGROUP_TEAMS
-                },
-            },
-        }
-    }
-
-    pub fn serial(&self) -> bool {
-        self.form == Form::Serial
-    }
-}
-
-/// Workgroups that keep all threads of a software driver busy.
-pub(super) fn serial_groups() -> u32 {
-    GROUPS_PER_THREAD
-        * std::thread::available_parallelism()
-            .map_or(1, |n| n.get() as u32)
-            .min(SOFTWARE_THREADS_MAX)
-}
-
-/// One kernel, without or with subgroup operations.
-#[derive(Debug)]
-pub(super) enum Variant<P, S> {
-    Plain(ComputePipeline<P>),
-    Subgroup(ComputePipeline<S>),
-}
-
-/// An operation of scans and reductions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Operation {
-    /// The sum; of scans modulo 2³².
-    #[default]
-    Sum,
-    /// The minimum of unsigned words.
-    Min,
-    /// The maximum of unsigned words.
-    Max,
-}
-
-impl Operation {
-    pub(super) fn code(self) -> u32 {
-        match self {
-            Self::Sum => OPERATION_SUM,
-            Self::Min => OPERATION_MIN,
-            Self::Max => OPERATION_MAX,
-        }
-    }
-
-    /// What changes nothing. Twin of `scan_identity`.
-    pub fn identity(self) -> u32 {
-        if self == Self::Min { u32::MAX } else { 0 }
-    }
-
-    /// Twin of `scan_operation`.
-    pub fn apply(self, a: u32, b: u32) -> u32 {
-        match self {
-            Self::Sum => a.wrapping_add(b),
-            Self::Min => a.min(b),
-            Self::Max => a.max(b),
-        }
-    }
-}
-
 /// Twin of `stream_block`.
 pub fn stream_block(count: u32, tile: u32, max_teams: u32) -> u32 {
     count.div_ceil(tile).div_ceil(max_teams).max(1) * tile
@@ -502,20 +265,5 @@ mod tests {
                 assert_eq!(next, count);
             }
         }
-    }
-
-    #[test]
-    fn blocks_keep_the_quota() {
-        let shape = Shape {
-            tile: 64,
-            quota: 4096,
-            teams_per_group: 8,
-            teams: 32,
-        };
-        for capacity in [0, 1, 64, 2048, 131_072, 131_073, 1 << 30] {
-            let block = stream_block(capacity, shape.tile, shape.max_teams(capacity));
-            assert!(block <= shape.quota, "{capacity}: {block}");
-        }
-        assert_eq!(shape.max_teams(131_072), 32);
     }
 }

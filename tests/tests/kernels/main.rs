@@ -5,9 +5,13 @@ mod device_model;
 mod many_sorts;
 mod sort;
 
-use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu, Pass};
-use clerestory::kernels::Form;
+use clerestory::Error;
+use clerestory::gpu::{
+    Buffer, BufferDesc, Caps, Category, DeviceKind, Gpu, GpuOptions, Lesser, OptionalFeatures, Pass, SubgroupOperations,
+};
+use clerestory::kernels::{Form, KeyWidth, RadixSort, RadixSortOptions};
 use clerestory_tests::random::Random;
+use clerestory_tests::{assert_no_messages, gpu_with};
 
 /// All forms that teams can have.
 const FORMS: [Form; 3] = [Form::Serial, Form::Shared, Form::Subgroup];
@@ -87,4 +91,54 @@ fn run(gpu: &Gpu, record: impl FnOnce(&mut Pass<'_>) -> clerestory::Result<()>) 
     let mut recorder = gpu.recorder("kernels").expect("recorder");
     recorder.pass("kernel", record).expect("recorded");
     recorder.submit().and_then(|submission| submission.wait()).expect("ran");
+}
+
+#[test]
+fn the_subgroup_form_wants_full_subgroups_that_are_not_too_small() {
+    let options = GpuOptions {
+        lesser: Lesser {
+            features: Some(OptionalFeatures::NONE),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    };
+    let gpu = gpu_with(&options);
+    assert!(!gpu.caps().full_subgroups);
+    let sort = |form| {
+        let options = RadixSortOptions {
+            form,
+            ..RadixSortOptions::new(KeyWidth::Bits32, true)
+        };
+        RadixSort::new(&gpu, options)
+    };
+    assert!(matches!(sort(Form::Subgroup), Err(Error::MissingFeature { .. })));
+    assert!(sort(Form::Auto).is_ok() && sort(Form::Shared).is_ok());
+    let operations = SubgroupOperations {
+        basic: true,
+        vote: true,
+        arithmetic: true,
+        ballot: true,
+        shuffle: true,
+    };
+    for (size, least, full, expected) in [
+        (32, 32, true, Form::Subgroup),
+        (32, 8, true, Form::Subgroup),
+        (4, 4, true, Form::Subgroup),
+        (32, 32, false, Form::Shared),
+        (32, 4, true, Form::Shared),
+        (32, 0, true, Form::Shared),
+        (2, 2, true, Form::Shared),
+    ] {
+        let caps = Caps {
+            kind: DeviceKind::Discrete,
+            subgroup: operations,
+            subgroup_size: size,
+            min_subgroup_size: least,
+            full_subgroups: full,
+            ..gpu.caps().clone()
+        };
+        assert_eq!(Form::Auto.on(&caps, "test").unwrap(), expected, "{size} {least} {full}");
+        assert_eq!(Form::Subgroup.on(&caps, "test").is_ok(), expected == Form::Subgroup);
+    }
+    assert_no_messages(&gpu);
 }

@@ -13,7 +13,7 @@ use clerestory_tests::with_gpu;
 use super::{FORMS, PATTERNS, Pattern, SIZES, empty, run, words};
 
 /// What the standard library makes of keys with their indices, and only these bits.
-fn expected(keys: &[u64], bits: &Range<u32>, order: Order) -> (Vec<u64>, Vec<u32>) {
+pub(super) fn expected(keys: &[u64], bits: &Range<u32>, order: Order) -> (Vec<u64>, Vec<u32>) {
     let part = |key: u64| key << (64 - bits.end) >> (64 - bits.end + bits.start);
     let mut pairs: Vec<(u64, u32)> = keys.iter().copied().zip(0..).collect();
     match order {
@@ -24,14 +24,14 @@ fn expected(keys: &[u64], bits: &Range<u32>, order: Order) -> (Vec<u64>, Vec<u32
 }
 
 /// Keys as words of their width.
-fn to_words(keys: &[u64], width: KeyWidth) -> Vec<u32> {
+pub(super) fn to_words(keys: &[u64], width: KeyWidth) -> Vec<u32> {
     match width {
         KeyWidth::Bits32 => keys.iter().map(|key| *key as u32).collect(),
         KeyWidth::Bits64 => bytemuck::cast_slice(keys).to_vec(),
     }
 }
 
-fn random_keys(random: &mut Random, pattern: Pattern, width: KeyWidth, count: u32) -> Vec<u64> {
+pub(super) fn random_keys(random: &mut Random, pattern: Pattern, width: KeyWidth, count: u32) -> Vec<u64> {
     let low = pattern.words(random, count);
     match width {
         KeyWidth::Bits32 => low.into_iter().map(u64::from).collect(),

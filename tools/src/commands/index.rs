@@ -9,9 +9,9 @@ use clerestory::accel::kd::{KdSettings, KdTree};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::{BuildStages, Ray, RayIndex, TraversalCounters};
 use clerestory::scene::Scene;
-use clerestory::{Result, scene};
+use clerestory::{Error, Result, scene};
 use clerestory_tools::random::Random;
-use clerestory_tools::timing::timed;
+use clerestory_tools::timing::{median, timed};
 use clerestory_tools::{geometry, machine};
 use glam::Vec3;
 
@@ -29,7 +29,7 @@ Examples:
   clerestory index --peers --rays 262144
   clerestory index --peers --rays 262144 --repeat 9 --folder out/index --page RESULTS.md
 
-Build times are medians by wall clock from triangles on the host to an index where it was built, by stage those of the median build; on \
+Build times are medians by wall clock from triangles on the host to an index where it was built, by stage those of the build in the middle; on \
 the device with the copies to it. Steps are nodes and triangles that a ray visits, exact counts of the same \
 rays for every index, though a node of a kd-tree is one plane, not two boxes: half of them leave the camera, half leave surfaces in random directions.")]
 pub struct Arguments {
@@ -85,6 +85,17 @@ struct Measured {
     stages: Vec<(String, f64)>,
 }
 
+/// An index that could not be built.
+#[derive(Debug, serde::Serialize)]
+struct Skipped {
+    scene: String,
+    index: &'static str,
+    because: String,
+}
+
+/// The index that the device builds.
+const ON_DEVICE: &str = "lbvh, fast, device";
+
 /// Builds an index.
 type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
 
@@ -135,6 +146,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     }
     let builder = LbvhBuilder::new(&gpu, &fast(30))?;
     let mut all: Vec<Measured> = Vec::new();
+    let mut skipped: Vec<Skipped> = Vec::new();
     for address in &arguments.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
         let triangles = geometry::triangles(&scene);
@@ -149,10 +161,19 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             }
             all.push(measured);
         }
-        let mut device = measure_device(&builder, &triangles, &rays, arguments.repeat)?;
-        (device.scene, device.index) = (address.clone(), "lbvh, fast, device".into());
-        (device.sah_ratio, device.steps_ratio) = (device.sah_cost / all[base].sah_cost, device.steps / all[base].steps);
-        all.push(device);
+        match measure_device(&builder, &triangles, &rays, arguments.repeat)? {
+            Ok(mut device) => {
+                (device.scene, device.index) = (address.clone(), ON_DEVICE.into());
+                device.sah_ratio = device.sah_cost / all[base].sah_cost;
+                device.steps_ratio = device.steps / all[base].steps;
+                all.push(device);
+            }
+            Err(because) => skipped.push(Skipped {
+                scene: address.clone(),
+                index: ON_DEVICE,
+                because,
+            }),
+        }
     }
     let (caps, log) = (gpu.caps().clone(), gpu.validation_log());
     drop((builder, gpu));
@@ -161,6 +182,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         output::print_json(&serde_json::json!({
             "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"),
             "processor": machine::processor(), "threads": machine::threads(), "load": machine::load(), "indexes": all,
+            "skipped": skipped,
         }))?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -198,6 +220,9 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             .collect();
         text += &format!("\n{}, {}: {}", one.scene, one.index, stages.join(", "));
     }
+    for one in &skipped {
+        text += &format!("\n{}, {}: skipped, {}", one.scene, one.index, one.because);
+    }
     output::print(&(text + "\n"))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -213,16 +238,30 @@ fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> 
     Ok(measured(index.as_ref(), rays, builds))
 }
 
-/// Of the build on the device that leaves the index there; what rays visit is counted in one that is read back.
-fn measure_device(builder: &LbvhBuilder, triangles: &[[Vec3; 3]], rays: &[Ray], repeat: u32) -> Result<Measured> {
-    let index = builder.build(triangles)?.index;
+/// Of the build on the device that leaves the index there; what rays visit is counted in one that is read back. Or why the device cannot
+/// build it.
+fn measure_device(
+    builder: &LbvhBuilder,
+    triangles: &[[Vec3; 3]],
+    rays: &[Ray],
+    repeat: u32,
+) -> Result<std::result::Result<Measured, String>> {
+    let built = match builder.build(triangles) {
+        Ok(built) => built,
+        Err(error @ Error::LimitExceeded { .. }) => return Ok(Err(error.to_string())),
+        Err(error) => return Err(error),
+    };
+    if built.buffers.is_none() {
+        return Ok(Err("fewer than two triangles that rays can meet".into()));
+    }
+    let index = built.index;
     let mut builds = Vec::new();
     for _ in 0..repeat {
         let (resident, seconds) = timed(|| builder.build_resident(triangles));
         let stages = resident?.map(|resident| resident.stages).unwrap_or_default();
         builds.push((seconds, used(&stages)));
     }
-    Ok(measured(&index, rays, builds))
+    Ok(Ok(measured(&index, rays, builds)))
 }
 
 /// The stages that a build has, with their milliseconds.
@@ -236,8 +275,13 @@ type BuildTime = (f64, Vec<(String, f64)>);
 
 fn measured(index: &dyn RayIndex, rays: &[Ray], mut builds: Vec<BuildTime>) -> Measured {
     builds.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let seconds = median(builds.iter().map(|(seconds, _)| *seconds).collect());
     let middle = builds.len() / 2;
-    let (seconds, stages) = builds.into_iter().nth(middle).unwrap_or_default();
+    let stages = builds
+        .into_iter()
+        .nth(middle)
+        .map(|(_, stages)| stages)
+        .unwrap_or_default();
     let mut counters = TraversalCounters::default();
     for ray in rays {
         index.closest_hit_filtered(ray, &mut |_, _| true, &mut counters);
@@ -258,7 +302,8 @@ fn measured(index: &dyn RayIndex, rays: &[Ray], mut builds: Vec<BuildTime>) -> M
     }
 }
 
-/// Rays from the middle of the first camera's picture outwards, and from triangles' centres in random directions.
+/// By turns rays from the first camera to the centres of random triangles and from such centres in random directions; without a camera
+/// all are of the second kind.
 fn rays_among(scene: &Scene, triangles: &[[Vec3; 3]], count: u32) -> Vec<Ray> {
     let mut random = Random::new(1);
     let eye = scene

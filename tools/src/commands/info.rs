@@ -156,8 +156,10 @@ impl DeviceInfo {
             ("shuffle", caps.subgroup.shuffle),
         ];
         lines.push(format!(
-            "  subgroup     {} lanes: {}",
+            "  subgroup     {} lanes, at least {}{}: {}",
             caps.subgroup_size,
+            caps.min_subgroup_size,
+            if caps.full_subgroups { ", full" } else { "" },
             names(&operations)
         ));
         let features = FEATURES.map(|name| (name, techniques::offers(caps, name) == Some(true)));

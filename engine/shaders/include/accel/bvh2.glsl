@@ -9,22 +9,15 @@
 //
 // With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);
-//
-// A node is four texels ("quarters"): lower0 upper0.x | upper0.yz lower1.xy | lower1.z upper1 | child words, parent word, and of the root where
-// the triangles begin. A triangle is three, behind the nodes: vertex 0, 1, 2, its index, two that are unused. Twin of
-// clerestory::accel::bvh2::Bvh2Node and the leaf-ordered triangles.
 #ifndef CLERESTORY_ACCEL_BVH2_GLSL
 #define CLERESTORY_ACCEL_BVH2_GLSL
 
 #include "accel/box_test.glsl"
+#include "accel/bvh2_layout.glsl"
 #include "accel/triangle.glsl"
 #include "accel/index_bindings.glsl"
 
 const uint BVH2_MAX_DEPTH = 32u;
-const uint BVH2_COUNT_BITS = 4u;
-const uint BVH2_COUNT_MASK = (1u << BVH2_COUNT_BITS) - 1u;
-const uint BVH2_NODE_QUARTERS = 4u;
-const uint BVH2_TRIANGLE_QUARTERS = 3u;
 
 // Not at the end, and not stopped; a leaf that was begun is ended.
 #define BVH2_UNFINISHED (word != INDEX_FINISHED && (iterations < INDEX_QUOTA || (word & BVH2_COUNT_MASK) != 0u))

@@ -1,9 +1,11 @@
-// What the stages of the linear hierarchy's build share: numbers as keys, the state of a build, and the constants of the Rust side.
+// What the stages of the linear hierarchy's build share: numbers as keys, the state of a build, and constants.
 //
 // Boxes are kept as integers in the order of the numbers, so that minimum and maximum are exact on every device, also of numbers that it
 // would flush to zero.
 #ifndef CLERESTORY_ACCEL_LBVH_GLSL
 #define CLERESTORY_ACCEL_LBVH_GLSL
+
+#include "accel/bvh2_layout.glsl"
 
 const uint LBVH_GROUP_SIZE = 64u;
 // Triangles whose boxes an invocation makes: the more, the fewer atomic operations.
@@ -12,11 +14,6 @@ const uint LBVH_BOXES_PER_INVOCATION = 16u;
 const uint LBVH_NODE_QUARTERS = 4u;
 // Quarters of a primitive's box, of which two words are unused.
 const uint LBVH_BOX_QUARTERS = 2u;
-// Words of a node and of a triangle where rays traverse them.
-const uint LBVH_BVH2_NODE_WORDS = 16u;
-const uint LBVH_BVH2_TRIANGLE_WORDS = 12u;
-const uint LBVH_COUNT_BITS = 4u;
-const uint LBVH_COUNT_MASK = (1u << LBVH_COUNT_BITS) - 1u;
 // More steps than any way to the root has: bits of a code and of a place.
 const uint LBVH_MAX_ASCENT = 96u;
 

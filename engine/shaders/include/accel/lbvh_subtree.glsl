@@ -11,7 +11,7 @@ const uint LBVH_LEVEL_BITS = 7u;
 // What a child tells its parent besides its box.
 struct LbvhSummary {
     float cost;
-    // Height, and above it the level on the side away from the parent.
+    // Level on the side away from the parent, and in the bits above it the height.
     uint height_level;
     // First place of a left child, last of a right one.
     uint end;
@@ -59,8 +59,8 @@ void lbvh_store_box(uint node, uint side, LbvhBox box) {
 // A subtree whose root is `slot`, as a child; leaves are as rays want them, and `slot` is not theirs.
 void lbvh_store_child(uint node, uint side, LbvhSubtree own, uint slot) {
     lbvh_store_box(node, side, own.box);
-    uint leaf = own.first << LBVH_COUNT_BITS | (own.last - own.first + 1u);
-    lbvh_nodes[4u * LBVH_NODE_QUARTERS * node + 12u + side] = int(own.height == 0u ? leaf : slot << LBVH_COUNT_BITS);
+    uint leaf = own.first << BVH2_COUNT_BITS | (own.last - own.first + 1u);
+    lbvh_nodes[4u * LBVH_NODE_QUARTERS * node + 12u + side] = int(own.height == 0u ? leaf : slot << BVH2_COUNT_BITS);
 }
 
 void lbvh_store_summary(uint node, uint side, LbvhSubtree own) {

@@ -15,7 +15,7 @@ shared TEAM_TYPE team_values[LANES];
 uint team_lane() { return gl_SubgroupID * (LANES / gl_NumSubgroups) + gl_SubgroupInvocationID; }
 
 TEAM_TYPE team_exclusive(TEAM_TYPE value, out TEAM_TYPE total) {
-    // Subgroups may be smaller than gl_SubgroupSize says, but they are full.
+    // Subgroups are full: the host asks for that.
     uint width = LANES / gl_NumSubgroups;
     uint lane = gl_SubgroupInvocationID;
     TEAM_TYPE all = value;

@@ -8,7 +8,7 @@
 use super::layout::Layout;
 use super::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, leaf_word};
 use crate::Result;
-use crate::accel::input::{Met, bounds_of, check_count, check_range};
+use crate::accel::input::{UsableTriangles, bounds_of, check_count, check_range};
 use crate::accel::stages::Stopwatch;
 use crate::accel::{Aabb, BuildStages};
 use bytemuck::Zeroable;
@@ -85,8 +85,8 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
     check_range("bvh2.bins", settings.bins, 2, MAX_BINS as u32)?;
     check_count(triangles.len())?;
     let mut watch = Stopwatch::start();
-    let met = Met::among(triangles);
-    let mut references = met.map(|triangle, index| Reference {
+    let usable = UsableTriangles::among(triangles);
+    let mut references = usable.map(|triangle, index| Reference {
         bounds: bounds_of(triangle),
         index,
     });
@@ -117,7 +117,7 @@ pub(super) fn build(triangles: &[[Vec3; 3]], settings: &Bvh2Settings) -> Result<
     };
     let layout = Layout::of(&flatten(&slots), references.len(), triangle);
     stages.layout = watch.lap();
-    Ok(layout.finish("bvh2", met.statistics, stages, watch))
+    Ok(layout.finish("bvh2", usable.statistics, stages, watch))
 }
 
 fn ceil_log2(n: usize) -> u32 {

@@ -3,7 +3,7 @@
 //! Guarantee: everything is filled and summed in parts that depend on the nodes alone, so bytes and statistics are the same whatever the
 //! number of threads.
 
-use super::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, NODE_QUARTERS, TRIANGLE_QUARTERS, leaf_word};
+use super::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, COUNT_MASK, NODE_QUARTERS, TRIANGLE_QUARTERS, leaf_word};
 use crate::accel::input::bounds_of;
 use crate::accel::stages::Stopwatch;
 use crate::accel::{Aabb, BuildStages, IndexStatistics, NO_HIT};
@@ -16,9 +16,6 @@ const CHUNK: usize = 2048;
 
 /// Subtrees that are measured on their own, at least, where there are as many.
 const MEASURED_SUBTREES: usize = 64;
-
-/// Bits of a child word that hold the number of triangles.
-const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
 
 /// Nodes, the root first with its parent word 0, and triangles in leaf order; zero at first.
 pub(in crate::accel) struct Layout {
@@ -63,7 +60,7 @@ impl Layout {
     ) -> Self {
         if nodes.is_empty() {
             let triangle = (count > 0).then(|| triangle(0));
-            return Self::without_split(triangle);
+            return Self::of_at_most_one(triangle);
         }
         let mut layout = Self::new(nodes.len(), count);
         let (to, triangles) = layout.parts();
@@ -78,8 +75,8 @@ impl Layout {
         layout
     }
 
-    /// One node over at most one triangle.
-    fn without_split(triangle: Option<Bvh2Triangle>) -> Self {
+    /// The root over one triangle or none, which no builder makes a node for.
+    fn of_at_most_one(triangle: Option<Bvh2Triangle>) -> Self {
         let bounds = triangle.map_or(Aabb::EMPTY.with_point(Vec3::ZERO), |t| bounds_of(&t.corners));
         // A point triangle, which no ray meets, keeps the buffers and the root's children from being empty.
         let sentinel = Bvh2Triangle::new([bounds.lower; 3], NO_HIT);

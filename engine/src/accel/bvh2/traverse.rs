@@ -6,7 +6,7 @@
 //! sibling that comes after the walk in the order, which rebuilds the stack, less what the hit so far has culled. Nothing is lost, and nothing
 //! is tested twice.
 
-use super::{BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
+use super::{BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, COUNT_MASK, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
 use crate::accel::{Aabb, CandidateFilter, Hit, Ray, TraversalCounters};
 use crate::gpu::shaders::constants;
@@ -14,8 +14,6 @@ use glam::Vec3;
 
 /// [`Traversal::resume`] of a traversal that is done.
 pub const FINISHED: u32 = constants::INDEX_FINISHED;
-
-const COUNT_MASK: u32 = constants::BVH2_COUNT_MASK;
 
 /// A traversal between two runs.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@ use super::radix_tree::next_skipped;
 use super::ray_index::{LbvhSettings, check_moved, moved_corners};
 use crate::accel::bvh2::layout::Layout;
 use crate::accel::bvh2::{Bvh2, MAX_DEPTH, NODE_QUARTERS, TRIANGLE_QUARTERS};
-use crate::accel::input::{Met, check_count};
+use crate::accel::input::{UsableTriangles, check_count};
 use crate::accel::morton::MORTON_30_AXIS_BITS;
 use crate::accel::stages::Stopwatch;
 use crate::accel::{BuildStages, IndexStatistics, RayIndex};
@@ -134,7 +134,8 @@ impl LbvhBuilder {
     /// these buffers by compute shaders may come before it without a barrier.
     ///
     /// Passes: `lbvh: boxes`, `lbvh: codes`, `lbvh: sort`, `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks`, `lbvh: emit`. It ends with a
-    /// barrier: compute shaders and copies may read `quarters` after it. The tree may be deeper than rays can go: [`LbvhBuilder::overflow`] says so once it has run.
+    /// barrier: compute shaders and copies may read `quarters` after it. The tree may be deeper than rays can go, which must then not
+    /// traverse it: once it has run, [`LbvhBuilder::bits_to_skip`] says so, and [`LbvhBuilder::record_shallower`] makes it again.
     ///
     /// # Errors
     /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
@@ -187,6 +188,20 @@ impl LbvhBuilder {
             Ok(())
         })?;
         self.record_tree(recorder, buffers, 0)
+    }
+
+    /// After a build whose tree is too deep: records its stages behind the sort once more, from the codes that stand in `buffers`, without
+    /// the lowest `skipped` bits of each. Passes `lbvh: hierarchy`, `lbvh: climb`, `lbvh: ranks` and `lbvh: emit`, with the barriers of
+    /// [`LbvhBuilder::record`]; `corners` and `indices` must be those of the build.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for more bits than codes have, and as [`Pass::dispatch`](crate::gpu::Pass::dispatch).
+    pub fn record_shallower(&self, recorder: &mut Recorder, buffers: &LbvhBuffers, skipped: u32) -> Result<()> {
+        if skipped > self.settings.code_bits {
+            let cause = format!("is more than the {} bits of a code", self.settings.code_bits);
+            return Err(Error::setting("lbvh.skipped", skipped, cause));
+        }
+        self.record_tree(recorder, buffers, skipped)
     }
 
     /// Records the stages after the sort, without the lowest `skipped` bits of the codes.
@@ -311,12 +326,20 @@ impl LbvhBuilder {
         })
     }
 
-    /// After a build has run: by how many levels its tree is deeper than rays can go, 0 for none.
+    /// After a build has run that left out the lowest `skipped` bits of the codes (0 for [`LbvhBuilder::record`]): `None` when rays can
+    /// traverse its tree, which is at most [`MAX_DEPTH`] inner nodes deep then; otherwise how many bits [`LbvhBuilder::record_shallower`]
+    /// must leave out. Each takes one level at most, so that a tree may have to be made more than twice; without any bits it is ⌈log₂ n⌉
+    /// deep.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
-    pub fn overflow(&self, buffers: &LbvhBuffers) -> Result<u32> {
-        Ok(self.state(buffers)?.height.saturating_sub(MAX_DEPTH))
+    pub fn bits_to_skip(&self, buffers: &LbvhBuffers, skipped: u32) -> Result<Option<u32>> {
+        Ok(self.bits_for(self.state(buffers)?.height, skipped))
+    }
+
+    fn bits_for(&self, height: u32, skipped: u32) -> Option<u32> {
+        let bits = self.settings.code_bits;
+        (height > MAX_DEPTH && skipped < bits).then(|| next_skipped(skipped, height, MAX_DEPTH, bits))
     }
 
     fn state(&self, buffers: &LbvhBuffers) -> Result<LbvhState> {
@@ -335,8 +358,8 @@ impl LbvhBuilder {
         let mut timings = recorder.submit()?.wait()?;
         let mut skipped = 0;
         let mut state = self.state(&buffers)?;
-        while state.height > MAX_DEPTH && skipped < self.settings.code_bits {
-            skipped = next_skipped(skipped, state.height, MAX_DEPTH, self.settings.code_bits);
+        while let Some(more) = self.bits_for(state.height, skipped) {
+            skipped = more;
             let mut recorder = self.gpu.recorder("lbvh")?;
             self.record_tree(&mut recorder, &buffers, skipped)?;
             timings.passes.extend(recorder.submit()?.wait()?.passes);
@@ -356,19 +379,19 @@ impl LbvhBuilder {
     /// As [`build`](super::build), [`LbvhBuilder::buffers`], and those of a submission.
     pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<LbvhBuild> {
         check_count(triangles.len())?;
-        let met = Met::among(triangles);
-        let corners = met.map(|triangle, _| *triangle);
+        let usable = UsableTriangles::among(triangles);
+        let corners = usable.map(|triangle, _| *triangle);
         if corners.len() < 2 {
-            let layout = Layout::of(&[], corners.len(), |place| met.triangle(place as u32));
+            let layout = Layout::of(&[], corners.len(), |place| usable.triangle(place as u32));
             return Ok(LbvhBuild {
-                index: layout.finish("lbvh", met.statistics, BuildStages::default(), Stopwatch::start()),
+                index: layout.finish("lbvh", usable.statistics, BuildStages::default(), Stopwatch::start()),
                 timings: Timings::default(),
                 buffers: None,
             });
         }
-        let ran = self.run(&corners, &met.map(|_, index| index))?;
+        let ran = self.run(&corners, &usable.map(|_, index| index))?;
         Ok(LbvhBuild {
-            index: self.read(&ran.buffers, ran.state.nodes, met.statistics)?,
+            index: self.read(&ran.buffers, ran.state.nodes, usable.statistics)?,
             timings: ran.timings,
             buffers: Some(ran.buffers),
         })
@@ -382,13 +405,13 @@ impl LbvhBuilder {
     pub fn build_resident(&self, triangles: &[[Vec3; 3]]) -> Result<Option<ResidentLbvh>> {
         check_count(triangles.len())?;
         let mut watch = Stopwatch::start();
-        let met = Met::among(triangles);
-        let corners = met.map(|triangle, _| *triangle);
+        let usable = UsableTriangles::among(triangles);
+        let corners = usable.map(|triangle, _| *triangle);
         if corners.len() < 2 {
             return Ok(None);
         }
         let on_host = watch.lap();
-        let ran = self.run(&corners, &met.map(|_, index| index))?;
+        let ran = self.run(&corners, &usable.map(|_, index| index))?;
         let mut stages = stages_of(&ran.timings);
         stages.transfer = (watch.lap() - stages.total()).max(0.0);
         stages.triangles += on_host;
@@ -409,7 +432,7 @@ impl LbvhBuilder {
                 0.0
             },
             bytes: ran.buffers.quarters.buffer().bytes(),
-            ..met.statistics
+            ..usable.statistics
         };
         Ok(Some(ResidentLbvh {
             quarters: ran.buffers.quarters,

@@ -6,12 +6,14 @@
 //! Guarantees: the same tree whatever the number of threads; every box the exact union of what it holds; any set of finite boxes gives a
 //! tree, equal codes and equal boxes included.
 
+mod codes;
 mod device;
 mod device_buffers;
 pub mod radix_tree;
 mod ray_index;
 mod sort;
 
+pub use codes::SortedCodes;
 pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
 pub use device_buffers::LbvhBuffers;
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};

@@ -1,21 +1,19 @@
 //! The hierarchy of sorted Morton codes: at each node the codes split where their highest differing bit changes.
 //!
 //! Source: C. Apetrei, "Fast and Simple Agglomerative LBVH Construction", EG UK CGVC 2014: a node is named by the last place of its left
-//! child, and of the two places at its ends a range joins the one whose codes differ in the lower bit. Equal codes are told apart by their
-//! places, as in T. Karras, "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees", HPG 2012. Here the top of the
-//! same tree is made from the root down, so that threads need no atomic operations, and what is below is merged in one run over the
+//! child, and of the two places at its ends a range joins the one whose codes differ in the lower bit. Here the top of
+//! the same tree is made from the root down, so that threads need no atomic operations, and what is below is merged in one run over the
 //! places, on a stack; the kernels climb from the leaves, and tests hold both together.
 //!
 //! Guarantee: twin of the kernels `lbvh_hierarchy` and `lbvh_emit` to the bit; the same tree whatever the number of threads; depth as
 //! asked for, see [`hierarchy`].
 
-use super::sort::sort_by_key;
-use crate::accel::Aabb;
+use super::codes::SortedCodes;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use crate::accel::bvh2::{Bvh2Node, COUNT_BITS, leaf_word};
-use crate::accel::morton::{MORTON_30_AXIS_BITS, MortonGrid, doubled_centre};
+use crate::accel::leaf_rule::half_area;
+use crate::accel::{Aabb, LeafRule};
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
 use rayon::prelude::*;
 
 /// Ranges above this are built in parallel.
@@ -27,123 +25,8 @@ const CHUNK: usize = 2048;
 /// In a slot, marks a child that is a leaf.
 const LEAF: u32 = 1 << 31;
 
-/// Level of a place whose code differs from the next in the lowest bit; where the codes are equal, places decide at the levels below.
-const CODE_LEVEL: u8 = 32;
-
 /// Level beyond the ends, above all others.
 const NO_LEVEL: u8 = u8::MAX;
-
-/// Primitives in the order of their codes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SortedCodes {
-    /// Codes, ascending.
-    pub codes: Vec<u64>,
-    /// Primitive of each code; of equal codes in ascending order.
-    pub order: Vec<u32>,
-    /// Bits of a code.
-    pub bits: u32,
-}
-
-impl SortedCodes {
-    /// Codes of the boxes' centres in a grid over the exact bounds of these, sorted; ties by index.
-    pub fn of_boxes(boxes: &[Aabb], axis_bits: u32) -> Self {
-        Codes::of_boxes(boxes, axis_bits).sorted()
-    }
-
-    /// How the codes at a place and the next differ when their lowest `skipped` bits do not count: larger where a higher bit differs.
-    #[cfg(test)]
-    pub(crate) fn difference(&self, place: usize, skipped: u32) -> (u64, u32) {
-        let codes = (self.codes[place] ^ self.codes[place + 1]) >> skipped;
-        (codes, (place ^ (place + 1)) as u32)
-    }
-
-    /// How far up the codes at a place and the next differ when their lowest `skipped` bits do not count.
-    fn level(&self, place: usize, skipped: u32) -> u8 {
-        match (self.codes[place] ^ self.codes[place + 1]) >> skipped {
-            0 => (place ^ (place + 1)).ilog2() as u8,
-            differing => CODE_LEVEL + differing.ilog2() as u8,
-        }
-    }
-
-    /// The last place of the left child of a range, both ends included, of at least two.
-    fn split(&self, first: usize, last: usize, skipped: u32) -> usize {
-        let differing = (self.codes[first] ^ self.codes[last]) >> skipped;
-        if differing == 0 {
-            let bit = (first ^ last).ilog2();
-            return (last >> bit << bit) - 1;
-        }
-        let bit = differing.ilog2() + skipped;
-        first + self.codes[first..=last].partition_point(|code| code >> bit & 1 == 0) - 1
-    }
-}
-
-/// Codes in the order of what they are of.
-pub(super) enum Codes {
-    /// Of 30 bits, in the high words; the low ones are indices.
-    Short(Vec<u64>),
-    /// Longer ones, with indices.
-    Long(Vec<(u64, u32)>, u32),
-}
-
-impl Codes {
-    pub(super) fn of_boxes(boxes: &[Aabb], axis_bits: u32) -> Self {
-        let centres = boxes
-            .par_iter()
-            .fold(|| Aabb::EMPTY, |bounds, b| bounds.with_point(doubled_centre(b)))
-            .reduce(|| Aabb::EMPTY, Aabb::union);
-        let grid = MortonGrid::new(&centres, axis_bits);
-        let code = |b: &Aabb| grid.code(doubled_centre(b));
-        let boxes = boxes.par_iter().enumerate();
-        if axis_bits == MORTON_30_AXIS_BITS {
-            Self::Short(boxes.map(|(i, b)| code(b) << 32 | i as u64).collect())
-        } else {
-            Self::Long(boxes.map(|(i, b)| (code(b), i as u32)).collect(), 3 * axis_bits)
-        }
-    }
-
-    pub(super) fn sorted(self) -> SortedCodes {
-        let (codes, order, bits) = match self {
-            Self::Short(mut pairs) => {
-                let bits = 3 * MORTON_30_AXIS_BITS;
-                sort_by_key(&mut pairs, bits, |pair| pair >> 32);
-                let (codes, order) = pairs.par_iter().map(|pair| (pair >> 32, *pair as u32)).unzip();
-                (codes, order, bits)
-            }
-            Self::Long(mut pairs, bits) => {
-                sort_by_key(&mut pairs, bits, |pair| pair.0);
-                let (codes, order) = pairs.into_par_iter().unzip();
-                (codes, order, bits)
-            }
-        };
-        SortedCodes { codes, order, bits }
-    }
-}
-
-/// When a subtree becomes a leaf.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LeafRule {
-    /// When it has at most so many primitives, the root too: for maps that are queried by points.
-    Size(u32),
-    /// When it has at most so many and a leaf is expected to cost a ray no more (surface area heuristic, unit costs, f32). The root stays
-    /// an inner node, as traversals of rays want it.
-    Area(u32),
-}
-
-impl LeafRule {
-    /// Whether a subtree becomes a leaf.
-    pub(crate) fn makes_leaf(self, count: u32, leaf_cost: f32, split_cost: f32, is_root: bool) -> bool {
-        match self {
-            Self::Size(largest) => count <= largest,
-            Self::Area(largest) => !is_root && count <= largest && leaf_cost <= split_cost,
-        }
-    }
-}
-
-/// Half the surface area in f32, as kernels compute it.
-pub(crate) fn half_area(bounds: &Aabb) -> f32 {
-    let e: Vec3 = bounds.upper - bounds.lower;
-    e.x * e.y + e.y * e.z + e.z * e.x
-}
 
 /// The node between two neighbouring places: its slot is the first of both.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -219,31 +102,32 @@ pub fn hierarchy(boxes: &[Aabb], sorted: &SortedCodes, rule: LeafRule, max_depth
 pub(super) struct Splits {
     /// Slots, by words.
     words: Vec<[u32; SLOT_WORDS]>,
-    /// Of each slot 0 if it lies inside of a leaf, otherwise 1, and in the end 1 + where its node goes.
-    targets: Vec<u32>,
+    /// Of each slot 1 + the index of its node, 0 where it lies inside of a leaf.
+    node_numbers: Vec<u32>,
     root: Built,
     /// Nodes outside of leaves, by chunks of slots.
-    kept: Vec<usize>,
+    chunk_nodes: Vec<usize>,
 }
 
 /// A range of slots that a task fills.
 struct Slots<'a> {
     slots: &'a mut [Slot],
-    targets: &'a mut [u32],
+    /// 1 for slots whose nodes stay, 0 for those inside of leaves and those that are not filled yet.
+    retained: &'a mut [u32],
 }
 
 impl<'a> Slots<'a> {
     /// Those before a slot and those behind it.
     fn around(&mut self, slot: usize) -> [Slots<'_>; 2] {
         let (left, right) = self.slots.split_at_mut(slot);
-        let (left_targets, right_targets) = self.targets.split_at_mut(slot);
+        let (left_retained, right_retained) = self.retained.split_at_mut(slot);
         let before = Slots {
             slots: left,
-            targets: left_targets,
+            retained: left_retained,
         };
         let behind = Slots {
             slots: &mut right[1..],
-            targets: &mut right_targets[1..],
+            retained: &mut right_retained[1..],
         };
         [before, behind]
     }
@@ -256,7 +140,7 @@ impl Splits {
         let mut skipped = 0;
         loop {
             let mut words = vec![[0; SLOT_WORDS]; inner];
-            let mut targets = vec![0; inner];
+            let mut retained = vec![0; inner];
             let levels: Vec<u8> = (0..inner).into_par_iter().map(|i| sorted.level(i, skipped)).collect();
             let builder = Builder {
                 sorted,
@@ -267,18 +151,11 @@ impl Splits {
             };
             let mut slots = Slots {
                 slots: bytemuck::cast_slice_mut(&mut words),
-                targets: &mut targets,
+                retained: &mut retained,
             };
             let root = builder.range(0, inner, &mut slots);
             if root.height <= max_depth || skipped >= sorted.bits {
-                let mut splits = Self {
-                    words,
-                    targets,
-                    root,
-                    kept: Vec::new(),
-                };
-                splits.number();
-                return Some(splits);
+                return Some(Self::numbered(words, retained, root));
             }
             skipped = next_skipped(skipped, root.height, max_depth, sorted.bits);
         }
@@ -290,7 +167,7 @@ impl Splits {
 
     /// Nodes outside of leaves.
     pub(super) fn nodes(&self) -> usize {
-        self.kept.iter().sum()
+        self.chunk_nodes.iter().sum()
     }
 
     /// Most inner nodes on a way from the root.
@@ -298,28 +175,39 @@ impl Splits {
         self.root.height
     }
 
-    /// Gives each node that stays its place: the root the first, the others by their slots.
-    fn number(&mut self) {
-        let staying = |targets: &[u32]| targets.iter().map(|target| *target as usize).sum();
-        self.kept = self.targets.par_chunks(CHUNK).map(staying).collect();
-        let before: Vec<usize> = self
-            .kept
+    /// Numbers the nodes of retained slots: the root the first, the others by their slots.
+    fn numbered(words: Vec<[u32; SLOT_WORDS]>, retained: Vec<u32>, root: Built) -> Self {
+        let sum = |retained: &[u32]| retained.iter().map(|one| *one as usize).sum();
+        let chunk_nodes: Vec<usize> = retained.par_chunks(CHUNK).map(sum).collect();
+        let before: Vec<usize> = chunk_nodes
             .iter()
-            .scan(0, |sum, kept| Some(std::mem::replace(sum, *sum + kept)))
+            .scan(0, |sum, nodes| Some(std::mem::replace(sum, *sum + nodes)))
             .collect();
-        let root = self.root.slot as usize;
-        let chunks = self.targets.par_chunks_mut(CHUNK).zip(before).enumerate();
-        chunks.for_each(|(chunk, (targets, before))| {
-            let stay = targets.iter_mut().enumerate().filter(|(_, target)| **target != 0);
-            for (rank, (i, target)) in (before as u32..).zip(stay) {
+        let root_slot = root.slot as usize;
+        // In the same memory.
+        let mut node_numbers = retained;
+        let chunks = node_numbers.par_chunks_mut(CHUNK).zip(before).enumerate();
+        chunks.for_each(|(chunk, (numbers, before))| {
+            let retained = numbers.iter_mut().enumerate().filter(|(_, number)| **number != 0);
+            for (rank, (i, number)) in (before as u32..).zip(retained) {
                 let at = chunk * CHUNK + i;
-                // Of those before the root one place is the root's, of those behind it the root is counted.
-                *target = if at == root { 1 } else { rank + 1 + u32::from(at < root) };
+                // Of those before the root the first number is the root's, of those behind it the root is counted.
+                *number = if at == root_slot {
+                    1
+                } else {
+                    rank + 1 + u32::from(at < root_slot)
+                };
             }
         });
+        Self {
+            words,
+            node_numbers,
+            root,
+            chunk_nodes,
+        }
     }
 
-    /// Makes a node of each slot that stays, and puts it where it goes.
+    /// Makes a node of each retained slot, and puts it where its number says.
     fn emit<T: Send>(&self, nodes: &mut [T], node: impl Fn(usize, &Slot) -> T + Sync) {
         let slots = self.slots();
         let root = self.root.slot as usize;
@@ -327,27 +215,32 @@ impl Splits {
             return;
         };
         *first = node(root, &slots[root]);
-        let mut targets = Vec::with_capacity(self.kept.len());
-        for (chunk, kept) in self.kept.iter().enumerate() {
-            let (own, after) = rest.split_at_mut(kept - usize::from(root / CHUNK == chunk));
-            targets.push(own);
+        let mut outputs = Vec::with_capacity(self.chunk_nodes.len());
+        for (chunk, nodes) in self.chunk_nodes.iter().enumerate() {
+            let (own, after) = rest.split_at_mut(nodes - usize::from(root / CHUNK == chunk));
+            outputs.push(own);
             rest = after;
         }
-        let chunks = slots.par_chunks(CHUNK).zip(targets).enumerate();
-        chunks.for_each(|(chunk, (slots, targets))| {
+        let chunks = slots.par_chunks(CHUNK).zip(outputs).enumerate();
+        chunks.for_each(|(chunk, (slots, outputs))| {
             let all = (chunk * CHUNK..).zip(slots);
-            let kept = all.filter(|(at, _)| self.targets[*at] != 0 && *at != root);
-            for (to, (at, slot)) in targets.iter_mut().zip(kept) {
-                *to = node(at, slot);
+            let retained = all.filter(|(at, _)| self.node_numbers[*at] != 0 && *at != root);
+            for (output, (at, slot)) in outputs.iter_mut().zip(retained) {
+                *output = node(at, slot);
             }
         });
+    }
+
+    /// Index of the node of a retained slot.
+    fn node_of(&self, slot: u32) -> u32 {
+        self.node_numbers[slot as usize] - 1
     }
 
     /// A child of the node in a slot.
     fn child(&self, at: usize, side: usize, word: u32) -> Child {
         let (at, end) = (at as u32, word & !LEAF);
         match (word & LEAF, side) {
-            (0, _) => Child::Inner(self.targets[word as usize] - 1),
+            (0, _) => Child::Inner(self.node_of(word)),
             (_, 0) => Child::Leaf {
                 first: end,
                 count: at - end + 1,
@@ -378,7 +271,6 @@ impl Splits {
 
     /// The nodes in the layout of rays; the root must not be a leaf, and leaves must be small enough for their words.
     pub(super) fn emit_nodes(&self, nodes: &mut [Bvh2Node]) {
-        let target = |slot: u32| self.targets[slot as usize] - 1;
         self.emit(nodes, |at, slot| Bvh2Node {
             bounds: slot.bounds,
             children: [0, 1].map(|side| match self.child(at, side, slot.children[side]) {
@@ -388,7 +280,7 @@ impl Splits {
             parent: if at == self.root.slot as usize {
                 0
             } else {
-                target(slot.parent >> 1) << 1 | slot.parent & 1
+                self.node_of(slot.parent >> 1) << 1 | slot.parent & 1
             },
             triangles: 0,
         });
@@ -449,7 +341,7 @@ impl Builder<'_> {
         if self.rule.makes_leaf(count, leaf_cost, split_cost, is_root) {
             // What a leaf holds does not stay.
             if left.slot != LEAF || right.slot != LEAF {
-                to.targets[(first - origin) as usize..(last - origin) as usize].fill(0);
+                to.retained[(first - origin) as usize..(last - origin) as usize].fill(0);
             }
             return Built {
                 bounds,
@@ -464,7 +356,7 @@ impl Builder<'_> {
         for (side, child) in [left, right].into_iter().enumerate().filter(|(_, c)| c.slot != LEAF) {
             to.slots[(child.slot - origin) as usize].parent = slot << 1 | side as u32;
         }
-        to.targets[(slot - origin) as usize] = 1;
+        to.retained[(slot - origin) as usize] = 1;
         to.slots[(slot - origin) as usize] = Slot {
             bounds: [left.bounds, right.bounds],
             children: [left.word(0), right.word(1)],

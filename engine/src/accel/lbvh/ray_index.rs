@@ -1,21 +1,19 @@
 //! The linear hierarchy as a ray index: over triangles, in the node layout that the path tracer traverses.
 
-use super::radix_tree::{Codes, LeafRule, SortedCodes, Splits, hierarchy};
+use super::codes::{Codes, SortedCodes};
+use super::radix_tree::{Splits, hierarchy};
 use crate::Result;
 use crate::accel::box_tree::{BoxTree, Child};
 use crate::accel::bvh2::layout::{Layout, fill_triangles};
-use crate::accel::bvh2::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, MAX_DEPTH, MAX_LEAF_SIZE, leaf_word};
-use crate::accel::input::{Met, bounds_of, can_be_met, check_count, check_range};
+use crate::accel::bvh2::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, COUNT_MASK, MAX_DEPTH, MAX_LEAF_SIZE, leaf_word};
+use crate::accel::input::{UsableTriangles, bounds_of, can_be_met, check_count, check_range};
 use crate::accel::morton::{MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS};
 use crate::accel::optimise::{MAX_TREELET, Optimisation, optimise};
 use crate::accel::stages::Stopwatch;
-use crate::accel::{Aabb, BuildStages, MAX_COORDINATE, RayIndex};
+use crate::accel::{Aabb, BuildStages, LeafRule, MAX_COORDINATE, RayIndex};
 use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;
-
-/// Bits of a child word that hold the number of triangles.
-const COUNT_MASK: u32 = (1 << COUNT_BITS) - 1;
 
 /// Most passes of an optimisation that settings may ask for.
 const MAX_ROUNDS: u32 = 16;
@@ -133,12 +131,12 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
     check_count(triangles.len())?;
     let mut watch = Stopwatch::start();
     let mut stages = BuildStages::default();
-    let met = Met::among(triangles);
-    let boxes: Vec<Aabb> = met.map(|triangle, _| bounds_of(triangle).without_negative_zero());
+    let usable = UsableTriangles::among(triangles);
+    let boxes: Vec<Aabb> = usable.map(|triangle, _| bounds_of(triangle).without_negative_zero());
     stages.triangles = watch.lap();
     if boxes.len() < 2 {
-        let layout = Layout::of(&[], boxes.len(), |place| met.triangle(place as u32));
-        return Ok(layout.finish("lbvh", met.statistics, stages, watch));
+        let layout = Layout::of(&[], boxes.len(), |place| usable.triangle(place as u32));
+        return Ok(layout.finish("lbvh", usable.statistics, stages, watch));
     }
     let codes = Codes::of_boxes(&boxes, settings.axis_bits());
     stages.codes = watch.lap();
@@ -155,7 +153,7 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
             let (nodes, places) = layout.parts();
             rayon::join(
                 || splits.iter().for_each(|splits| splits.emit_nodes(nodes)),
-                || fill_triangles(places, |place| met.triangle(sorted.order[place])),
+                || fill_triangles(places, |place| usable.triangle(sorted.order[place])),
             );
             layout
         }
@@ -164,11 +162,13 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
             stages.hierarchy = watch.lap();
             let tree = optimised(&tree, &boxes, settings);
             stages.optimise = watch.lap();
-            Layout::of(&nodes_of(&tree), boxes.len(), |place| met.triangle(tree.order[place]))
+            Layout::of(&nodes_of(&tree), boxes.len(), |place| {
+                usable.triangle(tree.order[place])
+            })
         }
     };
     stages.layout = watch.lap();
-    Ok(layout.finish("lbvh", met.statistics, stages, watch))
+    Ok(layout.finish("lbvh", usable.statistics, stages, watch))
 }
 
 /// Refits an index to its triangles where they are now: the tree stays what it was, boxes and corners are new. Triangles that were left
@@ -223,13 +223,13 @@ pub(super) fn check_moved(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<()> {
         let cause = format!("is not the {count} that the index was built of");
         return Err(crate::Error::setting("triangles", triangles.len(), cause));
     }
-    let met = &index.triangles()[..statistics.triangles as usize];
+    let usable = &index.triangles()[..statistics.triangles as usize];
     let outside = |i: &u32| {
         triangles[*i as usize]
             .iter()
             .any(|v| !v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all())
     };
-    match met.iter().map(|t| t.index).find(outside) {
+    match usable.iter().map(|t| t.index).find(outside) {
         None => Ok(()),
         Some(i) => {
             let corners = format!("{:?}", triangles[i as usize]);

@@ -1,9 +1,10 @@
-use super::radix_tree::{LeafRule, SortedCodes, half_area, hierarchy, next_skipped};
+use super::radix_tree::{hierarchy, next_skipped};
 use super::*;
 use crate::accel::box_tree::{BoxTree, Child, TreeShape};
 use crate::accel::bvh2::{Bvh2, Bvh2Settings, MAX_DEPTH};
+use crate::accel::leaf_rule::half_area;
 use crate::accel::test_support::{Random, ray};
-use crate::accel::{Aabb, Ray, RayIndex};
+use crate::accel::{Aabb, LeafRule, Ray, RayIndex};
 use glam::Vec3;
 
 /// Boxes around points, of random sizes up to `size`.

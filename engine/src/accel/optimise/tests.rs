@@ -1,8 +1,9 @@
 use super::*;
 use crate::accel::box_tree::TreeShape;
 use crate::accel::bvh2::MAX_DEPTH;
+use crate::accel::lbvh::SortedCodes;
 use crate::accel::lbvh::hard_boxes;
-use crate::accel::lbvh::radix_tree::{SortedCodes, hierarchy};
+use crate::accel::lbvh::radix_tree::hierarchy;
 use crate::accel::test_support::Random;
 use glam::Vec3;
 

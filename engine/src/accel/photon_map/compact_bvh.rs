@@ -21,7 +21,7 @@ use glam::Vec3;
 pub const COMPACT_PAIR_BYTES: u64 = size_of::<CompactPair>() as u64;
 
 /// Bytes of a stack entry of a ray query: reference and span.
-const RAY_ENTRY_BYTES: u64 = 12;
+pub const COMPACT_RAY_STACK_ENTRY_BYTES: u64 = 12;
 
 /// Where the mask of planes stands above index and leaf bit.
 const MASK_SHIFT: u32 = INDEX_BITS + 1;
@@ -104,7 +104,7 @@ impl CompactBvh {
     /// Encodes a complete tree.
     ///
     /// # Errors
-    /// [`TreeFault::Box`] for a pair whose boxes are not tight in their parent's.
+    /// [`TreeFault::Plane`] for a pair whose boxes are not tight in their parent's.
     pub fn encode(complete: &CompleteBvh) -> Result<Self, TreeFault> {
         let mut pairs = vec![CompactPair::zeroed(); complete.pairs.len()];
         let mut pending = Vec::new();
@@ -214,7 +214,7 @@ impl CompactBvh {
                         stack[top] = other;
                         top += 1;
                         counters.pushes += 1;
-                        counters.bytes += RAY_ENTRY_BYTES;
+                        counters.bytes += COMPACT_RAY_STACK_ENTRY_BYTES;
                     }
                 }
             }
@@ -239,9 +239,9 @@ fn encode_pair(pair: &RayPair, parent: &Aabb, place: u32) -> Result<CompactPair,
         ];
         for (end, [parent, left, right]) in planes.into_iter().enumerate() {
             if parent != left && parent != right {
-                return Err(TreeFault::Box {
-                    node: Some(place),
-                    side: end as u32,
+                return Err(TreeFault::Plane {
+                    node: place,
+                    plane: (3 * end + axis) as u32,
                 });
             }
             let is_left = parent == right;

@@ -9,7 +9,7 @@
 
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
-use crate::accel::lbvh::radix_tree::SortedCodes;
+use crate::accel::lbvh::SortedCodes;
 
 /// Two neighbours whose codes differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Trees over the kernels of photon maps, for queries by points: builders that are compared for them, and the layouts that queries read.
 //! None is a [`RayIndex`](super::RayIndex), though both layouts answer rays too.
 //!
-//! Builders, all over the same sorted codes ([`SortedCodes`](super::lbvh::radix_tree::SortedCodes)) but the last: [`split_lists`], [`merge`],
+//! Builders, all over the same sorted codes ([`SortedCodes`](super::lbvh::SortedCodes)) but the last: [`split_lists`], [`merge`],
 //! [`clustered`], and [`vvh`], which is the yardstick of their quality; [`leaf_threshold`] says how large leaves should be. Layouts:
 //! [`complete_bvh`] and, of half its size, [`compact_bvh`].
 //!

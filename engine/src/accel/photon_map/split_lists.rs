@@ -8,7 +8,7 @@
 
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
-use crate::accel::lbvh::radix_tree::SortedCodes;
+use crate::accel::lbvh::SortedCodes;
 
 /// A node of one level: a range of places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

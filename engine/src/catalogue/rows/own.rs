@@ -386,6 +386,7 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/accel/lbvh/tests.rs::refitted_trees_have_the_hits_of_new_ones",
                 "tests/tests/lbvh.rs::device_builds_are_the_twins_on_soups",
                 "tests/tests/lbvh.rs::device_builds_are_the_twins_on_hard_cases",
+                "tests/tests/lbvh.rs::trees_that_are_too_deep_are_made_again_as_the_hosts",
                 "tests/tests/lbvh.rs::device_refits_are_the_twins",
             ],
         ),

@@ -22,7 +22,7 @@ use obvhs::ray::{Ray as PeerRay, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-use super::{BASE, Contender, Met, built_in, in_parallel};
+use super::{BASE, Contender, Intersection, built_in, in_parallel};
 
 /// Rays of both kinds as obvhs has them.
 pub type PeerRays = [Vec<PeerRay>; 2];
@@ -49,14 +49,14 @@ fn in_order(order: &[u32], triangles: &[Triangle]) -> Vec<RtTriangle> {
     order.iter().map(tested).collect()
 }
 
-fn met(hit: &RayHit, order: &[u32]) -> Met {
+fn met(hit: &RayHit, order: &[u32]) -> Intersection {
     if hit.t.is_finite() {
-        Met {
+        Intersection {
             t: hit.t,
             triangle: order[hit.primitive_id as usize],
         }
     } else {
-        Met::NOTHING
+        Intersection::NONE
     }
 }
 
@@ -193,8 +193,8 @@ fn walk(
     boxed: &bvh::ray::Ray<f32, 3>,
     mut ray: PeerRay,
     stack: &mut Vec<(usize, f32)>,
-) -> Met {
-    let mut met = Met::NOTHING;
+) -> Intersection {
+    let mut met = Intersection::NONE;
     stack.clear();
     if !tree.nodes.is_empty() {
         stack.push((0, 0.0));
@@ -209,7 +209,7 @@ fn walk(
                     let t = triangles[*shape_index].intersect(&ray);
                     if t < ray.tmax {
                         ray.tmax = t;
-                        met = Met {
+                        met = Intersection {
                             t,
                             triangle: *shape_index as u32,
                         };

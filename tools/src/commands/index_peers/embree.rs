@@ -17,7 +17,7 @@ use clerestory_tools::timing::timed;
 use glam::Vec3;
 use libloading::Library;
 
-use super::Met;
+use super::Intersection;
 
 /// Names under which systems know the library, newest first.
 const NAMES: [&str; 8] = [
@@ -272,7 +272,7 @@ unsafe impl Sync for Tree<'_> {}
 
 impl Tree<'_> {
     /// The closest hit of a ray.
-    pub fn closest_hit(&self, ray: &Ray) -> Met {
+    pub fn closest_hit(&self, ray: &Ray) -> Intersection {
         let mut query = RayHit::from(ray);
         match self.embree.intersect {
             Intersect::Version3(intersect) => {
@@ -288,9 +288,9 @@ impl Tree<'_> {
             Intersect::Version4(intersect) => unsafe { intersect(self.scene, &mut query, std::ptr::null_mut()) },
         }
         if query.geometry == INVALID_ID {
-            Met::NOTHING
+            Intersection::NONE
         } else {
-            Met {
+            Intersection {
                 t: query.t_far,
                 triangle: query.primitive,
             }
@@ -350,8 +350,8 @@ mod tests {
                 direction: [0.0, 0.0, 1.0],
                 t_max: f32::INFINITY,
             };
-            assert_eq!(tree.closest_hit(&ray(0.1)), Met { t: 2.0, triangle: 1 });
-            assert_eq!(tree.closest_hit(&ray(2.0)), Met::NOTHING);
+            assert_eq!(tree.closest_hit(&ray(0.1)), Intersection { t: 2.0, triangle: 1 });
+            assert_eq!(tree.closest_hit(&ray(2.0)), Intersection::NONE);
             assert!(seconds > 0.0);
         }
         assert!(embree.version().starts_with(['3', '4']));

@@ -65,15 +65,15 @@ pub struct Settings<'a> {
 
 /// What a ray met.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Met {
+pub struct Intersection {
     /// Ray parameter.
     t: f32,
     /// Index of the triangle, or [`NO_HIT`].
     triangle: u32,
 }
 
-impl Met {
-    const NOTHING: Self = Self {
+impl Intersection {
+    const NONE: Self = Self {
         t: f32::INFINITY,
         triangle: NO_HIT,
     };
@@ -93,7 +93,7 @@ pub struct Disagreement {
 }
 
 impl Disagreement {
-    fn of(ours: &[Met], theirs: &[Met], reaches: &[f32]) -> Self {
+    fn of(ours: &[Intersection], theirs: &[Intersection], reaches: &[f32]) -> Self {
         let mut found = Self::default();
         for ((ours, theirs), reach) in ours.iter().zip(theirs).zip(reaches) {
             match (ours.triangle, theirs.triangle) {
@@ -169,7 +169,7 @@ pub struct Found {
 }
 
 /// Traces rays of one of two kinds: seconds and what they met.
-pub type Trace<'a> = Box<dyn FnMut(usize) -> Result<(f64, Vec<Met>)> + 'a>;
+pub type Trace<'a> = Box<dyn FnMut(usize) -> Result<(f64, Vec<Intersection>)> + 'a>;
 
 /// An index that was built, and how rays are traced in it.
 pub struct Contender<'a> {
@@ -295,7 +295,7 @@ fn one_scene(
 }
 
 /// Rates of all contenders, and what their rays met, both by kind.
-type Rates = (Vec<[Spread; 2]>, Vec<[Vec<Met>; 2]>);
+type Rates = (Vec<[Spread; 2]>, Vec<[Vec<Intersection>; 2]>);
 
 fn take_turns(contenders: &mut [Contender<'_>], rays: &[Vec<Ray>; 2], repeat: u32) -> Result<Rates> {
     let mut rates = vec![[Vec::new(), Vec::new()]; contenders.len()];
@@ -345,11 +345,11 @@ fn rays_of(index: &Bvh2, triangles: &[[Vec3; 3]], primary: &[(Vec3, Vec3)]) -> [
 fn in_parallel<R: Sync, S>(
     rays: &[R],
     state: impl Fn() -> S + Sync + Send,
-    trace: impl Fn(&mut S, &R) -> Met + Sync,
-) -> (f64, Vec<Met>) {
-    let mut met = vec![Met::NOTHING; rays.len()];
+    trace: impl Fn(&mut S, &R) -> Intersection + Sync,
+) -> (f64, Vec<Intersection>) {
+    let mut met = vec![Intersection::NONE; rays.len()];
     let chunks = met.par_chunks_mut(CHUNK).zip(rays.par_chunks(CHUNK));
-    let trace_all = |state: &mut S, (met, rays): (&mut [Met], &[R])| {
+    let trace_all = |state: &mut S, (met, rays): (&mut [Intersection], &[R])| {
         for (met, ray) in met.iter_mut().zip(rays) {
             *met = trace(state, ray);
         }
@@ -387,21 +387,21 @@ mod tests {
 
     #[test]
     fn disagreements_are_told_apart() {
-        let met = |t: f32, triangle: u32| Met { t, triangle };
+        let met = |t: f32, triangle: u32| Intersection { t, triangle };
         let ours = [
             met(1.0, 4),
             met(1.0, 4),
             met(1.0, 4),
-            Met::NOTHING,
-            Met::NOTHING,
+            Intersection::NONE,
+            Intersection::NONE,
             met(1.0, 4),
         ];
         let theirs = [
             met(1.1, 4),
             met(1.0, 5),
-            Met::NOTHING,
+            Intersection::NONE,
             met(3.0, 1),
-            Met::NOTHING,
+            Intersection::NONE,
             met(1.1, 5),
         ];
         let found = Disagreement::of(&ours, &theirs, &[10.0; 6]);

@@ -13,7 +13,7 @@ use clerestory::{Error, Result};
 use clerestory_tools::timing::timed;
 use glam::Vec3;
 
-use super::{Contender, Met, Spread, built_in};
+use super::{Contender, Intersection, Spread, built_in};
 
 /// Steps of a ray in one dispatch: few enough for software devices, which end long loops, and more than these rays need.
 const QUOTA: u32 = 50_000;
@@ -141,17 +141,17 @@ impl<'a> Kernel<'a> {
     }
 
     /// What a set met when it was traced last.
-    pub fn met(&self, set: usize) -> Result<Vec<Met>> {
+    pub fn met(&self, set: usize) -> Result<Vec<Intersection>> {
         let buffers = &self.sets[set];
         let hits = self.gpu.read::<Hit>(buffers.hits.view(), buffers.count as usize)?;
         let met = |hit: &Hit| {
             if hit.is_hit() {
-                Met {
+                Intersection {
                     t: hit.t,
                     triangle: hit.triangle,
                 }
             } else {
-                Met::NOTHING
+                Intersection::NONE
             }
         };
         Ok(hits.iter().map(met).collect())

@@ -1,6 +1,8 @@
 use super::*;
+use crate::accel::LeafRule;
+use crate::accel::lbvh::SortedCodes;
 use crate::accel::lbvh::hard_boxes;
-use crate::accel::lbvh::radix_tree::{LeafRule, SortedCodes, hierarchy};
+use crate::accel::lbvh::radix_tree::hierarchy;
 use crate::accel::photon_map::vvh::{Heuristic, sweep_tree};
 use crate::test_random::Random;
 
@@ -52,7 +54,7 @@ fn loose_boxes_are_refused() {
     let (_, _, mut complete, _) = trees().swap_remove(12);
     complete.pairs[0].bounds[0].lower.x -= 1.0;
     complete.pairs[0].bounds[1].lower.x -= 1.0;
-    assert!(matches!(CompactBvh::encode(&complete), Err(TreeFault::Box { .. })));
+    assert!(matches!(CompactBvh::encode(&complete), Err(TreeFault::Plane { .. })));
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! bytes (4 for shadow rays) and 12.
 
 use clerestory::accel::Aabb;
-use clerestory::accel::photon_map::compact_bvh::{COMPACT_PAIR_BYTES, CompactBvh};
+use clerestory::accel::photon_map::compact_bvh::{COMPACT_PAIR_BYTES, COMPACT_RAY_STACK_ENTRY_BYTES, CompactBvh};
 use clerestory::accel::photon_map::complete_bvh::{
     CompleteBvh, QueryCounters, RAY_STACK_ENTRY_BYTES, RayPair, SlabRay,
 };
@@ -23,9 +23,6 @@ use crate::experiments::table::{Cell, Table};
 const LEAF_SIZE: u32 = 5;
 /// Bytes that shadow rays spare on a complete pair's stack entry: they need no distance.
 const SHADOW_ENTRY_SPARES: u64 = 4;
-
-/// Bytes of a compact pair's stack entry.
-const COMPACT_ENTRY_BYTES: u64 = 12;
 
 /// What the source says of a ray with complete pairs, by its code base II, and what compact ones change in per cent.
 struct Published {
@@ -121,7 +118,8 @@ fn deviation(published: &Published, bytes: f64, same_work: bool, speed: f64) -> 
 
 /// Change of bytes in per cent that the source's nodes and stack entries give with the sizes that it states.
 fn by_its_counts(published: &Published) -> f64 {
-    let compact = 0.5 * published.nodes * COMPACT_PAIR_BYTES as f64 + published.entries * COMPACT_ENTRY_BYTES as f64;
+    let compact =
+        0.5 * published.nodes * COMPACT_PAIR_BYTES as f64 + published.entries * COMPACT_RAY_STACK_ENTRY_BYTES as f64;
     100.0 * (compact / published.bytes - 1.0)
 }
 
@@ -328,7 +326,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             each(complete[3]).into(),
             each(complete[2]).into(),
             change(compact[2], complete[2]).into(),
-            change(compact[2] + COMPACT_ENTRY_BYTES * compact[1], complete[2]).into(),
+            change(compact[2] + COMPACT_RAY_STACK_ENTRY_BYTES * compact[1], complete[2]).into(),
             theirs(|row| row.bytes),
             theirs(|row| row.compact_bytes),
             theirs(by_its_counts),

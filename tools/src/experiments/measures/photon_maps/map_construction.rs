@@ -7,7 +7,7 @@ use std::convert::Infallible;
 
 use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::BoxTree;
-use clerestory::accel::lbvh::radix_tree::SortedCodes;
+use clerestory::accel::lbvh::SortedCodes;
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
 use clerestory::accel::photon_map::clustered::{ClusterCounts, clustered_hierarchy};

@@ -5,7 +5,7 @@
 
 use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::{BoxTree, Child};
-use clerestory::accel::lbvh::radix_tree::SortedCodes;
+use clerestory::accel::lbvh::SortedCodes;
 use clerestory::accel::photon_map::merge::{merge_points, merged_hierarchy};
 use clerestory::accel::photon_map::split_lists::split_list_hierarchy;
 use clerestory::{Error, Result};

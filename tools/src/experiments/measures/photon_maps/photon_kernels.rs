@@ -11,7 +11,7 @@
 
 use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::BoxTree;
-use clerestory::accel::lbvh::radix_tree::SortedCodes;
+use clerestory::accel::lbvh::SortedCodes;
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
 use clerestory::accel::photon_map::compact_bvh::CompactBvh;
 use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};

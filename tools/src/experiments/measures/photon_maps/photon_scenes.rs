@@ -83,7 +83,7 @@ impl Case {
 
 /// Where a ray meets a surface.
 #[derive(Debug, Clone, Copy)]
-pub struct Meeting {
+pub struct Intersection {
     /// The point.
     pub point: Vec3,
     /// Unit normal on the side that the ray comes from.
@@ -131,7 +131,7 @@ impl Surfaces {
     }
 
     /// What a ray of unit direction meets first.
-    pub fn meet(&self, origin: Vec3, direction: Vec3) -> Option<Meeting> {
+    pub fn meet(&self, origin: Vec3, direction: Vec3) -> Option<Intersection> {
         let ray = Ray {
             origin: origin.into(),
             t_min: 0.0,
@@ -141,7 +141,7 @@ impl Surfaces {
         let hit: Hit = self.index.closest_hit(&ray);
         let [a, b, c] = *self.triangles.get(hit.triangle as usize)?;
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        Some(Meeting {
+        Some(Intersection {
             point: origin + hit.t * direction,
             normal: if normal.dot(direction) > 0.0 { -normal } else { normal },
             distance: hit.t,
@@ -150,7 +150,7 @@ impl Surfaces {
     }
 
     /// Origin, unit direction and length of the way from a surface to a light.
-    pub fn shadow_ray(&self, from: &Meeting, light: Vec3) -> (Vec3, Vec3, f32) {
+    pub fn shadow_ray(&self, from: &Intersection, light: Vec3) -> (Vec3, Vec3, f32) {
         let origin = from.point + self.offset * from.normal;
         let way = light - origin;
         (origin, way.normalize_or(Vec3::Y), way.length())
@@ -162,7 +162,7 @@ impl Surfaces {
     }
 
     /// The first surface on a ray's way that is no mirror, and all meetings before it.
-    pub fn follow(&self, mut origin: Vec3, mut direction: Vec3) -> Vec<(Vec3, Vec3, Option<Meeting>)> {
+    pub fn follow(&self, mut origin: Vec3, mut direction: Vec3) -> Vec<(Vec3, Vec3, Option<Intersection>)> {
         let mut way = Vec::new();
         for _ in 0..MIRRORS {
             let meeting = self.meet(origin, direction);

@@ -11,7 +11,7 @@ use glam::Vec3;
 
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::seconds;
-use crate::experiments::measures::photon_maps::photon_scenes::{Meeting, Surfaces};
+use crate::experiments::measures::photon_maps::photon_scenes::{Intersection, Surfaces};
 use crate::experiments::table::{Cell, Table};
 use crate::random::Random;
 
@@ -85,7 +85,7 @@ fn rays(surfaces: &Surfaces, light: Vec3, side: u32) -> Result<[Vec<Ray>; 3]> {
     let mut all = [const { Vec::new() }; 3];
     for (origin, direction) in surfaces.camera_rays(side)? {
         all[0].push(ray(origin, direction, f32::INFINITY));
-        let mut meeting: Option<Meeting> = surfaces.meet(origin, direction);
+        let mut meeting: Option<Intersection> = surfaces.meet(origin, direction);
         for _ in 0..BOUNCES {
             let Some(from) = meeting else {
                 break;
