@@ -170,8 +170,8 @@ fn leaves_that_software_devices_cannot_end_are_refused() {
         for (kind, refused) in [(IndexKind::default(), false), (kd, gpu.caps().kind == DeviceKind::Cpu)] {
             match render(gpu, &scene, &kind) {
                 Ok(_) => assert!(!refused, "{kind}"),
-                Err(Error::LimitExceeded { name, bytes, .. }) => {
-                    assert!(refused && name.contains("leaf") && bytes >= 20_000, "{name}: {bytes}");
+                Err(Error::LimitExceeded { name, value, .. }) => {
+                    assert!(refused && name.contains("leaf") && value >= 20_000, "{name}: {value}");
                 }
                 Err(error) => panic!("{kind}: {error}"),
             }

@@ -90,9 +90,6 @@ impl<'a> UsableTriangles<'a> {
     }
 }
 
-/// The name that kd-trees know it by.
-pub(super) type Met<'a> = UsableTriangles<'a>;
-
 /// The box of a triangle.
 pub(super) fn bounds_of(triangle: &[Vec3; 3]) -> Aabb {
     triangle.iter().fold(Aabb::EMPTY, |bounds, v| bounds.with_point(*v))

@@ -26,7 +26,7 @@ pub use probability::Heuristic;
 pub use traverse::{KdTraversal, MAX_SHORT_STACK, Scheme};
 pub use tree::{KdFault, KdNode};
 
-use super::input::{Met, check_count, check_range};
+use super::input::{UsableTriangles, check_count, check_range};
 use super::stages::Stopwatch;
 use super::{
     Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
@@ -126,7 +126,7 @@ impl KdTree {
         check_count(triangles.len())?;
         let mut watch = Stopwatch::start();
         let mut stages = BuildStages::default();
-        let met = Met::among(triangles);
+        let met = UsableTriangles::among(triangles);
         let indices: Vec<u32> = met.map(|_, index| index);
         let positions: Vec<[Vec3; 3]> = met.map(|triangle, _| *triangle);
         let statistics = met.statistics;

@@ -9,7 +9,7 @@ use super::cache::MAX_CACHED_LEVELS;
 use super::probability::Heuristic;
 use super::{KdTree, MAX_DEPTH};
 use crate::accel::bvh2::Bvh2Triangle;
-use crate::accel::input::{Met, check_count};
+use crate::accel::input::{UsableTriangles, check_count};
 use crate::accel::stages::Stopwatch;
 use crate::accel::{Aabb, BuildStages, IndexStatistics};
 use crate::gpu::shaders::constants;
@@ -195,7 +195,7 @@ impl KdTree {
     /// [`Error::Setting`] for what is not a tree of [`MAX_DEPTH`] at most whose leaves hold every triangle.
     pub fn from_nodes(triangles: &[[Vec3; 3]], nodes: Vec<KdNode>, references: Vec<u32>) -> Result<Self> {
         check_count(triangles.len())?;
-        let met = Met::among(triangles);
+        let met = UsableTriangles::among(triangles);
         let indices: Vec<u32> = met.map(|_, index| index);
         let positions: Vec<[Vec3; 3]> = met.map(|triangle, _| *triangle);
         let sound = |(place, node): (usize, &KdNode)| match node.kind() {
