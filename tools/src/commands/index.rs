@@ -59,7 +59,8 @@ pub struct Arguments {
 }
 
 /// Scenes of a quarter of a million triangles and of fewer.
-pub(super) const SCENES: [&str; 4] = [
+pub(super) const SCENES: [&str; 5] = [
+    "builtin:conference",
     "builtin:box-city?n=25000",
     "builtin:sphere-flake?depth=3&frequency=4",
     "builtin:materials",

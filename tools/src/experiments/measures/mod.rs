@@ -65,6 +65,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("alpha", surfaces::alpha::measure),
     on_device("automatic-choice", rendering::automatic_choice::measure),
     on_device("barriers", device::barriers::measure),
+    on_device("build-stages", rays::build_stages::measure),
     on_host("compact-map", photon_maps::compact_map::measure),
     on_host("compact-rays", photon_maps::compact_rays::measure),
     on_host("coupled-reflection", surfaces::coupled_reflection::measure),

@@ -1,5 +1,6 @@
 //! Rays: tests against primitives, origins, trees and models of execution.
 
+pub mod build_stages;
 pub mod persistent_threads;
 pub mod ray_offsets;
 pub mod sphere_tests;
