@@ -22,6 +22,7 @@ pub mod accel;
 pub mod catalogue;
 pub mod error;
 pub mod film;
+pub mod fingerprint;
 pub mod gpu;
 pub mod kernels;
 pub mod plan;

@@ -15,6 +15,7 @@ mod cache;
 mod clip;
 mod counters;
 mod entries;
+mod kept;
 pub mod probability;
 pub mod shifted_restart;
 mod traverse;
@@ -22,6 +23,7 @@ mod tree;
 
 pub use cache::{KdCaches, MAX_BYTE_LEVELS, MAX_CACHED_LEVELS, StackCache};
 pub use counters::KdCounters;
+pub use kept::KeptTree;
 pub use probability::Heuristic;
 pub use traverse::{KdTraversal, MAX_SHORT_STACK, Scheme};
 pub use tree::{KdFault, KdNode};
