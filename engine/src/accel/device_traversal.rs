@@ -16,6 +16,15 @@ pub enum DeviceTraversal {
     },
 }
 
+/// What the rounds of a kd-tree's kernel hold beside a way down, a leaf, and a way to what is left.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct KdRounds {
+    /// A leaf may wait for the next.
+    pub waits: bool,
+    /// Candidates are asked about before they count.
+    pub filters: bool,
+}
+
 impl DeviceTraversal {
     /// What kernels are specialized by.
     pub fn kind(self) -> u32 {
@@ -27,16 +36,26 @@ impl DeviceTraversal {
 
     /// Loop iterations of a subgroup by rays that each stop at `quota`, at most, where a loop over lanes that wait for each other may run as
     /// often as its lanes have in sum; binary hierarchies without a filter of candidates have one loop, which runs as often as its slowest lane.
-    pub(crate) fn kd_iterations(longest_leaf: u32, quota: u32, lanes: u32) -> u64 {
-        let round = constants::KD_ROUND_ITERATIONS + 2 * constants::KD_MAX_DEPTH + 1;
-        (u64::from(quota) + u64::from(round) + u64::from(longest_leaf)) * u64::from(lanes)
+    pub(crate) fn kd_iterations(longest_leaf: u32, quota: u32, lanes: u32, rounds: KdRounds) -> u64 {
+        let of_round = match rounds.waits {
+            true => constants::KD_PAIR_ITERATIONS,
+            false => constants::KD_ROUND_ITERATIONS,
+        };
+        let round = u64::from(of_round + 2 * constants::KD_MAX_DEPTH + 1);
+        // One that begins below the quota, one where the flags read as the end, and one for a leaf that waits.
+        let count = 2 + u64::from(rounds.waits);
+        // A candidate ends the loop over its leaf: what is left of that is a round of its own.
+        let triangle = 1 + u64::from(if rounds.filters { of_round } else { 0 });
+        let leaves = count * if rounds.waits { 2 } else { 1 };
+        (u64::from(quota) + count * round + leaves * triangle * u64::from(longest_leaf)) * u64::from(lanes)
     }
 
     /// The quota up to `quota` with which a subgroup's rays stay within `iterations`, for kd-trees on software devices; elsewhere `quota`.
+    /// `filters` says whether kernels ask about candidates.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] where a leaf alone is too long.
-    pub(crate) fn quota_within(self, caps: &Caps, quota: u32, iterations: u32) -> Result<u32> {
+    pub(crate) fn quota_within(self, caps: &Caps, quota: u32, iterations: u32, filters: bool) -> Result<u32> {
         let Self::Kd { longest_leaf } = self else {
             return Ok(quota);
         };
@@ -44,16 +63,18 @@ impl DeviceTraversal {
             return Ok(quota);
         }
         let lanes = caps.subgroup_size.max(1);
-        let unstopped = Self::kd_iterations(longest_leaf, 0, lanes) / u64::from(lanes);
+        let rounds = KdRounds { waits: false, filters };
+        let unstopped = |leaf| Self::kd_iterations(leaf, 0, 1, rounds);
         let most = u64::from(iterations / lanes);
-        if most <= unstopped {
+        if most <= unstopped(longest_leaf) {
+            let each = unstopped(1) - unstopped(0);
             return Err(Error::LimitExceeded {
                 name: "longest leaf of a kd-tree".into(),
                 value: u64::from(longest_leaf),
                 limit_name: "iterations of a software device's loops",
-                limit: most.saturating_sub(unstopped - u64::from(longest_leaf)),
+                limit: most.saturating_sub(unstopped(0)) / each,
             });
         }
-        Ok(quota.min((most - unstopped) as u32))
+        Ok(quota.min((most - unstopped(longest_leaf)) as u32))
     }
 }

@@ -27,12 +27,12 @@ BoxTest box_test(vec3 lower, vec3 upper, Ray ray) {
     return BoxTest(ray.origin, inverse, (BOX_SLACK * reach) * abs(inverse));
 }
 
-// Entry and exit distance of a box grown by the slack.
+// Entry and exit distance of a box grown by the slack; precise, since spans that are found again must have the same bits.
 vec2 box_span(BoxTest test, vec3 lower, vec3 upper) {
-    vec3 t0 = (lower - test.origin) * test.inverse;
-    vec3 t1 = (upper - test.origin) * test.inverse;
-    vec3 near = min(t0, t1) - test.slack;
-    vec3 far = max(t0, t1) + test.slack;
+    precise vec3 t0 = (lower - test.origin) * test.inverse;
+    precise vec3 t1 = (upper - test.origin) * test.inverse;
+    precise vec3 near = min(t0, t1) - test.slack;
+    precise vec3 far = max(t0, t1) + test.slack;
     return vec2(max(near.x, max(near.y, near.z)), min(far.x, min(far.y, far.z)));
 }
 

@@ -4,7 +4,8 @@
 // Each round goes down to a leaf, tests its triangles and finds what is left: three loops, in each of which lanes wait for each other, since
 // software drivers run both sides of branches, and a triangle costs ten planes. A subgroup may therefore run as many iterations as its lanes
 // have in sum, and the quota must be that much smaller. A ray that it stops returns the flags of what is left; call again with them and the
-// same hit. A round adds KD_ROUND_ITERATIONS, 2 × KD_MAX_DEPTH and the triangles of a leaf to the quota at most.
+// same hit. A round adds KD_ROUND_ITERATIONS, 2 × KD_MAX_DEPTH and the triangles of a leaf to the quota at most; two rounds may follow it, where
+// flags read as the end and where a leaf waits, and each candidate that is asked about is a round of its own.
 //
 // With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);

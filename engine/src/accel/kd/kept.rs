@@ -33,6 +33,8 @@ pub struct KeptTree {
     pub path: PathBuf,
     /// Whether it was read, not built.
     pub was_read: bool,
+    /// Why a tree that was built could not be kept.
+    pub not_kept: Option<Error>,
 }
 
 fn print_of(triangles: &[[Vec3; 3]], settings: &KdSettings) -> Fingerprint {
@@ -99,8 +101,8 @@ impl KdTree {
     /// As [`KdTree::build`], but read from `folder` where the same tree was kept before, and kept there otherwise; the folder is made.
     ///
     /// # Errors
-    /// As [`KdTree::build`]; [`Error::Io`] where the folder cannot be made or the file not be written. A file that cannot be read, or that is
-    /// damaged, is no error: the tree is built.
+    /// As [`KdTree::build`]. A file that cannot be read, or that is damaged, is no error: the tree is built; nor is one that cannot be
+    /// written, see [`KeptTree::not_kept`].
     pub fn kept(triangles: &[[Vec3; 3]], settings: &KdSettings, folder: &Path) -> Result<KeptTree> {
         settings.check()?;
         let print = print_of(triangles, settings);
@@ -113,15 +115,17 @@ impl KdTree {
                 tree,
                 path,
                 was_read: true,
+                not_kept: None,
             });
         }
         let tree = Self::build(triangles, settings)?;
-        std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-        atomic::write(&path, &encode(&tree, print))?;
+        let made = std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error));
+        let written = made.and_then(|()| atomic::write(&path, &encode(&tree, print)));
         Ok(KeptTree {
             tree,
             path,
             was_read: false,
+            not_kept: written.err(),
         })
     }
 }
@@ -154,6 +158,23 @@ mod tests {
             assert_eq!(first.tree.texels(), again.tree.texels());
             assert_eq!(first.tree.statistics(), again.tree.statistics());
         }
+    }
+
+    #[test]
+    fn a_builder_that_builds_another_tree_has_another_version() {
+        let kept = KdTree::build(&soup(700), &KdSettings::default()).expect("built");
+        let print = Fingerprint::of(bytemuck::cast_slice(kept.texels()));
+        // Where this differs, files of the old tree must no longer be read: raise VERSION, then put the new fingerprint here.
+        assert_eq!((VERSION, print.as_str()), (1, "6e56d39b9e13fdbc49ab0f9977cc8041"));
+    }
+
+    #[test]
+    fn a_tree_that_cannot_be_kept_is_built_all_the_same() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("a file");
+        std::fs::write(&file, b"").expect("written");
+        let built = KdTree::kept(&soup(20), &KdSettings::default(), &file.join("below")).expect("built");
+        assert!(!built.was_read && matches!(built.not_kept, Some(Error::Io { .. })));
     }
 
     #[test]

@@ -134,7 +134,9 @@ fn caches_change_where_work_is_done_and_no_hit() {
         let [none, nodes, head, postpone, nodes_head, bytes, nodes_postpone] = KdCaches::COMPARED.map(|caches| {
             let mut work = KdCounters::default();
             for ray in &rays {
-                let mut traversal = KdTraversal::closest(Scheme::Stack, ray).with_caches(caches);
+                let mut traversal = KdTraversal::closest(Scheme::Stack, ray)
+                    .with_caches(caches)
+                    .expect("caches");
                 traversal.run(tree, ray, u64::MAX, &mut |_, _| true, &mut work);
                 assert!(same_bits(&traversal.hit, &tree.closest_hit(ray)), "{caches:?} {ray:?}");
             }

@@ -146,9 +146,16 @@ impl KdTraversal {
     }
 
     /// The same with caches, in a traversal by a stack.
-    pub fn with_caches(mut self, caches: KdCaches) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for caches with another scheme, or with more levels than they can name.
+    pub fn with_caches(mut self, caches: KdCaches) -> crate::Result<Self> {
+        caches.check()?;
+        if self.scheme != Scheme::Stack {
+            caches.check_absent("go with a stack alone")?;
+        }
         self.caches = caches;
-        self
+        Ok(self)
     }
 
     /// Runs for about `quota` iterations; [`Self::resume`] says whether it is done. Any quota makes progress.

@@ -205,7 +205,16 @@ impl KdTree {
             KdKind::Leaf { first, count } => u64::from(first) + u64::from(count) <= references.len() as u64,
         };
         let places = references.iter().all(|place| (*place as usize) < positions.len());
-        if nodes.len() < 2 || !nodes.len().is_multiple_of(2) || !places || !nodes.iter().enumerate().all(sound) {
+        let mut named = vec![false; nodes.len() / 2];
+        let mut is_named_once = |node: &KdNode| match node.kind() {
+            KdKind::Inner { children, .. } => named
+                .get_mut(children as usize / 2)
+                .is_some_and(|named| !std::mem::replace(named, true)),
+            KdKind::Leaf { .. } => true,
+        };
+        let once = nodes.iter().all(&mut is_named_once);
+        if nodes.len() < 2 || !nodes.len().is_multiple_of(2) || !places || !once || !nodes.iter().enumerate().all(sound)
+        {
             return Err(Error::setting("kd.nodes", nodes.len(), "are no tree"));
         }
         let bounds = bounds_of_all(&positions);

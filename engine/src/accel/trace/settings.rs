@@ -3,6 +3,7 @@
 
 use crate::accel::DeviceTraversal;
 use crate::accel::bvh2::{MAX_DEPTH, MAX_LEAF_SIZE};
+use crate::accel::device_traversal::KdRounds;
 use crate::accel::input::check_range;
 use crate::accel::kd::{KdCaches, Scheme};
 use crate::gpu::{Caps, DeviceKind, SOFTWARE_LOOP_CAP};
@@ -138,11 +139,12 @@ impl TraceSettings {
                 let walk_back = MAX_DEPTH + 1;
                 u64::from(self.ray_quota) + u64::from(leaves_on_the_stack + walk_back)
             }
-            DeviceTraversal::Kd { mut longest_leaf } => {
-                if self.caches.postpone {
-                    longest_leaf = longest_leaf.saturating_mul(2);
-                }
-                DeviceTraversal::kd_iterations(longest_leaf, self.ray_quota, lanes_in_sum(caps, traversal))
+            DeviceTraversal::Kd { longest_leaf } => {
+                let rounds = KdRounds {
+                    waits: self.caches.postpone,
+                    filters: false,
+                };
+                DeviceTraversal::kd_iterations(longest_leaf, self.ray_quota, lanes_in_sum(caps, traversal), rounds)
             }
         };
         match self.execution {

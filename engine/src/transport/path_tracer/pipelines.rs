@@ -35,7 +35,10 @@ pub(super) fn ray_quota(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettin
         (true, true) => (MEDIA_ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES_ALPHA),
     };
     let quota = settings.ray_quota.min(most);
-    scene.index_traversal().quota_within(gpu.caps(), quota, iterations)
+    let filters = scene.profile().has_alpha();
+    scene
+        .index_traversal()
+        .quota_within(gpu.caps(), quota, iterations, filters)
 }
 
 /// One kernel a stage.

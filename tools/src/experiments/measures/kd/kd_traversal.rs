@@ -200,9 +200,11 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         }
     }
     table.note(
-        "Flights as in `kd-heuristics`, SIROH trees over boxes as the source's. Counts are exact and the same on every machine: inner nodes, \
+        "Flights as in `kd-heuristics`, SIROH trees over boxes with leaves of 4, as the source's text has them, though its trees have many more \
+         nodes (see there). Here rays go on until leaves begin beyond their hit, so that no rounding loses one. Counts are exact and the same on every machine: inner nodes, \
          entries of stacks written and read, and bytes by the source's model of 8 for each of these. Visits are hardware independent, so \
-         their changes can be held against the source's; stand-ins for its models differ in depth. Times are medians of runs that take \
+         their changes can be held against the source's; the ranking is the source's, the sizes are not: \
+         flags restart once for each leaf that is left, and rays meet more leaves in these trees. Times are medians of runs that take \
          turns, one invocation a ray.",
     );
     restarts.note(
