@@ -36,6 +36,13 @@ impl From<f64> for Cell {
     }
 }
 
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    /// What is not there is named so.
+    fn from(value: Option<T>) -> Self {
+        value.map_or_else(|| "none".into(), Into::into)
+    }
+}
+
 impl std::fmt::Display for Cell {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {

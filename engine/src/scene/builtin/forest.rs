@@ -139,16 +139,3 @@ fn build(values: &Values) -> Result<Scene> {
     scene.defaults.aspect = Some(4.0 / 3.0);
     Ok(scene)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::generate;
-    use crate::scene::SceneProfile;
-
-    #[test]
-    fn it_has_about_as_many_triangles_as_what_it_stands_in_for() {
-        let scene = generate("builtin:forest").expect("forest");
-        let found = SceneProfile::of(&scene).triangles as f64;
-        assert!((found / 174_117.0 - 1.0).abs() < 0.05, "{found}");
-    }
-}

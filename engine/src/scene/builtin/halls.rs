@@ -419,18 +419,3 @@ fn cathedral(values: &Values) -> Result<Scene> {
     scene.defaults.aspect = Some(4.0 / 3.0);
     Ok(scene)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::generate;
-    use crate::scene::SceneProfile;
-
-    #[test]
-    fn halls_have_about_as_many_triangles_as_what_they_stand_in_for() {
-        for (name, triangles) in [("atrium", 66_454.0), ("cathedral", 80_131.0)] {
-            let scene = generate(&format!("builtin:{name}")).expect(name);
-            let found = SceneProfile::of(&scene).triangles as f64;
-            assert!((found / triangles - 1.0).abs() < 0.05, "{name}: {found}");
-        }
-    }
-}

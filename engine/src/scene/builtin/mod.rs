@@ -141,6 +141,21 @@ mod tests {
     }
 
     #[test]
+    fn stand_ins_have_about_as_many_triangles_as_the_models_they_stand_in_for() {
+        let models = [
+            ("atrium", 66_454.0),
+            ("cathedral", 80_131.0),
+            ("conference", 282_801.0),
+            ("forest", 174_117.0),
+        ];
+        for (name, triangles) in models {
+            let scene = generate(&format!("{PREFIX}{name}")).expect(name);
+            let found = SceneProfile::of(&scene).triangles as f64;
+            assert!((found / triangles - 1.0).abs() < 0.05, "{name}: {found}");
+        }
+    }
+
+    #[test]
     fn every_entry_builds_with_its_defaults_and_has_what_it_promises() {
         for entry in catalogue() {
             let scene = generate(&format!("{PREFIX}{}", entry.name)).expect(entry.name);

@@ -6,8 +6,9 @@
 //!
 //! Guarantee: deterministic.
 
+use clerestory::accel::kd::{KdCaches, KdCounters, KdSettings, KdTraversal, KdTree, Scheme};
 use clerestory::accel::trace::{Query, RayTracer, TraceSettings};
-use clerestory::accel::{Aabb, Ray, RayIndex};
+use clerestory::accel::{Aabb, Hit, Ray, RayIndex};
 use clerestory::gpu::Gpu;
 use clerestory::scene::Camera;
 use clerestory::{Error, Result, scene};
@@ -58,21 +59,39 @@ pub static CASES: [Case; 5] = [
 ];
 
 impl Case {
-    /// The scene's name.
+    /// The scene's name, with its parameters but for the light.
     pub fn name(&self) -> &'static str {
-        let query = self.scene.find('?').unwrap_or(self.scene.len());
-        self.scene[..query].trim_start_matches("builtin:")
+        self.scene
+            .trim_start_matches("builtin:")
+            .trim_end_matches("?source=point")
     }
 }
 
-/// The cases that a run looks at: of a quick look the first alone.
+/// The source's scenes that a run looks at: of a quick look the first alone.
 pub fn cases(context: &Context<'_>) -> &'static [Case] {
     if context.smoke { &CASES[..1] } else { &CASES }
 }
 
-/// Frames, and pixels across and down.
-pub fn size(context: &Context<'_>) -> (u32, u32) {
-    if context.smoke { (2, 8) } else { (10, 96) }
+/// Loads each scene, flies through it, and measures that, until it is stopped.
+///
+/// # Errors
+/// Those of scenes, and the measure's first.
+pub fn each_flight<'a>(
+    context: &Context<'_>,
+    cases: impl ExactSizeIterator<Item = &'a Case>,
+    mut measure: impl FnMut(&'a Case, &Surfaces, &Flight) -> Result<()>,
+) -> Result<()> {
+    let count = cases.len();
+    for (done, case) in cases.enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(case.name(), done, count);
+        let surfaces = Surfaces::load(case.scene)?;
+        let flight = fly(context, case, &surfaces, case.light)?;
+        measure(case, &surfaces, &flight)?;
+    }
+    Ok(())
 }
 
 /// The rays of a flight.
@@ -126,12 +145,13 @@ fn frames(cameras: &[Camera], count: u32) -> Result<Vec<Camera>> {
     Ok((0..count).map(frame).collect())
 }
 
-/// The rays of a flight of so many frames and square pictures, lit from `light`.
+/// The rays of a flight with the light in this place: 10 frames of 96 × 96 pixels, 2 of 8 × 8 in a quick look.
 ///
 /// # Errors
 /// Those of scenes, and [`Error::Setting`] for one without a camera.
-pub fn fly(address: &str, surfaces: &Surfaces, light: Vec3, (count, side): (u32, u32)) -> Result<Flight> {
-    let scene = scene::load(address)?;
+pub fn fly(context: &Context<'_>, case: &Case, surfaces: &Surfaces, light: Vec3) -> Result<Flight> {
+    let (count, side) = if context.smoke { (2, 8) } else { (10, 96) };
+    let scene = scene::load(case.scene)?;
     let mut flight = Flight::default();
     for camera in frames(&scene.cameras, count)? {
         for (origin, direction) in geometry::camera_rays(&camera, side)? {
@@ -160,59 +180,100 @@ pub fn outside(surfaces: &Surfaces) -> Vec3 {
     0.5 * (bounds.lower + bounds.upper) + extent.length() * Vec3::new(0.9, 2.0, 0.7)
 }
 
-/// An index on the device, for closest and for any hits, and its times.
-pub struct Raced {
-    closest: RayTracer,
-    any: RayTracer,
-    seconds: [Vec<f64>; 2],
+/// A tree like the source's: SIROH over the triangles' boxes.
+///
+/// # Errors
+/// As [`KdTree::build`].
+pub fn source_tree(surfaces: &Surfaces) -> Result<KdTree> {
+    let settings = KdSettings {
+        clip: false,
+        ..KdSettings::default()
+    };
+    KdTree::build(&surfaces.triangles, &settings)
 }
 
-impl Raced {
-    /// Uploads an index twice, for closest hits and for any, with these settings but for the query.
-    pub fn new(gpu: &Gpu, index: &dyn RayIndex, settings: TraceSettings) -> Result<Self> {
+/// Hits of the rays that ask for the closest, and the exact work of all rays, on the host.
+///
+/// # Errors
+/// [`Error::Setting`] for caches that do not go with the scheme.
+pub fn trace(
+    tree: &KdTree,
+    scheme: Scheme,
+    caches: KdCaches,
+    [closest, any]: [&[Ray]; 2],
+) -> Result<(Vec<Hit>, KdCounters)> {
+    let mut counters = KdCounters::default();
+    let mut run = |traversal: KdTraversal, ray: &Ray| {
+        let mut traversal = traversal.with_caches(caches)?;
+        traversal.run(tree, ray, u64::MAX, &mut |_, _| true, &mut counters);
+        Ok(traversal.hit)
+    };
+    let hits = closest.iter().map(|ray| run(KdTraversal::closest(scheme, ray), ray));
+    let hits = hits.collect::<Result<_>>()?;
+    for ray in any {
+        run(KdTraversal::any(scheme, ray), ray)?;
+    }
+    Ok((hits, counters))
+}
+
+/// How many of the hits are not those expected.
+pub fn different(hits: &[Hit], expected: &[Hit]) -> u64 {
+    hits.iter().zip(expected).filter(|(a, b)| a != b).count() as u64
+}
+
+/// What a value changes in the first, in per cent; nothing where that is nothing.
+pub fn change(value: f64, first: f64) -> f64 {
+    if first > 0.0 {
+        100.0 * (value / first - 1.0)
+    } else {
+        0.0
+    }
+}
+
+/// Traces of a race: 5 after one to warm up, a single one in a quick look.
+const REPEATS: usize = 5;
+const SMOKE_REPEATS: usize = 1;
+
+/// Lets the device trace the same rays in several indexes in turns, with settings but for the query. Millions of rays a second of each,
+/// medians: closest hits, any hits, both together.
+///
+/// # Errors
+/// Those of uploads and of submissions.
+pub fn race<'a>(
+    context: &Context<'_>,
+    gpu: &Gpu,
+    flight: &Flight,
+    indexes: impl IntoIterator<Item = (&'a dyn RayIndex, TraceSettings)>,
+) -> Result<Vec<[f64; 3]>> {
+    let tracers = indexes.into_iter().map(|(index, settings)| {
         let of = |query| {
             let settings = TraceSettings { query, ..settings };
             RayTracer::new(gpu, index, &settings.fitted(gpu.caps(), index.device_traversal()))
         };
-        Ok(Self {
-            closest: of(Query::Closest)?,
-            any: of(Query::Any)?,
-            seconds: [Vec::new(), Vec::new()],
-        })
-    }
-
-    /// Millions of rays a second, medians: closest hits, any hits, both together.
-    pub fn rates(&self, flight: &Flight) -> [f64; 3] {
-        let seconds = [0, 1].map(|query| median(self.seconds[query].clone()));
-        let counts =
-            [flight.camera.len() + flight.reflection.len(), flight.shadow.len()].map(|count| 1e-6 * count as f64);
-        [
-            counts[0] / seconds[0],
-            counts[1] / seconds[1],
-            (counts[0] + counts[1]) / (seconds[0] + seconds[1]),
-        ]
-    }
-}
-
-/// Lets indexes trace the same rays in turns: so often after once to warm up.
-///
-/// # Errors
-/// Those of submissions.
-pub fn race(all: &mut [Raced], flight: &Flight, repeats: usize) -> Result<()> {
-    let closest = flight.closest();
-    for repeat in 0..=repeats {
-        for one in &mut *all {
-            for (query, (tracer, rays)) in [(&one.closest, &closest), (&one.any, &flight.shadow)]
-                .into_iter()
-                .enumerate()
-            {
+        Ok([of(Query::Closest)?, of(Query::Any)?])
+    });
+    let tracers = tracers.collect::<Result<Vec<_>>>()?;
+    let mut seconds = vec![[Vec::new(), Vec::new()]; tracers.len()];
+    let rays = [&flight.closest(), &flight.shadow];
+    for repeat in 0..=if context.smoke { SMOKE_REPEATS } else { REPEATS } {
+        for (both, seconds) in tracers.iter().zip(&mut seconds) {
+            for ((tracer, rays), seconds) in both.iter().zip(rays).zip(seconds) {
                 let (traced, wall) = timed(|| tracer.trace(rays));
                 let on_device = traced?.seconds();
                 if repeat > 0 {
-                    one.seconds[query].push(if on_device > 0.0 { on_device } else { wall });
+                    seconds.push(if on_device > 0.0 { on_device } else { wall });
                 }
             }
         }
     }
-    Ok(())
+    let [closest, any] = rays.map(|rays| 1e-6 * rays.len() as f64);
+    let rates = seconds.into_iter().map(|both| {
+        let [of_closest, of_any] = both.map(median);
+        [
+            closest / of_closest,
+            any / of_any,
+            (closest + any) / (of_closest + of_any),
+        ]
+    });
+    Ok(rates.collect())
 }

@@ -4,16 +4,13 @@
 //! Dublin, 2011, tables 4.8 and 4.10.
 
 use clerestory::Result;
-use clerestory::accel::kd::{KdCaches, KdCounters, KdSettings, KdTraversal, KdTree, Scheme};
+use clerestory::accel::kd::{KdCaches, KdCounters, Scheme};
 use clerestory::accel::trace::TraceSettings;
-use clerestory::accel::{Hit, Ray};
+use clerestory::accel::{Hit, RayIndex};
 
-use super::flights::{self, Flight, Raced, cases, fly, race};
+use super::flights::{cases, change, different, each_flight, race, source_tree, trace};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
 use crate::experiments::table::{Cell, Table};
-
-const REPEATS: usize = 5;
 
 /// The forms of [`KdCaches::COMPARED`].
 const NAMES: [&str; 7] = [
@@ -80,32 +77,6 @@ const PUBLISHED: [Published; 5] = [
     },
 ];
 
-/// Hits of the rays that ask for the closest, and the exact work of all rays, on the host.
-fn trace(tree: &KdTree, caches: KdCaches, closest: &[Ray], flight: &Flight) -> Result<(Vec<Hit>, KdCounters)> {
-    let mut counters = KdCounters::default();
-    let mut run = |traversal: KdTraversal, ray: &Ray| {
-        let mut traversal = traversal.with_caches(caches)?;
-        traversal.run(tree, ray, u64::MAX, &mut |_, _| true, &mut counters);
-        Ok(traversal.hit)
-    };
-    let hits = closest
-        .iter()
-        .map(|ray| run(KdTraversal::closest(Scheme::Stack, ray), ray))
-        .collect::<Result<_>>()?;
-    for ray in &flight.shadow {
-        run(KdTraversal::any(Scheme::Stack, ray), ray)?;
-    }
-    Ok((hits, counters))
-}
-
-fn change(value: f64, first: f64) -> f64 {
-    if first > 0.0 {
-        100.0 * (value / first - 1.0)
-    } else {
-        0.0
-    }
-}
-
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
@@ -131,33 +102,17 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "source: speed (%)",
         ],
     );
-    let all = cases(context);
-    for (done, case) in all.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, all.len());
-        let surfaces = Surfaces::load(case.scene)?;
-        let flight = fly(case.scene, &surfaces, case.light, flights::size(context))?;
-        // As the source's trees.
-        let settings = KdSettings {
-            clip: false,
-            ..KdSettings::default()
-        };
-        let tree = KdTree::build(&surfaces.triangles, &settings)?;
-        let of = |caches| {
-            let settings = TraceSettings {
-                caches,
-                ..TraceSettings::persistent(gpu.caps())
-            };
-            Raced::new(&gpu, &tree, settings)
-        };
-        let mut raced = KdCaches::COMPARED.into_iter().map(of).collect::<Result<Vec<_>>>()?;
-        race(&mut raced, &flight, if context.smoke { 1 } else { REPEATS })?;
-        let rates: Vec<f64> = raced.iter().map(|one| one.rates(&flight)[2]).collect();
+    each_flight(context, cases(context).iter(), |case, surfaces, flight| {
+        let tree = source_tree(surfaces)?;
+        let settings = KdCaches::COMPARED.map(|caches| TraceSettings {
+            caches,
+            ..TraceSettings::persistent(gpu.caps())
+        });
+        let contenders = settings.map(|settings| (&tree as &dyn RayIndex, settings));
+        let rates = race(context, &gpu, flight, contenders)?;
         let closest = flight.closest();
-        let traced = KdCaches::COMPARED.map(|caches| trace(&tree, caches, &closest, &flight));
-        let traced = traced.into_iter().collect::<Result<Vec<_>>>()?;
+        let of = |caches| trace(&tree, Scheme::Stack, caches, [&closest, &flight.shadow]);
+        let traced = KdCaches::COMPARED.into_iter().map(of).collect::<Result<Vec<_>>>()?;
         let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
         let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
         let of = |(_, work): &(Vec<Hit>, KdCounters)| {
@@ -169,17 +124,15 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         };
         let first = of(&traced[0]);
         for (i, (name, one)) in NAMES.into_iter().zip(&traced).enumerate() {
-            let differ = one.0.iter().zip(&traced[0].0).filter(|(a, b)| a != b).count();
             let found = of(one);
             let of_source = |of: fn(&Published) -> &[f64; 6]| {
-                let value = published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]);
-                value.map_or(Cell::from("none"), Into::into)
+                Cell::from(published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]))
             };
             let mut row: Vec<Cell> = vec![
                 case.name().into(),
                 case.counterpart.into(),
                 name.into(),
-                (differ as u64).into(),
+                different(&one.0, &traced[0].0).into(),
             ];
             let sources: [fn(&Published) -> &[f64; 6]; 3] = [|row| &row.nodes, |row| &row.entries, |row| &row.bytes];
             for ((value, first), source) in found.into_iter().zip(first).zip(sources) {
@@ -187,8 +140,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             }
             row.extend([
                 each(one.1.nodes).into(),
-                rates[i].into(),
-                change(rates[i], rates[0]).into(),
+                rates[i][2].into(),
+                change(rates[i][2], rates[0][2]).into(),
                 of_source(|row| &row.speed),
             ]);
             table.row(row);
@@ -201,7 +154,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 case.counterpart
             ));
         }
-    }
+        Ok(())
+    })?;
     table.note(
         "Flights as in `kd-heuristics`, SIROH trees over boxes with leaves of 4, as the source's text has them, though its trees have many more \
          nodes (see there); traversal with a stack. Counts are exact and the same on every \

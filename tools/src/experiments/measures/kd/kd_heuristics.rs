@@ -4,19 +4,18 @@
 //! weigh triangles by their boxes; ours do also by what of them lies in a node.
 
 use clerestory::Result;
-use clerestory::accel::kd::{Heuristic, KdCounters, KdSettings, KdTree, Scheme};
+use clerestory::accel::kd::{Heuristic, KdCaches, KdCounters, KdSettings, KdTree, Scheme};
 use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::{Ray, RayIndex};
 
-use super::flights::{self, Flight, Raced, cases, fly, outside, race};
+use super::flights::{Flight, cases, change, each_flight, fly, outside, race, trace};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
-use crate::experiments::table::{Cell, Table};
+use crate::experiments::table::Table;
 use crate::timing::{median, repeated, timed};
 
 /// Heuristics, the one that others are compared with first.
 const HEURISTICS: [Heuristic; 3] = [Heuristic::SurfaceArea, Heuristic::Regions, Heuristic::InteriorOrigin];
-const REPEATS: usize = 5;
 /// Triangles up to which trees are built again for a median, and by 26 regions at all, which takes twenty times as long as the others.
 const MANY_TRIANGLES: usize = 100_000;
 
@@ -130,16 +129,9 @@ const PUBLISHED: [Published; 5] = [
     },
 ];
 
-/// Exact work of rays on the host.
-pub fn work(tree: &KdTree, scheme: Scheme, closest: &[Ray], shadow: &[Ray]) -> KdCounters {
-    let mut counters = KdCounters::default();
-    for ray in closest {
-        tree.closest_hit_by(scheme, ray, &mut |_, _| true, &mut counters);
-    }
-    for ray in shadow {
-        tree.any_hit_by(scheme, ray, &mut |_, _| true, &mut counters);
-    }
-    counters
+/// Exact work of rays on the host, by a stack.
+fn work(tree: &KdTree, rays: [&[Ray]; 2]) -> Result<KdCounters> {
+    Ok(trace(tree, Scheme::Stack, KdCaches::default(), rays)?.1)
 }
 
 /// A tree with what was measured of it.
@@ -165,7 +157,7 @@ fn grow(context: &Context<'_>, surfaces: &Surfaces, flight: &Flight, form: &Form
             let (tree, time) = timed(|| KdTree::build(&surfaces.triangles, &settings));
             tree.map(|tree| (tree, 1e3 * time))
         })?;
-        let work = work(&tree, Scheme::Stack, &closest, &flight.shadow);
+        let work = work(&tree, [&closest, &flight.shadow])?;
         Ok(Grown {
             heuristic,
             tree,
@@ -181,14 +173,6 @@ fn grow(context: &Context<'_>, surfaces: &Surfaces, flight: &Flight, form: &Form
 fn inner_nodes(tree: &KdTree) -> u64 {
     let statistics = tree.statistics();
     statistics.nodes - statistics.leaves
-}
-
-fn change(value: f64, first: f64) -> f64 {
-    100.0 * (value / first - 1.0)
-}
-
-fn cell(number: Option<f64>) -> Cell {
-    number.map_or("none".into(), Into::into)
 }
 
 /// The measure.
@@ -245,23 +229,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "SIROH, change of tests (%)",
         ],
     );
-    let all = cases(context);
-    for (done, case) in all.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, all.len());
-        let surfaces = Surfaces::load(case.scene)?;
-        let flight = fly(case.scene, &surfaces, case.light, flights::size(context))?;
+    each_flight(context, cases(context).iter(), |case, surfaces, flight| {
         let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
         for form in &FORMS {
-            let grown = grow(context, &surfaces, &flight, form)?;
-            let mut raced = grown
-                .iter()
-                .map(|grown| Raced::new(&gpu, &grown.tree, TraceSettings::ray_per_thread()))
-                .collect::<Result<Vec<_>>>()?;
-            race(&mut raced, &flight, if context.smoke { 1 } else { REPEATS })?;
-            let rates: Vec<f64> = raced.iter().map(|one| one.rates(&flight)[2]).collect();
+            let grown = grow(context, surfaces, flight, form)?;
+            let trees_raced = grown.iter().map(|one| &one.tree as &dyn RayIndex);
+            let contenders = trees_raced.map(|tree| (tree, TraceSettings::ray_per_thread()));
+            let rates = race(context, &gpu, flight, contenders)?;
             let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
             let first = &grown[0];
             for (one, rate) in grown.iter().zip(&rates) {
@@ -280,16 +254,16 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                     (flight.rays() as u64).into(),
                     each(one.work.nodes).into(),
                     change(each(one.work.nodes), each(first.work.nodes)).into(),
-                    cell(published.map(|row| row.visits)),
-                    cell(changes.map(|changes| changes.visits)),
+                    published.map(|row| row.visits).into(),
+                    changes.map(|changes| changes.visits).into(),
                     each(one.work.triangles).into(),
                     change(each(one.work.triangles), each(first.work.triangles)).into(),
-                    cell(published.map(|row| row.tests)),
-                    cell(changes.map(|changes| changes.tests)),
+                    published.map(|row| row.tests).into(),
+                    changes.map(|changes| changes.tests).into(),
                     each(one.work.leaves).into(),
-                    (*rate).into(),
-                    change(*rate, rates[0]).into(),
-                    cell(changes.map(|changes| changes.speed)),
+                    rate[2].into(),
+                    change(rate[2], rates[0][2]).into(),
+                    changes.map(|changes| changes.speed).into(),
                 ]);
                 trees.row([
                     case.name().into(),
@@ -300,8 +274,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                     change(one.build, first.build).into(),
                     inner_nodes(&one.tree).into(),
                     change(inner_nodes(&one.tree) as f64, inner_nodes(&first.tree) as f64).into(),
-                    cell(published.map(|row| row.nodes)),
-                    cell(changes.and_then(|changes| changes.nodes)),
+                    published.map(|row| row.nodes).into(),
+                    changes.and_then(|changes| changes.nodes).into(),
                     (one.tree.references().len() as u64).into(),
                     u64::from(one.tree.statistics().max_depth).into(),
                     u64::from(one.tree.longest_leaf()).into(),
@@ -310,11 +284,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             if form.leaf_size > 1 || form.clip {
                 continue;
             }
-            for (place, light) in [("inside", case.light), ("outside", outside(&surfaces))] {
-                let flight = fly(case.scene, &surfaces, light, flights::size(context))?;
+            let lit_from_outside = fly(context, case, surfaces, outside(surfaces))?;
+            for (place, flight) in [("inside", flight), ("outside", &lit_from_outside)] {
                 let each = |count: u64| count as f64 / flight.shadow.len().max(1) as f64;
-                let [area, siroh] =
-                    [0, grown.len() - 1].map(|i| work(&grown[i].tree, Scheme::Stack, &[], &flight.shadow));
+                let (area, siroh) = (
+                    work(&grown[0].tree, [&[], &flight.shadow])?,
+                    work(&grown[grown.len() - 1].tree, [&[], &flight.shadow])?,
+                );
                 lights.row([
                     case.name().into(),
                     place.into(),
@@ -325,7 +301,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 ]);
             }
         }
-    }
+        Ok(())
+    })?;
     rays.note(
         "Camera flights of 10 frames of 96 × 96 pixels (2 of 8 × 8 in a quick look): camera rays, reflections at mirrors, and a shadow ray \
          from the end of each; traversal with a stack. Counts are exact and the same on every machine; times are medians of runs that take \

@@ -12,23 +12,27 @@ use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::{IndexKind, Ray, RayIndex, TraversalCounters};
 use glam::Vec3;
 
-use super::flights::{self, CASES, Flight, Raced, fly, race};
+use super::flights::{CASES, Case, Flight, each_flight, race};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
 use crate::experiments::table::{Cell, Table};
 use crate::timing::{median, repeated, timed};
 
-const REPEATS: usize = 5;
-/// A light beside the soups.
-const SOUP_LIGHT: Vec3 = Vec3::new(0.0, 3.0, 0.0);
+const fn soup(scene: &'static str) -> Case {
+    Case {
+        scene,
+        counterpart: "",
+        light: Vec3::new(0.0, 3.0, 0.0),
+    }
+}
+
 /// As many triangles each, of growing size: the sweep over depth complexity.
-const SOUPS: [&str; 4] = [
-    "builtin:triangle-soup?n=50000&size=0.005",
-    "builtin:triangle-soup?n=50000&size=0.02",
-    "builtin:triangle-soup?n=50000&size=0.08",
-    "builtin:triangle-soup?n=50000&size=0.3",
+static SOUPS: [Case; 4] = [
+    soup("builtin:triangle-soup?n=50000&size=0.005"),
+    soup("builtin:triangle-soup?n=50000&size=0.02"),
+    soup("builtin:triangle-soup?n=50000&size=0.08"),
+    soup("builtin:triangle-soup?n=50000&size=0.3"),
 ];
-const SMOKE_SOUP: &str = "builtin:triangle-soup?n=500&size=0.1";
+static SMOKE_SOUP: Case = soup("builtin:triangle-soup?n=500&size=0.1");
 
 /// Indexes by name, kd-trees first.
 fn kinds() -> [(&'static str, IndexKind); 4] {
@@ -124,27 +128,15 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "kd pays for its build after (M rays)",
         ],
     );
-    let smoke = [(SMOKE_SOUP, SOUP_LIGHT)];
-    let full: Vec<(&str, Vec3)> = CASES
-        .iter()
-        .map(|case| (case.scene, case.light))
-        .chain(SOUPS.map(|soup| (soup, SOUP_LIGHT)))
-        .collect();
-    let scenes = if context.smoke { &smoke[..] } else { &full[..] };
-    for (done, (address, light)) in scenes.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        let name = address.trim_start_matches("builtin:").trim_end_matches("?source=point");
-        context.watch.begin(name, done, scenes.len());
-        let surfaces = Surfaces::load(address)?;
-        let flight = fly(address, &surfaces, *light, flights::size(context))?;
-        let layers = layers(
-            &Bvh2::build(&surfaces.triangles, &Bvh2Settings::default())?,
-            &flight.camera,
-        );
+    let scenes: Vec<&Case> = match context.smoke {
+        true => vec![&SMOKE_SOUP],
+        false => CASES.iter().chain(&SOUPS).collect(),
+    };
+    each_flight(context, scenes.into_iter(), |case, surfaces, flight| {
+        let name = case.name();
+        let layers = layers(surfaces.index(), &flight.camera);
         let mut measured = Vec::new();
-        let mut raced = Vec::new();
+        let mut built = Vec::new();
         for (_, kind) in kinds() {
             let (index, times) = repeated(if context.smoke { 0 } else { 3 }, || {
                 let (index, time) = timed(|| kind.build(&surfaces.triangles));
@@ -153,12 +145,12 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             measured.push(Measured {
                 build: median(times),
                 bytes: index.statistics().bytes,
-                steps: steps(&*index, &flight),
+                steps: steps(&*index, flight),
             });
-            raced.push(Raced::new(&gpu, &*index, TraceSettings::ray_per_thread())?);
+            built.push(index);
         }
-        race(&mut raced, &flight, if context.smoke { 1 } else { REPEATS })?;
-        let rates: Vec<[f64; 3]> = raced.iter().map(|one| one.rates(&flight)).collect();
+        let contenders = built.iter().map(|index| (&**index, TraceSettings::ray_per_thread()));
+        let rates = race(context, &gpu, flight, contenders)?;
         for (((index, _), one), rates) in kinds().iter().zip(&measured).zip(&rates) {
             indexes.row([
                 name.into(),
@@ -194,7 +186,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             (measured[kd].build / measured[bvh].build).into(),
             pays_after(of(kd), of(bvh)).map_or("never".into(), Into::into),
         ]);
-    }
+        Ok(())
+    })?;
     indexes.note(
         "Flights as in `kd-heuristics`; the soups have as many triangles each, of growing size, and a camera that stands still. Steps are \
          inner nodes and triangles, exact counts: a step of a kd-tree reads a plane of 8 bytes, one of a bounding volume hierarchy two boxes \

@@ -4,18 +4,15 @@
 //! Dublin, 2011, tables 4.5 and 4.6.
 
 use clerestory::Result;
-use clerestory::accel::Ray;
 use clerestory::accel::kd::shifted_restart::{ShiftedRestart, leaves_by_stack};
-use clerestory::accel::kd::{KdCounters, KdSettings, KdTree, Scheme};
+use clerestory::accel::kd::{KdCaches, KdTree, Scheme};
 use clerestory::accel::trace::TraceSettings;
+use clerestory::accel::{Ray, RayIndex};
 
-use super::flights::{self, Raced, cases, fly, race};
-use super::kd_heuristics::work;
+use super::flights::{cases, change, different, each_flight, race, source_tree, trace};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
 use crate::experiments::table::{Cell, Table};
 
-const REPEATS: usize = 5;
 /// Entries of the source's short stack.
 const SHORT_STACK: u32 = 4;
 
@@ -126,38 +123,18 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         "Restarts behind a leaf",
         &["scene", "form", "rays", "rays without an end", "rays with other leaves"],
     );
-    let all = cases(context);
-    for (done, case) in all.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, all.len());
-        let surfaces = Surfaces::load(case.scene)?;
-        let flight = fly(case.scene, &surfaces, case.light, flights::size(context))?;
-        // As the source's trees.
-        let settings = KdSettings {
-            clip: false,
-            ..KdSettings::default()
-        };
-        let tree = KdTree::build(&surfaces.triangles, &settings)?;
+    each_flight(context, cases(context).iter(), |case, surfaces, flight| {
+        let tree = source_tree(surfaces)?;
         let closest = flight.closest();
-        let of = |(_, scheme): (&str, Scheme)| {
-            let settings = TraceSettings {
-                scheme,
-                ..TraceSettings::ray_per_thread()
-            };
-            Raced::new(&gpu, &tree, settings)
-        };
-        let mut raced = SCHEMES.into_iter().map(of).collect::<Result<Vec<_>>>()?;
-        race(&mut raced, &flight, if context.smoke { 1 } else { REPEATS })?;
-        let rates: Vec<[f64; 3]> = raced.iter().map(|one| one.rates(&flight)).collect();
-        let works = SCHEMES.map(|(_, scheme)| work(&tree, scheme, &closest, &flight.shadow));
-        let hits = |scheme| {
-            let mut counters = KdCounters::default();
-            let hit = |ray| tree.closest_hit_by(scheme, ray, &mut |_, _| true, &mut counters);
-            closest.iter().map(hit).collect::<Vec<_>>()
-        };
-        let expected = hits(Scheme::Stack);
+        let settings = SCHEMES.map(|(_, scheme)| TraceSettings {
+            scheme,
+            ..TraceSettings::ray_per_thread()
+        });
+        let contenders = settings.map(|settings| (&tree as &dyn RayIndex, settings));
+        let rates = race(context, &gpu, flight, contenders)?;
+        let of = |(_, scheme)| trace(&tree, scheme, KdCaches::default(), [&closest, &flight.shadow]);
+        let traced = SCHEMES.into_iter().map(of).collect::<Result<Vec<_>>>()?;
+        let (expected, by_stack) = &traced[0];
         let step = flight.camera.len().div_ceil(RESTARTED_RAYS).max(1);
         let some: Vec<&Ray> = flight.camera.iter().step_by(step).collect();
         for (name, form) in RESTARTS {
@@ -172,33 +149,31 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         }
         let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
         let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
-        for (i, (name, scheme)) in SCHEMES.into_iter().enumerate() {
-            let differ = hits(scheme).iter().zip(&expected).filter(|(a, b)| a != b).count();
-            let change = |value: f64, first: f64| 100.0 * (value / first - 1.0);
+        for (i, ((name, _), (hits, work))) in SCHEMES.into_iter().zip(&traced).enumerate() {
             let of_source = |of: fn(&Published) -> &[f64; 4]| {
-                let value = published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]);
-                value.map_or(Cell::from("none"), Into::into)
+                Cell::from(published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]))
             };
             table.row([
                 case.name().into(),
                 case.counterpart.into(),
                 name.into(),
-                (differ as u64).into(),
-                each(works[i].nodes).into(),
-                change(works[i].nodes as f64, works[0].nodes as f64).into(),
-                published.map_or(Cell::from("none"), |row| row.visits.into()),
+                different(hits, expected).into(),
+                each(work.nodes).into(),
+                change(work.nodes as f64, by_stack.nodes as f64).into(),
+                published.map(|row| row.visits).into(),
                 of_source(|row| &row.changes),
-                each(works[i].leaves).into(),
-                each(works[i].restarts).into(),
-                each(works[i].pushes + works[i].pops).into(),
-                each(works[i].bytes()).into(),
+                each(work.leaves).into(),
+                each(work.restarts).into(),
+                each(work.pushes + work.pops).into(),
+                each(work.bytes()).into(),
                 rates[i][0].into(),
                 rates[i][1].into(),
                 change(rates[i][2], rates[0][2]).into(),
                 of_source(|row| &row.speeds),
             ]);
         }
-    }
+        Ok(())
+    })?;
     table.note(
         "Flights as in `kd-heuristics`, SIROH trees over boxes with leaves of 4, as the source's text has them, though its trees have many more \
          nodes (see there). Here rays go on until leaves begin beyond their hit, so that no rounding loses one. Counts are exact and the same on every machine: inner nodes, \

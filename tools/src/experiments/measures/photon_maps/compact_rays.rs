@@ -309,7 +309,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let speed = 100.0 * (times[0] / times[1] - 1.0);
         let each = |count: u64| count as f64 / queries.len().max(1) as f64;
         let change = |second: u64, first: u64| 100.0 * (second as f64 / first.max(1) as f64 - 1.0);
-        let theirs = |of: fn(&Published) -> f64| published.as_ref().map_or(Cell::from("none"), |row| of(row).into());
+        let theirs = |of: fn(&Published) -> f64| Cell::from(published.as_ref().map(of));
         let pairs = trees.complete.pairs.len() as u64;
         table.row([
             name.into(),

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::photon_kernels::{Kernels, Map, Prepared, SOURCE_SHAPE, Shape, Work, prepared};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
+use crate::experiments::table::Table;
 use crate::least_squares::{Fit, non_negative};
 use crate::timing::{median, timed};
 
@@ -155,26 +155,28 @@ impl Sweep<'_> {
                 reached(cost, &self.works, self.sizes, chosen)
             });
             let count = self.works[chosen].contributions;
-            let cell = |number: Option<f64>| number.map_or(Cell::from("none"), Into::into);
             table.row([
                 self.scene.into(),
                 self.shape.word().into(),
                 self.tree.into(),
                 (*by).into(),
                 u64::from(*size).into(),
-                best.map_or(Cell::from("none"), |best| u64::from(self.wanted[best].0).into()),
+                best.map(|best| u64::from(self.wanted[best].0)).into(),
                 self.cover.into(),
                 each(count).into(),
                 each(self.works_anywhere[chosen].contributions).into(),
                 seen.into(),
                 anywhere.into(),
-                cell(frames.as_ref().map(|fit| {
-                    let [frame, ..] = fit.coefficients;
-                    frame * self.published.map_or(0.0, |row| f64::from(row.automatic))
-                })),
-                cell(frames.as_ref().map(|fit| 100.0 * fit.relative_error)),
-                cell(in_frames),
-                cell(theirs),
+                frames
+                    .as_ref()
+                    .map(|fit| {
+                        let [frame, ..] = fit.coefficients;
+                        frame * self.published.map_or(0.0, |row| f64::from(row.automatic))
+                    })
+                    .into(),
+                frames.as_ref().map(|fit| 100.0 * fit.relative_error).into(),
+                in_frames.into(),
+                theirs.into(),
                 deviation(by, seen, anywhere, in_frames).into(),
             ]);
         }
@@ -299,7 +301,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                     reached(steps, &found.works, sizes.len(), i).into(),
                     (1e-3 * time).into(),
                     (best / time).into(),
-                    theirs.map_or("none".into(), Into::into),
+                    theirs.into(),
                 ]);
             }
         }

@@ -115,7 +115,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let each = |count: u64| count as f64 / points.len().max(1) as f64;
         let more = |[first, second]: [u64; 2]| 100.0 * (second as f64 / first.max(1) as f64 - 1.0);
         let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
-        let theirs = |of: fn(&Published) -> f64| published.map_or(Cell::from("none"), |row| of(row).into());
+        let theirs = |of: fn(&Published) -> f64| Cell::from(published.map(of));
         let (nodes, tests) = (work.map(|w| w.tree.nodes), work.map(|w| w.tests));
         let ours = [
             more(nodes),

@@ -130,6 +130,11 @@ impl Surfaces {
         })
     }
 
+    /// Over the triangles, by the binned surface area heuristic.
+    pub fn index(&self) -> &Bvh2 {
+        &self.index
+    }
+
     /// What a ray of unit direction meets first.
     pub fn meet(&self, origin: Vec3, direction: Vec3) -> Option<Intersection> {
         let ray = Ray {
