@@ -16,6 +16,7 @@
 
 mod features;
 mod path;
+pub mod photon_mapping;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -2,6 +2,7 @@
 
 pub mod albedo;
 pub mod bsdf;
+pub mod differentials;
 pub mod distribution;
 pub mod environment;
 pub mod free_flight;
@@ -10,6 +11,7 @@ pub mod ggx;
 pub mod gpu_scene;
 pub mod lights;
 pub mod medium;
+pub mod packing;
 pub mod path_set;
 pub mod path_tracer;
 pub mod phase;

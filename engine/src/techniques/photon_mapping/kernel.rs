@@ -1,0 +1,230 @@
+//! Kernels of density estimation on surfaces: ellipsoids as large as a photon's footprint, and the record of a photon in the map.
+//!
+//! Source: Interactive Manycore Photon Mapping (2011), §3.4.2, §5.2.1 and §5.2.2. An ellipsoid with the axes A (longer) and B in the
+//! tangent plane and C across it, |C| = |B|, is kept as A ([`along`](PhotonKernel::along)) and P ([`across`](PhotonKernel::across)),
+//! which is B turned by a right angle in the plane, P·A > 0. Two things follow that the source does without: the Jacobian |A × B| is P·A,
+//! and the record may keep fluxes undivided by it, in the narrow range that nine bits serve well. The normal cannot be had from P and A
+//! (they are parallel whenever A and B are at right angles) and is kept as well. Guarantees: a kernel integrates to one over the tangent
+//! plane; the box is tight; no length is compared with a constant, only with the unit length. Bias: proximity (blur) by the kernel's size,
+//! boundary bias at edges, topological bias on curved surfaces. Twin of `techniques/photon_mapping/kernel.glsl`.
+
+use crate::gpu::shaders::constants::{
+    KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
+    PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
+};
+use crate::transport::differentials::Differentials;
+use crate::transport::packing::{pack_octahedral, pack_rgb9e5, unpack_octahedral, unpack_rgb9e5};
+use crate::transport::warp::orthonormal_basis;
+use glam::{DVec2, DVec3, Vec3};
+use std::f64::consts::FRAC_1_PI;
+
+/// How a kernel falls off from its centre to its rim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[repr(u32)]
+pub enum KernelProfile {
+    /// Even: least variance, hard rims.
+    Uniform = KERNEL_UNIFORM,
+    /// Straight to zero: 1.5 times the variance.
+    Cone = KERNEL_CONE,
+    /// Parabola to zero: 4/3 of the variance, and rims that do not show.
+    Epanechnikov = KERNEL_EPANECHNIKOV,
+}
+
+/// What a kernel takes its axes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[repr(u32)]
+pub enum KernelShape {
+    /// The differentials themselves.
+    Skewed = KERNEL_SKEWED,
+    /// The principal axes of the same ellipse. Damping and thickness then do not depend on the frame that the differentials began in.
+    Principal = KERNEL_PRINCIPAL,
+    /// A disk of the footprint's area.
+    Isotropic = KERNEL_ISOTROPIC,
+    /// A disk of the radius [`KernelSettings::length_max`].
+    Fixed = KERNEL_FIXED,
+}
+
+/// How kernels are made from footprints.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KernelSettings {
+    /// Shape.
+    pub shape: KernelShape,
+    /// Times the footprint, [`global_step`](crate::transport::differentials::global_step) included.
+    pub spread: f64,
+    /// Exponent of the footprint's length in unit lengths: 1 is undampened, 1/4 the source's.
+    pub exponent: f64,
+    /// The unit of lengths, m: lengths above shrink by the dampening, lengths below grow. It scales with the scene.
+    pub unit_length: f64,
+    /// Least length of an axis, in unit lengths.
+    pub length_min: f64,
+    /// Greatest length of an axis, in unit lengths.
+    pub length_max: f64,
+    /// Least |z1 × z2| / longer² of a photon with a kernel.
+    pub flatness: f64,
+}
+
+/// An ellipsoid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhotonKernel {
+    /// Its longer axis A in the tangent plane, m.
+    pub along: DVec3,
+    /// In the tangent plane at a right angle to the other axis there, and of its length, m.
+    pub across: DVec3,
+}
+
+/// Kernel of the squared distance in the unit disk, 1/area of the disk of radius 1.
+pub fn kernel_profile(profile: KernelProfile, d2: f64) -> f64 {
+    let k = match profile {
+        KernelProfile::Uniform => 1.0,
+        KernelProfile::Cone => 3.0 - 3.0 * d2.sqrt(),
+        KernelProfile::Epanechnikov => 2.0 - 2.0 * d2,
+    };
+    if d2 < 1.0 { k * FRAC_1_PI } else { 0.0 }
+}
+
+/// The ball of a radius, for kernels that footprints do not shape.
+pub fn disk_kernel(radius: f64, n: DVec3) -> PhotonKernel {
+    let (t, _) = orthonormal_basis(n);
+    PhotonKernel {
+        along: radius * t,
+        across: radius * t,
+    }
+}
+
+/// The principal axes of the ellipse cos(x) a + sin(x) b, the longer one first.
+pub fn principal_axes(a: DVec3, b: DVec3) -> [DVec3; 2] {
+    let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
+    let swing = DVec2::new(aa - bb, 2.0 * ab).length();
+    if swing <= 0.0 {
+        return [a, b];
+    }
+    let (longer, shorter) = if aa >= bb { (a, b) } else { (b, a) };
+    let c = (0.5 + 0.5 * (aa - bb).abs() / swing).sqrt();
+    let s = ab / (swing * c);
+    [c * longer + s * shorter, c * shorter - s * longer]
+}
+
+/// The kernel of a photon with differentials in the tangent plane across the unit normal `n`; `None` for footprints too flat, or without
+/// area.
+///
+/// In this order: discard, dampen, spread, clamp. Energy is kept by clamping and lost by discarding.
+pub fn photon_kernel(s: &KernelSettings, d: &Differentials, n: DVec3) -> Option<PhotonKernel> {
+    if s.shape == KernelShape::Fixed {
+        return Some(disk_kernel(s.length_max * s.unit_length, n));
+    }
+    let (mut a, mut b) = (d.z1 / s.unit_length, d.z2 / s.unit_length);
+    if s.shape == KernelShape::Principal {
+        [a, b] = principal_axes(a, b);
+    }
+    if a.length() < b.length() {
+        (a, b) = (b, a);
+    }
+    let lengths = DVec2::new(a.length(), b.length());
+    let area = a.cross(b).length();
+    if !(area > 0.0 && area >= s.flatness * lengths.x * lengths.x) {
+        return None;
+    }
+    if s.shape == KernelShape::Isotropic {
+        let radius = s.spread * area.powf(0.5 * s.exponent);
+        return Some(disk_kernel(radius.clamp(s.length_min, s.length_max) * s.unit_length, n));
+    }
+    let wanted = s.spread * lengths.x.powf(s.exponent - 1.0) * lengths;
+    let scale = wanted.clamp(DVec2::splat(s.length_min), DVec2::splat(s.length_max)) / lengths * s.unit_length;
+    a *= scale.x;
+    b *= scale.y;
+    let across = b.cross(n);
+    Some(PhotonKernel {
+        along: a,
+        across: if across.dot(a) < 0.0 { -across } else { across },
+    })
+}
+
+/// |A × B|, the area of the ellipse over π, m².
+pub fn kernel_area(k: &PhotonKernel) -> f64 {
+    k.along.dot(k.across)
+}
+
+/// Half of the sides of the ellipsoid's box, m.
+pub fn kernel_extent(k: &PhotonKernel) -> DVec3 {
+    let squared = k.along * k.along + (k.across.length_squared() - k.across * k.across).max(DVec3::ZERO);
+    DVec3::new(squared.x.sqrt(), squared.y.sqrt(), squared.z.sqrt())
+}
+
+/// Kernel at `delta` from the photon, 1/m².
+pub fn kernel_weight(profile: KernelProfile, k: &PhotonKernel, delta: DVec3) -> f64 {
+    let inverse_area = 1.0 / kernel_area(k);
+    let q = k.across.dot(delta) * inverse_area;
+    let rest = delta - q * k.along;
+    kernel_profile(profile, q * q + rest.length_squared() / k.across.length_squared()) * inverse_area
+}
+
+/// A photon of the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhotonRecord {
+    /// Where it landed, m.
+    pub position: Vec3,
+    /// The geometric normal there, to the side that it came from.
+    pub normal: Vec3,
+    /// The unit direction in which it came.
+    pub direction: Vec3,
+    /// Flux by band, relative to the lights' flux / n, and not divided by the kernel's area.
+    pub flux: Vec3,
+    /// Longer axis of its kernel, m: [`PhotonKernel::along`].
+    pub along: Vec3,
+    /// [`PhotonKernel::across`], m.
+    pub across: Vec3,
+}
+
+impl PhotonRecord {
+    /// Its kernel.
+    pub fn kernel(&self) -> PhotonKernel {
+        PhotonKernel {
+            along: self.along.as_dvec3(),
+            across: self.across.as_dvec3(),
+        }
+    }
+}
+
+/// Words of a record in the map.
+pub type PhotonWords = [[u32; 4]; 3];
+
+/// A record as the map keeps it: position, normal | across, direction | along, flux. The end of a leaf is not marked.
+pub fn pack_photon(p: &PhotonRecord) -> PhotonWords {
+    let quarter = |v: Vec3, word: u32| [v.x.to_bits(), v.y.to_bits(), v.z.to_bits(), word];
+    [
+        quarter(p.position, pack_octahedral(p.normal, PHOTON_NORMAL_BITS)),
+        quarter(p.across, pack_octahedral(p.direction, PHOTON_DIRECTION_BITS)),
+        quarter(p.along, pack_rgb9e5(p.flux)),
+    ]
+}
+
+/// The record of these words. Normal and direction are good to 1.3·10⁻⁴ and 6.5·10⁻⁵ radians, flux to 2⁻⁹ of its largest band.
+pub fn unpack_photon(words: &PhotonWords) -> PhotonRecord {
+    let vector = |q: [u32; 4]| Vec3::new(f32::from_bits(q[0]), f32::from_bits(q[1]), f32::from_bits(q[2]));
+    PhotonRecord {
+        position: vector(words[0]),
+        normal: unpack_octahedral(words[0][3], PHOTON_NORMAL_BITS).as_vec3(),
+        direction: unpack_octahedral(words[1][3], PHOTON_DIRECTION_BITS).as_vec3(),
+        flux: unpack_rgb9e5(words[2][3]).as_vec3(),
+        along: vector(words[2]),
+        across: vector(words[1]),
+    }
+}
+
+/// Whether the record is the last one of a leaf.
+pub fn photon_ends_leaf(words: &PhotonWords) -> bool {
+    words[0][3] & PHOTON_LEAF_END != 0
+}
+
+/// What a unit of the photon's flux counts for at `x` on a surface of normal `n`, 1/m²; 0 where the cosine between the normals is not above
+/// `normal_cos_min`.
+pub fn photon_weight(profile: KernelProfile, words: &PhotonWords, x: DVec3, n: DVec3, normal_cos_min: f64) -> f64 {
+    let p = unpack_photon(words);
+    if unpack_octahedral(words[0][3], PHOTON_NORMAL_BITS).dot(n) > normal_cos_min {
+        kernel_weight(profile, &p.kernel(), x - p.position.as_dvec3())
+    } else {
+        0.0
+    }
+}

@@ -1,0 +1,3 @@
+//! Photon mapping: density estimation over the places where photons from the lights land.
+
+pub mod kernel;

@@ -1,0 +1,103 @@
+#version 460
+// Photon differentials, kernels and records, for comparison with their Rust twins: `function` says which.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "twin_interface.glsl"
+
+#include "techniques/photon_mapping/kernel.glsl"
+
+Differentials in_differentials(uint i) { return Differentials(in3(i), in3(i + 3u), in3(i + 6u), in3(i + 9u)); }
+
+void out_differentials(Differentials d) {
+    out3(0u, d.z1);
+    out3(3u, d.z2);
+    out3(6u, d.w1);
+    out3(9u, d.w2);
+}
+
+void main() {
+    if (twin_case() >= push.case_count) {
+        return;
+    }
+    switch (push.function) {
+    case 0u: {  // what emits
+        uint kind = in_bits(9u);
+        if (kind == 0u) {
+            out_differentials(emission_differentials(in3(0u), in1(3u)));
+        } else if (kind == 1u) {
+            out_differentials(area_light_differentials(in3(0u), in1(3u), in1(4u), in1(5u)));
+        } else if (kind == 2u) {
+            out_differentials(parallel_beam_differentials(in3(0u), in1(4u)));
+        } else {
+            out_differentials(camera_differentials(in3(0u), in3(3u), in3(6u)));
+        }
+        break;
+    }
+    case 1u: {  // what happens at a surface
+        uint kind = in_bits(28u);
+        Differentials d = in_differentials(0u);
+        vec3 w = in3(12u);
+        vec3 n = in3(15u);
+        if (kind == 0u) {
+            d = transfer_differentials(d, in1(24u), w, n);
+        } else if (kind == 1u) {
+            d = reflect_differentials(d, w, n, in3(18u), in3(21u));
+        } else if (kind == 2u) {
+            d = refract_differentials(d, w, n, in1(25u), in3(18u), in3(21u));
+        } else if (kind == 3u) {
+            d = diffuse_reemission(d, w, in1(26u));
+        } else if (kind == 4u) {
+            d = rough_reemission(d, w, in1(26u));
+        } else if (kind == 5u) {
+            d = roulette_differentials(d, in1(27u));
+        } else {
+            out_bits(12u, guard_differentials(d, in1(27u)) ? 1u : 0u);
+        }
+        out_differentials(d);
+        break;
+    }
+    case 2u: {  // derivatives of normals
+        Differentials d = Differentials(in3(17u), in3(20u), vec3(0.0), vec3(0.0));
+        vec3 dn1;
+        vec3 dn2;
+        normal_derivatives(in3(0u), in3(3u), in3(6u), in3(9u), in3(12u), in2(15u), d, dn1, dn2);
+        out3(0u, dn1);
+        out3(3u, dn2);
+        break;
+    }
+    case 3u: {  // kernels
+        KernelSettings s = KernelSettings(in_bits(18u), in1(9u), in1(10u), in1(11u), in1(12u), in1(13u), in1(14u));
+        Differentials d = Differentials(in3(0u), in3(3u), vec3(0.0), vec3(0.0));
+        PhotonKernel k;
+        bool has = photon_kernel(s, d, in3(6u), k);
+        out3(0u, has ? k.along : vec3(0.0));
+        out3(3u, has ? k.across : vec3(0.0));
+        out3(6u, has ? kernel_extent(k) : vec3(0.0));
+        out1(9u, has ? kernel_area(k) : 0.0);
+        out_bits(10u, has ? 1u : 0u);
+        break;
+    }
+    case 4u: {  // their weights
+        out1(0u, kernel_weight(in_bits(9u), PhotonKernel(in3(0u), in3(3u)), in3(6u)));
+        out1(1u, kernel_profile(in_bits(9u), in1(10u)));
+        break;
+    }
+    case 5u: {  // records
+        uvec4 q0;
+        uvec4 q1;
+        uvec4 q2;
+        pack_photon(PhotonRecord(in3(0u), in3(3u), in3(6u), in3(9u), PhotonKernel(in3(12u), in3(15u))), q0, q1, q2);
+        out_bits(0u, q0.w);
+        out_bits(1u, q1.w);
+        out_bits(2u, q2.w);
+        out3(3u, photon_normal(q0));
+        out3(6u, photon_direction(q1));
+        out3(9u, photon_flux(q2));
+        q0.w |= in_bits(21u);
+        out1(12u, photon_weight(in_bits(22u), q0, q1, q2, in3(18u), in3(23u), in1(26u)));
+        out_bits(13u, photon_ends_leaf(q0) ? 1u : 0u);
+        break;
+    }
+    }
+}
