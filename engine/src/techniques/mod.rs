@@ -16,6 +16,7 @@
 
 mod features;
 mod path;
+mod photon;
 pub mod photon_mapping;
 
 use std::collections::BTreeMap;
@@ -169,7 +170,7 @@ pub struct Skipped {
 
 /// Every technique of the engine.
 pub fn all() -> &'static [TechniqueInfo] {
-    &[path::INFO]
+    &[path::INFO, photon::INFO]
 }
 
 /// The technique of that id.

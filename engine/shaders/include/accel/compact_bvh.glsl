@@ -2,9 +2,10 @@
 //
 // The includer defines, before this file,
 //   uvec4 compact_quarter(uint index);                     halves of pairs: lower planes and left reference, upper planes and right one
-//   void compact_visit_point(uint first);                  for each leaf with its first record, if COMPACT_POINT is defined
+//   bool compact_visit_point(uint record);                 for each leaf with its first record, and with the one behind it as long as it
+//                                                          returns true, if COMPACT_POINT is defined
 //   float compact_visit_ray(uint first, float t_max);      the same, returning the ray's end, if COMPACT_RAY is defined
-// Loops take at most COMPACT_QUOTA steps; a query that they stop returns false.
+// Loops take at most COMPACT_QUOTA steps, each a node or a record; a query that they stop returns false.
 #ifndef CLERESTORY_ACCEL_COMPACT_BVH_GLSL
 #define CLERESTORY_ACCEL_COMPACT_BVH_GLSL
 
@@ -44,7 +45,8 @@ bool compact_point_query(CompactRoot root, vec3 point) {
     for (uint step = 0u; next != COMPACT_NOTHING && step < COMPACT_QUOTA; ++step) {
         bool pop = true;
         if ((next & COMPACT_LEAF_BIT) != 0u) {
-            compact_visit_point(next ^ COMPACT_LEAF_BIT);
+            pop = !compact_visit_point(next ^ COMPACT_LEAF_BIT);
+            ++next;
         } else {
             uvec4 low = compact_quarter(2u * next);
             uvec4 high = compact_quarter(2u * next + 1u);

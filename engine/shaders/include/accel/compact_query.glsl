@@ -28,9 +28,10 @@ uint compact_leaves = 0u;
 
 uvec4 compact_quarter(uint index) { return compact_pairs[index]; }
 
-void compact_visit_point(uint first) {
+bool compact_visit_point(uint first) {
     compact_visits = (compact_visits ^ first) * COMPACT_VISIT_FACTOR;
     ++compact_leaves;
+    return false;
 }
 
 float compact_visit_ray(uint first, float t_max);

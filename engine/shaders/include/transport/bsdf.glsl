@@ -158,6 +158,12 @@ struct CosineLobes {
     vec3 seen;
 };
 
+// Whether there is a diffuse base to scatter light from wo; `below`: wo.z < 0.
+bool bsdf_has_diffuse_base(Bsdf b, bool below) {
+    bool inside = HAS_TRANSMISSION && below && b.transmission > 0.0 && (b.flags & BSDF_THIN) == 0u;
+    return !inside && (1.0 - bsdf_metallic(b)) * (1.0 - bsdf_transmission(b)) > 0.0 && b.base_color != vec3(0.0);
+}
+
 CosineLobes cosine_lobes(Bsdf b, float cos_o, bool inside, uint mask) {
     CosineLobes lobes;
     lobes.diffuse = vec3(0.0);

@@ -17,6 +17,7 @@
 const uint STALLED_NOT = 0u;
 const uint STALLED_EXTEND = 1u;
 const uint STALLED_SHADOW = 2u;
+const uint STALLED_ARRIVAL = 3u;  // a stage of a technique's own
 
 const uint FLAG_ALIVE = 1u;
 const uint FLAG_SHADOW = 2u;

@@ -142,6 +142,15 @@ impl Geometry {
         self.triangles.iter().map(corners_of).collect()
     }
 
+    /// Area of all triangles, m².
+    pub(super) fn surface_area(&self) -> f64 {
+        let area = |triangle: &SceneTriangle| {
+            let [a, b, c] = corners_of(triangle).map(|corner| corner.as_dvec3());
+            0.5 * (b - a).cross(c - a).length()
+        };
+        self.triangles.iter().map(area).filter(|area| area.is_finite()).sum()
+    }
+
     pub(super) fn bounds(&self) -> [Vec3; 2] {
         let corners = self.triangles.iter().flat_map(corners_of).filter(is_traceable);
         let (lower, upper) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {

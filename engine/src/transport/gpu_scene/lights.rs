@@ -23,6 +23,8 @@ pub(super) struct Lights {
     pub(super) cdf: Vec<f32>,
     /// The environment's block: header and texels.
     pub(super) environment: Vec<u8>,
+    /// Sum of their powers, W of luminance.
+    pub(super) power: f64,
     /// Some surface shines that is not among the records.
     has_unsampled: bool,
 }
@@ -105,6 +107,7 @@ impl Lights {
             // The lights' table has one more entry than there are lights; the texels' begins behind it.
             environment = environment_block(map, &environment_cdf, records.len() as u32 + 1);
         }
+        let power = powers.iter().sum();
         share_choices(&records, &mut powers);
         if has_unsampled && records.is_empty() {
             // Kernels that know of emission also sample lights: a dark one to choose.
@@ -124,6 +127,7 @@ impl Lights {
             records,
             cdf,
             environment,
+            power,
             has_unsampled,
         })
     }

@@ -34,6 +34,8 @@ pub struct GpuScene {
     profile: SceneProfile,
     bsdf: BsdfFeatures,
     bounds: [Vec3; 2],
+    surface_area: f64,
+    light_power: f64,
     light_kinds: LightKinds,
     index: IndexOnDevice,
     buffers: SceneBuffers,
@@ -109,6 +111,8 @@ impl GpuScene {
             profile,
             bsdf,
             bounds,
+            surface_area: geometry.surface_area(),
+            light_power: lights.power,
             light_kinds: lights.kinds(),
             index,
             buffers,
@@ -144,6 +148,17 @@ impl GpuScene {
     /// Least and greatest corner, world space, metres.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.bounds
+    }
+
+    /// Area of all triangles, m².
+    pub fn surface_area(&self) -> f64 {
+        self.surface_area
+    }
+
+    /// Power of the lights that light sampling chooses among, W of luminance; that of distant ones is what they send through a disk as large
+    /// as the bounding sphere of the scene.
+    pub fn light_power(&self) -> f64 {
+        self.light_power
     }
 
     /// True when there is anything for light sampling to choose.

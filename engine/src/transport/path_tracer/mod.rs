@@ -12,10 +12,11 @@
 //! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
 
-mod pipelines;
+pub(crate) mod pipelines;
 mod record;
 mod settings;
-mod wave;
+pub(crate) mod stages;
+pub(crate) mod wave;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -29,8 +30,9 @@ use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, Step};
-use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
-use crate::gpu::{Access, Buffer, DeviceKind, Gpu, PipelineInfo, Timings};
+use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
+use crate::gpu::shaders::sets::PathBuffers;
+use crate::gpu::{Access, Buffer, BufferView, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
 use crate::scene::Camera;
 use crate::{Error, Result};
 use glam::DVec3;
@@ -62,6 +64,15 @@ pub struct PathCounters {
     pub density_lookups: u64,
     /// Submissions that ended with rays stopped by the quota, which then went on.
     pub stalls: u64,
+}
+
+/// What a technique gathers where the rays of a bounce have arrived, before the surfaces there are shaded.
+pub(crate) trait ArrivalStage {
+    /// Records it for all places of the queue. Places that its quota stops stall the wave with `STALLED_ARRIVAL`.
+    fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()>;
+
+    /// Records what the places that it has stopped at still lack.
+    fn record_stopped(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()>;
 }
 
 /// A progressive rendering of one view.
@@ -166,13 +177,18 @@ impl PathTracer {
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        self.step_with(samples, None)
+    }
+
+    /// As [`PathTracer::step`], with a stage of a technique's own in each bounce.
+    pub(crate) fn step_with(&mut self, samples: u32, arrival: Option<&dyn ArrivalStage>) -> Result<Option<Step>> {
         let [width, height] = self.film.size();
         let wanted = u64::from(samples) * u64::from(width) * u64::from(height);
         let Some((wave, next)) = self.cursor.next_wave(&self.film, self.slots, samples) else {
             return Ok(None);
         };
         // A wave that fails is rendered again by the next step.
-        let timings = self.run(&wave)?;
+        let timings = self.run(&wave, arrival)?;
         self.cursor = next;
         Ok(Some(Step {
             timings,
@@ -193,6 +209,11 @@ impl PathTracer {
     /// Exact counts since the tracer was made.
     pub fn counters(&self) -> PathCounters {
         self.counters
+    }
+
+    /// Samples that every pixel has got.
+    pub(crate) fn samples_done(&self) -> u32 {
+        self.cursor.sample
     }
 
     /// The settings.
@@ -231,19 +252,19 @@ impl PathTracer {
     }
 
     /// Renders a wave, in as many submissions as it takes.
-    fn run(&mut self, wave: &Wave) -> Result<Vec<Timings>> {
+    fn run(&mut self, wave: &Wave, arrival: Option<&dyn ArrivalStage>) -> Result<Vec<Timings>> {
         let paths = wave.pixels * wave.samples;
         let mut status = Status {
             active_count: paths,
             ..Status::default()
         };
-        let mut timings = vec![self.submit_bounces(wave, &mut status, true)?];
+        let mut timings = vec![self.submit_bounces(wave, &mut status, true, arrival)?];
         let quota = u64::from(ray_quota(&self.gpu, &self.scene, &self.settings)?);
         let mut iterations = 0;
         while status.active_count > 0 || status.stalled != STALLED_NOT {
             let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);
             self.counters.stalls += u64::from(stalled);
-            timings.push(self.submit_bounces(wave, &mut status, false)?);
+            timings.push(self.submit_bounces(wave, &mut status, false, arrival)?);
             let stands = stalled && status.stalled != STALLED_NOT && status.rounds == rounds;
             iterations = if stands { iterations + quota } else { 0 };
             if iterations > RAY_ITERATIONS_MAX {
@@ -273,15 +294,22 @@ impl PathTracer {
     }
 
     /// Submits some bounces of a wave, the first ones with its camera rays and the last wave's way to the film, and reads how far they came.
-    fn submit_bounces(&mut self, wave: &Wave, status: &mut Status, first: bool) -> Result<Timings> {
+    fn submit_bounces(
+        &mut self,
+        wave: &Wave,
+        status: &mut Status,
+        first: bool,
+        arrival: Option<&dyn ArrivalStage>,
+    ) -> Result<Timings> {
         let stalled = status.stalled;
+        let rays_stalled = stalled == STALLED_EXTEND || stalled == STALLED_SHADOW;
         if first {
             self.uncounted_seconds = 0.0;
         }
-        if stalled != STALLED_NOT && self.pipelines.resume.is_none() {
+        if rays_stalled && self.pipelines.resume.is_none() {
             self.pipelines.resume = Some(TracePipelines::new(&self.gpu, &self.scene, &self.settings, true)?);
         }
-        let resume = self.pipelines.resume.as_ref().filter(|_| stalled != STALLED_NOT);
+        let resume = self.pipelines.resume.as_ref().filter(|_| rays_stalled);
         let mut recorder = self.gpu.recorder("path wave")?;
         if let Some(pending) = &self.pending {
             self.record_resolve(&mut recorder, pending)?;
@@ -311,7 +339,12 @@ impl PathTracer {
         for bounce in 0..self.bounces_for(status.active_count) {
             let resumed = resume.filter(|_| stalled == STALLED_EXTEND && bounce == 0);
             let trace = resumed.unwrap_or(&self.pipelines.trace);
-            self.record_bounce(&mut recorder, wave, (status.rounds as usize + bounce) % 2, trace)?;
+            let parity = (status.rounds as usize + bounce) % 2;
+            if stalled == STALLED_ARRIVAL && bounce == 0 {
+                self.record_arrivals(&mut recorder, wave, parity, arrival, true)?;
+            } else {
+                self.record_bounce(&mut recorder, wave, parity, trace, arrival)?;
+            }
         }
         recorder.pass("path: read status", |pass| {
             pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);

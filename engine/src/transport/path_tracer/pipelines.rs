@@ -1,13 +1,13 @@
 //! The path tracer's kernels, specialized to what a scene needs.
 
 use super::settings::PathTracerSettings;
+use super::stages::Compaction;
 use crate::Result;
 use crate::gpu::SOFTWARE_LOOP_CAP;
 use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::transport::{
-    path_camera, path_compact_count, path_compact_scan, path_compact_scatter, path_extend, path_extend_alpha,
-    path_extend_media, path_extend_media_alpha, path_medium, path_resolve, path_shade, path_shadow, path_shadow_alpha,
-    path_shadow_media, path_shadow_media_alpha,
+    path_camera, path_extend, path_extend_alpha, path_extend_media, path_extend_media_alpha, path_medium, path_resolve,
+    path_shade, path_shadow, path_shadow_alpha, path_shadow_media, path_shadow_media_alpha,
 };
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
 use crate::scene::Camera;
@@ -26,7 +26,7 @@ const MEDIA_ALPHA_QUOTA_MAX: u32 = 512;
 ///
 /// # Errors
 /// As [`DeviceTraversal::quota_within`](crate::accel::DeviceTraversal).
-pub(super) fn ray_quota(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettings) -> Result<u32> {
+pub(crate) fn ray_quota(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettings) -> Result<u32> {
     // With media half of the iterations are for walks through grids.
     let (most, iterations) = match (scene.profile().has_alpha(), scene.profile().media.any()) {
         (false, false) => (u32::MAX, SOFTWARE_LOOP_CAP),
@@ -50,14 +50,12 @@ pub(super) struct Pipelines {
     /// Only where there are media.
     pub medium: Option<ComputePipeline<path_medium::Kernel>>,
     pub shade: ComputePipeline<path_shade::Kernel>,
-    pub count: ComputePipeline<path_compact_count::Kernel>,
-    pub scan: ComputePipeline<path_compact_scan::Kernel>,
-    pub scatter: ComputePipeline<path_compact_scatter::Kernel>,
+    pub compaction: Compaction,
     pub resolve: ComputePipeline<path_resolve::Kernel>,
 }
 
 /// Ray kernels, with the alpha test only where a scene has alpha.
-pub(super) enum TracePipelines {
+pub(crate) enum TracePipelines {
     Opaque {
         extend: ComputePipeline<path_extend::Kernel>,
         shadow: ComputePipeline<path_shadow::Kernel>,
@@ -154,9 +152,7 @@ impl Pipelines {
             resume: None,
             medium,
             shade: gpu.compute_pipeline(&shade)?,
-            count: gpu.compute_pipeline(&())?,
-            scan: gpu.compute_pipeline(&())?,
-            scatter: gpu.compute_pipeline(&())?,
+            compaction: Compaction::new(gpu)?,
             resolve: gpu.compute_pipeline(&path_resolve::Spec {
                 write_aovs: settings.aovs,
             })?,
@@ -167,16 +163,9 @@ impl Pipelines {
     pub fn info(&self) -> Vec<PipelineInfo> {
         let p = self;
         let [extend, shadow] = p.trace.info();
-        let mut all = vec![
-            p.camera.info(),
-            extend,
-            shadow,
-            p.shade.info(),
-            p.count.info(),
-            p.scan.info(),
-            p.scatter.info(),
-            p.resolve.info(),
-        ];
+        let mut all = vec![p.camera.info(), extend, shadow, p.shade.info()];
+        all.extend(p.compaction.info());
+        all.push(p.resolve.info());
         all.extend(p.medium.as_ref().map(ComputePipeline::info));
         all
     }
@@ -269,7 +258,7 @@ impl TracePipelines {
         })
     }
 
-    fn info(&self) -> [PipelineInfo; 2] {
+    pub fn info(&self) -> [PipelineInfo; 2] {
         match self {
             Self::Opaque { extend, shadow } => [extend.info(), shadow.info()],
             Self::Alpha { extend, shadow } => [extend.info(), shadow.info()],

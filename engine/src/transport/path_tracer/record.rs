@@ -1,15 +1,15 @@
 //! The passes of a wave: what each stage reads, and the barriers between them.
 
-use super::PathTracer;
 use super::pipelines::TracePipelines;
+use super::stages::{WaveKey, indirect, stage_barrier};
 use super::wave::{Status, Wave};
+use super::{ArrivalStage, PathTracer};
 use crate::Result;
 use crate::gpu::shaders::constants::{NO_MEDIUM, OUTSIDE};
 use crate::gpu::shaders::transport::{
-    path_camera, path_extend_alpha, path_extend_media, path_extend_media_alpha, path_medium, path_resolve, path_shade,
-    path_shadow_alpha, path_shadow_media, path_shadow_media_alpha,
+    path_camera, path_medium, path_resolve, path_shade, path_shadow_alpha, path_shadow_media, path_shadow_media_alpha,
 };
-use crate::gpu::{Access, BufferView, Pass, Recorder};
+use crate::gpu::{Access, Recorder};
 
 impl PathTracer {
     pub(super) fn record_camera(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {
@@ -48,51 +48,37 @@ impl PathTracer {
         wave: &Wave,
         parity: usize,
         trace: &TracePipelines,
+        arrival: Option<&dyn ArrivalStage>,
+    ) -> Result<()> {
+        let paths = self.buffers.set(parity);
+        let items = indirect(&self.buffers, std::mem::offset_of!(Status, item_groups));
+        let path_media = self.buffers.media_set();
+        recorder.pass("path: extend", |pass| {
+            trace.record_extend(pass, &self.scene, &paths, &path_media, self.key(wave), items)
+        })?;
+        self.record_arrivals(recorder, wave, parity, arrival, false)
+    }
+
+    /// What happens where the rays of a bounce have arrived, and the next queue; `stopped` goes on with what an arrival stage has left.
+    pub(super) fn record_arrivals(
+        &self,
+        recorder: &mut Recorder,
+        wave: &Wave,
+        parity: usize,
+        arrival: Option<&dyn ArrivalStage>,
+        stopped: bool,
     ) -> Result<()> {
         let p = &self.pipelines;
         let paths = self.buffers.set(parity);
-        let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
-        let items = self.groups(std::mem::offset_of!(Status, item_groups));
+        let scene = self.scene.scene_set();
+        let items = indirect(&self.buffers, std::mem::offset_of!(Status, item_groups));
         let path_media = self.buffers.media_set();
         let surrounding = self.scene.surrounding().unwrap_or(NO_MEDIUM);
-        recorder.pass("path: extend", |pass| {
-            match trace {
-                TracePipelines::Opaque { extend, .. } => {
-                    pass.dispatch_indirect(extend, &[&paths, &index], &(), items)?;
-                }
-                TracePipelines::Alpha { extend, .. } => {
-                    let push = path_extend_alpha::Push {
-                        first_pixel: wave.first_pixel,
-                        first_sample: wave.first_sample,
-                        sample_count: wave.samples,
-                        seed: self.settings.seed,
-                    };
-                    pass.dispatch_indirect(extend, &[&paths, &index, &scene], &push, items)?;
-                }
-                TracePipelines::Media { extend, .. } => {
-                    let push = path_extend_media::Push {
-                        first_pixel: wave.first_pixel,
-                        first_sample: wave.first_sample,
-                        sample_count: wave.samples,
-                        seed: self.settings.seed,
-                        surrounding,
-                    };
-                    pass.dispatch_indirect(extend, &[&paths, &index, &path_media], &push, items)?;
-                }
-                TracePipelines::MediaAlpha { extend, .. } => {
-                    let push = path_extend_media_alpha::Push {
-                        first_pixel: wave.first_pixel,
-                        first_sample: wave.first_sample,
-                        sample_count: wave.samples,
-                        seed: self.settings.seed,
-                        surrounding,
-                    };
-                    pass.dispatch_indirect(extend, &[&paths, &index, &scene, &path_media], &push, items)?;
-                }
-            }
-            stage_barrier(pass);
-            Ok(())
-        })?;
+        match arrival {
+            Some(arrival) if stopped => arrival.record_stopped(recorder, &paths, items)?,
+            Some(arrival) => arrival.record(recorder, &paths, items)?,
+            None => {}
+        }
         let [lower, upper] = self.scene.bounds();
         if let (Some(medium), Some(media)) = (&p.medium, self.scene.media_set()) {
             let push = path_medium::Push {
@@ -133,17 +119,7 @@ impl PathTracer {
             stage_barrier(pass);
             Ok(())
         })?;
-        recorder.pass("path: compact", |pass| {
-            let chunks = self.groups(std::mem::offset_of!(Status, chunk_groups));
-            let scatter = self.groups(std::mem::offset_of!(Status, scatter_groups));
-            pass.dispatch_indirect(&p.count, &[&paths], &(), chunks)?;
-            stage_barrier(pass);
-            pass.dispatch(&p.scan, &[&paths], &(), [1, 1, 1])?;
-            stage_barrier(pass);
-            pass.dispatch_indirect(&p.scatter, &[&paths], &(), scatter)?;
-            stage_barrier(pass);
-            Ok(())
-        })?;
+        recorder.pass("path: compact", |pass| p.compaction.record(pass, &self.buffers, &paths))?;
         self.record_shadow(recorder, wave, parity, &p.trace)
     }
 
@@ -160,7 +136,7 @@ impl PathTracer {
         }
         let paths = self.buffers.set(parity);
         let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
-        let rays = self.groups(std::mem::offset_of!(Status, shadow_groups));
+        let rays = indirect(&self.buffers, std::mem::offset_of!(Status, shadow_groups));
         let path_media = self.buffers.media_set();
         let surrounding = self.scene.surrounding().unwrap_or(NO_MEDIUM);
         recorder.pass("path: shadow", |pass| {
@@ -207,9 +183,13 @@ impl PathTracer {
         })
     }
 
-    /// Indirect arguments at an offset of the status.
-    fn groups(&self, offset: usize) -> BufferView<'_> {
-        self.buffers.status.slice(offset as u64, size_of::<[u32; 3]>() as u64)
+    fn key(&self, wave: &Wave) -> WaveKey {
+        WaveKey {
+            first_pixel: wave.first_pixel,
+            first_sample: wave.first_sample,
+            sample_count: wave.samples,
+            seed: self.settings.seed,
+        }
     }
 
     pub(super) fn record_resolve(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {
@@ -234,12 +214,4 @@ impl PathTracer {
             Ok(())
         })
     }
-}
-
-/// What every stage leaves behind is for the next one to read, write or take its arguments from.
-fn stage_barrier(pass: &mut Pass<'_>) {
-    pass.memory_barrier(
-        Access::COMPUTE | Access::INDIRECT_READ,
-        Access::COMPUTE | Access::INDIRECT_READ,
-    );
 }

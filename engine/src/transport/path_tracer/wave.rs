@@ -48,13 +48,13 @@ pub(super) struct Cursor {
 }
 
 /// The head of the working memory: indirect arguments and counters.
-pub(super) type Status = path_camera::PathStatusBlock;
+pub(crate) type Status = path_camera::PathStatusBlock;
 
 /// Counts of what happened in media.
 pub(super) type MediumCounters = path_medium::PathMediumCounters;
 
 /// Working memory for participating media.
-pub(super) struct MediaBuffers {
+pub(crate) struct MediaBuffers {
     states: Buffer,
     events: Buffer,
     shadow_starts: Buffer,
@@ -66,7 +66,7 @@ pub(super) struct MediaBuffers {
 
 /// Which buffers a wave needs beside those of all scenes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct WaveNeeds {
+pub(crate) struct WaveNeeds {
     pub lights: bool,
     pub media: bool,
     /// Equi-angular samples.
@@ -74,7 +74,7 @@ pub(super) struct WaveNeeds {
 }
 
 /// Working memory of a wave.
-pub(super) struct WaveBuffers {
+pub(crate) struct WaveBuffers {
     pub status: Buffer,
     pub queues: [TexelView; 2],
     pub states: [TexelView; 2],
@@ -130,7 +130,7 @@ impl Cursor {
 }
 
 /// Slots that one dispatch reaches and whose largest buffer can be bound, in whole workgroups.
-pub(super) fn slots_of_device(gpu: &Gpu) -> u32 {
+pub(crate) fn slots_of_device(gpu: &Gpu) -> u32 {
     let slot_bytes = size_of::<PathState>().max(size_of::<ShadowRay>()) as u64;
     let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
     let by_texels = gpu.caps().max_texel_buffer_elements * TEXEL_BYTES / slot_bytes;
@@ -146,7 +146,7 @@ pub(super) fn slots_of_picture([width, height]: [u32; 2]) -> u32 {
 }
 
 /// Indirect arguments of stages with one invocation a place, and a chunk, of a queue.
-pub(super) fn group_counts(places: u32) -> [[u32; 3]; 2] {
+pub(crate) fn group_counts(places: u32) -> [[u32; 3]; 2] {
     [places, places.div_ceil(COMPACT_CHUNK)].map(|count| [count.div_ceil(PATH_GROUP), 1, 1])
 }
 

@@ -20,7 +20,7 @@ const uint KERNEL_FIXED = 3u;      // disk of the radius length_max
 
 const uint PHOTON_QUARTERS = 3u;
 const uint PHOTON_NORMAL_BITS = 15u;
-const uint PHOTON_DIRECTION_BITS = 16u;
+const uint PHOTON_DIRECTION_BITS = 13u;
 const uint PHOTON_LEAF_END = 0x80000000u;  // in the word of the normal: last photon of a leaf
 
 struct KernelSettings {

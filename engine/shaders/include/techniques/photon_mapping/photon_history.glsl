@@ -1,0 +1,19 @@
+// What a record says of the photon's way, in bits that the words of kernel.glsl leave free.
+#ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_HISTORY_GLSL
+#define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_HISTORY_GLSL
+
+// In the word of the normal: the photon has been scattered diffusely.
+const uint PHOTON_DIFFUSED_BIT = 0x40000000u;
+// In the word of the direction: how often it has been scattered before it landed, at most PHOTON_BOUNCE_MAX.
+const uint PHOTON_BOUNCE_SHIFT = 26u;
+const uint PHOTON_BOUNCE_MAX = 63u;
+
+void add_history(uint bounce, bool diffused, inout uvec4 q0, inout uvec4 q1) {
+    q0.w |= diffused ? PHOTON_DIFFUSED_BIT : 0u;
+    q1.w |= min(bounce, PHOTON_BOUNCE_MAX) << PHOTON_BOUNCE_SHIFT;
+}
+
+bool photon_is_diffused(uvec4 q0) { return (q0.w & PHOTON_DIFFUSED_BIT) != 0u; }
+uint photon_bounce(uvec4 q1) { return q1.w >> PHOTON_BOUNCE_SHIFT; }
+
+#endif

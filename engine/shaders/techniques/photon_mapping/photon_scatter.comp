@@ -1,0 +1,213 @@
+#version 460
+// Where photons have arrived: what is stored of them, and where they go on.
+//
+// Diffuse surfaces keep a deposit of each photon that has been scattered as often as asked for. A photon goes on with the probability that
+// leaves its largest band as it is. Scattering functions are those of power (BSDF_IMPORTANCE), and where normals are interpolated the ratio
+// of cosines makes up for it (Veach 1997, 5.3.2), except for what adapt_shading_normal bends.
+//
+// PM-PH-1, PM-PD-2 to PM-PD-7: "Interactive Manycore Photon Mapping", 2011, §3.4.1 and §5.1. Deterministic in (seed, pass, photon).
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/path_features.glsl"
+#include "techniques/photon_mapping/photon_features.glsl"
+#include "techniques/photon_mapping/photon_wave.glsl"
+#include "scene/bindings.glsl"
+#include "transport/bsdf_label.glsl"
+#include "transport/path_set.glsl"
+#include "transport/surface.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint first_pixel;    // number of the pass
+    vec3 scene_upper;
+    uint first_sample;   // first photon of the wave, within the pass
+    uint sample_count;   // photons of the wave
+    uint seed;
+    uint first_deposit;  // least number of scatterings before a hit that is stored
+    uint last_bounce;    // greatest
+    float flux_scale;    // of fluxes as they are stored
+    KernelSettings kernel;
+} push;
+
+#include "transport/path_draws.glsl"
+
+// The ratio by which power that leaves for wi falls short of what interpolated normals make of radiance.
+float adjoint_ratio(vec3 normal, vec3 geometric_normal, vec3 wo, vec3 wi) {
+    float shown = abs(dot(wo, geometric_normal) * dot(wi, normal));
+    return shown > 0.0 ? abs(dot(wo, normal) * dot(wi, geometric_normal)) / shown : 0.0;
+}
+
+void deposit(uint place, PathState photon, vec3 position, vec3 normal, Differentials footprint, inout uint flags) {
+    atomicAdd(photon_counters.deposits, 1u);
+    PhotonKernel kernel;
+    bool fit = true;
+    if (HAS_DIFFERENTIALS) {
+        fit = guard_differentials(footprint, push.kernel.unit_length);
+        fit = photon_kernel(push.kernel, footprint, normal, kernel) && fit;
+    } else {
+        kernel = disk_kernel(push.kernel.length_max * push.kernel.unit_length, normal);
+    }
+    if (!fit) {
+        atomicAdd(photon_counters.without_kernel, 1u);
+        return;
+    }
+    uvec4 q0;
+    uvec4 q1;
+    uvec4 q2;
+    pack_photon(PhotonRecord(position, normal, photon.direction, photon.throughput * push.flux_scale, kernel), q0, q1, q2);
+    add_history(path_set_bounce(photon.bounce), path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
+    uint first = PHOTON_QUARTERS * place;
+    photon_deposits_out[first] = q0;
+    photon_deposits_out[first + 1u] = q1;
+    photon_deposits_out[first + 2u] = q2;
+    flags |= FLAG_DEPOSIT;
+}
+
+// Derivatives of the normal that a specular lobe reflects or refracts about, which faces wo.
+void specular_normal_derivatives(Hit hit, Differentials footprint, vec3 normal, out vec3 dn1, out vec3 dn2) {
+    dn1 = vec3(0.0);
+    dn2 = vec3(0.0);
+    if (HAS_SHADING_NORMALS) {
+        SceneTriangle t = load_triangle(hit.triangle);
+        uvec3 v = load_vertices(hit.triangle);
+        vec3 n0 = texelFetch(scene_normals, int(v.x)).xyz;
+        vec3 n1 = texelFetch(scene_normals, int(v.y)).xyz;
+        vec3 n2 = texelFetch(scene_normals, int(v.z)).xyz;
+        normal_derivatives(t.b - t.a, t.c - t.a, n0, n1, n2, hit.barycentrics, footprint, dn1, dn2);
+        vec3 interpolated = interpolate(n0, n1, n2, vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics));
+        if (dot(interpolated, normal) < 0.0) {
+            dn1 = -dn1;
+            dn2 = -dn2;
+        }
+    }
+}
+
+// The footprint of a photon that has been scattered into wi.
+Differentials scattered_differentials(Differentials d, Hit hit, Bsdf bsdf, vec3 w, vec3 normal, bool front, BsdfSample scattered,
+                                      vec3 wi) {
+    if ((scattered.flags & LOBE_DIFFUSE) != 0u) {
+        return diffuse_reemission(d, wi, scattered.pdf);
+    }
+    if ((scattered.flags & LOBE_GLOSSY) != 0u) {
+        return rough_reemission(d, wi, scattered.pdf);
+    }
+    bool straight = (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) != 0u;
+    if (straight) {
+        return d;
+    }
+    vec3 dn1;
+    vec3 dn2;
+    specular_normal_derivatives(hit, d, normal, dn1, dn2);
+    if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u) {
+        return refract_differentials(d, w, normal, front ? 1.0 / bsdf.eta : bsdf.eta, dn1, dn2);
+    }
+    return reflect_differentials(d, w, normal, dn1, dn2);
+}
+
+// Scatters the photon of a slot at its hit; true when it goes on.
+bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
+    Hit hit = load_hit(place);
+    if (hit.triangle == NO_HIT) {
+        return false;
+    }
+    uint diffused = path_set_state(photon.bounce);
+    uint bounce = path_set_bounce(photon.bounce);
+    Surface s = surface_at(hit, push.scene_lower, push.scene_upper);
+    SceneMaterial m = load_material(s.material);
+    if (photon.throughput == vec3(0.0) || (HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u)) {
+        return false;
+    }
+    vec3 wo = -photon.direction;
+    bool front = dot(wo, s.geometric_normal) > 0.0;
+    bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
+    if (HAS_ABSORPTION) {
+        uint interior = path_gathered[slot].interior;
+        interior = interior == OUTSIDE && solid && !front ? s.material : interior;
+        if (interior != OUTSIDE) {
+            photon.throughput *= exp(-load_material(interior).absorption * hit.t);
+        }
+    }
+    Bsdf bsdf = surface_bsdf(m, s);
+    bsdf.flags |= BSDF_IMPORTANCE;
+    vec3 facing = front ? s.geometric_normal : -s.geometric_normal;
+    vec3 outward = solid ? s.geometric_normal : facing;
+    vec3 normal = facing;
+    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
+        normal = adapt_shading_normal(surface_mapped_normal(m, s), facing, wo);
+    }
+    Differentials footprint;
+    if (HAS_DIFFERENTIALS) {
+        footprint = transfer_differentials(photon_differentials[slot], hit.t, photon.direction, s.geometric_normal);
+    }
+    if (bounce >= push.first_deposit && bsdf_has_diffuse_base(bsdf, solid && !front)) {
+        deposit(place, photon, s.point.position, facing, footprint, flags);
+    }
+    if (bounce >= push.last_bounce) {
+        return false;
+    }
+    vec3 z = dot(outward, facing) < 0.0 ? -normal : normal;
+    vec3 x;
+    vec3 y;
+    orthonormal_basis(z, x, y);
+    vec3 wo_local = vec3(dot(wo, x), dot(wo, y), dot(wo, z));
+    vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
+    BsdfSample scattered = bsdf_sample(bsdf, wo_local, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), LOBE_ALL);
+    if (TELLS_CAUSTICS && (HAS_METAL || HAS_SPECULAR_LAYER)) {
+        scattered = bsdf_label(bsdf, wo_local, scattered, LOBE_ALL, false, lobe.y);
+    }
+    vec3 wi = scattered.wi.x * x + scattered.wi.y * y + scattered.wi.z * z;
+    if (scattered.flags == 0u || !sides_agree(z, outward, wi)) {
+        return false;
+    }
+    vec3 flux = photon.throughput * scattered.weight;
+    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
+        flux *= adjoint_ratio(z, s.geometric_normal, wo, wi);
+    }
+    // Also ends a photon whose flux is not a number.
+    float survival = min(largest_component(flux) / largest_component(photon.throughput), 1.0);
+    if (!(lobe.y < survival)) {
+        return false;
+    }
+    if (HAS_DIFFERENTIALS) {
+        footprint = scattered_differentials(footprint, hit, bsdf, photon.direction, normal, wo_local.z > 0.0, scattered, wi);
+        footprint = roulette_differentials(footprint, survival);
+        guard_differentials(footprint, push.kernel.unit_length);
+        photon_differentials[slot] = footprint;
+    }
+    if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
+        path_gathered[slot].interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
+    }
+    if ((scattered.flags & LOBE_DIFFUSE) != 0u) {
+        diffused = PHOTON_DIFFUSED;
+    }
+    photon.throughput = flux / survival;
+    photon.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
+    if (HAS_ABSORPTION && solid && dot(wi, s.geometric_normal) < 0.0) {
+        // The way through the body that the offset of the start leaves out.
+        photon.throughput *= exp(m.absorption * (distance(photon.origin, s.point.position) / dot(wi, s.geometric_normal)));
+    }
+    photon.direction = normalize(wi);
+    photon.bounce = path_set_joined(bounce + 1u, diffused);
+    path_states_out[slot] = photon;
+    return true;
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled != STALLED_NOT || place >= status.active_count) {
+        return;
+    }
+    uint slot = load_slot(place);
+    uint flags = 0u;
+    if (scatter(slot, place, load_path(slot), flags)) {
+        flags |= FLAG_ALIVE;
+    } else if (load_hit(place).triangle == NO_HIT) {
+        atomicAdd(photon_counters.escaped, 1u);
+    } else {
+        atomicAdd(photon_counters.absorbed, 1u);
+    }
+    path_flags_out[place] = flags;
+}

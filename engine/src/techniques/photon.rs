@@ -1,0 +1,212 @@
+//! Photon mapping as a technique.
+
+use std::collections::BTreeMap;
+
+use super::photon_mapping::{PhotonMapper, PhotonSettings};
+use super::{Bias, SettingInfo, Skipped, Technique, TechniqueInfo, Variant};
+use crate::Result;
+use crate::film::Step;
+use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::gpu::{Buffer, PipelineInfo};
+use crate::scene::{Camera, SceneProfile};
+use crate::settings::from_json;
+use crate::transport::PathSet;
+
+/// The catalogue's entry.
+pub(super) const INFO: TechniqueInfo = TechniqueInfo {
+    id: "photon",
+    summary: "progressive photon mapping: what diffuse surfaces get indirectly from a map of photons, anew for each pass, with kernels that shrink",
+    publication: "Jensen 2001; Hachisuka and Jensen 2009; Knaus and Zwicker 2011; Interactive Manycore Photon Mapping, 2011",
+    bias: Bias::Consistent("kernels blur what they gather, and lose light at edges, until they have shrunk"),
+    needs: &[],
+    path_set: PathSet::ALL,
+    refusals,
+    settings: &SETTINGS,
+    default_settings: || serde_json::to_value(PhotonSettings::default()).unwrap_or_default(),
+    variants: &[Variant {
+        name: "defaults",
+        settings: || serde_json::json!({}),
+    }],
+    create: |gpu, scene, view, settings| {
+        let mut settings: PhotonSettings = from_json(settings)?;
+        settings.seed = view.seed;
+        settings.aovs = view.aovs;
+        Ok(Box::new(PhotonMapper::new(
+            gpu,
+            scene,
+            view.camera,
+            view.size,
+            settings,
+        )?))
+    },
+};
+
+fn refusals(profile: &SceneProfile) -> Vec<String> {
+    if profile.media.any() {
+        vec!["the scene has participating media, and its map is of surfaces alone".into()]
+    } else {
+        Vec::new()
+    }
+}
+
+const SETTINGS: [SettingInfo; 14] = [
+    SettingInfo {
+        name: "path_set",
+        range: "all | emitted | direct | indirect | bounces=A..B, up to 63",
+        unit: "",
+        meaning: "which light paths the picture contains",
+    },
+    SettingInfo {
+        name: "photons",
+        range: "1 … 16777216",
+        unit: "photons a pass",
+        meaning: "more have less noise, and less bias with kernels that follow footprints",
+    },
+    SettingInfo {
+        name: "shape",
+        range: "fixed | isotropic | principal | skewed",
+        unit: "",
+        meaning: "kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials",
+    },
+    SettingInfo {
+        name: "profile",
+        range: "uniform | cone | epanechnikov",
+        unit: "",
+        meaning: "how kernels fall off: noise against visible rims",
+    },
+    SettingInfo {
+        name: "radius",
+        range: "0 or more",
+        unit: "m",
+        meaning: "of fixed kernels, greatest axis of others, in the first pass; 0 for a hundredth, or a ninth, of the scene's diagonal",
+    },
+    SettingInfo {
+        name: "spread",
+        range: "above 0",
+        unit: "footprints",
+        meaning: "size of kernels that follow footprints, in the first pass",
+    },
+    SettingInfo {
+        name: "dampening",
+        range: "above 0, at most 1",
+        unit: "exponent",
+        meaning: "evens out the sizes of footprints; 1 leaves them as they are",
+    },
+    SettingInfo {
+        name: "unit_length",
+        range: "0 or more",
+        unit: "m",
+        meaning: "size that the dampening leaves as it is; 0 for a ninth of the scene's diagonal",
+    },
+    SettingInfo {
+        name: "flatness",
+        range: "0 … 1",
+        unit: "",
+        meaning: "photons of flatter footprints are left out",
+    },
+    SettingInfo {
+        name: "reduction",
+        range: "above 0, at most 1",
+        unit: "",
+        meaning: "what passes keep of the kernels' area as they go on: less converges with less bias and more noise, 1 never loses the bias",
+    },
+    SettingInfo {
+        name: "samples_per_pass",
+        range: "1 … 1024",
+        unit: "samples",
+        meaning: "eye paths of a pixel that ask the same map",
+    },
+    SettingInfo {
+        name: "direct_photons",
+        range: "true | false",
+        unit: "",
+        meaning: "takes direct light from the map too",
+    },
+    SettingInfo {
+        name: "final_gather",
+        range: "true | false",
+        unit: "",
+        meaning: "sees the map after one more diffuse reflection, caustics directly",
+    },
+    SettingInfo {
+        name: "sampler",
+        range: "sobol | pcg",
+        unit: "",
+        meaning: "Owen-scrambled Sobol' points, or independent samples; changes the noise only",
+    },
+];
+
+impl Technique for PhotonMapper {
+    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        PhotonMapper::step(self, samples)
+    }
+
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        PhotonMapper::picture(self)
+    }
+
+    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        PhotonMapper::display(self, target, exposure, bgra)
+    }
+
+    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        PhotonMapper::set_camera(self, camera)
+    }
+
+    fn path_set(&self) -> PathSet {
+        PhotonMapper::settings(self).path_set
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        serde_json::to_value(PhotonMapper::settings(self)).unwrap_or_default()
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        let (eye, c) = (self.eye_counters(), self.counts());
+        BTreeMap::from([
+            ("paths", eye.paths),
+            ("extend_rays", eye.extend_rays),
+            ("shadow_rays", eye.shadow_rays),
+            ("photon_rays", c.photons.rays),
+            ("rays", eye.extend_rays + eye.shadow_rays + c.photons.rays),
+            ("waves", eye.waves),
+            ("stalls", eye.stalls),
+            ("passes", c.passes),
+            ("photons_emitted", c.photons.emitted),
+            ("photons_escaped", c.photons.escaped),
+            ("photons_absorbed", c.photons.absorbed),
+            ("photons_stored", c.records),
+            ("photons_without_kernel", c.photons.without_kernel),
+            ("map_queries", c.gather.queries),
+            ("photons_gathered", c.gather.photons),
+        ])
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        PhotonMapper::pipelines(self)
+    }
+
+    fn skipped(&self) -> Vec<Skipped> {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setting_is_explained() {
+        let defaults = (INFO.default_settings)();
+        let mut names: Vec<&str> = INFO.settings.iter().map(|setting| setting.name).collect();
+        names.sort_unstable();
+        let mut known: Vec<&str> = defaults
+            .as_object()
+            .expect("object")
+            .keys()
+            .map(String::as_str)
+            .collect();
+        known.sort_unstable();
+        assert_eq!(names, known);
+    }
+}

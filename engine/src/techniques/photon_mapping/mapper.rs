@@ -1,0 +1,231 @@
+//! A progressive rendering by photon mapping: pass after pass, photons, a map of them, and eye paths that ask it.
+//!
+//! Sources: H. W. Jensen, "Realistic Image Synthesis Using Photon Mapping", 2001; T. Hachisuka and H. W. Jensen, "Stochastic Progressive Photon
+//! Mapping", ACM TOG 28(5), 2009; C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011, whose
+//! passes are independent of each other and need nothing kept of a pixel but its mean; "Interactive Manycore Photon Mapping", PhD thesis,
+//! Trinity College Dublin, 2011, §6.3.
+//!
+//! Light paths are parted without overlap: what the eye sees through specular and glossy scattering alone, and the light that arrives
+//! directly where it first sees a diffuse surface, are the path tracer's; everything else that arrives there is the map's. Glossy lobes are
+//! never estimated from the map.
+//!
+//! Guarantees: deterministic in (seed, pass, photon) and (seed, pixel, sample), on any number of threads; scaling a scene, with lengths among
+//! the settings, scales the picture.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::gather::{Gather, GatherCounts};
+use super::kernel::PhotonWords;
+use super::map::PhotonMap;
+use super::settings::PhotonSettings;
+use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
+use crate::Result;
+use crate::film::Step;
+use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::gpu::{Buffer, Gpu, PipelineInfo};
+use crate::scene::Camera;
+use crate::transport::path_tracer::{ArrivalStage, PathCounters};
+use crate::transport::{GpuScene, PathTracer, PathTracerSettings};
+
+/// Exact counts, and what the host's share took.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct MapperCounts {
+    /// Passes begun.
+    pub passes: u64,
+    /// Photons of all passes.
+    pub photons: PhotonCounts,
+    /// Records of all maps.
+    pub records: u64,
+    /// Kernels about a point of the scene's surfaces, on average, in the last map.
+    pub cover: f64,
+    /// Records that leaves of the last map were to hold at most.
+    pub leaf_size: u32,
+    /// Queries.
+    pub gather: GatherCounts,
+    /// Seconds that maps were built for by the host, with copies.
+    pub map_seconds: f64,
+}
+
+/// A progressive rendering of one view by photon mapping.
+pub struct PhotonMapper {
+    gpu: Gpu,
+    scene: Arc<GpuScene>,
+    settings: PhotonSettings,
+    eye: PathTracer,
+    /// None where the picture has nothing of a map.
+    photons: Option<Photons>,
+    /// Passes whose eye paths are done.
+    passes: u32,
+    counts: MapperCounts,
+}
+
+struct Photons {
+    tracer: PhotonTracer,
+    gather: Gather,
+    /// Of the pass under way.
+    map: Option<PhotonMap>,
+}
+
+impl PhotonMapper {
+    /// Prepares a rendering of `size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a path set
+    /// that is more than a range of bounces, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn new(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: PhotonSettings,
+    ) -> Result<Self> {
+        settings.check()?;
+        let eye_paths = settings.eye_paths()?;
+        let eye_settings = PathTracerSettings {
+            path_set: eye_paths,
+            sampler: settings.sampler,
+            seed: settings.seed,
+            aovs: settings.aovs,
+            ..PathTracerSettings::default()
+        };
+        let photons = if settings.needs_photons() && scene.has_lights() {
+            Some(Photons {
+                tracer: PhotonTracer::new(gpu, Arc::clone(&scene), &settings, settings.stored())?,
+                gather: Gather::new(gpu, &scene, &settings, &eye_paths)?,
+                map: None,
+            })
+        } else {
+            None
+        };
+        Ok(Self {
+            gpu: gpu.clone(),
+            eye: PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?,
+            scene,
+            settings,
+            photons,
+            passes: 0,
+            counts: MapperCounts::default(),
+        })
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &PhotonSettings {
+        &self.settings
+    }
+
+    /// Exact counts since it was made.
+    pub fn counts(&self) -> MapperCounts {
+        self.counts
+    }
+
+    /// Counts of the eye paths.
+    pub fn eye_counters(&self) -> PathCounters {
+        self.eye.counters()
+    }
+
+    /// The kernels with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let mut all = self.eye.pipelines();
+        if let Some(photons) = &self.photons {
+            all.extend(photons.tracer.pipelines());
+            all.push(photons.gather.pipeline());
+        }
+        all
+    }
+
+    /// Looks through another camera and begins anew.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for a camera that cannot be used, [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        self.eye.set_camera(camera)?;
+        self.passes = 0;
+        if let Some(photons) = &mut self.photons {
+            photons.map = None;
+        }
+        Ok(())
+    }
+
+    /// Does a pass, or a part of its eye paths, towards `samples` samples a pixel; `None` when all are there.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory),
+    /// [`Error::Overflow`](crate::Error::Overflow) for more photon records than the device can hold.
+    pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        let begun = self.passes.saturating_mul(self.settings.samples_per_pass);
+        if begun >= samples {
+            return Ok(None);
+        }
+        let end = begun.saturating_add(self.settings.samples_per_pass).min(samples);
+        let mut timings = Vec::new();
+        if let Some(photons) = &mut self.photons
+            && photons.map.is_none()
+        {
+            let [lower, upper] = self.scene.bounds();
+            let diagonal = f64::from((upper - lower).length());
+            let traced = photons
+                .tracer
+                .trace(self.passes, &self.settings.kernel(self.passes, diagonal))?;
+            timings.extend(traced.timings);
+            let clock = Instant::now();
+            let records = photons.tracer.records().buffer().view();
+            let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;
+            let map = PhotonMap::build(&self.gpu, &records, self.scene.surface_area())?;
+            (self.counts.cover, self.counts.leaf_size) = (map.cover, map.leaf_size);
+            photons.map = Some(map);
+            self.counts.map_seconds += clock.elapsed().as_secs_f64();
+            self.counts.passes += 1;
+            self.counts.photons += traced.counts;
+            self.counts.records += u64::from(traced.records);
+        }
+        let stage = match &self.photons {
+            Some(Photons {
+                gather, map: Some(map), ..
+            }) => {
+                let scale = 1.0 / (flux_scale(&self.scene) * f64::from(self.settings.photons));
+                Some(gather.stage(&self.scene, map, scale)?)
+            }
+            _ => None,
+        };
+        let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
+        let step = self.eye.step_with(end, arrival)?;
+        if let Some(photons) = &self.photons {
+            let counts = photons.gather.take_counts()?;
+            self.counts.gather.queries += counts.queries;
+            self.counts.gather.photons += counts.photons;
+        }
+        let Some(mut step) = step else {
+            return Ok(None);
+        };
+        if self.eye.samples_done() >= end {
+            self.passes += 1;
+            if let Some(photons) = &mut self.photons {
+                photons.map = None;
+            }
+        }
+        timings.append(&mut step.timings);
+        let pixels = self.eye.size().iter().map(|side| u64::from(*side)).product::<u64>();
+        Ok(Some(Step {
+            timings,
+            done: step.done,
+            wanted: pixels * u64::from(samples),
+        }))
+    }
+
+    /// The picture so far, as [`PathTracer::picture`] has it.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        self.eye.picture()
+    }
+
+    /// As [`PathTracer::display`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        self.eye.display(target, exposure, bgra)
+    }
+}

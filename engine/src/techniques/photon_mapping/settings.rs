@@ -1,0 +1,232 @@
+//! Settings of photon mapping, and the path sets of its two parts.
+
+use super::kernel::{KernelProfile, KernelSettings, KernelShape};
+use super::tracer::Stored;
+use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
+use crate::transport::PathSet;
+use crate::transport::differentials::global_step;
+use crate::transport::path_set::PATH_SET_LOBES;
+use crate::transport::random::SamplerKind;
+use crate::{Error, Result};
+use std::ops::RangeInclusive;
+
+/// Most photons of a pass.
+const PHOTONS_MAX: u32 = 1 << 24;
+/// Most samples of a pixel in a pass.
+const SAMPLES_MAX: u32 = 1024;
+/// Automatic lengths as shares of the diagonal of the scene's box: the radius of fixed kernels, the greatest axis of others, and the unit of
+/// the dampening. A room of 6 m × 6 m × 3 m has a diagonal of 9 m; the source's unit and greatest axis are 1 m.
+const RADIUS_SHARE: f64 = 1.0 / 100.0;
+const UNIT_SHARE: f64 = 1.0 / 9.0;
+/// Least length of an axis in unit lengths.
+const LENGTH_MIN: f64 = 1e-3;
+
+/// Settings of photon mapping.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PhotonSettings {
+    /// Which light paths the picture contains: all, or a range of bounces.
+    pub path_set: PathSet,
+    /// Photons of a pass, 1 to 2²⁴.
+    pub photons: u32,
+    /// What the kernels' axes are.
+    pub shape: KernelShape,
+    /// How kernels fall off.
+    pub profile: KernelProfile,
+    /// Radius of fixed kernels, greatest axis of others, in the first pass, m; 0 for a hundredth, or a ninth, of the scene's diagonal.
+    #[serde(serialize_with = "crate::settings::serialize_f32")]
+    pub radius: f32,
+    /// Axes of kernels that follow footprints, as multiples of these, in the first pass.
+    #[serde(serialize_with = "crate::settings::serialize_f32")]
+    pub spread: f32,
+    /// Exponent by which footprints are dampened, in (0, 1]; 1 leaves them as they are.
+    #[serde(serialize_with = "crate::settings::serialize_f32")]
+    pub dampening: f32,
+    /// Unit length of the dampening, m; 0 for a ninth of the scene's diagonal.
+    #[serde(serialize_with = "crate::settings::serialize_f32")]
+    pub unit_length: f32,
+    /// Footprints flatter than this have no kernel, in [0, 1).
+    #[serde(serialize_with = "crate::settings::serialize_f32")]
+    pub flatness: f32,
+    /// What is kept of the photons' number as kernels shrink from pass to pass, in (0, 1]: kernels of pass i + 1 have
+    /// (i + reduction) / (i + 1) of the area of those of pass i. 1 keeps them, and the bias.
+    #[serde(serialize_with = "crate::settings::serialize_f32")]
+    pub reduction: f32,
+    /// Eye paths of a pixel in a pass.
+    pub samples_per_pass: u32,
+    /// Direct light comes from the map too, not from shadow rays.
+    pub direct_photons: bool,
+    /// The map is seen after one more diffuse reflection; caustics stay directly seen.
+    pub final_gather: bool,
+    /// Random numbers: Owen-scrambled Sobol' or PCG.
+    pub sampler: SamplerKind,
+    /// Seed of the random numbers; the view's, where settings come as text.
+    #[serde(skip)]
+    pub seed: u32,
+    /// Also gathers albedo, normal and depth of what is seen first; the view's, where settings come as text.
+    #[serde(skip)]
+    pub aovs: bool,
+}
+
+impl Default for PhotonSettings {
+    fn default() -> Self {
+        Self {
+            path_set: PathSet::ALL,
+            photons: 1 << 16,
+            shape: KernelShape::Fixed,
+            profile: KernelProfile::Epanechnikov,
+            radius: 0.0,
+            spread: 20.0,
+            dampening: 0.25,
+            unit_length: 0.0,
+            flatness: 0.05,
+            reduction: 2.0 / 3.0,
+            samples_per_pass: 1,
+            direct_photons: false,
+            final_gather: false,
+            sampler: SamplerKind::Sobol,
+            seed: 0,
+            aovs: false,
+        }
+    }
+}
+
+impl PhotonSettings {
+    /// Refuses what is out of range.
+    pub(super) fn check(&self) -> Result<()> {
+        let in_range = |name: &str, value: u32, range: RangeInclusive<u32>| {
+            let cause = || format!("is not in {range:?}");
+            range
+                .contains(&value)
+                .then_some(())
+                .ok_or_else(|| Error::setting(name, value, cause()))
+        };
+        in_range("photons", self.photons, 1..=PHOTONS_MAX)?;
+        in_range("samples_per_pass", self.samples_per_pass, 1..=SAMPLES_MAX)?;
+        let fits = |name: &str, value: f32, fits: bool, cause: &str| {
+            fits.then_some(()).ok_or_else(|| Error::setting(name, value, cause))
+        };
+        let length = |value: f32| value >= 0.0 && value.is_finite();
+        fits("radius", self.radius, length(self.radius), "is no length")?;
+        fits(
+            "unit_length",
+            self.unit_length,
+            length(self.unit_length),
+            "is no length",
+        )?;
+        fits(
+            "spread",
+            self.spread,
+            self.spread > 0.0 && self.spread.is_finite(),
+            "is not positive",
+        )?;
+        fits(
+            "dampening",
+            self.dampening,
+            self.dampening > 0.0 && self.dampening <= 1.0,
+            "is not in (0, 1]",
+        )?;
+        fits(
+            "flatness",
+            self.flatness,
+            (0.0..1.0).contains(&self.flatness),
+            "is not in [0, 1)",
+        )?;
+        fits(
+            "reduction",
+            self.reduction,
+            self.reduction > 0.0 && self.reduction <= 1.0,
+            "is not in (0, 1]",
+        )?;
+        if self.direct_photons && self.final_gather {
+            let cause = "cannot be had with direct_photons: direct light would be seen twice";
+            return Err(Error::setting("final_gather", true, cause));
+        }
+        Ok(())
+    }
+
+    /// Whether kernels follow the photons' footprints.
+    pub(super) fn follows_footprints(&self) -> bool {
+        self.shape != KernelShape::Fixed
+    }
+
+    /// Kernels of a pass, in a scene of that diagonal, m.
+    pub(super) fn kernel(&self, pass: u32, diagonal: f64) -> KernelSettings {
+        let automatic = |setting: f32, share: f64| match f64::from(setting) {
+            0.0 => share * if diagonal > 0.0 { diagonal } else { 1.0 },
+            set => set,
+        };
+        let unit_length = automatic(self.unit_length, UNIT_SHARE);
+        let radius_share = if self.follows_footprints() {
+            UNIT_SHARE
+        } else {
+            RADIUS_SHARE
+        };
+        let length_max = automatic(self.radius, radius_share) / unit_length;
+        let shrunk = shrinkage(pass, f64::from(self.reduction));
+        KernelSettings {
+            shape: self.shape,
+            spread: f64::from(self.spread) * global_step(f64::from(self.photons)) * shrunk,
+            exponent: f64::from(self.dampening),
+            unit_length,
+            length_min: LENGTH_MIN.min(length_max) * shrunk,
+            length_max: length_max * shrunk,
+            flatness: f64::from(self.flatness),
+        }
+    }
+
+    /// What is stored of photons, scattered so often before they land.
+    pub(super) fn stored(&self) -> Stored {
+        Stored {
+            first_bounce: u32::from(!self.direct_photons),
+            // They are scattered once more where they are seen.
+            last_bounce: self
+                .path_set
+                .max_bounces()
+                .map_or(u32::MAX, |max| max.saturating_sub(1)),
+        }
+    }
+
+    /// Whether the picture has anything of a map.
+    pub(super) fn needs_photons(&self) -> bool {
+        self.path_set
+            .max_bounces()
+            .is_none_or(|max| max > u32::from(!self.direct_photons))
+    }
+
+    /// What eye paths gather by themselves: light seen through specular and glossy scattering, and direct light at the first diffuse surface
+    /// (with a final gather, at the second too).
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for a path set that is more than a range of bounces.
+    pub(super) fn eye_paths(&self) -> Result<PathSet> {
+        if self.path_set != PathSet::new(self.path_set.min_bounces(), self.path_set.max_bounces(), PATH_SET_LOBES)? {
+            return Err(Error::Unsupported {
+                technique: "photon".into(),
+                reasons: vec![format!(
+                    "its pictures contain all paths of a range of bounces (bounces=A..B), but {} is more than that",
+                    self.path_set
+                )],
+            });
+        }
+        if let Some(max) = self.path_set.max_bounces().filter(|max| *max > PHOTON_BOUNCE_MAX) {
+            let cause = format!("counts more than {PHOTON_BOUNCE_MAX} bounces: leave the end open");
+            return Err(Error::setting("path_set", format!("bounces=..{max}"), cause));
+        }
+        let seen = match (self.direct_photons, self.final_gather) {
+            (true, _) => "L[SG]*E",
+            (false, false) => "LD?[SG]*E",
+            (false, true) => "L[SG]*E|LD[SG]*E|LD[SG]*D[SG]*E",
+        };
+        self.path_set.intersection(&seen.parse()?)
+    }
+}
+
+/// Length of kernels in a pass relative to the first: the square root of the product of (k + reduction) / (k + 1) for k = 1 … pass, which
+/// falls as pass^((reduction - 1) / 2).
+///
+/// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011, §4.
+pub(super) fn shrinkage(pass: u32, reduction: f64) -> f64 {
+    let step = |k: u32| (f64::from(k) + reduction) / (f64::from(k) + 1.0);
+    (1..=pass).map(step).product::<f64>().sqrt()
+}
