@@ -6,6 +6,9 @@ use clerestory::{Error, Result};
 
 use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
 
+/// Photons of a pass, of techniques that have them: pictures are small, and each sample of a pixel has a pass of its own.
+const PHOTONS: u32 = 1024;
+
 /// What a case is run against.
 #[derive(Debug, Clone, Copy)]
 pub enum Subject {
@@ -108,8 +111,13 @@ pub struct Outcome {
 pub fn judge(gpu: &Gpu, case: &HardCase, subject: &Subject) -> Option<Outcome> {
     let judged = match subject {
         Subject::Technique { info, sampler } => {
-            let settings = sampler.map(|sampler| ("sampler".to_owned(), sampler.into()));
-            (case.techniques?)(&Easel::new(gpu, info, settings.into_iter().collect()))
+            let sampler = sampler.map(|sampler| ("sampler", sampler));
+            let easel = Easel::new(gpu, info, serde_json::Map::new()).with("photons", PHOTONS);
+            (case.techniques?)(
+                &sampler
+                    .into_iter()
+                    .fold(easel, |easel, (name, value)| easel.with(name, value)),
+            )
         }
         Subject::Index(kind) => crate::rays::judge(kind, &(case.rays?)()),
         Subject::Lobes => {

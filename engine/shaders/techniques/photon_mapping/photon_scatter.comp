@@ -34,21 +34,31 @@ layout(push_constant, scalar) uniform Push {
 
 #include "transport/path_draws.glsl"
 
+// Least axis of a kernel, in errors of its position: far from the origin positions lie on a grid, which a kernel must not fall through.
+const float KERNEL_RESOLUTION = 4.0;
+// From this bounce on no photon is sure to go on.
+const uint CAPPED_BOUNCE = 8u;
+const float SURVIVAL_MAX = 0.95;
+
 // The ratio by which power that leaves for wi falls short of what interpolated normals make of radiance.
 float adjoint_ratio(vec3 normal, vec3 geometric_normal, vec3 wo, vec3 wi) {
     float shown = abs(dot(wo, geometric_normal) * dot(wi, normal));
     return shown > 0.0 ? abs(dot(wo, normal) * dot(wi, geometric_normal)) / shown : 0.0;
 }
 
-void deposit(uint place, PathState photon, vec3 position, vec3 normal, Differentials footprint, inout uint flags) {
+void deposit(uint place, PathState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
     atomicAdd(photon_counters.deposits, 1u);
     PhotonKernel kernel;
     bool fit = true;
+    KernelSettings settings = push.kernel;
+    float resolution = KERNEL_RESOLUTION * largest_component(point.error) / settings.unit_length;
+    settings.length_min = max(settings.length_min, resolution);
+    settings.length_max = max(settings.length_max, resolution);
     if (HAS_DIFFERENTIALS) {
-        fit = guard_differentials(footprint, push.kernel.unit_length);
-        fit = photon_kernel(push.kernel, footprint, normal, kernel) && fit;
+        fit = guard_differentials(footprint, settings.unit_length);
+        fit = photon_kernel(settings, footprint, normal, kernel) && fit;
     } else {
-        kernel = disk_kernel(push.kernel.length_max * push.kernel.unit_length, normal);
+        kernel = disk_kernel(settings.length_max * settings.unit_length, normal);
     }
     if (!fit) {
         atomicAdd(photon_counters.without_kernel, 1u);
@@ -57,7 +67,7 @@ void deposit(uint place, PathState photon, vec3 position, vec3 normal, Different
     uvec4 q0;
     uvec4 q1;
     uvec4 q2;
-    pack_photon(PhotonRecord(position, normal, photon.direction, photon.throughput * push.flux_scale, kernel), q0, q1, q2);
+    pack_photon(PhotonRecord(point.position, normal, photon.direction, photon.throughput * push.flux_scale, kernel), q0, q1, q2);
     add_history(path_set_bounce(photon.bounce), path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
     uint first = PHOTON_QUARTERS * place;
     photon_deposits_out[first] = q0;
@@ -143,7 +153,7 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
         footprint = transfer_differentials(photon_differentials[slot], hit.t, photon.direction, s.geometric_normal);
     }
     if (bounce >= push.first_deposit && bsdf_has_diffuse_base(bsdf, solid && !front)) {
-        deposit(place, photon, s.point.position, facing, footprint, flags);
+        deposit(place, photon, s.point, facing, footprint, flags);
     }
     if (bounce >= push.last_bounce) {
         return false;
@@ -166,8 +176,9 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
         flux *= adjoint_ratio(z, s.geometric_normal, wo, wi);
     }
-    // Also ends a photon whose flux is not a number.
-    float survival = min(largest_component(flux) / largest_component(photon.throughput), 1.0);
+    // Between lossless surfaces photons end by the cap alone. Also ends a photon whose flux is not a number.
+    float most = bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
+    float survival = min(largest_component(flux) / largest_component(photon.throughput), most);
     if (!(lobe.y < survival)) {
         return false;
     }

@@ -99,7 +99,7 @@ impl Gather {
     pub fn stage<'a>(&'a self, scene: &'a GpuScene, map: &'a PhotonMap, scale: f64) -> Result<GatherStage<'a>> {
         let linear = photon_gather::Spec {
             linear: true,
-            ..self.spec.clone()
+            ..self.spec
         };
         Ok(GatherStage {
             gather: self,
