@@ -265,20 +265,26 @@ impl Chain {
         transfer_differentials(&d, met.t, w, met.geometric)
     }
 
-    /// Largest error of the carried derivatives against differences of fourth order, relative to the derivative's length.
+    /// Largest error of the carried derivatives against differences of fourth order, relative to the derivative's length. Of three steps the
+    /// one that suits the chain's curvature counts: a wrong derivative agrees with none.
     fn error(&self, reflect: Reflect) -> f64 {
         let d = self.differentials(reflect);
-        let h = 2e-4;
-        let difference = |axis: DVec2| {
-            let at = |s: f64| self.trace(s * h * axis);
-            let (a, b) = ([at(1.0), at(-1.0)], [at(2.0), at(-2.0)]);
-            [0, 1].map(|i| (8.0 * (a[0][i] - a[1][i]) - (b[0][i] - b[1][i])) / (12.0 * h))
+        let with_step = |h: f64| {
+            let difference = |axis: DVec2| {
+                let at = |s: f64| self.trace(s * h * axis);
+                let (a, b) = ([at(1.0), at(-1.0)], [at(2.0), at(-2.0)]);
+                [0, 1].map(|i| (8.0 * (a[0][i] - a[1][i]) - (b[0][i] - b[1][i])) / (12.0 * h))
+            };
+            let ([z1, w1], [z2, w2]) = (difference(DVec2::X), difference(DVec2::Y));
+            [(d.z1, z1), (d.z2, z2), (d.w1, w1), (d.w2, w2)]
+                .iter()
+                .map(|(carried, difference)| (*carried - *difference).length() / difference.length())
+                .fold(0.0, f64::max)
         };
-        let ([z1, w1], [z2, w2]) = (difference(DVec2::X), difference(DVec2::Y));
-        [(d.z1, z1), (d.z2, z2), (d.w1, w1), (d.w2, w2)]
-            .iter()
-            .map(|(carried, difference)| (*carried - *difference).length() / difference.length())
-            .fold(0.0, f64::max)
+        [2e-4, 2e-5, 2e-6]
+            .map(with_step)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -306,8 +312,8 @@ fn each_event_agrees_with_finite_differences() {
     for (i, kind) in KINDS.iter().enumerate() {
         let (largest, middle) = errors(i as u64, 500, reflect_differentials, |_| vec![*kind]);
         println!("event {i}: {largest:.1e}, median {middle:.1e}");
-        // The differences' own error is 1e-16/h = 5e-13 of rounding, and h⁴ times the fifth derivative.
-        assert!(largest < 1e-6 && middle < 1e-10, "event {i}: {largest:e} {middle:e}");
+        // The differences' own error is 1e-16/h of rounding, 5e-13 to 5e-11, and h⁴ times the fifth derivative.
+        assert!(largest < 1e-8 && middle < 1e-10, "event {i}: {largest:e} {middle:e}");
     }
 }
 

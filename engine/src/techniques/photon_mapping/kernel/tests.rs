@@ -307,7 +307,7 @@ fn equal_disks_are_the_estimator_of_fixed_bandwidth() {
 #[test]
 fn even_light_is_estimated_without_bias() {
     // Photons even over a square, kernels of varying size and skew far from its rim: the mean is flux / area.
-    let photons = 400_000u32;
+    let photons = 1_600_000u32;
     let mut random = Random(7);
     let (mut sum, mut squares) = (0.0, 0.0);
     for _ in 0..photons {
