@@ -27,4 +27,4 @@ pub use path_tracer::{PathTracer, PathTracerSettings};
 mod camera_frame;
 
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;

@@ -7,6 +7,7 @@ mod directions;
 mod geometry;
 mod lights;
 mod media;
+mod photons;
 mod random;
 mod reflection;
 mod scattering;

@@ -71,7 +71,7 @@ float footprint_side(Differentials d) {
     return size > 0.0 ? size * sqrt(length(cross(d.z1 / size, d.z2 / size))) : 0.0;
 }
 
-vec3 transferred(vec3 z, vec3 w, vec3 n, float incidence) {
+vec3 transferred_differential(vec3 z, vec3 w, vec3 n, float incidence) {
     z -= dot(z, n) / incidence * w;
     return z - dot(z, n) * n;
 }
@@ -80,8 +80,8 @@ vec3 transferred(vec3 z, vec3 w, vec3 n, float incidence) {
 Differentials transfer_differentials(Differentials d, float t, vec3 w, vec3 n) {
     float c = dot(w, n);
     float incidence = c < 0.0 ? min(c, -DIFFERENTIAL_COS_MIN) : max(c, DIFFERENTIAL_COS_MIN);
-    d.z1 = transferred(d.z1 + t * d.w1, w, n, incidence);
-    d.z2 = transferred(d.z2 + t * d.w2, w, n, incidence);
+    d.z1 = transferred_differential(d.z1 + t * d.w1, w, n, incidence);
+    d.z2 = transferred_differential(d.z2 + t * d.w2, w, n, incidence);
     return d;
 }
 
@@ -112,12 +112,12 @@ void normal_derivatives(vec3 e1, vec3 e2, vec3 n0, vec3 n1, vec3 n2, vec2 uv, Di
     }
 }
 
-vec3 reflected(vec3 dw, vec3 w, vec3 n, vec3 dn) { return dw - 2.0 * (dot(w, n) * dn + (dot(dw, n) + dot(w, dn)) * n); }
+vec3 reflected_differential(vec3 dw, vec3 w, vec3 n, vec3 dn) { return dw - 2.0 * (dot(w, n) * dn + (dot(dw, n) + dot(w, dn)) * n); }
 
 // Mirror reflection of w about n, which changes by dn1, dn2.
 Differentials reflect_differentials(Differentials d, vec3 w, vec3 n, vec3 dn1, vec3 dn2) {
-    d.w1 = reflected(d.w1, w, n, dn1);
-    d.w2 = reflected(d.w2, w, n, dn2);
+    d.w1 = reflected_differential(d.w1, w, n, dn1);
+    d.w2 = reflected_differential(d.w2, w, n, dn2);
     return d;
 }
 

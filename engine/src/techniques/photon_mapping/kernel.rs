@@ -8,6 +8,11 @@
 //! plane; the box is tight; no length is compared with a constant, only with the unit length. Bias: proximity (blur) by the kernel's size,
 //! boundary bias at edges, topological bias on curved surfaces. Twin of `techniques/photon_mapping/kernel.glsl`.
 
+#[cfg(test)]
+mod room_tests;
+#[cfg(test)]
+mod tests;
+
 use crate::gpu::shaders::constants::{
     KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
     PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,

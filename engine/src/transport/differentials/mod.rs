@@ -9,6 +9,14 @@
 //! and Ω/Q to a re-emission. Guarantees: scaling the scene scales `z1` and `z2` and nothing else; in a direction of finite density the
 //! results are finite. Bias: none by itself, since footprints only choose the size of kernels. Twin of `transport/differentials.glsl`.
 
+#[cfg(test)]
+mod chain_tests;
+#[cfg(test)]
+mod footprint_tests;
+pub mod path_differentials;
+#[cfg(test)]
+pub(crate) mod testing;
+
 use super::warp::orthonormal_basis;
 use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
