@@ -12,7 +12,7 @@ use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::{IndexKind, Ray, RayIndex, TraversalCounters};
 use glam::Vec3;
 
-use super::flights::{CASES, Case, Flight, Raced, different, each_flight, race, told};
+use super::flights::{CASES, Case, Flight, different, each_flight, race, told};
 use super::kd_traversal::SCHEMES;
 use super::real_models;
 use crate::experiments::measures::Context;
@@ -170,8 +170,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "triangles",
             "triangles along a ray",
             "index",
-            "traversal",
-            "closest hits that differ",
+            "timed closest hits that differ",
             "build (ms)",
             "MiB",
             "steps a ray, closest",
@@ -179,6 +178,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "closest hits (M rays/s)",
             "any hits (M rays/s)",
             "both (M rays/s)",
+            "fastest traversal",
+            "both by it (M rays/s)",
         ],
     );
     let mut answer = Table::new(
@@ -231,31 +232,39 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             (&*built[way.index], settings)
         });
         let raced = race(context, &gpu, flight, contenders)?;
-        for (way, Raced { rates, hits }) in ways.iter().zip(&raced) {
-            let one = &measured[way.index];
-            let by_stack = way.scheme == Scheme::Stack;
+        let fastest = |fit: &dyn Fn(&Way) -> bool, query: usize| {
+            let fit = (0..ways.len()).filter(|way| fit(&ways[*way]));
+            fit.max_by(|a, b| raced[*a].rates[query].total_cmp(&raced[*b].rates[query]))
+                .unwrap_or_default()
+        };
+        for (index, (kind, one)) in kinds().iter().zip(&measured).enumerate() {
+            let is_of_it = |way: &Way| way.index == index;
+            let by_stack = fastest(&|way| is_of_it(way) && way.scheme == Scheme::Stack, 2);
+            let rates = raced[by_stack].rates;
+            let fastest = fastest(&is_of_it, 2);
+            let hits = ways.iter().zip(&raced).filter(|(way, _)| is_of_it(way));
+            let differ = hits
+                .map(|(_, one)| different(&one.hits[0], &raced[0].hits[0]))
+                .sum::<u64>();
             indexes.row([
                 name.into(),
                 (surfaces.triangles.len() as u64).into(),
                 layers.into(),
-                way.words.into(),
-                way.by.into(),
-                different(&hits[0], &raced[0].hits[0]).into(),
+                kind.words.into(),
+                differ.into(),
                 one.build.into(),
                 (one.bytes as f64 / f64::from(1 << 20)).into(),
-                by_stack.then_some(one.steps[0]).into(),
-                by_stack.then_some(one.steps[1]).into(),
+                one.steps[0].into(),
+                one.steps[1].into(),
                 rates[0].into(),
                 rates[1].into(),
                 rates[2].into(),
+                ways[fastest].by.into(),
+                raced[fastest].rates[2].into(),
             ]);
         }
-        let best = |is_kd: bool, query: usize| {
-            let fit = (0..ways.len()).filter(|way| (ways[*way].index < KD_TREES) == is_kd);
-            fit.max_by(|a, b| raced[*a].rates[query].total_cmp(&raced[*b].rates[query]))
-                .unwrap_or_default()
-        };
-        let pair = |query| [best(true, query), best(false, query)];
+        let is_kd = |way: &Way| way.index < KD_TREES;
+        let pair = |query| [fastest(&is_kd, query), fastest(&|way| !is_kd(way), query)];
         let ratio = |query| {
             let [kd, bvh] = pair(query);
             Cell::from(raced[kd].rates[query] / raced[bvh].rates[query])
@@ -278,8 +287,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     indexes.note(
         "Flights as in `kd-heuristics`; the soups have as many triangles each, of growing size, and a camera that stands still. Steps are \
          inner nodes and triangles, exact counts: a step of a kd-tree reads a plane of 8 bytes, one of a bounding volume hierarchy two boxes \
-         in 64. kd-trees weigh triangles by their parts, with leaves of 4 (the default) and of 1; each is traversed by every scheme, and steps \
-         are those by a stack. Hits are those of the timed kernels, held against the first row's. Times are medians of runs that take turns; \
+         in 64. kd-trees weigh triangles by their parts, with leaves of 4 (the default) and of 1; steps and rates are those \
+         by a stack, and beside them stands the fastest of the five schemes. Hits are those of the timed kernels by every scheme, held against \
+         the first one's. Times are medians of runs that take turns; \
          builds on all of the host's threads, after one to warm up, but those of more than 3 s, which are timed once.",
     );
     if let Some(models) = models {
