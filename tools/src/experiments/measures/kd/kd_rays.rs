@@ -43,7 +43,7 @@ struct Amount {
 const FULL: Amount = Amount {
     of_each: 166_667,
     on_host: 50_000,
-    tests: 200_000_000,
+    tests: 100_000_000,
 };
 const SMOKE: Amount = Amount {
     of_each: 40,
@@ -53,6 +53,9 @@ const SMOKE: Amount = Amount {
 
 /// Most triangles in a leaf of the trees that share their kernels; quotas of software devices depend on it.
 const COMMON_LEAF: u32 = 64;
+
+/// Workgroups of a queue's dispatch, so that software devices, whose workgroups trace a few rays each, need not millions of dispatches.
+const LEAST_GROUPS: u32 = 128;
 
 /// One way to find hits.
 struct Variant {
@@ -82,7 +85,10 @@ fn variants(gpu: &Gpu) -> Vec<Variant> {
             add("ray per thread", words, TraceSettings { scheme, ..settings });
         }
         for (words, caches) in kd_caches::NAMES.into_iter().zip(KdCaches::COMPARED) {
-            let settings = TraceSettings::persistent(gpu.caps());
+            let mut settings = TraceSettings::persistent(gpu.caps());
+            if let Execution::Persistent(threads) = &mut settings.execution {
+                threads.groups = threads.groups.max(LEAST_GROUPS);
+            }
             add("queue, caches:", words, TraceSettings { caches, ..settings });
         }
     }
