@@ -12,3 +12,46 @@ pub mod kd_threads;
 pub mod kd_traversal;
 mod ray_kinds;
 mod real_models;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::measures::Context;
+    use crate::experiments::table::Cell;
+    use crate::experiments::watch::Unwatched;
+    use clerestory::gpu::{DeviceKind, Gpu, GpuOptions};
+
+    #[test]
+    fn no_table_has_hits_that_differ() {
+        let scenes = ["builtin:cornell-box".to_owned()];
+        let mut context = Context {
+            smoke: true,
+            scenes: &[],
+            gpu: &|| Gpu::headless(&GpuOptions::default()),
+            folder: std::path::Path::new(""),
+            watch: &Unwatched,
+        };
+        if (context.gpu)().unwrap().caps().kind != DeviceKind::Cpu {
+            // Only software devices must have the host's bits.
+            return;
+        }
+        for (measure, columns) in [
+            (kd_traversal::measure as fn(&Context<'_>) -> _, 2),
+            (kd_caches::measure, 2),
+            (kd_threads::measure, 1),
+            (kd_or_bvh::measure, 1),
+        ] {
+            for scenes in [&[][..], &scenes] {
+                context.scenes = scenes;
+                let table = &measure(&context).unwrap()[0];
+                let differ = (0..table.heads.len()).filter(|column| table.heads[*column].contains("differ"));
+                let differ: Vec<usize> = differ.collect();
+                assert_eq!(differ.len(), columns, "{}", table.title);
+                for row in &table.rows {
+                    assert!(differ.iter().all(|column| row[*column] == Cell::Count(0)), "{row:?}");
+                    assert!(scenes.is_empty() || row[0] == Cell::from("cornell-box"), "{row:?}");
+                }
+            }
+        }
+    }
+}
