@@ -60,7 +60,7 @@ impl Case {
         case(scene, "none", light)
     }
 
-    /// A scene of any address, lit from outside.
+    /// A scene of any address, lit from outside; where it has one camera, that flies around it.
     pub fn at(address: &str) -> Self {
         Self {
             scene: Cow::Owned(address.to_owned()),
@@ -169,6 +169,21 @@ fn frames(cameras: &[Camera], count: u32) -> Result<Vec<Camera>> {
     Ok((0..count).map(frame).collect())
 }
 
+/// Once around what the surfaces fill, on a circle about the vertical.
+fn around(camera: &Camera, surfaces: &Surfaces, count: u32) -> Vec<Camera> {
+    let bounds = bounds(surfaces);
+    let centre = (0.5 * (bounds.lower + bounds.upper)).as_dvec3();
+    let frame = |i: u32| {
+        let turn = DAffine3::from_rotation_y(std::f64::consts::TAU * f64::from(i) / f64::from(count));
+        let about_centre = DAffine3::from_translation(centre) * turn * DAffine3::from_translation(-centre);
+        Camera {
+            transform: about_centre * camera.transform,
+            ..camera.clone()
+        }
+    };
+    (0..count).map(frame).collect()
+}
+
 /// The rays of a flight with the light in this place: 10 frames of 96 × 96 pixels, 2 of 8 × 8 in a quick look.
 ///
 /// # Errors
@@ -177,7 +192,12 @@ pub fn fly(context: &Context<'_>, case: &Case, surfaces: &Surfaces, light: Vec3)
     let (count, side) = if context.smoke { (2, 8) } else { (10, 96) };
     let scene = scene::load(&case.scene)?;
     let mut flight = Flight::default();
-    for camera in frames(&scene.cameras, count)? {
+    let cameras = match &scene.cameras[..] {
+        // A model stands free.
+        [only] if case.light.is_none() => around(only, surfaces, count),
+        cameras => frames(cameras, count)?,
+    };
+    for camera in cameras {
         for (origin, direction) in geometry::camera_rays(&camera, side)? {
             for (bounce, (origin, direction, meeting)) in surfaces.follow(origin, direction).into_iter().enumerate() {
                 let rays = if bounce == 0 {
@@ -196,10 +216,14 @@ pub fn fly(context: &Context<'_>, case: &Case, surfaces: &Surfaces, light: Vec3)
     Ok(flight)
 }
 
+fn bounds(surfaces: &Surfaces) -> Aabb {
+    let corners = surfaces.triangles.iter().flatten();
+    corners.fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner))
+}
+
 /// A light far outside of what the surfaces fill, above it.
 pub fn outside(surfaces: &Surfaces) -> Vec3 {
-    let corners = surfaces.triangles.iter().flatten();
-    let bounds = corners.fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner));
+    let bounds = bounds(surfaces);
     let extent = bounds.upper - bounds.lower;
     0.5 * (bounds.lower + bounds.upper) + extent.length() * Vec3::new(0.9, 2.0, 0.7)
 }

@@ -55,7 +55,7 @@ fn among(is_there: impl Fn(&Path) -> bool) -> Found {
     let mut words = match named.is_empty() {
         true => "No real models".to_owned(),
         false => format!(
-            "Real models, lit from outside and seen from one place: {}",
+            "Real models, lit from outside and seen from all around: {}",
             named.join("; ")
         ),
     };
