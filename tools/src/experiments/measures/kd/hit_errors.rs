@@ -1,10 +1,10 @@
 //! A hit in f32 against all triangles: the same search in f32, to the bit, and in f64, up to the stated bounds of the watertight test.
 //!
-//! The bounds are those of `clerestory::accel::triangle`, with u = 2⁻²⁴, M the largest coordinate distance of one of the triangle's corners from
-//! the ray's origin and |d| the largest component of the direction: the point that a hit's weights name lies within 16uM of the ray, seen along
-//! the dominant axis, and within 32uM when the rounding of the reported weights counts too; its parameter is within 18uM/|d| of the point's.
-//! So the parameter is within 18uM/|d| + 16uM·s of where the ray meets the triangle's plane, where s is the sum of the sizes of both slopes of
-//! the plane's parameter.
+//! The bounds are those of `clerestory::accel::triangle`, with u = 2⁻²⁴, M the largest coordinate distance of one of the triangle's corners
+//! from the ray's origin and |d| the largest component of the direction: the point that a hit's weights name lies within 16uM of the ray,
+//! seen along the dominant axis, and within 32uM when the rounding of the reported weights counts too; its parameter is within 18uM/|d| of
+//! the point's. So the parameter is within 18uM/|d| + 16uM·s of where the ray meets the triangle's plane, where s is the sum of the sizes of
+//! both slopes of the plane's parameter.
 
 use clerestory::accel::triangle::{intersect_triangle, intersect_triangle_f64, ray_shear};
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray};

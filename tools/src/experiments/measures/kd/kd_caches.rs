@@ -164,14 +164,14 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         Ok(())
     })?;
     table.note(
-        "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer to the numbers of nodes \
-         that it gives (see there). Traversal with a stack. Hits, of closest and of any hits, are compared with those of the host without \
-         caches: first the host's, then those of the kernels that were timed. Counts are exact and the same on every \
-         machine; bytes by the source's model of 8 for each node fetched from memory and each entry written or read there. The nodes \
-         that a workgroup loads into its cache beforehand are in none of these counts. On a software driver shared memory and registers are \
-         ordinary cached memory, and its cap on loops lets a workgroup trace only some dozens of rays for each of these loads: the times \
-         say what the forms cost there, nothing about what they would gain on a device with such memories, where the source found +6 to \
-         −52 %. Instructions are not counted.",
+        "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer to \
+         the numbers of nodes that it gives (see there). Traversal with a stack. Hits, of closest and of any hits, are compared with \
+         those of the host without caches: first the host's, then those of the kernels that were timed. Counts are exact and the same on \
+         every machine; bytes by the source's model of 8 for each node fetched from memory and each entry written or read there. The \
+         nodes that a workgroup loads into its cache beforehand are in none of these counts. On a software driver shared memory and \
+         registers are ordinary cached memory, and its cap on loops lets a workgroup trace only some dozens of rays for each of these \
+         loads: the times say what the forms cost there, nothing about what they would gain on a device with such memories, where the \
+         source found +6 to −52 %. Instructions are not counted.",
     );
     Ok(vec![table])
 }

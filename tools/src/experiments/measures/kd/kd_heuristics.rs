@@ -304,19 +304,19 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         Ok(())
     })?;
     rays.note(
-        "Camera flights of 10 frames of 96 × 96 pixels (2 of 8 × 8 in a quick look): camera rays, reflections at mirrors, and a shadow ray \
-         from the end of each; traversal with a stack. Counts are exact and the same on every machine; times are medians of runs that take \
-         turns. The source's models but Scene 6 are files that are not here: its figures stand beside generated scenes of the same kind \
-         and number of triangles, so what can agree is the sign and the size of the changes. By its text nodes of four triangles or fewer are \
-         leaves; its numbers of nodes are nearer to those of trees that split such nodes too, so both stand here.",
+        "Camera flights of 10 frames of 96 × 96 pixels (2 of 8 × 8 in a quick look): camera rays, reflections at mirrors, and a shadow \
+         ray from the end of each; traversal with a stack. Counts are exact and the same on every machine; times are medians of runs that \
+         take turns. The source's models but Scene 6 are files that are not here: its figures stand beside generated scenes of the same \
+         kind and number of triangles, so what can agree is the sign and the size of the changes. By its text nodes of four triangles or \
+         fewer are leaves; its numbers of nodes are nearer to those of trees that split such nodes too, so both stand here.",
     );
     trees.note(
         "Build times by wall clock on all of the host's threads, medians of three up to 100,000 triangles, layout for the kernels and all. \
          Trees by 26 regions are not built above that: they take twenty times as long as the others.",
     );
     lights.note(
-        "Trees over boxes with leaves of 1. SIROH takes origins to lie among the surfaces. The source found frames with a light inside 1.7 % faster and with one outside 3.8 % \
-         slower than by surface area (its table 4.2, another tracer's scene with an animated light).",
+        "Trees over boxes with leaves of 1. SIROH takes origins to lie among the surfaces. The source found frames with a light inside 1.7 % \
+         faster and with one outside 3.8 % slower than by surface area (its table 4.2, another tracer's scene with an animated light).",
     );
     Ok(vec![rays, trees, lights])
 }

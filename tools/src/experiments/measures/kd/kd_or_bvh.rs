@@ -286,11 +286,11 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     })?;
     indexes.note(
         "Flights as in `kd-heuristics`; the soups have as many triangles each, of growing size, and a camera that stands still. Steps are \
-         inner nodes and triangles, exact counts: a step of a kd-tree reads a plane of 8 bytes, one of a bounding volume hierarchy two boxes \
-         in 64. kd-trees weigh triangles by their parts, with leaves of 4 (the default) and of 1; steps and rates are those \
-         by a stack, and beside them stands the fastest of the five schemes. Hits are those of the timed kernels by every scheme, held against \
-         the first one's. Times are medians of runs that take turns; \
-         builds on all of the host's threads, after one to warm up, but those of more than 3 s, which are timed once.",
+         inner nodes and triangles, exact counts: a step of a kd-tree reads a plane of 8 bytes, one of a bounding volume hierarchy two \
+         boxes in 64. kd-trees weigh triangles by their parts, with leaves of 4 (the default) and of 1; steps and rates are those by a \
+         stack, and beside them stands the fastest of the five schemes. Hits are those of the timed kernels by every scheme, held against \
+         the first one's. Times are medians of runs that take turns; builds on all of the host's threads, after one to warm up, but those \
+         of more than 3 s, which are timed once.",
     );
     if let Some(models) = models {
         indexes.note(models.words);

@@ -361,19 +361,20 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         ]);
     }
     table.note(format!(
-        "Rays of {} in even shares, a fourth of them with an end, and those of all hard cases; kd-trees with default settings. A hit is t, u, v \
-         and the triangle, and differs where one bit of these does: closest hits from those of the engine's bounding volume hierarchy on the \
-         device, any hits from those of the first variant; answers, whether there is a hit, from those of the closest. The host traces an even \
-         part of the rays by the twin of each kernel. Devices whose division is not exact, which Vulkan lets them have, may differ from the \
-         host in last bits; software devices must not.",
+        "Rays of {} in even shares, a fourth of those but the camera's and the diffuse ones with an end, and those of all hard cases; \
+         kd-trees with default settings. A hit is t, u, v and the triangle, and differs where one bit of these does: closest hits from those of the engine's bounding volume \
+         hierarchy on the device, any hits from those of the first variant; answers, whether there is a hit, from those of the closest. \
+         The host traces an even part of the rays by the twin of each kernel. Devices whose division is not exact, which Vulkan lets them \
+         have, may differ from the host in last bits; software devices must not.",
         ray_kinds::KINDS.join(", ")
     ));
     scenes.note(
-        "All triangles are tried, for an even part of the rays, by the kernels' test in f32 and by the same test in f64. With u = 2⁻²⁴, M the \
-         largest coordinate distance of a triangle's corner from the ray's origin, |d| the direction's largest component and s the slopes of \
-         t in the triangle's plane across the ray, t must lie within 18uM/|d| + 16uMs of the plane's in f64, no triangle that f64 meets clear \
-         of its edges may be nearer by more than that, and the point that u and v name must lie within 32uM of the ray along each axis \
-         (`clerestory::accel::triangle`). Errors are shares of these bounds, the largest of all; above 1 a bound is broken.",
+        "All triangles are tried, for an even part of the rays, by the kernels' test in f32 and by the same test in f64. With u = 2⁻²⁴, M \
+         the largest coordinate distance of a triangle's corner from the ray's origin, |d| the direction's largest component and s the \
+         slopes of t in the triangle's plane across the ray, t must lie within 18uM/|d| + 16uMs of the plane's in f64, no triangle that \
+         f64 meets clear of its edges may be nearer by more than that, and the point that u and v name must lie within 32uM of the ray \
+         along each axis (`clerestory::accel::triangle`). Errors are shares of these bounds, the largest of all; above 1 a bound is \
+         broken.",
     );
     Ok(vec![table, scenes])
 }

@@ -108,11 +108,12 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         Ok(())
     })?;
     table.note(
-        "Flights as in `kd-heuristics`; trees by surface area over boxes with leaves of 1, which come nearest to the source's, traversal by a \
-         stack. Times are medians of runs that take turns; workgroups are the fastest power of two on the rays that ask for the closest hit. \
-         The source's ratio is of frames a second on one device of 2011, where persistent threads spare the scheduler's work for warps whose \
-         rays end at different times. A software driver has no such scheduler: it runs workgroups one after the other on each of the host's \
-         threads, and its cap on loops lets a workgroup trace only some dozens of rays a dispatch, so here the ratio says what the queue costs.",
+        "Flights as in `kd-heuristics`; trees by surface area over boxes with leaves of 1, which come nearest to the source's, traversal \
+         by a stack. Times are medians of runs that take turns; workgroups are the fastest power of two on the rays that ask for the \
+         closest hit. The source's ratio is of frames a second on one device of 2011, where persistent threads spare the scheduler's work \
+         for warps whose rays end at different times. A software driver has no such scheduler: it runs workgroups one after the other on \
+         each of the host's threads, and its cap on loops lets a workgroup trace only some dozens of rays a dispatch, so here the ratio \
+         says what the queue costs.",
     );
     Ok(vec![table])
 }

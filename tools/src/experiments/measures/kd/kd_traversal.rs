@@ -191,13 +191,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         Ok(())
     })?;
     table.note(
-        "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer to the numbers of nodes \
-         that it gives (see there). Hits, of closest and of any hits, are compared with those of the host by a stack: first the host's, then \
-         those of the kernels that were timed. Here rays go on until leaves begin beyond their hit, so that no rounding loses one. Counts are exact and the same on every machine: inner nodes, \
-         entries of stacks written and read, and bytes by the source's model of 8 for each of these. Visits are hardware independent, so \
-         their changes can be held against the source's; the ranking is the source's, the sizes are not: \
-         flags restart once for each leaf that is left, and rays meet more leaves in these trees. Times are medians of runs that take \
-         turns, one invocation a ray.",
+        "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer to \
+         the numbers of nodes that it gives (see there). Hits, of closest and of any hits, are compared with those of the host by a \
+         stack: first the host's, then those of the kernels that were timed. Here rays go on until leaves begin beyond their hit, so that \
+         no rounding loses one. Counts are exact and the same on every machine: inner nodes, entries of stacks written and read, and \
+         bytes by the source's model of 8 for each of these. Visits are hardware independent, so their changes can be held against the \
+         source's; the ranking is the source's, the sizes are not: flags restart once for each leaf that is left, and rays meet more \
+         leaves in these trees. Times are medians of runs that take turns, one invocation a ray.",
     );
     restarts.note(
         "Without flags a ray that restarts behind the leaf that it has left (at its end, or a step behind it) does not know which of the \
