@@ -4,6 +4,7 @@
 //! step by step, so that a host can show progress, stop at any time and keep what is there.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -176,8 +177,17 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::new`], and [`Error::Setting`] for settings of the index that are out of range.
     pub fn with_index(gpu: &Gpu, scene: &Scene, index: &IndexKind) -> Result<Self> {
+        Self::with_kept_index(gpu, scene, index, None)
+    }
+
+    /// As [`Renderer::with_index`]; with a folder a kd-tree is read from there where the same was kept before, and kept there otherwise.
+    /// The report says which ([`IndexReport::kept`]).
+    ///
+    /// # Errors
+    /// As [`Renderer::with_index`]; what cannot be read or written there is none.
+    pub fn with_kept_index(gpu: &Gpu, scene: &Scene, index: &IndexKind, folder: Option<&Path>) -> Result<Self> {
         let start = Instant::now();
-        let gpu_scene = Arc::new(GpuScene::with_index(gpu, scene, index)?);
+        let gpu_scene = Arc::new(GpuScene::with_kept_index(gpu, scene, index, folder)?);
         let upload_seconds = start.elapsed().as_secs_f64();
         // Only names and cameras are needed from here on; the geometry lives on the device.
         let scene = Scene {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use clerestory::accel::IndexKept;
 use clerestory::render::FrameReport;
 
 use crate::output::{self, Stream, Table};
@@ -121,6 +122,14 @@ fn rest(report: &FrameReport) -> String {
     let stages: Vec<String> = stages.map(|(name, ms)| format!("{name} {ms:.1}")).collect();
     if !stages.is_empty() {
         let _ = writeln!(text, "       ms of it: {}", stages.join(", "));
+    }
+    let kept = report.index.kept.map(|kept| match kept {
+        IndexKept::Read => "read, not built: the folder had it",
+        IndexKept::Written => "kept for the next time",
+        IndexKept::NotWritten => "could not be kept",
+    });
+    if let Some(kept) = kept {
+        let _ = writeln!(text, "       {kept}");
     }
     if let Some(cause) = report.index.host_because {
         let _ = writeln!(text, "       built on the host: {cause}");

@@ -123,6 +123,54 @@ fn a_rendering_leaves_picture_preview_and_report() -> Tested {
 }
 
 #[test]
+fn kd_trees_are_kept_and_read_again() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let cache = folder.path().join("new/indexes");
+    let picture = folder.path().join("a.exr");
+    let render = |index: &'static str| {
+        let size = [
+            "render",
+            "builtin:cornell-box",
+            "--size",
+            "8",
+            "--spp",
+            "1",
+            "-o",
+            text(&picture),
+        ];
+        run(&[&size[..], &["--index", index, "--index-cache", text(&cache)]].concat())
+    };
+    let mut pixels = Vec::new();
+    for (kept, words) in [("written", "kept for the next time"), ("read", "read, not built")] {
+        let output = render("kd")?;
+        assert!(output.status.success(), "{}", said(&output));
+        assert!(
+            String::from_utf8_lossy(&output.stdout).contains(words),
+            "{}",
+            said(&output)
+        );
+        assert_eq!(json_file(&picture.with_extension("json"))?["index"]["kept"], kept);
+        pixels.push(exr::read(&picture)?.main_layer()?.values().to_vec());
+    }
+    assert_eq!(pixels[0], pixels[1]);
+    assert_eq!(std::fs::read_dir(&cache)?.count(), 1);
+    let refused = render("bvh2")?;
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+
+    let scene = ["--scene", "builtin:cornell-box", "--repeat", "1", "--rays", "10"];
+    let index = [&["index", "--index-cache", text(&cache)][..], &scene].concat();
+    let table = String::from_utf8(succeed(&index)?.stdout)?;
+    assert!(table.contains("kd: read in"), "the same tree as the picture's: {table}");
+    let soup = ["--scene", "builtin:triangle-soup?n=50", "--repeat", "1", "--rays", "10"];
+    let index = [&["index", "--json", "--index-cache", text(&cache)][..], &soup].concat();
+    for was_read in [false, true] {
+        let report = json(&succeed(&index)?.stdout)?;
+        assert_eq!(report["kept"][0]["was_read"], was_read, "{report}");
+    }
+    Ok(())
+}
+
+#[test]
 fn indexes_are_compared_also_where_the_device_cannot_build_one() -> Tested {
     let scenes = ["builtin:triangle-soup?n=1", "builtin:triangle-soup?n=500"];
     let scenes = ["--scene", scenes[0], "--scene", scenes[1]];

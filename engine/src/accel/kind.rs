@@ -4,6 +4,7 @@
 //! (see [`accel`](super)).
 
 use std::fmt;
+use std::path::Path;
 use std::str::FromStr;
 use std::time::Instant;
 
@@ -89,6 +90,20 @@ impl IndexKind {
     /// # Errors
     /// As [`IndexKind::build`], and those of uploads and of submissions; [`Error::LimitExceeded`] for an index that the device cannot bind.
     pub fn build_for(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<IndexOnDevice> {
+        self.build_or_read_for(gpu, triangles, None)
+    }
+
+    /// As [`IndexKind::build_for`]; with a folder a kd-tree is read from there where the same was kept before, and kept there otherwise
+    /// ([`KdTree::kept`]).
+    ///
+    /// # Errors
+    /// As [`IndexKind::build_for`].
+    pub fn build_or_read_for(
+        &self,
+        gpu: &Gpu,
+        triangles: &[[Vec3; 3]],
+        folder: Option<&Path>,
+    ) -> Result<IndexOnDevice> {
         let mut fallback = None;
         if let Self::LbvhOnDevice(settings) = self {
             let builder = LbvhBuilder::new(gpu, settings)?;
@@ -100,6 +115,7 @@ impl IndexKind {
                         build_ms: 1e3 * begin.elapsed().as_secs_f64(),
                         stages: built.stages,
                         host_because: None,
+                        kept: None,
                         statistics: built.statistics,
                     };
                     return Ok(IndexOnDevice {
@@ -116,7 +132,7 @@ impl IndexKind {
                 Err(error) => return Err(error),
             }
         }
-        let (index, report) = self.build_timed(triangles)?;
+        let (index, report) = self.build_timed(triangles, folder)?;
         let format = vk::Format::R32G32B32A32_UINT;
         let host_because = fallback;
         Ok(IndexOnDevice {
@@ -126,15 +142,30 @@ impl IndexKind {
         })
     }
 
-    /// Builds on the host, and says how long that took.
-    fn build_timed(&self, triangles: &[[Vec3; 3]]) -> Result<(Box<dyn RayIndex>, IndexReport)> {
+    /// Builds on the host, or reads what was kept, and says how long that took.
+    fn build_timed(&self, triangles: &[[Vec3; 3]], folder: Option<&Path>) -> Result<(Box<dyn RayIndex>, IndexReport)> {
         let begin = Instant::now();
-        let index = self.build(triangles)?;
+        let (index, kept): (Box<dyn RayIndex>, _) = match (self, folder) {
+            (Self::Kd(settings), Some(folder)) => {
+                let kept = KdTree::kept(triangles, settings, folder)?;
+                let how = match (kept.was_read, &kept.not_kept) {
+                    (true, _) => IndexKept::Read,
+                    (false, None) => IndexKept::Written,
+                    (false, Some(error)) => {
+                        tracing::warn!("kd-tree not kept: {error}");
+                        IndexKept::NotWritten
+                    }
+                };
+                (Box::new(kept.tree), Some(how))
+            }
+            _ => (self.build(triangles)?, None),
+        };
         let report = IndexReport {
             kind: self.name(),
             build_ms: 1e3 * begin.elapsed().as_secs_f64(),
             stages: index.stages(),
             host_because: None,
+            kept,
             statistics: index.statistics(),
         };
         Ok((index, report))
@@ -180,12 +211,24 @@ pub struct IndexOnDevice {
     pub report: IndexReport,
 }
 
+/// What became of an index that was to be kept on disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IndexKept {
+    /// It was read, not built.
+    Read,
+    /// It was built, and written for the next time.
+    Written,
+    /// It was built, and could not be written; the log has the cause.
+    NotWritten,
+}
+
 /// The ray index of a scene, as frame reports have it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct IndexReport {
     /// One of [`IndexKind::NAMES`].
     pub kind: &'static str,
-    /// Wall-clock milliseconds of its build, without the upload of what the host has built. Pipelines are made
+    /// Wall-clock milliseconds of its build, or of reading what was kept, without the upload of what the host has built. Pipelines are made
     /// before it begins, but drivers that compile at the first dispatch, as Mesa's software driver does, do so within a device's first build.
     pub build_ms: f64,
     /// Where these went.
@@ -193,6 +236,9 @@ pub struct IndexReport {
     /// Why the host has built what the device was to build.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub host_because: Option<&'static str>,
+    /// What became of it, where it was to be kept on disk.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kept: Option<IndexKept>,
     /// Size and quality.
     #[serde(flatten)]
     pub statistics: IndexStatistics,
@@ -223,7 +269,11 @@ mod tests {
             })
             .collect();
         for (name, builder) in IndexKind::NAMES.into_iter().zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd"]) {
-            let (index, report) = name.parse::<IndexKind>().unwrap().build_timed(&triangles).unwrap();
+            let (index, report) = name
+                .parse::<IndexKind>()
+                .unwrap()
+                .build_timed(&triangles, None)
+                .unwrap();
             assert_eq!(index.name(), builder);
             assert_eq!(report.statistics, index.statistics());
             assert!(report.build_ms > 0.0 && report.stages.total() <= report.build_ms);
@@ -232,6 +282,16 @@ mod tests {
             assert_eq!(json["triangles"], 40);
             assert_eq!(json["leaves"], index.statistics().leaves);
         }
+        let folder = tempfile::tempdir().unwrap();
+        let kept = |kind: &str| {
+            let kind = kind.parse::<IndexKind>().unwrap();
+            kind.build_timed(&triangles, Some(folder.path())).unwrap().1
+        };
+        assert_eq!(
+            ["kd", "kd", "bvh2"].map(|kind| kept(kind).kept),
+            [Some(IndexKept::Written), Some(IndexKept::Read), None]
+        );
+        assert_eq!(serde_json::to_value(kept("kd")).unwrap()["kept"], "read");
         let wrong = IndexKind::Bvh2(Bvh2Settings { leaf_size: 0, bins: 16 });
         assert!(matches!(wrong.build(&triangles), Err(Error::Setting { .. })));
     }

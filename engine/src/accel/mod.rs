@@ -42,7 +42,7 @@ mod test_support;
 
 pub use aabb::Aabb;
 pub use device_traversal::DeviceTraversal;
-pub use kind::{IndexKind, IndexOnDevice, IndexReport};
+pub use kind::{IndexKept, IndexKind, IndexOnDevice, IndexReport};
 pub use leaf_rule::LeafRule;
 pub use stages::BuildStages;
 

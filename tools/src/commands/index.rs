@@ -26,6 +26,7 @@ use crate::output::{self, Table};
 Examples:
   clerestory index
   clerestory index --scene 'builtin:sphere-flake?depth=4' --repeat 9 --json
+  clerestory index --index-cache out/indexes
   clerestory index --peers --rays 262144
   clerestory index --peers --rays 262144 --repeat 9 --folder out/index --page RESULTS.md
 
@@ -42,6 +43,9 @@ pub struct Arguments {
     /// Rays
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(2..))]
     rays: u32,
+    /// Folder that keeps kd-trees: one of the same triangles is read from there, not built anew, and so are repeats
+    #[arg(long, value_name = "FOLDER", conflicts_with = "peers")]
+    index_cache: Option<PathBuf>,
     /// Instead: builds, and rays a second of the device's kernels, beside obvhs, bvh and, where it is installed, Embree on the processor
     #[arg(long)]
     peers: bool,
@@ -86,6 +90,18 @@ struct Measured {
     stages: Vec<(String, f64)>,
 }
 
+/// The kd-tree of a scene that was to be kept.
+#[derive(Debug, serde::Serialize)]
+struct Kept {
+    scene: String,
+    /// Whether it was there before the run.
+    was_read: bool,
+    /// Seconds of the build, or of reading.
+    seconds: f64,
+    /// Why it could not be kept.
+    not_kept: Option<String>,
+}
+
 /// An index that could not be built.
 #[derive(Debug, serde::Serialize)]
 struct Skipped {
@@ -96,6 +112,9 @@ struct Skipped {
 
 /// The index that the device builds.
 const ON_DEVICE: &str = "lbvh, fast, device";
+
+/// The index that may be kept.
+const KD: &str = "kd";
 
 /// Builds an index.
 type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
@@ -113,7 +132,7 @@ const INDEXES: [(&str, Build); 6] = [
     ("lbvh, high, 3 reinsertions", |t| {
         Ok(Box::new(lbvh::build(t, &reinserted(3))?))
     }),
-    ("kd", |t| Ok(Box::new(KdTree::build(t, &KdSettings::default())?))),
+    (KD, |t| Ok(Box::new(KdTree::build(t, &KdSettings::default())?))),
 ];
 
 fn fast(code_bits: u32) -> LbvhSettings {
@@ -148,13 +167,29 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let builder = LbvhBuilder::new(&gpu, &fast(30))?;
     let mut all: Vec<Measured> = Vec::new();
     let mut skipped: Vec<Skipped> = Vec::new();
+    let mut all_kept: Vec<Kept> = Vec::new();
     for address in &arguments.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
         let triangles = geometry::triangles(&scene);
         let rays = rays_among(&scene, &triangles, arguments.rays);
         let base = all.len();
         for (name, build) in INDEXES {
-            let mut measured = measure(&triangles, &rays, build, arguments.repeat)?;
+            let folder = arguments.index_cache.as_deref().filter(|_| name == KD);
+            let mut measured = match folder {
+                None => measure(&triangles, &rays, build, arguments.repeat)?,
+                Some(folder) => {
+                    let read = |t: &[[Vec3; 3]]| KdTree::kept(t, &KdSettings::default(), folder);
+                    let (kept, seconds) = timed(|| read(&triangles));
+                    let kept = kept?;
+                    all_kept.push(Kept {
+                        scene: address.clone(),
+                        was_read: kept.was_read,
+                        seconds,
+                        not_kept: kept.not_kept.map(|error| error.to_string()),
+                    });
+                    measure(&triangles, &rays, |t| Ok(Box::new(read(t)?.tree)), arguments.repeat)?
+                }
+            };
             (measured.scene, measured.index) = (address.clone(), name.into());
             if let Some(first) = all.get(base) {
                 measured.sah_ratio = measured.sah_cost / first.sah_cost;
@@ -183,7 +218,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         output::print_json(&serde_json::json!({
             "device": caps.device, "driver": caps.driver, "engine_version": env!("CARGO_PKG_VERSION"),
             "processor": machine::processor(), "threads": machine::threads(), "load": machine::load(), "indexes": all,
-            "skipped": skipped,
+            "skipped": skipped, "kept": all_kept,
         }))?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -221,6 +256,15 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             .collect();
         text += &format!("\n{}, {}: {}", one.scene, one.index, stages.join(", "));
     }
+    for one in &all_kept {
+        let ms = 1e3 * one.seconds;
+        let how = match (&one.not_kept, one.was_read) {
+            (Some(cause), _) => format!("built in {ms:.1} ms, not kept: {cause}"),
+            (None, true) => format!("read in {ms:.1} ms, not built; repeats were read too"),
+            (None, false) => format!("built in {ms:.1} ms and kept; repeats were read"),
+        };
+        text += &format!("\n{}, {KD}: {how}", one.scene);
+    }
     for one in &skipped {
         text += &format!("\n{}, {}: skipped, {}", one.scene, one.index, one.because);
     }
@@ -228,7 +272,12 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn measure(triangles: &[[Vec3; 3]], rays: &[Ray], build: Build, repeat: u32) -> Result<Measured> {
+fn measure(
+    triangles: &[[Vec3; 3]],
+    rays: &[Ray],
+    build: impl Fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>,
+    repeat: u32,
+) -> Result<Measured> {
     let mut index = build(triangles)?;
     let mut builds = Vec::new();
     for _ in 0..repeat {

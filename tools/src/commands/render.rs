@@ -94,6 +94,9 @@ pub struct Arguments {
     /// Index of the rays: bvh2 by binned SAH, lbvh along the Morton curve (least build, slower rays), lbvh-high optimised, lbvh-device as lbvh but built by the device, kd a kd-tree (longest build). The picture is the same
     #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd", default_value_t, value_parser = parse_index)]
     index: IndexKind,
+    /// With --index kd: folder that keeps kd-trees; one of the same triangles is read from there, not built anew
+    #[arg(long, value_name = "FOLDER")]
+    index_cache: Option<PathBuf>,
     /// The technique's settings as JSON, or @FILE that holds them
     #[arg(long, value_name = "JSON|@FILE")]
     settings: Option<String>,
@@ -214,6 +217,11 @@ fn without_name(error: Error) -> String {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    if arguments.index_cache.is_some() && !matches!(arguments.index, IndexKind::Kd(_)) {
+        return Err(Failure::usage(
+            "--index-cache keeps kd-trees alone; it goes with --index kd",
+        ));
+    }
     let scene = scene::load(&arguments.scene).map_err(Failure::scene)?;
     for note in &scene.notes {
         output::warn(&format!("{} ({}): {}", note.feature, note.at, note.instead));
@@ -225,7 +233,8 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
     let interruptible = Interruptible::start()?;
-    let renderer = Renderer::with_index(&gpu, &scene, &arguments.index)?;
+    let folder = arguments.index_cache.as_deref();
+    let renderer = Renderer::with_kept_index(&gpu, &scene, &arguments.index, folder)?;
     let goal = Goal {
         error: arguments.error,
         time: arguments.time,

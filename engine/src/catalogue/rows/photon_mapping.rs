@@ -59,7 +59,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-caches",
+        "clerestory report kd-caches kd-rays",
         part(
             "PM-CA-1",
             "kd node cache I: the top of the tree in shared memory",
@@ -69,7 +69,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-caches",
+        "clerestory report kd-caches kd-rays",
         part(
             "PM-CA-2",
             "node cache II: the same with boxes",
@@ -79,7 +79,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-caches",
+        "clerestory report kd-caches kd-rays",
         part(
             "PM-CA-3",
             "stack cache I: the last entry in registers",
@@ -89,7 +89,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-caches",
+        "clerestory report kd-caches kd-rays",
         part(
             "PM-CA-4",
             "stack cache II: entries as bytes in registers",
@@ -99,7 +99,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-caches",
+        "clerestory report kd-caches kd-rays",
         part(
             "PM-CA-5",
             "stack cache III: a leaf that waits",
@@ -109,7 +109,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-caches",
+        "clerestory report kd-caches kd-rays",
         part(
             "PM-CA-7",
             "caches of nodes and of the last entry together",
@@ -375,7 +375,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-traversal",
+        "clerestory report kd-traversal kd-rays",
         part(
             "PM-TR-1",
             "traversal of kd-trees with a stack",
@@ -400,7 +400,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-traversal",
+        "clerestory report kd-traversal kd-rays",
         part(
             "PM-TR-3",
             "the same without a stack, by a word of flags",
@@ -414,7 +414,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-traversal",
+        "clerestory report kd-traversal kd-rays",
         part(
             "PM-TR-4",
             "flags with push-down",
@@ -427,7 +427,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-traversal",
+        "clerestory report kd-traversal kd-rays",
         part(
             "PM-TR-5",
             "flags with a short stack",
@@ -440,7 +440,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report kd-traversal",
+        "clerestory report kd-traversal kd-rays",
         part(
             "PM-TR-6",
             "flags with both",
@@ -522,7 +522,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report persistent-threads",
+        "clerestory report persistent-threads kd-threads",
         part(
             "PM-X-1",
             "closest hits of a buffer of rays: one thread a ray",
@@ -536,7 +536,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report persistent-threads",
+        "clerestory report persistent-threads kd-threads",
         part(
             "PM-X-2",
             "closest hits of a buffer of rays: persistent threads on a queue with quotas",

@@ -10,6 +10,8 @@ mod materials;
 mod media;
 mod textures;
 
+use std::path::Path;
+
 use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
@@ -82,12 +84,20 @@ impl GpuScene {
     /// # Errors
     /// As [`GpuScene::new`], and [`Error::Setting`](crate::Error::Setting) for settings of the index that are out of range.
     pub fn with_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind) -> Result<Self> {
+        Self::with_kept_index(gpu, scene, kind, None)
+    }
+
+    /// As [`GpuScene::with_index`]; with a folder a kd-tree is read from there where the same was kept before, and kept there otherwise.
+    ///
+    /// # Errors
+    /// As [`GpuScene::with_index`]; what cannot be read or written there is none.
+    pub fn with_kept_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind, folder: Option<&Path>) -> Result<Self> {
         scene.check()?;
         let profile = SceneProfile::of(scene);
         let mut geometry = Geometry::flatten(scene, &profile)?;
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
-        let index = kind.build_for(gpu, &geometry.corners())?;
+        let index = kind.build_or_read_for(gpu, &geometry.corners(), folder)?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
         let placed = materials

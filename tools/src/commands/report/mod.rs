@@ -33,6 +33,7 @@ Examples:
   clerestory report samplers                       into out/report/samplers: index.html, report.md, report.json, CSV, plots, pictures
   clerestory report convergence roulette           two of them
   clerestory report map-quality --page RESULTS.md  its tables also into a part of that page
+  clerestory report kd-or-bvh --scene model.ply    a kd-tree beside bounding volumes on a model of your own
   clerestory report my-experiment.toml             an experiment of your own; the format is that of tools/experiments/
   clerestory report                                error against time on surfaces and in media, also into RESULTS.md
   clerestory report --smoke                        its smallest form, under two minutes on two cores
@@ -54,7 +55,7 @@ pub struct Arguments {
     /// The smallest form: small pictures, few samples, two repeats; into a folder NAME-smoke
     #[arg(long)]
     smoke: bool,
-    /// Scenes in place of the experiment's; may be given several times
+    /// Scenes in place of the experiment's, of sweeps and of experiments on kd-trees; may be given several times
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<String>,
     /// Pictures of each budget in place of the experiment's number
@@ -205,6 +206,7 @@ fn measure(
     let folder = folder(arguments, experiment);
     let context = Context {
         smoke: arguments.smoke,
+        scenes: &arguments.scenes,
         gpu: &open,
         folder: &folder,
         watch: bar,

@@ -25,6 +25,8 @@ use super::watch::Watch;
 pub struct Context<'a> {
     /// Few inputs, for a quick look.
     pub smoke: bool,
+    /// Addresses of scenes to measure in place of a measure's own, for those that measure scenes; none for its own.
+    pub scenes: &'a [String],
     /// Opens the device, for measures that need one.
     pub gpu: &'a dyn Fn() -> Result<Gpu>,
     /// For files beside the tables; a measure that writes some makes it.
@@ -75,6 +77,8 @@ pub const MEASURES: &[Measure] = &[
     on_device("kd-heuristics", kd::kd_heuristics::measure),
     on_device("kd-or-bvh", kd::kd_or_bvh::measure),
     on_host("kd-probability", kd::kd_probability::measure),
+    on_device("kd-rays", kd::kd_rays::measure),
+    on_device("kd-threads", kd::kd_threads::measure),
     on_device("kd-traversal", kd::kd_traversal::measure),
     on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
     on_device("map-construction", photon_maps::map_construction::measure),
@@ -123,6 +127,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let context = Context {
             smoke: true,
+            scenes: &[],
             gpu,
             folder: folder.path(),
             watch: &Unwatched,

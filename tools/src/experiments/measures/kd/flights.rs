@@ -6,6 +6,9 @@
 //!
 //! Guarantee: deterministic.
 
+use std::borrow::Cow;
+use std::path::Path;
+
 use clerestory::accel::kd::{KdCaches, KdCounters, KdSettings, KdTraversal, KdTree, Scheme};
 use clerestory::accel::trace::{Query, RayTracer, TraceSettings};
 use clerestory::accel::{Aabb, Hit, Ray, RayIndex};
@@ -20,75 +23,96 @@ use crate::geometry;
 use crate::timing::{median, timed};
 
 /// A scene with a light, and what it stands for in the source's tables.
+#[derive(Clone)]
 pub struct Case {
     /// Address of the scene.
-    pub scene: &'static str,
+    pub scene: Cow<'static, str>,
     /// The source's scene.
     pub counterpart: &'static str,
-    /// A light among the surfaces, metres.
-    pub light: Vec3,
+    /// A light among the surfaces, metres; `None` for one [`outside`] of them.
+    pub light: Option<Vec3>,
+}
+
+const fn case(scene: &'static str, counterpart: &'static str, light: Vec3) -> Case {
+    Case {
+        scene: Cow::Borrowed(scene),
+        counterpart,
+        light: Some(light),
+    }
 }
 
 /// The source's five scenes.
 pub static CASES: [Case; 5] = [
-    Case {
-        scene: "builtin:box-room?source=point",
-        counterpart: "Scene 6",
-        light: Vec3::new(3.0, 2.5, 3.0),
-    },
-    Case {
-        scene: "builtin:atrium?source=point",
-        counterpart: "Sponza",
-        light: Vec3::new(0.0, 4.0, 0.0),
-    },
-    Case {
-        scene: "builtin:cathedral?source=point",
-        counterpart: "Sibenik",
-        light: Vec3::new(0.0, 7.0, 20.0),
-    },
-    Case {
-        scene: "builtin:forest?source=point",
-        counterpart: "Fairy",
-        light: Vec3::new(0.0, 3.0, 0.0),
-    },
-    Case {
-        scene: "builtin:conference?source=point",
-        counterpart: "Conference",
-        light: Vec3::new(6.0, 2.6, 4.0),
-    },
+    case("builtin:box-room?source=point", "Scene 6", Vec3::new(3.0, 2.5, 3.0)),
+    case("builtin:atrium?source=point", "Sponza", Vec3::new(0.0, 4.0, 0.0)),
+    case("builtin:cathedral?source=point", "Sibenik", Vec3::new(0.0, 7.0, 20.0)),
+    case("builtin:forest?source=point", "Fairy", Vec3::new(0.0, 3.0, 0.0)),
+    case(
+        "builtin:conference?source=point",
+        "Conference",
+        Vec3::new(6.0, 2.6, 4.0),
+    ),
 ];
 
 impl Case {
-    /// The scene's name, with its parameters but for the light.
-    pub fn name(&self) -> &'static str {
-        self.scene
-            .trim_start_matches("builtin:")
-            .trim_end_matches("?source=point")
+    /// One of the engine's scenes that stands for none of the source's.
+    pub const fn of_our_own(scene: &'static str, light: Vec3) -> Self {
+        case(scene, "none", light)
+    }
+
+    /// A scene of any address, lit from outside; where it has one camera, that flies around it.
+    pub fn at(address: &str) -> Self {
+        Self {
+            scene: Cow::Owned(address.to_owned()),
+            counterpart: "none",
+            light: None,
+        }
+    }
+
+    /// The scene's name, with its parameters but for the light; of a file the name alone.
+    pub fn name(&self) -> &str {
+        match self.scene.strip_prefix("builtin:") {
+            Some(name) => name.trim_end_matches("?source=point"),
+            None => {
+                let file = Path::new(self.scene.as_ref()).file_name();
+                file.and_then(|name| name.to_str()).unwrap_or(&self.scene)
+            }
+        }
+    }
+
+    /// Where its light is.
+    pub fn light(&self, surfaces: &Surfaces) -> Vec3 {
+        self.light.unwrap_or_else(|| outside(surfaces))
     }
 }
 
-/// The source's scenes that a run looks at: of a quick look the first alone.
-pub fn cases(context: &Context<'_>) -> &'static [Case] {
-    if context.smoke { &CASES[..1] } else { &CASES }
+/// The scenes that a run looks at: those that it was told, or the source's, of a quick look the first alone.
+pub fn cases(context: &Context<'_>) -> Vec<Case> {
+    told(context).unwrap_or_else(|| if context.smoke { &CASES[..1] } else { &CASES[..] }.to_vec())
+}
+
+/// The scenes that a run was told to look at.
+pub fn told(context: &Context<'_>) -> Option<Vec<Case>> {
+    let told = context.scenes.iter().map(|address| Case::at(address));
+    (!context.scenes.is_empty()).then(|| told.collect())
 }
 
 /// Loads each scene, flies through it, and measures that, until it is stopped.
 ///
 /// # Errors
 /// Those of scenes, and the measure's first.
-pub fn each_flight<'a>(
+pub fn each_flight(
     context: &Context<'_>,
-    cases: impl ExactSizeIterator<Item = &'a Case>,
-    mut measure: impl FnMut(&'a Case, &Surfaces, &Flight) -> Result<()>,
+    cases: &[Case],
+    mut measure: impl FnMut(&Case, &Surfaces, &Flight) -> Result<()>,
 ) -> Result<()> {
-    let count = cases.len();
-    for (done, case) in cases.enumerate() {
+    for (done, case) in cases.iter().enumerate() {
         if context.watch.stopped() {
             break;
         }
-        context.watch.begin(case.name(), done, count);
-        let surfaces = Surfaces::load(case.scene)?;
-        let flight = fly(context, case, &surfaces, case.light)?;
+        context.watch.begin(case.name(), done, cases.len());
+        let surfaces = Surfaces::load(&case.scene)?;
+        let flight = fly(context, case, &surfaces, case.light(&surfaces))?;
         measure(case, &surfaces, &flight)?;
     }
     Ok(())
@@ -145,15 +169,35 @@ fn frames(cameras: &[Camera], count: u32) -> Result<Vec<Camera>> {
     Ok((0..count).map(frame).collect())
 }
 
+/// Once around what the surfaces fill, on a circle about the vertical.
+fn around(camera: &Camera, surfaces: &Surfaces, count: u32) -> Vec<Camera> {
+    let bounds = bounds(surfaces);
+    let centre = (0.5 * (bounds.lower + bounds.upper)).as_dvec3();
+    let frame = |i: u32| {
+        let turn = DAffine3::from_rotation_y(std::f64::consts::TAU * f64::from(i) / f64::from(count));
+        let about_centre = DAffine3::from_translation(centre) * turn * DAffine3::from_translation(-centre);
+        Camera {
+            transform: about_centre * camera.transform,
+            ..camera.clone()
+        }
+    };
+    (0..count).map(frame).collect()
+}
+
 /// The rays of a flight with the light in this place: 10 frames of 96 × 96 pixels, 2 of 8 × 8 in a quick look.
 ///
 /// # Errors
 /// Those of scenes, and [`Error::Setting`] for one without a camera.
 pub fn fly(context: &Context<'_>, case: &Case, surfaces: &Surfaces, light: Vec3) -> Result<Flight> {
     let (count, side) = if context.smoke { (2, 8) } else { (10, 96) };
-    let scene = scene::load(case.scene)?;
+    let scene = scene::load(&case.scene)?;
     let mut flight = Flight::default();
-    for camera in frames(&scene.cameras, count)? {
+    let cameras = match &scene.cameras[..] {
+        // A model stands free.
+        [only] if case.light.is_none() => around(only, surfaces, count),
+        cameras => frames(cameras, count)?,
+    };
+    for camera in cameras {
         for (origin, direction) in geometry::camera_rays(&camera, side)? {
             for (bounce, (origin, direction, meeting)) in surfaces.follow(origin, direction).into_iter().enumerate() {
                 let rays = if bounce == 0 {
@@ -172,27 +216,36 @@ pub fn fly(context: &Context<'_>, case: &Case, surfaces: &Surfaces, light: Vec3)
     Ok(flight)
 }
 
+fn bounds(surfaces: &Surfaces) -> Aabb {
+    let corners = surfaces.triangles.iter().flatten();
+    corners.fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner))
+}
+
 /// A light far outside of what the surfaces fill, above it.
 pub fn outside(surfaces: &Surfaces) -> Vec3 {
-    let corners = surfaces.triangles.iter().flatten();
-    let bounds = corners.fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner));
+    let bounds = bounds(surfaces);
     let extent = bounds.upper - bounds.lower;
     0.5 * (bounds.lower + bounds.upper) + extent.length() * Vec3::new(0.9, 2.0, 0.7)
 }
 
-/// A tree like the source's: SIROH over the triangles' boxes.
+/// Trees like the source's, by the least number of triangles that they split: SIROH over the triangles' boxes. Its text has leaves of 4; its
+/// numbers of nodes are nearer to those of leaves of 1.
+pub const SOURCE_LEAVES: [u32; 2] = [4, 1];
+
+/// One of them.
 ///
 /// # Errors
 /// As [`KdTree::build`].
-pub fn source_tree(surfaces: &Surfaces) -> Result<KdTree> {
+pub fn source_tree(surfaces: &Surfaces, leaf_size: u32) -> Result<KdTree> {
     let settings = KdSettings {
         clip: false,
+        leaf_size,
         ..KdSettings::default()
     };
     KdTree::build(&surfaces.triangles, &settings)
 }
 
-/// Hits of the rays that ask for the closest, and the exact work of all rays, on the host.
+/// Hits of the rays that ask for the closest and of those that ask for any, and the exact work of all, on the host.
 ///
 /// # Errors
 /// [`Error::Setting`] for caches that do not go with the scheme.
@@ -201,7 +254,7 @@ pub fn trace(
     scheme: Scheme,
     caches: KdCaches,
     [closest, any]: [&[Ray]; 2],
-) -> Result<(Vec<Hit>, KdCounters)> {
+) -> Result<([Vec<Hit>; 2], KdCounters)> {
     let mut counters = KdCounters::default();
     let mut run = |traversal: KdTraversal, ray: &Ray| {
         let mut traversal = traversal.with_caches(caches)?;
@@ -209,16 +262,28 @@ pub fn trace(
         Ok(traversal.hit)
     };
     let hits = closest.iter().map(|ray| run(KdTraversal::closest(scheme, ray), ray));
-    let hits = hits.collect::<Result<_>>()?;
-    for ray in any {
-        run(KdTraversal::any(scheme, ray), ray)?;
-    }
-    Ok((hits, counters))
+    let closest = hits.collect::<Result<_>>()?;
+    let hits = any.iter().map(|ray| run(KdTraversal::any(scheme, ray), ray));
+    let any = hits.collect::<Result<_>>()?;
+    Ok(([closest, any], counters))
 }
 
-/// How many of the hits are not those expected.
+fn bits(hit: &Hit) -> [u32; 4] {
+    let [u, v] = hit.barycentrics.map(f32::to_bits);
+    [hit.t.to_bits(), u, v, hit.triangle]
+}
+
+/// How many of the hits are not those expected, to the bit; those that are missing too.
 pub fn different(hits: &[Hit], expected: &[Hit]) -> u64 {
-    hits.iter().zip(expected).filter(|(a, b)| a != b).count() as u64
+    let pairs = hits.iter().zip(expected);
+    let missing = hits.len().abs_diff(expected.len());
+    (pairs.filter(|(a, b)| bits(a) != bits(b)).count() + missing) as u64
+}
+
+/// The same for both kinds of rays.
+pub fn different_of_both(hits: &[Vec<Hit>; 2], expected: &[Vec<Hit>; 2]) -> u64 {
+    let pairs = hits.iter().zip(expected);
+    pairs.map(|(hits, expected)| different(hits, expected)).sum()
 }
 
 /// What a value changes in the first, in per cent; nothing where that is nothing.
@@ -234,8 +299,15 @@ pub fn change(value: f64, first: f64) -> f64 {
 const REPEATS: usize = 5;
 const SMOKE_REPEATS: usize = 1;
 
-/// Lets the device trace the same rays in several indexes in turns, with settings but for the query. Millions of rays a second of each,
-/// medians: closest hits, any hits, both together.
+/// What a race found of one index.
+pub struct Raced {
+    /// Millions of rays a second, medians: closest hits, any hits, both together.
+    pub rates: [f64; 3],
+    /// What the last of the timed runs found, closest hits and any hits.
+    pub hits: [Vec<Hit>; 2],
+}
+
+/// Lets the device trace the same rays in several indexes in turns, with settings but for the query.
 ///
 /// # Errors
 /// Those of uploads and of submissions.
@@ -244,7 +316,7 @@ pub fn race<'a>(
     gpu: &Gpu,
     flight: &Flight,
     indexes: impl IntoIterator<Item = (&'a dyn RayIndex, TraceSettings)>,
-) -> Result<Vec<[f64; 3]>> {
+) -> Result<Vec<Raced>> {
     let tracers = indexes.into_iter().map(|(index, settings)| {
         let of = |query| {
             let settings = TraceSettings { query, ..settings };
@@ -254,26 +326,30 @@ pub fn race<'a>(
     });
     let tracers = tracers.collect::<Result<Vec<_>>>()?;
     let mut seconds = vec![[Vec::new(), Vec::new()]; tracers.len()];
+    let mut hits = vec![[Vec::new(), Vec::new()]; tracers.len()];
     let rays = [&flight.closest(), &flight.shadow];
     for repeat in 0..=if context.smoke { SMOKE_REPEATS } else { REPEATS } {
-        for (both, seconds) in tracers.iter().zip(&mut seconds) {
-            for ((tracer, rays), seconds) in both.iter().zip(rays).zip(seconds) {
-                let (traced, wall) = timed(|| tracer.trace(rays));
-                let on_device = traced?.seconds();
+        for (tracer, one) in tracers.iter().enumerate() {
+            for query in 0..one.len() {
+                let (traced, wall) = timed(|| one[query].trace(rays[query]));
+                let traced = traced?;
+                let on_device = traced.seconds();
                 if repeat > 0 {
-                    seconds.push(if on_device > 0.0 { on_device } else { wall });
+                    seconds[tracer][query].push(if on_device > 0.0 { on_device } else { wall });
+                    hits[tracer][query] = traced.hits;
                 }
             }
         }
     }
     let [closest, any] = rays.map(|rays| 1e-6 * rays.len() as f64);
-    let rates = seconds.into_iter().map(|both| {
+    let raced = seconds.into_iter().zip(hits).map(|(both, hits)| {
         let [of_closest, of_any] = both.map(median);
-        [
+        let rates = [
             closest / of_closest,
             any / of_any,
             (closest + any) / (of_closest + of_any),
-        ]
+        ];
+        Raced { rates, hits }
     });
-    Ok(rates.collect())
+    Ok(raced.collect())
 }

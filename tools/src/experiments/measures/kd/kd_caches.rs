@@ -4,16 +4,16 @@
 //! Dublin, 2011, tables 4.8 and 4.10.
 
 use clerestory::Result;
+use clerestory::accel::RayIndex;
 use clerestory::accel::kd::{KdCaches, KdCounters, Scheme};
 use clerestory::accel::trace::TraceSettings;
-use clerestory::accel::{Hit, RayIndex};
 
-use super::flights::{cases, change, different, each_flight, race, source_tree, trace};
+use super::flights::{SOURCE_LEAVES, cases, change, different_of_both, each_flight, race, source_tree, trace};
 use crate::experiments::measures::Context;
 use crate::experiments::table::{Cell, Table};
 
 /// The forms of [`KdCaches::COMPARED`].
-const NAMES: [&str; 7] = [
+pub(super) const NAMES: [&str; 7] = [
     "none",
     "nodes",
     "last entry",
@@ -85,8 +85,10 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         &[
             "scene",
             "counterpart",
+            "leaves of",
             "caches",
             "hits that differ",
+            "timed hits that differ",
             "inner nodes a ray from memory",
             "change of nodes (%)",
             "source: nodes (%)",
@@ -102,49 +104,54 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "source: speed (%)",
         ],
     );
-    each_flight(context, cases(context).iter(), |case, surfaces, flight| {
-        let tree = source_tree(surfaces)?;
-        let settings = KdCaches::COMPARED.map(|caches| TraceSettings {
-            caches,
-            ..TraceSettings::persistent(gpu.caps())
-        });
-        let contenders = settings.map(|settings| (&tree as &dyn RayIndex, settings));
-        let rates = race(context, &gpu, flight, contenders)?;
-        let closest = flight.closest();
-        let of = |caches| trace(&tree, Scheme::Stack, caches, [&closest, &flight.shadow]);
-        let traced = KdCaches::COMPARED.into_iter().map(of).collect::<Result<Vec<_>>>()?;
+    each_flight(context, &cases(context), |case, surfaces, flight| {
         let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
-        let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
-        let of = |(_, work): &(Vec<Hit>, KdCounters)| {
-            [
-                each(work.nodes - work.cached_nodes),
-                each(work.pushes + work.pops),
-                each(work.bytes()),
-            ]
-        };
-        let first = of(&traced[0]);
-        for (i, (name, one)) in NAMES.into_iter().zip(&traced).enumerate() {
-            let found = of(one);
-            let of_source = |of: fn(&Published) -> &[f64; 6]| {
-                Cell::from(published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]))
+        for leaf_size in SOURCE_LEAVES {
+            let tree = source_tree(surfaces, leaf_size)?;
+            let settings = KdCaches::COMPARED.map(|caches| TraceSettings {
+                caches,
+                ..TraceSettings::persistent(gpu.caps())
+            });
+            let contenders = settings.map(|settings| (&tree as &dyn RayIndex, settings));
+            let raced = race(context, &gpu, flight, contenders)?;
+            let closest = flight.closest();
+            let of = |caches| trace(&tree, Scheme::Stack, caches, [&closest, &flight.shadow]);
+            let traced = KdCaches::COMPARED.into_iter().map(of).collect::<Result<Vec<_>>>()?;
+            let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
+            let of = |work: &KdCounters| {
+                [
+                    each(work.nodes - work.cached_nodes),
+                    each(work.pushes + work.pops),
+                    each(work.bytes()),
+                ]
             };
-            let mut row: Vec<Cell> = vec![
-                case.name().into(),
-                case.counterpart.into(),
-                name.into(),
-                different(&one.0, &traced[0].0).into(),
-            ];
-            let sources: [fn(&Published) -> &[f64; 6]; 3] = [|row| &row.nodes, |row| &row.entries, |row| &row.bytes];
-            for ((value, first), source) in found.into_iter().zip(first).zip(sources) {
-                row.extend([value.into(), change(value, first).into(), of_source(source)]);
+            let (expected, without) = (&traced[0].0, of(&traced[0].1));
+            for (i, (name, (hits, work))) in NAMES.into_iter().zip(&traced).enumerate() {
+                let of_source = |of: fn(&Published) -> &[f64; 6]| {
+                    Cell::from(published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]))
+                };
+                let mut row: Vec<Cell> = vec![
+                    case.name().into(),
+                    case.counterpart.into(),
+                    u64::from(leaf_size).into(),
+                    name.into(),
+                    different_of_both(hits, expected).into(),
+                    different_of_both(&raced[i].hits, expected).into(),
+                ];
+                let sources: [fn(&Published) -> &[f64; 6]; 3] =
+                    [|row| &row.nodes, |row| &row.entries, |row| &row.bytes];
+                for ((value, first), source) in of(work).into_iter().zip(without).zip(sources) {
+                    row.extend([value.into(), change(value, first).into(), of_source(source)]);
+                }
+                let rate = |i: usize| raced[i].rates[2];
+                row.extend([
+                    each(work.nodes).into(),
+                    rate(i).into(),
+                    change(rate(i), rate(0)).into(),
+                    of_source(|row| &row.speed),
+                ]);
+                table.row(row);
             }
-            row.extend([
-                each(one.1.nodes).into(),
-                rates[i][2].into(),
-                change(rates[i][2], rates[0][2]).into(),
-                of_source(|row| &row.speed),
-            ]);
-            table.row(row);
         }
         if let Some(published) = published {
             let [nodes, entries, bytes] = published.none;
@@ -157,13 +164,14 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         Ok(())
     })?;
     table.note(
-        "Flights as in `kd-heuristics`, SIROH trees over boxes with leaves of 4, as the source's text has them, though its trees have many more \
-         nodes (see there); traversal with a stack. Counts are exact and the same on every \
-         machine; bytes by the source's model of 8 for each node fetched from memory and each entry written or read there. The nodes \
-         that a workgroup loads into its cache beforehand are in none of these counts. On a software driver shared memory and registers are \
-         ordinary cached memory, and its cap on loops lets a workgroup trace only some dozens of rays for each of these loads: the times \
-         say what the forms cost there, nothing about what they would gain on a device with such memories, where the source found +6 to \
-         −52 %. Instructions are not counted.",
+        "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer to \
+         the numbers of nodes that it gives (see there). Traversal with a stack. Hits, of closest and of any hits, are compared with \
+         those of the host without caches: first the host's, then those of the kernels that were timed. Counts are exact and the same on \
+         every machine; bytes by the source's model of 8 for each node fetched from memory and each entry written or read there. The \
+         nodes that a workgroup loads into its cache beforehand are in none of these counts. On a software driver shared memory and \
+         registers are ordinary cached memory, and its cap on loops lets a workgroup trace only some dozens of rays for each of these \
+         loads: the times say what the forms cost there, nothing about what they would gain on a device with such memories, where the \
+         source found +6 to −52 %. Instructions are not counted.",
     );
     Ok(vec![table])
 }

@@ -6,23 +6,22 @@
 
 use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
-use clerestory::accel::kd::{Heuristic, KdSettings};
+use clerestory::accel::kd::{Heuristic, KdSettings, Scheme};
 use clerestory::accel::lbvh::BuildQuality;
 use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::{IndexKind, Ray, RayIndex, TraversalCounters};
 use glam::Vec3;
 
-use super::flights::{CASES, Case, Flight, each_flight, race};
+use super::flights::{CASES, Case, Flight, different, each_flight, race, told};
+use super::kd_traversal::SCHEMES;
+use super::real_models;
 use crate::experiments::measures::Context;
+use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
 use crate::experiments::table::{Cell, Table};
-use crate::timing::{median, repeated, timed};
+use crate::timing::{median, timed};
 
 const fn soup(scene: &'static str) -> Case {
-    Case {
-        scene,
-        counterpart: "",
-        light: Vec3::new(0.0, 3.0, 0.0),
-    }
+    Case::of_our_own(scene, Vec3::new(0.0, 3.0, 0.0))
 }
 
 /// As many triangles each, of growing size: the sweep over depth complexity.
@@ -34,23 +33,47 @@ static SOUPS: [Case; 4] = [
 ];
 static SMOKE_SOUP: Case = soup("builtin:triangle-soup?n=500&size=0.1");
 
+/// A tree that took longer to build than these seconds is not built again for a median.
+const LONG_BUILD: f64 = 3.0;
+/// Timed builds of others, after one to warm up.
+const REPEATS: usize = 3;
+
+/// An index and the ways through it that are timed.
+struct Kind {
+    words: &'static str,
+    index: IndexKind,
+    ways: &'static [(&'static str, Scheme)],
+}
+
+const BY_STACK: [(&str, Scheme); 1] = [("stack", Scheme::Stack)];
+
 /// Indexes by name, kd-trees first.
-fn kinds() -> [(&'static str, IndexKind); 4] {
-    let kd = |heuristic| {
-        IndexKind::Kd(KdSettings {
+fn kinds() -> [Kind; 6] {
+    let kd = |words, heuristic, leaf_size| Kind {
+        words,
+        index: IndexKind::Kd(KdSettings {
             heuristic,
+            leaf_size,
             ..KdSettings::default()
-        })
+        }),
+        ways: &SCHEMES,
+    };
+    let bvh = |words, index| Kind {
+        words,
+        index,
+        ways: &BY_STACK,
     };
     [
-        ("kd, SIROH", kd(Heuristic::InteriorOrigin)),
-        ("kd, surface area", kd(Heuristic::SurfaceArea)),
-        ("BVH, binned", IndexKind::Bvh2(Bvh2Settings::default())),
-        ("BVH, linear and optimised", IndexKind::lbvh(BuildQuality::High)),
+        kd("kd, SIROH", Heuristic::InteriorOrigin, 4),
+        kd("kd, surface area", Heuristic::SurfaceArea, 4),
+        kd("kd, SIROH, leaves of 1", Heuristic::InteriorOrigin, 1),
+        kd("kd, surface area, leaves of 1", Heuristic::SurfaceArea, 1),
+        bvh("BVH, binned", IndexKind::Bvh2(Bvh2Settings::default())),
+        bvh("BVH, linear and optimised", IndexKind::lbvh(BuildQuality::High)),
     ]
 }
 /// How many of them are kd-trees.
-const KD_TREES: usize = 2;
+const KD_TREES: usize = 4;
 
 /// Triangles along a ray, all of them.
 fn layers(index: &Bvh2, rays: &[Ray]) -> f64 {
@@ -97,6 +120,46 @@ fn pays_after(kd: (f64, f64), bvh: (f64, f64)) -> Option<f64> {
     (kd_rate > bvh_rate).then(|| (1e-3 * (kd_build - bvh_build)).max(0.0) / (1.0 / bvh_rate - 1.0 / kd_rate))
 }
 
+/// A way through one of the indexes.
+struct Way {
+    /// Which.
+    index: usize,
+    words: &'static str,
+    by: &'static str,
+    scheme: Scheme,
+}
+
+impl Way {
+    fn all(index: usize, kind: &Kind) -> impl Iterator<Item = Self> {
+        let words = kind.words;
+        kind.ways.iter().map(move |(by, scheme)| Self {
+            index,
+            words,
+            by,
+            scheme: *scheme,
+        })
+    }
+}
+
+/// An index and the median of its builds, milliseconds.
+fn build(context: &Context<'_>, kind: &Kind, surfaces: &Surfaces) -> Result<(Box<dyn RayIndex>, f64)> {
+    let once = || {
+        let (index, time) = timed(|| kind.index.build(&surfaces.triangles));
+        index.map(|index| (index, 1e3 * time))
+    };
+    let (mut index, first) = once()?;
+    if context.smoke || first > 1e3 * LONG_BUILD {
+        return Ok((index, first));
+    }
+    let mut times = Vec::new();
+    for _ in 0..REPEATS {
+        let (again, time) = once()?;
+        index = again;
+        times.push(time);
+    }
+    Ok((index, median(times)))
+}
+
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
@@ -107,6 +170,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "triangles",
             "triangles along a ray",
             "index",
+            "timed closest hits that differ",
             "build (ms)",
             "MiB",
             "steps a ray, closest",
@@ -114,6 +178,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "closest hits (M rays/s)",
             "any hits (M rays/s)",
             "both (M rays/s)",
+            "fastest traversal",
+            "both by it (M rays/s)",
         ],
     );
     let mut answer = Table::new(
@@ -121,6 +187,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         &[
             "scene",
             "triangles along a ray",
+            "best kd-tree",
+            "best BVH",
             "closest hits: kd / BVH",
             "any hits: kd / BVH",
             "both: kd / BVH",
@@ -128,35 +196,62 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "kd pays for its build after (M rays)",
         ],
     );
-    let scenes: Vec<&Case> = match context.smoke {
-        true => vec![&SMOKE_SOUP],
-        false => CASES.iter().chain(&SOUPS).collect(),
+    let mut models = None;
+    let scenes = match (told(context), context.smoke) {
+        (Some(told), _) => told,
+        (None, true) => vec![SMOKE_SOUP.clone()],
+        (None, false) => {
+            let found = models.insert(real_models::find());
+            [&CASES[..], &SOUPS, &found.cases].concat()
+        }
     };
-    each_flight(context, scenes.into_iter(), |case, surfaces, flight| {
+    each_flight(context, &scenes, |case, surfaces, flight| {
         let name = case.name();
         let layers = layers(surfaces.index(), &flight.camera);
         let mut measured = Vec::new();
         let mut built = Vec::new();
-        for (_, kind) in kinds() {
-            let (index, times) = repeated(if context.smoke { 0 } else { 3 }, || {
-                let (index, time) = timed(|| kind.build(&surfaces.triangles));
-                index.map(|index| (index, 1e3 * time))
-            })?;
+        for kind in &kinds() {
+            let (index, build) = build(context, kind, surfaces)?;
             measured.push(Measured {
-                build: median(times),
+                build,
                 bytes: index.statistics().bytes,
                 steps: steps(&*index, flight),
             });
             built.push(index);
         }
-        let contenders = built.iter().map(|index| (&**index, TraceSettings::ray_per_thread()));
-        let rates = race(context, &gpu, flight, contenders)?;
-        for (((index, _), one), rates) in kinds().iter().zip(&measured).zip(&rates) {
+        let ways: Vec<Way> = kinds()
+            .iter()
+            .enumerate()
+            .flat_map(|(index, kind)| Way::all(index, kind))
+            .collect();
+        let contenders = ways.iter().map(|way| {
+            let settings = TraceSettings {
+                scheme: way.scheme,
+                ..TraceSettings::ray_per_thread()
+            };
+            (&*built[way.index], settings)
+        });
+        let raced = race(context, &gpu, flight, contenders)?;
+        let fastest = |fit: &dyn Fn(&Way) -> bool, query: usize| {
+            let fit = (0..ways.len()).filter(|way| fit(&ways[*way]));
+            fit.max_by(|a, b| raced[*a].rates[query].total_cmp(&raced[*b].rates[query]))
+                .unwrap_or_default()
+        };
+        for (index, (kind, one)) in kinds().iter().zip(&measured).enumerate() {
+            let is_of_it = |way: &Way| way.index == index;
+            let by_stack = fastest(&|way| is_of_it(way) && way.scheme == Scheme::Stack, 2);
+            let rates = raced[by_stack].rates;
+            let fastest = fastest(&is_of_it, 2);
+            let hits = ways.iter().zip(&raced).filter(|(way, _)| is_of_it(way));
+            let differ = hits
+                .map(|(_, one)| different(&one.hits[0], &raced[0].hits[0]))
+                .sum::<u64>();
             indexes.row([
                 name.into(),
                 (surfaces.triangles.len() as u64).into(),
                 layers.into(),
-                (*index).into(),
+                kind.words.into(),
+                differ.into(),
                 one.build.into(),
                 (one.bytes as f64 / f64::from(1 << 20)).into(),
                 one.steps[0].into(),
@@ -164,38 +259,45 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 rates[0].into(),
                 rates[1].into(),
                 rates[2].into(),
+                ways[fastest].by.into(),
+                raced[fastest].rates[2].into(),
             ]);
         }
-        let best = |of: std::ops::Range<usize>, query: usize| {
-            let by_rate = |a: &usize, b: &usize| rates[*a][query].total_cmp(&rates[*b][query]);
-            of.max_by(by_rate).unwrap_or_default()
-        };
-        let pair = |query| [best(0..KD_TREES, query), best(KD_TREES..measured.len(), query)];
+        let is_kd = |way: &Way| way.index < KD_TREES;
+        let pair = |query| [fastest(&is_kd, query), fastest(&|way| !is_kd(way), query)];
         let ratio = |query| {
             let [kd, bvh] = pair(query);
-            Cell::from(rates[kd][query] / rates[bvh][query])
+            Cell::from(raced[kd].rates[query] / raced[bvh].rates[query])
         };
         let [kd, bvh] = pair(2);
-        let of = |i: usize| (measured[i].build, rates[i][2]);
+        let of = |way: usize| (measured[ways[way].index].build, raced[way].rates[2]);
         answer.row([
             name.into(),
             layers.into(),
+            format!("{}; {}", ways[kd].words, ways[kd].by).into(),
+            ways[bvh].words.into(),
             ratio(0),
             ratio(1),
             ratio(2),
-            (measured[kd].build / measured[bvh].build).into(),
+            (of(kd).0 / of(bvh).0).into(),
             pays_after(of(kd), of(bvh)).map_or("never".into(), Into::into),
         ]);
         Ok(())
     })?;
     indexes.note(
         "Flights as in `kd-heuristics`; the soups have as many triangles each, of growing size, and a camera that stands still. Steps are \
-         inner nodes and triangles, exact counts: a step of a kd-tree reads a plane of 8 bytes, one of a bounding volume hierarchy two boxes \
-         in 64. kd-trees with default settings (leaves of 4, triangles weighed by their parts) and traversal by a stack; `kd-heuristics` and \
-         `kd-traversal` show what other settings would give. Times are medians of runs that take turns; builds on all of the host's threads.",
+         inner nodes and triangles, exact counts: a step of a kd-tree reads a plane of 8 bytes, one of a bounding volume hierarchy two \
+         boxes in 64. kd-trees weigh triangles by their parts, with leaves of 4 (the default) and of 1; steps and rates are those by a \
+         stack, and beside them stands the fastest of the five schemes. Hits are those of the timed kernels by every scheme, held against \
+         the first one's. Times are medians of runs that take turns; builds on all of the host's threads, after one to warm up, but those \
+         of more than 3 s, which are timed once.",
     );
+    if let Some(models) = models {
+        indexes.note(models.words);
+    }
     answer.note(
-        "By medians of the same run: the kd-tree and the hierarchy with the higher rate of each kind of rays. On the software driver a \
+        "By medians of the same run: the kd-tree with its traversal and the hierarchy with the highest rate of each kind of rays; those named \
+         are the best of both kinds together. On the software driver a \
          kd-tree is worth building where rays pass through many triangles that overlap each other's boxes and rays are counted in millions; \
          in rooms, halls and woods the hierarchy is faster to trace and several times faster to build.",
     );

@@ -9,7 +9,9 @@ use clerestory::accel::kd::{KdCaches, KdTree, Scheme};
 use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::{Ray, RayIndex};
 
-use super::flights::{cases, change, different, each_flight, race, source_tree, trace};
+use super::flights::{
+    Case, Flight, SOURCE_LEAVES, cases, change, different_of_both, each_flight, race, source_tree, trace,
+};
 use crate::experiments::measures::Context;
 use crate::experiments::table::{Cell, Table};
 
@@ -21,7 +23,7 @@ const fn flags(push_down: bool, short_stack: u32) -> Scheme {
 }
 
 /// The one that others are compared with first.
-const SCHEMES: [(&str, Scheme); 5] = [
+pub(super) const SCHEMES: [(&str, Scheme); 5] = [
     ("stack", Scheme::Stack),
     ("flags", flags(false, 0)),
     ("flags, push-down", flags(true, 0)),
@@ -95,6 +97,22 @@ fn failures(tree: &KdTree, rays: &[&Ray], form: ShiftedRestart) -> [u64; 2] {
     failures
 }
 
+/// Rows of restarts that fail.
+fn restarted(restarts: &mut Table, case: &Case, tree: &KdTree, flight: &Flight) {
+    let step = flight.camera.len().div_ceil(RESTARTED_RAYS).max(1);
+    let some: Vec<&Ray> = flight.camera.iter().step_by(step).collect();
+    for (name, form) in RESTARTS {
+        let [endless, other] = failures(tree, &some, form);
+        restarts.row([
+            case.name().into(),
+            name.into(),
+            (some.len() as u64).into(),
+            endless.into(),
+            other.into(),
+        ]);
+    }
+}
+
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
@@ -103,8 +121,10 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         &[
             "scene",
             "counterpart",
+            "leaves of",
             "scheme",
             "hits that differ",
+            "timed hits that differ",
             "inner nodes a ray",
             "change (%)",
             "source: inner nodes",
@@ -123,69 +143,67 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         "Restarts behind a leaf",
         &["scene", "form", "rays", "rays without an end", "rays with other leaves"],
     );
-    each_flight(context, cases(context).iter(), |case, surfaces, flight| {
-        let tree = source_tree(surfaces)?;
-        let closest = flight.closest();
-        let settings = SCHEMES.map(|(_, scheme)| TraceSettings {
-            scheme,
-            ..TraceSettings::ray_per_thread()
-        });
-        let contenders = settings.map(|settings| (&tree as &dyn RayIndex, settings));
-        let rates = race(context, &gpu, flight, contenders)?;
-        let of = |(_, scheme)| trace(&tree, scheme, KdCaches::default(), [&closest, &flight.shadow]);
-        let traced = SCHEMES.into_iter().map(of).collect::<Result<Vec<_>>>()?;
-        let (expected, by_stack) = &traced[0];
-        let step = flight.camera.len().div_ceil(RESTARTED_RAYS).max(1);
-        let some: Vec<&Ray> = flight.camera.iter().step_by(step).collect();
-        for (name, form) in RESTARTS {
-            let [endless, other] = failures(&tree, &some, form);
-            restarts.row([
-                case.name().into(),
-                name.into(),
-                (some.len() as u64).into(),
-                endless.into(),
-                other.into(),
-            ]);
-        }
+    each_flight(context, &cases(context), |case, surfaces, flight| {
         let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
-        let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
-        for (i, ((name, _), (hits, work))) in SCHEMES.into_iter().zip(&traced).enumerate() {
-            let of_source = |of: fn(&Published) -> &[f64; 4]| {
-                Cell::from(published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]))
-            };
-            table.row([
-                case.name().into(),
-                case.counterpart.into(),
-                name.into(),
-                different(hits, expected).into(),
-                each(work.nodes).into(),
-                change(work.nodes as f64, by_stack.nodes as f64).into(),
-                published.map(|row| row.visits).into(),
-                of_source(|row| &row.changes),
-                each(work.leaves).into(),
-                each(work.restarts).into(),
-                each(work.pushes + work.pops).into(),
-                each(work.bytes()).into(),
-                rates[i][0].into(),
-                rates[i][1].into(),
-                change(rates[i][2], rates[0][2]).into(),
-                of_source(|row| &row.speeds),
-            ]);
+        for leaf_size in SOURCE_LEAVES {
+            let tree = source_tree(surfaces, leaf_size)?;
+            let closest = flight.closest();
+            let settings = SCHEMES.map(|(_, scheme)| TraceSettings {
+                scheme,
+                ..TraceSettings::ray_per_thread()
+            });
+            let contenders = settings.map(|settings| (&tree as &dyn RayIndex, settings));
+            let raced = race(context, &gpu, flight, contenders)?;
+            let of = |(_, scheme)| trace(&tree, scheme, KdCaches::default(), [&closest, &flight.shadow]);
+            let traced = SCHEMES.into_iter().map(of).collect::<Result<Vec<_>>>()?;
+            let (expected, by_stack) = &traced[0];
+            let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
+            for (i, ((name, _), (hits, work))) in SCHEMES.into_iter().zip(&traced).enumerate() {
+                let of_source = |of: fn(&Published) -> &[f64; 4]| {
+                    Cell::from(published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]))
+                };
+                let rates = raced[i].rates;
+                table.row([
+                    case.name().into(),
+                    case.counterpart.into(),
+                    u64::from(leaf_size).into(),
+                    name.into(),
+                    different_of_both(hits, expected).into(),
+                    different_of_both(&raced[i].hits, expected).into(),
+                    each(work.nodes).into(),
+                    change(work.nodes as f64, by_stack.nodes as f64).into(),
+                    published.map(|row| row.visits).into(),
+                    of_source(|row| &row.changes),
+                    each(work.leaves).into(),
+                    each(work.restarts).into(),
+                    each(work.pushes + work.pops).into(),
+                    each(work.bytes()).into(),
+                    rates[0].into(),
+                    rates[1].into(),
+                    change(rates[2], raced[0].rates[2]).into(),
+                    of_source(|row| &row.speeds),
+                ]);
+            }
+            if leaf_size == SOURCE_LEAVES[0] {
+                restarted(&mut restarts, case, &tree, flight);
+            }
         }
         Ok(())
     })?;
     table.note(
-        "Flights as in `kd-heuristics`, SIROH trees over boxes with leaves of 4, as the source's text has them, though its trees have many more \
-         nodes (see there). Here rays go on until leaves begin beyond their hit, so that no rounding loses one. Counts are exact and the same on every machine: inner nodes, \
-         entries of stacks written and read, and bytes by the source's model of 8 for each of these. Visits are hardware independent, so \
-         their changes can be held against the source's; the ranking is the source's, the sizes are not: \
-         flags restart once for each leaf that is left, and rays meet more leaves in these trees. Times are medians of runs that take \
-         turns, one invocation a ray.",
+        "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer to \
+         the numbers of nodes that it gives (see there). Hits, of closest and of any hits, are compared with those of the host by a \
+         stack: first the host's, then those of the kernels that were timed. Here rays go on until leaves begin beyond their hit, so that \
+         no rounding loses one. Counts are exact and the same on every machine: inner nodes, entries of stacks written and read, and \
+         bytes by the source's model of 8 for each of these. Visits are hardware independent, so their changes can be held against the \
+         source's; the ranking is the source's, the sizes are not: flags restart once for each leaf that is left, and rays meet more \
+         leaves in these trees. Times are medians of runs that take turns, one invocation a ray.",
     );
     restarts.note(
         "Without flags a ray that restarts behind the leaf that it has left (at its end, or a step behind it) does not know which of the \
          leaves that begin there it has had: closed intervals meet the last one for ever, open ones never meet leaves without volume, and a \
-         step skips what is thinner or is lost in rounding. Leaves of the whole ray, whatever it hits, beside those by a stack.",
+         step skips what is thinner or is lost in rounding. Leaves of the whole ray, whatever it hits, beside those by a stack, in \
+         the trees with leaves of 4.",
     );
     Ok(vec![table, restarts])
 }

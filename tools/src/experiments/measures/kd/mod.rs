@@ -1,8 +1,57 @@
-//! kd-trees: probabilities of their nodes, what the heuristics and the traversals cost rays, and where they beat bounding volumes.
+//! kd-trees: probabilities of their nodes, what the heuristics and the traversals cost rays, whether all find the same hits, and where they
+//! beat bounding volumes.
 
 pub mod flights;
+mod hit_errors;
 pub mod kd_caches;
 pub mod kd_heuristics;
 pub mod kd_or_bvh;
 pub mod kd_probability;
+pub mod kd_rays;
+pub mod kd_threads;
 pub mod kd_traversal;
+mod ray_kinds;
+mod real_models;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::measures::Context;
+    use crate::experiments::table::Cell;
+    use crate::experiments::watch::Unwatched;
+    use clerestory::gpu::{DeviceKind, Gpu, GpuOptions};
+
+    #[test]
+    fn no_table_has_hits_that_differ() {
+        let scenes = ["builtin:cornell-box".to_owned()];
+        let mut context = Context {
+            smoke: true,
+            scenes: &[],
+            gpu: &|| Gpu::headless(&GpuOptions::default()),
+            folder: std::path::Path::new(""),
+            watch: &Unwatched,
+        };
+        if (context.gpu)().unwrap().caps().kind != DeviceKind::Cpu {
+            // Only software devices must have the host's bits.
+            return;
+        }
+        for (measure, columns) in [
+            (kd_traversal::measure as fn(&Context<'_>) -> _, 2),
+            (kd_caches::measure, 2),
+            (kd_threads::measure, 1),
+            (kd_or_bvh::measure, 1),
+        ] {
+            for scenes in [&[][..], &scenes] {
+                context.scenes = scenes;
+                let table = &measure(&context).unwrap()[0];
+                let differ = (0..table.heads.len()).filter(|column| table.heads[*column].contains("differ"));
+                let differ: Vec<usize> = differ.collect();
+                assert_eq!(differ.len(), columns, "{}", table.title);
+                for row in &table.rows {
+                    assert!(differ.iter().all(|column| row[*column] == Cell::Count(0)), "{row:?}");
+                    assert!(scenes.is_empty() || row[0] == Cell::from("cornell-box"), "{row:?}");
+                }
+            }
+        }
+    }
+}

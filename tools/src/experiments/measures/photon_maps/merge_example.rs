@@ -136,6 +136,7 @@ mod tests {
     fn every_array_of_the_worked_example_is_as_by_hand() {
         let context = Context {
             smoke: true,
+            scenes: &[],
             gpu: &|| Err(Error::setting("device", "none", "is not to be opened")),
             folder: std::path::Path::new(""),
             watch: &Unwatched,

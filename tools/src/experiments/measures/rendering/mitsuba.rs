@@ -217,6 +217,7 @@ mod tests {
             let gpu = || Err(clerestory::Error::setting("device", "none", "is not to be opened"));
             let context = Context {
                 smoke,
+                scenes: &[],
                 gpu: &gpu,
                 folder: std::path::Path::new("folder"),
                 watch: &Unwatched,
