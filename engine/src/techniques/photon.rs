@@ -49,7 +49,7 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
     }
 }
 
-const SETTINGS: [SettingInfo; 14] = [
+const SETTINGS: [SettingInfo; 16] = [
     SettingInfo {
         name: "path_set",
         range: "all | emitted | direct | indirect | bounces=A..B, up to 63",
@@ -69,6 +69,12 @@ const SETTINGS: [SettingInfo; 14] = [
         meaning: "kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials",
     },
     SettingInfo {
+        name: "neighbors",
+        range: "0 … 10000",
+        unit: "photons",
+        meaning: "takes the nearest so many photons of each point under one kernel, as wide as the last is away; 0: photons have kernels of their own",
+    },
+    SettingInfo {
         name: "profile",
         range: "uniform | cone | epanechnikov",
         unit: "",
@@ -78,7 +84,7 @@ const SETTINGS: [SettingInfo; 14] = [
         name: "radius",
         range: "0 or more",
         unit: "m",
-        meaning: "of fixed kernels, greatest axis of others, in the first pass; 0 for a hundredth, or a ninth, of the scene's diagonal",
+        meaning: "of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 for a hundredth, or a ninth, of the scene's diagonal",
     },
     SettingInfo {
         name: "spread",
@@ -127,6 +133,12 @@ const SETTINGS: [SettingInfo; 14] = [
         range: "true | false",
         unit: "",
         meaning: "sees the map after one more diffuse reflection, caustics directly",
+    },
+    SettingInfo {
+        name: "query",
+        range: "single | packet",
+        unit: "",
+        meaning: "points ask the map by themselves, or those of a subgroup together; never changes the picture",
     },
     SettingInfo {
         name: "sampler",

@@ -34,12 +34,17 @@ struct CompactRoot {
 uvec2 compact_counters = uvec2(0u);
 
 #ifdef COMPACT_POINT
+// Whether any point of those that go through the tree together is where the argument says; defined by the includer where there are several.
+#ifndef COMPACT_ANY
+#define COMPACT_ANY(MEETS) (MEETS)
+#endif
+
 // Bits of the three components, x highest.
 uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z); }
 
 bool compact_point_query(CompactRoot root, vec3 point) {
     bool inside = all(lessThan(root.lower, point)) && all(lessThan(point, root.upper));
-    uint next = inside ? root.reference : COMPACT_NOTHING;
+    uint next = COMPACT_ANY(inside) ? root.reference : COMPACT_NOTHING;
     uint stack[COMPACT_STACK_SIZE];
     uint top = 0u;
     for (uint step = 0u; next != COMPACT_NOTHING && step < COMPACT_QUOTA; ++step) {
@@ -53,8 +58,8 @@ bool compact_point_query(CompactRoot root, vec3 point) {
             uint owners = low.w >> COMPACT_MASK_SHIFT << 3 | high.w >> COMPACT_MASK_SHIFT;
             uint outside = compact_bits(greaterThanEqual(uintBitsToFloat(low.xyz), point)) << 3
                          | compact_bits(lessThanEqual(uintBitsToFloat(high.xyz), point));
-            bool in_left = (owners & outside) == 0u;
-            bool in_right = (~owners & outside) == 0u;
+            bool in_left = COMPACT_ANY((owners & outside) == 0u);
+            bool in_right = COMPACT_ANY((~owners & outside) == 0u);
             compact_counters.x += 2u;
             if (in_left && in_right) {
                 stack[top++] = low.w & COMPACT_REFERENCE_MASK;

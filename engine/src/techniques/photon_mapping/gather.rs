@@ -1,18 +1,20 @@
 //! Queries of the photon map where eye paths have arrived: a stage of the path tracer's bounces.
 
 use super::map::PhotonMap;
-use super::settings::PhotonSettings;
-use crate::Result;
+use super::settings::{MapQuery, PhotonSettings};
 use crate::gpu::shaders::constants::{LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD, PATH_SET_STATE_BITS};
 use crate::gpu::shaders::sets::{PathBuffers, PhotonMapSet};
-use crate::gpu::shaders::techniques::photon_mapping::photon_gather;
+use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
 use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, PipelineInfo, Recorder};
 use crate::transport::path_tracer::ArrivalStage;
 use crate::transport::path_tracer::stages::stage_barrier;
 use crate::transport::{GpuScene, PathSet};
+use crate::{Error, Result};
 
 /// Nodes and records after which a query is given up and its place goes through all records instead.
 const QUERY_QUOTA: u32 = 32_768;
+/// The same of each of the rounds in which neighbours are found, and of the sum: six of them stay below the software driver's cap.
+const NEAREST_QUOTA: u32 = 10_000;
 
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -23,11 +25,25 @@ pub struct GatherCounts {
     pub photons: u64,
 }
 
+/// Each point by itself, or those of a subgroup together.
+enum Query {
+    Single(ComputePipeline<photon_gather::Kernel>),
+    Packet(ComputePipeline<photon_gather_packet::Kernel>),
+}
+
+/// What is done where a quota has stopped a query.
+enum Linear {
+    /// All records are gone through. The driver compiles it only if it is dispatched.
+    Records(ComputePipeline<photon_gather::Kernel>),
+    /// Neighbours cannot be found so.
+    Refuse,
+}
+
 /// The kernels of queries.
 pub(super) struct Gather {
     gpu: Gpu,
-    spec: photon_gather::Spec,
-    query: ComputePipeline<photon_gather::Kernel>,
+    query: Query,
+    linear: Linear,
     counters: Buffer,
     gather_states: u32,
     caustic_states: u32,
@@ -37,11 +53,12 @@ pub(super) struct Gather {
 /// Queries of one map, to be recorded with a wave.
 pub(super) struct GatherStage<'a> {
     gather: &'a Gather,
-    linear: ComputePipeline<photon_gather::Kernel>,
     scene: &'a GpuScene,
     map: &'a PhotonMap,
     /// Of stored fluxes, in W a photon.
     scale: f32,
+    neighbors: u32,
+    radius: f32,
 }
 
 type Counters = photon_gather::GatherCounters;
@@ -54,31 +71,60 @@ impl Gather {
         // Photons have been scattered once before they land, and at the point that gathers them.
         let least = if settings.direct_photons { 1 } else { 2 };
         let counts_bounces = set.min_bounces() > least || set.max_bounces().is_some();
-        let spec = photon_gather::Spec {
-            has_metal: bsdf.metal,
-            has_conductor: bsdf.conductor,
-            has_specular_layer: bsdf.specular_layer,
-            has_transmission: bsdf.transmission,
-            has_multiple_scattering: false,
-            separable_masking: false,
-            has_textures: profile.has_textures,
-            has_shading_normals: profile.has_shading_normals,
-            has_normal_maps: profile.has_normal_maps,
-            has_vertex_colors: profile.has_vertex_colors,
-            has_absorption: profile.has_absorption,
-            has_unlit: profile.has_unlit,
-            has_path_automaton: eye.has_automaton(),
-            tells_caustics: settings.final_gather,
-            profile: settings.profile as u32,
-            counts_bounces,
-            compact_quota: QUERY_QUOTA,
-            linear: false,
-            ..Default::default()
+        // Both entry points have the same constants.
+        macro_rules! spec {
+            ($shader:ident, $linear:expr) => {
+                $shader::Spec {
+                    has_metal: bsdf.metal,
+                    has_conductor: bsdf.conductor,
+                    has_specular_layer: bsdf.specular_layer,
+                    has_transmission: bsdf.transmission,
+                    has_multiple_scattering: false,
+                    separable_masking: false,
+                    has_textures: profile.has_textures,
+                    has_shading_normals: profile.has_shading_normals,
+                    has_normal_maps: profile.has_normal_maps,
+                    has_vertex_colors: profile.has_vertex_colors,
+                    has_absorption: profile.has_absorption,
+                    has_unlit: profile.has_unlit,
+                    has_path_automaton: eye.has_automaton(),
+                    tells_caustics: settings.final_gather,
+                    profile: settings.profile as u32,
+                    counts_bounces,
+                    compact_quota: if settings.neighbors > 0 {
+                        NEAREST_QUOTA
+                    } else {
+                        QUERY_QUOTA
+                    },
+                    nearest: settings.neighbors > 0,
+                    linear: $linear,
+                    ..Default::default()
+                }
+            };
+        }
+        let query = match settings.query {
+            MapQuery::Packet if gpu.caps().subgroup.vote => {
+                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, false))?)
+            }
+            MapQuery::Packet => {
+                return Err(Error::MissingFeature {
+                    feature: "VK_SUBGROUP_FEATURE_VOTE_BIT".into(),
+                    needed_by: "photon_gather_packet".into(),
+                    device: gpu.caps().device.clone(),
+                    instead: "ask the map point by point: \"query\": \"single\"".into(),
+                });
+            }
+            MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_gather, false))?),
+        };
+        let linear = if settings.neighbors > 0 {
+            Linear::Refuse
+        } else {
+            Linear::Records(gpu.compute_pipeline(&spec!(photon_gather, true))?)
         };
         let (gather_states, caustic_states) = gathering_states(settings, eye);
         Ok(Self {
-            query: gpu.compute_pipeline(&spec)?,
-            spec,
+            query,
+            linear,
             counters: gpu.buffer(&BufferDesc::storage(
                 "gather counters",
                 size_of::<Counters>() as u64,
@@ -92,23 +138,28 @@ impl Gather {
     }
 
     pub fn pipeline(&self) -> PipelineInfo {
-        self.query.info()
+        match &self.query {
+            Query::Single(kernel) => kernel.info(),
+            Query::Packet(kernel) => kernel.info(),
+        }
     }
 
-    /// Queries of a map whose photons' fluxes are to be multiplied by `scale`.
-    pub fn stage<'a>(&'a self, scene: &'a GpuScene, map: &'a PhotonMap, scale: f64) -> Result<GatherStage<'a>> {
-        let linear = photon_gather::Spec {
-            linear: true,
-            ..self.spec
-        };
-        Ok(GatherStage {
+    /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for.
+    pub fn stage<'a>(
+        &'a self,
+        scene: &'a GpuScene,
+        map: &'a PhotonMap,
+        scale: f64,
+        (neighbors, radius): (u32, f64),
+    ) -> GatherStage<'a> {
+        GatherStage {
             gather: self,
-            // Compiled by the driver only if it is dispatched.
-            linear: self.gpu.compute_pipeline(&linear)?,
             scene,
             map,
             scale: scale as f32,
-        })
+            neighbors,
+            radius: radius as f32,
+        }
     }
 
     /// Counts since they were read last.
@@ -136,6 +187,8 @@ impl GatherStage<'_> {
             scale: self.scale,
             first,
             last,
+            neighbors: self.neighbors,
+            radius: self.radius,
         }
     }
 
@@ -152,18 +205,34 @@ impl ArrivalStage for GatherStage<'_> {
     fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()> {
         let (scene, map) = (self.scene.scene_set(), self.set());
         recorder.pass("photon: gather", |pass| {
-            pass.dispatch_indirect(&self.gather.query, &[paths, &scene, &map], &self.push(0, 0), items)?;
+            match &self.gather.query {
+                Query::Single(kernel) => {
+                    pass.dispatch_indirect(kernel, &[paths, &scene, &map], &self.push(0, 0), items)?;
+                }
+                Query::Packet(kernel) => {
+                    pass.dispatch_indirect(kernel, &[paths, &scene, &map], &bytemuck::cast(self.push(0, 0)), items)?;
+                }
+            }
             stage_barrier(pass);
             Ok(())
         })
     }
 
     fn record_stopped(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()> {
+        let Linear::Records(linear) = &self.gather.linear else {
+            return Err(Error::Overflow {
+                kernel: "photon_gather".into(),
+                what: "steps of a query for neighbours".into(),
+                needed: u64::from(NEAREST_QUOTA) + 1,
+                capacity: u64::from(NEAREST_QUOTA),
+                instead: "look for neighbours within a smaller radius, or trace fewer photons a pass".into(),
+            });
+        };
         let (scene, map) = (self.scene.scene_set(), self.set());
         recorder.pass("photon: gather all", |pass| {
             for first in (0..self.map.count).step_by(QUERY_QUOTA as usize) {
                 let last = first.saturating_add(QUERY_QUOTA).min(self.map.count);
-                pass.dispatch_indirect(&self.linear, &[paths, &scene, &map], &self.push(first, last), items)?;
+                pass.dispatch_indirect(linear, &[paths, &scene, &map], &self.push(first, last), items)?;
                 stage_barrier(pass);
             }
             Ok(())

@@ -159,6 +159,7 @@ impl PhotonMapper {
         }
         let end = begun.saturating_add(self.settings.samples_per_pass).min(samples);
         let mut timings = Vec::new();
+        let diagonal = self.diagonal();
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
@@ -184,7 +185,12 @@ impl PhotonMapper {
                 gather, map: Some(map), ..
             }) => {
                 let scale = 1.0 / (flux_scale(&self.scene) * f64::from(self.settings.photons));
-                Some(gather.stage(&self.scene, map, scale)?)
+                let kernel = self.settings.kernel(self.passes, diagonal);
+                let nearest = (
+                    self.settings.neighbors_in(self.passes),
+                    kernel.length_max * kernel.unit_length,
+                );
+                Some(gather.stage(&self.scene, map, scale, nearest))
             }
             _ => None,
         };
@@ -211,6 +217,12 @@ impl PhotonMapper {
             done: step.done,
             wanted: pixels * u64::from(samples),
         }))
+    }
+
+    /// Of the scene's box, m.
+    fn diagonal(&self) -> f64 {
+        let [lower, upper] = self.scene.bounds();
+        f64::from((upper - lower).length())
     }
 
     /// The picture so far, as [`PathTracer::picture`] has it.

@@ -18,8 +18,21 @@ const SAMPLES_MAX: u32 = 1024;
 /// the dampening. A room of 6 m × 6 m × 3 m has a diagonal of 9 m; the source's unit and greatest axis are 1 m.
 const RADIUS_SHARE: f64 = 1.0 / 100.0;
 const UNIT_SHARE: f64 = 1.0 / 9.0;
+/// Most photons under a kernel about a point, and least: the last one only says how wide it is.
+const NEIGHBORS_MAX: u32 = 10_000;
+const NEIGHBORS_MIN: u32 = 2;
 /// Least length of an axis in unit lengths.
 const LENGTH_MIN: f64 = 1e-3;
+
+/// How points are looked up in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapQuery {
+    /// Each by itself.
+    Single,
+    /// Those of a subgroup together, where the device has votes.
+    Packet,
+}
 
 /// Settings of photon mapping.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -31,9 +44,12 @@ pub struct PhotonSettings {
     pub photons: u32,
     /// What the kernels' axes are.
     pub shape: KernelShape,
+    /// Photons under one kernel about each point that is looked up, in the first pass; 0 for kernels about the photons.
+    pub neighbors: u32,
     /// How kernels fall off.
     pub profile: KernelProfile,
-    /// Radius of fixed kernels, greatest axis of others, in the first pass, m; 0 for a hundredth, or a ninth, of the scene's diagonal.
+    /// Radius of fixed kernels, greatest axis of others, farthest neighbour, in the first pass, m; 0 for a hundredth of the scene's diagonal for
+    /// fixed kernels, and for a ninth for the others.
     #[serde(serialize_with = "crate::settings::serialize_f32")]
     pub radius: f32,
     /// Axes of kernels that follow footprints, as multiples of these, in the first pass.
@@ -58,6 +74,8 @@ pub struct PhotonSettings {
     pub direct_photons: bool,
     /// The map is seen after one more diffuse reflection; caustics stay directly seen.
     pub final_gather: bool,
+    /// How the map is asked; never changes the picture.
+    pub query: MapQuery,
     /// Random numbers: Owen-scrambled Sobol' or PCG.
     pub sampler: SamplerKind,
     /// Seed of the random numbers; the view's, where settings come as text.
@@ -74,6 +92,7 @@ impl Default for PhotonSettings {
             path_set: PathSet::ALL,
             photons: 1 << 16,
             shape: KernelShape::Fixed,
+            neighbors: 0,
             profile: KernelProfile::Epanechnikov,
             radius: 0.0,
             spread: 20.0,
@@ -84,6 +103,7 @@ impl Default for PhotonSettings {
             samples_per_pass: 1,
             direct_photons: false,
             final_gather: false,
+            query: MapQuery::Single,
             sampler: SamplerKind::Sobol,
             seed: 0,
             aovs: false,
@@ -103,6 +123,7 @@ impl PhotonSettings {
         };
         in_range("photons", self.photons, 1..=PHOTONS_MAX)?;
         in_range("samples_per_pass", self.samples_per_pass, 1..=SAMPLES_MAX)?;
+        in_range("neighbors", self.neighbors, 0..=NEIGHBORS_MAX)?;
         let fits = |name: &str, value: f32, fits: bool, cause: &str| {
             fits.then_some(()).ok_or_else(|| Error::setting(name, value, cause))
         };
@@ -147,7 +168,13 @@ impl PhotonSettings {
 
     /// Whether kernels follow the photons' footprints.
     pub(super) fn follows_footprints(&self) -> bool {
-        self.shape != KernelShape::Fixed
+        self.shape != KernelShape::Fixed && self.neighbors == 0
+    }
+
+    /// Neighbours of a point in a pass.
+    pub(super) fn neighbors_in(&self, pass: u32) -> u32 {
+        let kept = shrinkage(pass, f64::from(self.reduction)).powi(2);
+        ((f64::from(self.neighbors) * kept).round() as u32).max(NEIGHBORS_MIN)
     }
 
     /// Kernels of a pass, in a scene of that diagonal, m.
@@ -165,7 +192,11 @@ impl PhotonSettings {
         let length_max = automatic(self.radius, radius_share) / unit_length;
         let shrunk = shrinkage(pass, f64::from(self.reduction));
         KernelSettings {
-            shape: self.shape,
+            shape: if self.follows_footprints() {
+                self.shape
+            } else {
+                KernelShape::Fixed
+            },
             spread: f64::from(self.spread) * global_step(f64::from(self.photons)) * shrunk,
             exponent: f64::from(self.dampening),
             unit_length,

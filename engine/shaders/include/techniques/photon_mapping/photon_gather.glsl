@@ -1,0 +1,247 @@
+// Radiance from the photon map where eye paths have arrived, at surfaces with a diffuse base: the kernels that hold the point, each times the
+// scattering function between the photon's way and the path's; or the nearest photons, under one kernel as wide as the last of them is away.
+//
+// A query is one loop, in which a step is a node or a record. With CLERESTORY_PHOTON_PACKET defined a subgroup goes through the map together,
+// wherever any of its points lies; the sums are the same bits, as each point meets its kernels in the same order. A query that its quota stops
+// leaves nothing, marks its place and stalls the wave: such places go through all records instead (LINEAR), so many a dispatch.
+//
+// PM-DE-1, PM-DE-3 to PM-DE-5, PM-ST-5, PM-ST-6: "Interactive Manycore Photon Mapping", 2011, §3.4.2, §5.2, §6.2.3 and §7.4.2. Deterministic: a
+// path's sum has the order of the map's leaves, or of its records.
+#ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_GATHER_GLSL
+#define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_GATHER_GLSL
+
+#include "transport/path_features.glsl"
+#include "techniques/photon_mapping/photon_features.glsl"
+#include "techniques/photon_mapping/photon_map.glsl"
+#include "scene/bindings.glsl"
+#include "transport/path_buffers.glsl"
+#include "transport/path_set.glsl"
+#include "transport/surface.glsl"
+
+layout(constant_id = 42) const uint PROFILE = KERNEL_EPANECHNIKOV;
+layout(constant_id = 43) const bool LINEAR = false;        // goes through records, for places that have stopped
+layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
+layout(constant_id = 45) const bool NEAREST = false;       // one kernel about the point, up to its `neighbors`-th photon
+
+// Stands in path_resume for a query that its quota stopped.
+const uint GATHER_STOPPED = 0xFFFFFFFEu;
+// Photons count where their surface's normal is less than 60 degrees from that of the point: not through thin walls nor around corners.
+const float PHOTON_NORMAL_COS_MIN = 0.5;
+
+// What the query under way is about.
+struct Gather {
+    vec3 position;
+    vec3 facing;      // geometric normal, to the viewer's side
+    vec3 z;           // of the scattering frame
+    vec3 outward;     // geometric normal on the side of z
+    Bsdf bsdf;
+    CosineLobes lobes;
+    uint bounce;      // scatterings between the point and the eye
+    bool caustics;    // photons that were never scattered diffusely are the only ones that count
+};
+Gather gather;
+vec3 gathered;
+uint gathered_photons;
+
+// Photons about the point by their squared distance, of which more rounds see less, but finer.
+const uint NEAREST_BINS = 32u;
+const uint NEAREST_ROUNDS = 5u;
+// Least part of the squared distance that is told apart.
+const float NEAREST_PRECISION = 1e-4;
+uint nearest_bins[NEAREST_BINS];
+vec2 nearest_span;
+bool nearest_counts;
+float nearest_squared;  // squared distance of the last photon
+
+// Adds a photon's kernel times its scattering function, or counts it; what all photons have in common is left to the end. Whether the leaf
+// goes on.
+bool compact_visit_point(uint record);
+
+#define COMPACT_POINT
+#ifdef CLERESTORY_PHOTON_PACKET
+#define COMPACT_ANY(MEETS) subgroupAny(MEETS)
+#endif
+#include "accel/compact_bvh.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint gather_states;   // states of a path whose diffuse surfaces gather, a bit each
+    vec3 scene_upper;
+    uint caustic_states;  // those that gather photons not scattered diffusely alone
+    CompactRoot root;
+    uint least_bounces;   // scatterings in all, with that at the point
+    uint most_bounces;
+    float scale;          // of stored fluxes
+    uint first;           // of the records that a linear query goes through
+    uint last;
+    uint neighbors;       // of NEAREST
+    float radius;         // within which they are looked for
+} push;
+
+// Where all photons are scattered alike, up to their kernels.
+const bool LAMBERT = !HAS_SPECULAR_LAYER && !HAS_SHADING_NORMALS && !HAS_NORMAL_MAPS;
+
+bool compact_visit_point(uint record) {
+    uvec4 q0 = photon_quarter(record, 0u);
+    uvec4 q1 = photon_quarter(record, 1u);
+    uvec4 q2 = photon_quarter(record, 2u);
+    float weight;
+    float squared;
+    if (NEAREST) {
+        vec3 way = gather.position - uintBitsToFloat(q0.xyz);
+        squared = dot(way, way);
+        bool held = squared < (nearest_counts ? nearest_span.y : nearest_squared);
+        held = held && dot(photon_normal(q0), gather.facing) > PHOTON_NORMAL_COS_MIN;
+        weight = held ? kernel_profile(PROFILE, nearest_counts ? 0.0 : squared / nearest_squared) / nearest_squared : 0.0;
+    } else {
+        weight = photon_weight(PROFILE, q0, q1, q2, gather.position, gather.facing, PHOTON_NORMAL_COS_MIN);
+    }
+    if (TELLS_CAUSTICS && gather.caustics && photon_is_diffused(q0)) {
+        weight = 0.0;
+    }
+    if (COUNTS_BOUNCES) {
+        uint bounces = photon_bounce(q1) + 1u + gather.bounce;
+        weight = bounces < push.least_bounces || bounces > push.most_bounces ? 0.0 : weight;
+    }
+    if (NEAREST && nearest_counts) {
+        if (weight > 0.0) {
+            float place = (squared - nearest_span.x) / (nearest_span.y - nearest_span.x) * float(NEAREST_BINS);
+            // What is nearer than the span is in its first bin.
+            ++nearest_bins[uint(clamp(place, 0.0, float(NEAREST_BINS - 1u)))];
+        }
+    } else if (weight > 0.0) {
+        vec3 flux = photon_flux(q2);
+        ++gathered_photons;
+        if (LAMBERT) {
+            gathered += weight * flux;
+        } else {
+            vec3 wi = -photon_direction(q1);
+            float cos_i = dot(wi, gather.z);
+            float cos_g = dot(wi, gather.outward);
+            if (cos_i * cos_g > 0.0 && cos_i > 0.0) {
+                gathered += cosine_lobes_eval(gather.bsdf, gather.lobes, cos_i) * flux * (weight * (cos_i / cos_g));
+            }
+        }
+    }
+    return !photon_ends_leaf(q0);
+}
+
+// Finds the squared distance of the point's last neighbour among those within `radius`, or that of the radius where there are fewer; false when
+// a quota stops it.
+bool find_nearest(float radius) {
+    nearest_counts = true;
+    nearest_span = vec2(0.0, radius * radius);
+    nearest_squared = nearest_span.y;
+    for (uint round = 0u; round < NEAREST_ROUNDS && nearest_span.y - nearest_span.x > NEAREST_PRECISION * nearest_span.x; ++round) {
+        for (uint i = 0u; i < NEAREST_BINS; ++i) {
+            nearest_bins[i] = 0u;
+        }
+        if (!compact_point_query(push.root, gather.position)) {
+            return false;
+        }
+        uint bin = 0u;
+        uint found = nearest_bins[0];
+        while (found < push.neighbors && bin + 1u < NEAREST_BINS) {
+            found += nearest_bins[++bin];
+        }
+        float width = (nearest_span.y - nearest_span.x) / float(NEAREST_BINS);
+        if (found < push.neighbors) {
+            break;
+        }
+        nearest_span = vec2(nearest_span.x + float(bin) * width, nearest_span.x + float(bin + 1u) * width);
+        nearest_squared = nearest_span.y;
+    }
+    nearest_counts = false;
+    return true;
+}
+
+// Prepares the query of a place; false where nothing is gathered. The throughput is that at the point.
+bool begin_gather(uint slot, uint place, out vec3 throughput) {
+    PathState path = load_path(slot);
+    throughput = path.throughput;
+    uint state = HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u;
+    gather.bounce = HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce;
+    Hit hit = load_hit(place);
+    if ((push.gather_states >> state & 1u) == 0u || hit.triangle == NO_HIT) {
+        return false;
+    }
+    if (COUNTS_BOUNCES && gather.bounce + 1u > push.most_bounces) {
+        return false;
+    }
+    Surface s = surface_at(hit, push.scene_lower, push.scene_upper);
+    SceneMaterial m = load_material(s.material);
+    vec3 wo = -path.direction;
+    bool front = dot(wo, s.geometric_normal) > 0.0;
+    bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
+    gather.bsdf = surface_bsdf(m, s);
+    if ((HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u) || !bsdf_has_diffuse_base(gather.bsdf, solid && !front)) {
+        return false;
+    }
+    if (HAS_ABSORPTION) {
+        uint interior = path_gathered[slot].interior;
+        interior = interior == OUTSIDE && solid && !front ? s.material : interior;
+        if (interior != OUTSIDE) {
+            throughput *= exp(-load_material(interior).absorption * hit.t);
+        }
+    }
+    gather.position = s.point.position;
+    gather.facing = front ? s.geometric_normal : -s.geometric_normal;
+    vec3 outward = solid ? s.geometric_normal : gather.facing;
+    vec3 normal = gather.facing;
+    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
+        normal = adapt_shading_normal(surface_mapped_normal(m, s), gather.facing, wo);
+    }
+    // The base scatters on the viewer's side alone.
+    gather.z = normal;
+    gather.outward = gather.facing;
+    gather.lobes = cosine_lobes(gather.bsdf, max(dot(wo, normal), 0.0), false, LOBE_DIFFUSE);
+    gather.caustics = (push.caustic_states >> state & 1u) != 0u;
+    return true;
+}
+
+// Gathers at the point that is prepared; false when a quota stops it.
+bool gather_photons() {
+    gathered = vec3(0.0);
+    gathered_photons = 0u;
+    if (LINEAR) {
+        for (uint record = push.first; record < push.last; ++record) {
+            compact_visit_point(record);
+        }
+        return true;
+    }
+    if (NEAREST && !find_nearest(push.radius)) {
+        return false;
+    }
+    return compact_point_query(push.root, gather.position);
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled == STALLED_EXTEND || status.stalled == STALLED_SHADOW || place >= status.active_count) {
+        return;
+    }
+    if (LINEAR && path_resume[place] != GATHER_STOPPED) {
+        return;
+    }
+    uint slot = load_slot(place);
+    vec3 throughput;
+    if (!begin_gather(slot, place, throughput)) {
+        return;
+    }
+    if (!gather_photons()) {
+        path_resume[place] = GATHER_STOPPED;
+        atomicAdd(status.unfinished, 1u);
+        atomicMax(status.stalled, STALLED_ARRIVAL);
+        return;
+    }
+    if (LAMBERT) {
+        gathered *= gather.lobes.diffuse * INV_PI;
+    }
+    atomicAdd(gather_counters.queries, 1u);
+    if (atomicAdd(gather_counters.photons[0], gathered_photons) > 0xFFFFFFFFu - gathered_photons) {
+        atomicAdd(gather_counters.photons[1], 1u);
+    }
+    path_gathered[slot].radiance += throughput * gathered * push.scale;
+}
+
+#endif

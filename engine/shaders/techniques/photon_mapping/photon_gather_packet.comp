@@ -1,0 +1,11 @@
+#version 460
+// Radiance from the photon map where eye paths have arrived, the queries of a subgroup together.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_vote : require
+
+#define CLERESTORY_PHOTON_PACKET
+
+layout(local_size_x = 64) in;
+
+#include "techniques/photon_mapping/photon_gather.glsl"
