@@ -12,6 +12,9 @@
 // With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);
 //
+// With KD_VOTES defined, by includers that cache, subgroups decide together when leaves are tested; what rays visit then depends on their
+// neighbours, and hits do not.
+//
 // Texels: the box with where triangles begin (lower, triangles | upper, 0), pairs of sibling nodes, triangles as bvh2.glsl has them in the order
 // of the leaves, those of several leaves several times. A node is two words, twin of clerestory::accel::kd::KdNode.
 #ifndef CLERESTORY_ACCEL_KD_GLSL
@@ -155,6 +158,45 @@ void kd_descend(inout KdDescent at, KdTurn turn, bool far_is_left, float t_min) 
         } \
     }
 
+// On to what is left: sets is_end where that is nothing, or is_beyond where it begins beyond the hit.
+#define KD_POP \
+    { \
+        flags += KD_FLAGS ? at.parent : 0u; \
+        bool empty = (KD_CAPACITY == 0u || KD_SIZE == 0u) && head.x == 0u && bytes.x == 0u; \
+        if (KD_FLAGS ? flags == 0u : empty) { \
+            is_end = true; \
+        } else if (empty) { \
+            at = restart; \
+            can_push_down = KD_PUSH_DOWN; \
+            INDEX_COUNT_ONE(restarts) \
+        } else { \
+            uvec2 entry; \
+            if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD && head.x != 0u) { \
+                entry = head; \
+                head.x = 0u; \
+                INDEX_COUNT_ONE(register_pops) \
+            } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && top == 0u) { \
+                entry = kd_cached_entry(boxes, (bytes.y != 0u ? bytes.y : bytes.x) & 0xFFu, ray.t_max); \
+                bytes = bytes.y != 0u ? uvec2(bytes.x, bytes.y >> 8) : uvec2(bytes.x >> 8, 0u); \
+                INDEX_COUNT_ONE(register_pops) \
+            } else { \
+                --top; \
+                --size; \
+                uint slot = KD_FLAGS ? top % KD_CAPACITY : top; \
+                entry = uvec2(entry_nodes[slot], entry_ends[slot]); \
+                INDEX_COUNT_ONE(pops) \
+            } \
+            uint axis = entry.x & KD_LEAF; \
+            float begins = far_begins(along_axis(boxes.slack, axis), at.span.y, ray.t_min); \
+            /* The carry has set the bit of the node above. */ \
+            uint parent = flags & -flags; \
+            at = KdDescent(entry.x >> KD_KIND_BITS, vec2(begins, uintBitsToFloat(entry.y)), parent >> 1, parent); \
+            is_beyond = begins > hit.t; \
+            iterations += is_beyond ? 1u : 0u; \
+            can_push_down = false; \
+        } \
+    }
+
 // Traverses from `resume` on (INDEX_START at first), improving `hit` (no_hit(ray.t_max) at first). Returns INDEX_FINISHED or where to go on.
 uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     if (resume == INDEX_FINISHED || !is_traceable(ray)) {
@@ -206,10 +248,40 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         } while (!is_beyond && at.bit != 0u && (resume & (2u * at.bit - 1u)) != 0u);
     }
     uvec2 node = kd_node(at.node);
+    bool is_end = false;
     bool done = false;
     bool stops = false;
     do {
         iterations += KD_POSTPONES ? KD_PAIR_ITERATIONS : KD_ROUND_ITERATIONS;
+#ifdef KD_VOTES
+        // Until each lane of the subgroup holds a leaf or has seen them all. Those that hold one go on behind it meanwhile, up to the next.
+        do {
+            bool at_leaf = !is_beyond && kd_is_leaf(node);
+            if (!is_end && !(at_leaf && waits)) {
+                if (at_leaf || is_beyond) {
+                    if (at_leaf) {
+                        postponed = uvec2(node.y >> KD_KIND_BITS, (node.y >> KD_KIND_BITS) + node.x);
+                        waits = true;
+                        INDEX_COUNT_ONE(leaves)
+                    }
+                    ++iterations;
+                    is_beyond = false;
+                    KD_POP
+                } else {
+                    KD_COUNT_NODE
+                    KdTurn turn = kd_turn(node, boxes, at.span);
+                    if (turn.both) {
+                        KD_PUSH(turn)
+                    }
+                    kd_descend(at, turn, false, ray.t_min);
+                }
+                node = kd_node(at.node);
+            }
+        } while (!subgroupAll(waits || is_end));
+        reference = postponed.x;
+        reference_end = waits ? postponed.y : postponed.x;
+        waits = false;
+#else
         // Down to a leaf, or to a far child that begins beyond the hit; unless a candidate has interrupted a leaf.
         bool reached = reference == reference_end && !ends_waiting && !is_beyond;
         is_beyond = false;
@@ -236,10 +308,12 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             reference_end = reference + node.x;
             INDEX_COUNT_ONE(leaves)
         }
+#endif
         bool awaiting = false;
         Hit awaited;
         // The second of two leaves, tested if it begins before what is met in the first.
         uvec2 second = uvec2(0u);
+#ifndef KD_VOTES
         if (KD_POSTPONES && reached) {
             second = uvec2(reference, reference_end);
             uvec2 first = waits ? postponed : uvec2(0u);
@@ -249,6 +323,7 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             reference_end = first.y;
             waits = !waits;
         }
+#endif
         for (uint leaf = 0u; leaf < (KD_POSTPONES ? 2u : 1u); ++leaf) {
             if (reference != reference_end && !done) {
                 bool more;
@@ -289,53 +364,27 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             done = any_hit;
         }
 #endif
+#ifdef KD_VOTES
+        done = done || is_end;
+        is_beyond = is_beyond || at.span.x > hit.t;
+#else
         // On to what is left, skipping what begins beyond the hit.
         bool leaves = !done && reference == reference_end && !ends_waiting;
         done = done || ends_waiting;
         if (leaves) {
             do {
-                flags += KD_FLAGS ? at.parent : 0u;
-                bool empty = (KD_CAPACITY == 0u || KD_SIZE == 0u) && head.x == 0u && bytes.x == 0u;
-                if (KD_FLAGS ? flags == 0u : empty) {
-                    ends_waiting = KD_POSTPONES && waits;
-                    done = !ends_waiting;
-                    leaves = false;
-                    reference = postponed.x;
-                    reference_end = ends_waiting ? postponed.y : postponed.x;
-                } else if (empty) {
-                    at = restart;
-                    can_push_down = KD_PUSH_DOWN;
-                    leaves = false;
-                    INDEX_COUNT_ONE(restarts)
-                } else {
-                    uvec2 entry;
-                    if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD && head.x != 0u) {
-                        entry = head;
-                        head.x = 0u;
-                        INDEX_COUNT_ONE(register_pops)
-                    } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && top == 0u) {
-                        entry = kd_cached_entry(boxes, (bytes.y != 0u ? bytes.y : bytes.x) & 0xFFu, ray.t_max);
-                        bytes = bytes.y != 0u ? uvec2(bytes.x, bytes.y >> 8) : uvec2(bytes.x >> 8, 0u);
-                        INDEX_COUNT_ONE(register_pops)
-                    } else {
-                        --top;
-                        --size;
-                        uint slot = KD_FLAGS ? top % KD_CAPACITY : top;
-                        entry = uvec2(entry_nodes[slot], entry_ends[slot]);
-                        INDEX_COUNT_ONE(pops)
-                    }
-                    uint axis = entry.x & KD_LEAF;
-                    float begins = far_begins(along_axis(boxes.slack, axis), at.span.y, ray.t_min);
-                    // The carry has set the bit of the node above.
-                    uint parent = flags & -flags;
-                    at = KdDescent(entry.x >> KD_KIND_BITS, vec2(begins, uintBitsToFloat(entry.y)), parent >> 1, parent);
-                    leaves = begins > hit.t;
-                    iterations += leaves ? 1u : 0u;
-                    can_push_down = false;
-                }
-            } while (leaves);
+                is_beyond = false;
+                KD_POP
+            } while (is_beyond);
+            if (is_end) {
+                ends_waiting = KD_POSTPONES && waits;
+                done = !ends_waiting;
+                reference = postponed.x;
+                reference_end = ends_waiting ? postponed.y : postponed.x;
+            }
             node = kd_node(at.node);
         }
+#endif
         // One leaf that is left is not worth stopping at; nor could flags say so of one at the lowest level, where they read as the end.
         bool one_leaf = KD_FLAGS ? flags == INDEX_FINISHED : kd_is_leaf(node) && top == 0u && head.x == 0u && bytes.x == 0u;
         // Neither does a ray stop while a leaf waits, or within one.
