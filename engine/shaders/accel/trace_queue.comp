@@ -6,5 +6,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+layout(local_size_x_id = 0) in;
+
 #define KD_CACHES
 #include "accel/trace_queue.glsl"

@@ -7,6 +7,8 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_vote : require
 
+layout(local_size_x_id = 0) in;
+
 #define KD_CACHES
 #define KD_VOTES
 #include "accel/trace_queue.glsl"

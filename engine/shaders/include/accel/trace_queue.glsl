@@ -2,8 +2,6 @@
 #ifndef CLERESTORY_ACCEL_TRACE_QUEUE_GLSL
 #define CLERESTORY_ACCEL_TRACE_QUEUE_GLSL
 
-layout(local_size_x_id = 0) in;
-
 #include "accel/trace_ray.glsl"
 
 // Batches that a workgroup fetches in one dispatch; 0 sets no end. Software drivers end loops in silence after so many iterations of all
