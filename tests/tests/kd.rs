@@ -292,6 +292,55 @@ fn caches_are_those_of_the_twin_and_change_no_hit() {
 }
 
 #[test]
+fn votes_change_no_hit() {
+    with_gpu(|gpu| {
+        let exact = gpu.caps().kind == DeviceKind::Cpu;
+        let cases = cases();
+        let threads = PersistentThreads {
+            groups: 3,
+            batch: 2 * gpu.caps().subgroup_size,
+            fetches: 2,
+            subgroups: 2,
+        };
+        let [none, .., nodes_head, bytes, _] = KdCaches::COMPARED;
+        let mut stopped = 0;
+        for (caches, query, ray_quota) in [
+            (none, Query::Closest, 1000),
+            (nodes_head, Query::Any, SMALL_QUOTA),
+            (bytes, Query::Closest, SMALL_QUOTA),
+        ] {
+            let settings = TraceSettings {
+                execution: Execution::Persistent(threads),
+                caches: KdCaches { vote: true, ..caches },
+                ..settings(Scheme::Stack, query, ray_quota)
+            };
+            if !gpu.caps().subgroup.vote {
+                let refused = RayTracer::new(gpu, &cases[0].tree, &settings);
+                assert!(matches!(refused, Err(Error::MissingFeature { .. })), "{refused:?}");
+                continue;
+            }
+            let mut tracers = Vec::new();
+            for case in &cases {
+                let tracer = RayTracer::new(gpu, &case.tree, &settings).unwrap();
+                let traced = tracer.trace(&case.rays).unwrap();
+                tracers.push(tracer);
+                stopped += traced.unfinished;
+                // Of a subgroup of one ray; its work is not that of the device's.
+                let (hits, ..) = twin(case, &settings);
+                for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
+                    if exact {
+                        assert_eq!(bits(found), bits(expected), "{}, {settings:?}: {ray:?}", case.what);
+                    } else if query == Query::Closest || !found.is_hit() {
+                        assert!(!misses(&case.triangles, ray, found), "{}: {ray:?}", case.what);
+                    }
+                }
+            }
+        }
+        assert!(!gpu.caps().subgroup.vote || stopped > 1000, "{stopped} stops");
+    });
+}
+
+#[test]
 fn settings_that_could_lose_rays_are_refused_and_can_be_fitted() {
     with_gpu(|gpu| {
         let (triangles, rays) = soup();
@@ -318,6 +367,13 @@ fn settings_that_could_lose_rays_are_refused_and_can_be_fitted() {
             TraceSettings {
                 caches: nodes,
                 scheme: BOTH,
+                ..persistent
+            },
+            TraceSettings {
+                caches: KdCaches {
+                    postpone: true,
+                    ..KdCaches::SPECULATION
+                },
                 ..persistent
             },
             TraceSettings {

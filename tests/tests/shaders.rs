@@ -38,6 +38,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("accel/lbvh_emit.comp", "SampledBuffer"),
     ("accel/lbvh_hierarchy.comp", "SampledBuffer"),
     ("accel/trace_queue.comp", "SampledBuffer"),
+    ("accel/trace_queue_vote.comp", "SampledBuffer"),
     ("accel/trace_rays.comp", "SampledBuffer"),
     ("transport/path_extend.comp", "SampledBuffer"),
     ("transport/path_extend_alpha.comp", "SampledBuffer"),

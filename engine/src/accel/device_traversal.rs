@@ -47,7 +47,9 @@ impl DeviceTraversal {
         // A candidate ends the loop over its leaf: what is left of that is a round of its own.
         let triangle = 1 + u64::from(if rounds.filters { of_round } else { 0 });
         let leaves = count * if rounds.waits { 2 } else { 1 };
-        (u64::from(quota) + count * round + leaves * triangle * u64::from(longest_leaf)) * u64::from(lanes)
+        // Where a ray stops it goes its way from the root once more, to say what is left.
+        let way = u64::from(constants::KD_MAX_DEPTH + 1);
+        (u64::from(quota) + count * round + way + leaves * triangle * u64::from(longest_leaf)) * u64::from(lanes)
     }
 
     /// The quota up to `quota` with which a subgroup's rays stay within `iterations`, for kd-trees on software devices; elsewhere `quota`.

@@ -3,9 +3,9 @@
 //!
 //! Sources: T. Aila and S. Laine, "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009 (persistent threads); "Interactive
 //! Manycore Photon Mapping", 2011, §2.2.3.4 and appendix A.1 (both models beside each other). The kernels are
-//! `shaders/accel/trace_rays.comp` and `trace_queue.comp`.
+//! `shaders/accel/trace_rays.comp`, `trace_queue.comp` and, where subgroups vote, `trace_queue_vote.comp`.
 //!
-//! Guarantees: both give the hits and the exact work of [`Traversal`](super::bvh2::Traversal) and [`KdTraversal`](super::kd::KdTraversal); no ray is lost and none is traced twice,
+//! Guarantees: all give the hits and, but for votes, the exact work of [`Traversal`](super::bvh2::Traversal) and [`KdTraversal`](super::kd::KdTraversal); no ray is lost and none is traced twice,
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
 //! differs from run to run, and shows in nothing but the time.
 
@@ -17,7 +17,7 @@ use super::kd::KdCounters;
 use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
-use crate::gpu::shaders::accel::trace_rays;
+use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
 use crate::gpu::shaders::sets::IndexSet;
 use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, Timings};
 use crate::{Error, Result};
@@ -72,7 +72,54 @@ const TRACE_PASS: &str = "trace";
 #[derive(Debug)]
 enum Kernel {
     RayPerThread(ComputePipeline<trace_rays::Kernel>),
-    Queue(PersistentThreads, ComputePipeline<trace_queue::Kernel>),
+    Queue(PersistentThreads, QueueKernel),
+}
+
+/// The kernels of persistent threads: of one interface, but of types of their own.
+#[derive(Debug)]
+enum QueueKernel {
+    Plain(ComputePipeline<trace_queue::Kernel>),
+    Vote(ComputePipeline<trace_queue_vote::Kernel>),
+}
+
+/// The specialization of a queue's kernel.
+macro_rules! queue_spec {
+    ($kernel:ident, $caps:expr, $threads:expr, $settings:expr, $traversal:expr) => {{
+        let (kd_flags, kd_push_down, kd_short_stack) = $settings.scheme.specialization();
+        $kernel::Spec {
+            local_size_x: $threads.lanes($caps),
+            trace_fetches: $threads.fetches,
+            trace_batch: $threads.batch,
+            index_quota: $settings.ray_quota,
+            index_count: $settings.count,
+            index_kind: $traversal.kind(),
+            trace_any: $settings.query == Query::Any,
+            kd_flags,
+            kd_push_down,
+            kd_short_stack,
+            kd_cache_levels: $settings.caches.node_levels,
+            kd_stack_cache: $settings.caches.stack_specialization(),
+            kd_postpones: $settings.caches.postpone,
+        }
+    }};
+}
+
+/// A dispatch of a queue's kernel.
+macro_rules! dispatch_queue {
+    ($kernel:ident, $pipeline:expr, $pass:expr, $buffers:expr, $index:expr, $count:expr, $groups:expr) => {{
+        let set = $kernel::Set0 {
+            trace_rays: $buffers.rays.view(),
+            trace_hits: $buffers.hits.view(),
+            trace_resume: $buffers.resume.view(),
+            trace_status: $buffers.status.view(),
+            trace_queue: $buffers.queue.view(),
+        };
+        let push = $kernel::Push {
+            first_ray: 0,
+            ray_count: $count,
+        };
+        $pass.dispatch($pipeline, &[&set, $index], &push, [$groups, 1, 1])
+    }};
 }
 
 /// An index on a device and the kernel that traces rays in it.
@@ -132,22 +179,15 @@ impl RayTracer {
                 kd_short_stack,
             })?),
             Execution::Persistent(threads) => {
-                let spec = trace_queue::Spec {
-                    local_size_x: threads.lanes(gpu.caps()),
-                    trace_fetches: threads.fetches,
-                    trace_batch: threads.batch,
-                    index_quota,
-                    index_count,
-                    index_kind,
-                    trace_any,
-                    kd_flags,
-                    kd_push_down,
-                    kd_short_stack,
-                    kd_cache_levels: settings.caches.node_levels,
-                    kd_stack_cache: settings.caches.stack_specialization(),
-                    kd_postpones: settings.caches.postpone,
+                let caps = gpu.caps();
+                let kernel = if settings.caches.vote {
+                    let spec = queue_spec!(trace_queue_vote, caps, threads, settings, traversal);
+                    QueueKernel::Vote(gpu.compute_pipeline(&spec)?)
+                } else {
+                    let spec = queue_spec!(trace_queue, caps, threads, settings, traversal);
+                    QueueKernel::Plain(gpu.compute_pipeline(&spec)?)
                 };
-                Kernel::Queue(threads, gpu.compute_pipeline(&spec)?)
+                Kernel::Queue(threads, kernel)
             }
         };
         Ok(Self {
@@ -341,18 +381,15 @@ impl RayTracer {
                 pass.dispatch(kernel, &[&set, &index], &push, [kernel.groups_for(ray_count), 1, 1])
             }
             Kernel::Queue(threads, kernel) => {
-                let set = trace_queue::Set0 {
-                    trace_rays: buffers.rays.view(),
-                    trace_hits: buffers.hits.view(),
-                    trace_resume: buffers.resume.view(),
-                    trace_status: buffers.status.view(),
-                    trace_queue: buffers.queue.view(),
-                };
-                let push = trace_queue::Push {
-                    first_ray: 0,
-                    ray_count: count,
-                };
-                pass.dispatch(kernel, &[&set, &index], &push, [threads.groups, 1, 1])
+                let groups = threads.groups;
+                match kernel {
+                    QueueKernel::Plain(kernel) => {
+                        dispatch_queue!(trace_queue, kernel, pass, buffers, &index, count, groups)
+                    }
+                    QueueKernel::Vote(kernel) => {
+                        dispatch_queue!(trace_queue_vote, kernel, pass, buffers, &index, count, groups)
+                    }
+                }
             }
         }
     }

@@ -20,6 +20,18 @@ const uint KD_STACK_CACHE_BYTES = 2u;
 const uint KD_HEAP_LEVELS = 10u;
 const uint KD_BYTE_LEVELS = 8u;
 
+// The oldest of nodes that are four bytes a word, the older word first; 0 for none.
+uint kd_oldest_byte(uvec2 bytes) {
+    uint word = bytes.x != 0u ? bytes.x : bytes.y;
+    return word >> (max(findMSB(word), 0) & ~7);
+}
+
+uvec2 kd_without_oldest_byte(uvec2 bytes) {
+    uint word = bytes.x != 0u ? bytes.x : bytes.y;
+    uint rest = word & ~(0xFFu << (max(findMSB(word), 0) & ~7));
+    return bytes.x != 0u ? uvec2(rest, bytes.y) : uvec2(0u, rest);
+}
+
 uvec2 kd_fetch_node(uint node) {
     uvec4 pair = index_texel(KD_HEADER_TEXELS + (node >> 1));
     return (node & 1u) == 0u ? pair.xy : pair.zw;

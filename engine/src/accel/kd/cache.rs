@@ -38,6 +38,10 @@ pub struct KdCaches {
     pub stack: StackCache,
     /// Whether the first of two leaves waits until the second is found, so that both are tested together ("stack cache III").
     pub postpone: bool,
+    /// Whether leaves wait until each lane of a subgroup holds one, which the subgroup votes on; lanes that hold one go on behind it
+    /// meanwhile ("speculation"). What a ray visits then depends on its neighbours. The twin is a subgroup of one ray, in which no leaf
+    /// waits. Not with [`KdCaches::postpone`]; needs subgroup votes.
+    pub vote: bool,
 }
 
 impl KdCaches {
@@ -48,6 +52,7 @@ impl KdCaches {
             node_levels: 0,
             stack: StackCache::None,
             postpone: false,
+            vote: false,
         };
         let nodes = Self {
             node_levels: MAX_CACHED_LEVELS,
@@ -77,6 +82,13 @@ impl KdCaches {
         ]
     };
 
+    /// Speculation by a vote, without other caches: what the source describes and does not measure, so that it is not among
+    /// [`KdCaches::COMPARED`], whose work is exact.
+    pub const SPECULATION: Self = Self {
+        vote: true,
+        ..Self::COMPARED[0]
+    };
+
     /// Nodes whose index is below this are in shared memory.
     pub(super) fn cached_nodes(&self) -> u32 {
         match self.node_levels {
@@ -95,8 +107,11 @@ impl KdCaches {
     }
 
     /// # Errors
-    /// [`Error::Setting`] for too many levels, or none for bytes to name.
+    /// [`Error::Setting`] for too many levels, or none for bytes to name, or leaves that wait in two ways.
     pub(in crate::accel) fn check(&self) -> Result<()> {
+        if self.postpone && self.vote {
+            return Err(Error::setting("kd.vote", self.vote, "does not go with `postpone`"));
+        }
         match self.stack {
             StackCache::Bytes => check_range("kd.node_levels", self.node_levels, 1, MAX_BYTE_LEVELS),
             _ => check_range("kd.node_levels", self.node_levels, 0, MAX_CACHED_LEVELS),

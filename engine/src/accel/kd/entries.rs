@@ -64,6 +64,10 @@ impl Entries {
         }
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.size == 0 && self.head.is_none() && self.bytes == [0; 2]
+    }
+
     /// The last one; `of_node` is the entry of a cached node.
     pub fn pop(&mut self, counters: &mut KdCounters, of_node: impl Fn(u32) -> Entry) -> Option<Entry> {
         if let Some(entry) = self.head.take() {

@@ -252,9 +252,13 @@ impl KdTraversal {
                 }
                 break;
             }
-            // Flags that read as the end say that one leaf is left, at the lowest level.
+            // A leaf that alone is left is not worth stopping at; nor could flags say so at the lowest level, where they read as the end.
+            let one_leaf = match self.scheme {
+                Scheme::Stack => walk.entries.is_empty() && walk.is_at_leaf(),
+                Scheme::Flags { .. } => walk.flags == FINISHED,
+            };
             let all = iterations + counters.nodes + counters.triangles - begun;
-            if all >= quota && walk.flags != FINISHED && waiting.is_none() {
+            if all >= quota && !one_leaf && waiting.is_none() {
                 self.resume = walk.flags;
                 break;
             }
@@ -388,6 +392,10 @@ impl<'a> Walk<'a> {
                 return None;
             }
         }
+    }
+
+    fn is_at_leaf(&self) -> bool {
+        matches!(self.tree.nodes[self.at.node as usize].kind(), KdKind::Leaf { .. })
     }
 
     /// On to what is left, an iteration for each subtree that is skipped since it begins beyond the hit; false at the end.

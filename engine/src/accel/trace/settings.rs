@@ -141,7 +141,7 @@ impl TraceSettings {
             }
             DeviceTraversal::Kd { longest_leaf } => {
                 let rounds = KdRounds {
-                    waits: self.caches.postpone,
+                    waits: self.caches.postpone || self.caches.vote,
                     filters: false,
                 };
                 DeviceTraversal::kd_iterations(longest_leaf, self.ray_quota, lanes_in_sum(caps, traversal), rounds)
@@ -178,6 +178,14 @@ impl TraceSettings {
             self.caches.check_absent("are of traversals by a stack")?;
         } else if self.execution == Execution::RayPerThread {
             self.caches.check_absent("are of persistent threads")?;
+        }
+        if self.caches.vote && !caps.subgroup.vote {
+            return Err(Error::MissingFeature {
+                feature: "subgroup votes in compute shaders".into(),
+                needed_by: "kd.vote".into(),
+                device: caps.device.clone(),
+                instead: "trace without `vote`".into(),
+            });
         }
         let iterations = self.iterations(caps, traversal);
         if caps.kind == DeviceKind::Cpu && iterations > u64::from(SOFTWARE_LOOP_CAP) {
