@@ -84,7 +84,7 @@ const SETTINGS: [SettingInfo; 16] = [
         name: "radius",
         range: "0 or more",
         unit: "m",
-        meaning: "of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 for a hundredth, or a ninth, of the scene's diagonal",
+        meaning: "of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 chooses by the size of the scene",
     },
     SettingInfo {
         name: "spread",

@@ -34,8 +34,12 @@ struct CompactRoot {
 uvec2 compact_counters = uvec2(0u);
 
 #ifdef COMPACT_POINT
-// Whether any point of those that go through the tree together is where the argument says; defined by the includer where there are several.
-#ifndef COMPACT_ANY
+// With COMPACT_PACKET defined, by includers with the extension for subgroup votes, the points of a subgroup go through the tree together:
+// each child that holds any of them is visited by all. A pair says where a point lies only for points in its parent's box, so that each
+// invocation remembers whether its own is there.
+#ifdef COMPACT_PACKET
+#define COMPACT_ANY(MEETS) subgroupAny(MEETS)
+#else
 #define COMPACT_ANY(MEETS) (MEETS)
 #endif
 
@@ -43,9 +47,12 @@ uvec2 compact_counters = uvec2(0u);
 uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z); }
 
 bool compact_point_query(CompactRoot root, vec3 point) {
-    bool inside = all(lessThan(root.lower, point)) && all(lessThan(point, root.upper));
-    uint next = COMPACT_ANY(inside) ? root.reference : COMPACT_NOTHING;
+    bool mine = all(lessThan(root.lower, point)) && all(lessThan(point, root.upper));
+    uint next = COMPACT_ANY(mine) ? root.reference : COMPACT_NOTHING;
     uint stack[COMPACT_STACK_SIZE];
+#ifdef COMPACT_PACKET
+    bool stack_mine[COMPACT_STACK_SIZE];
+#endif
     uint top = 0u;
     for (uint step = 0u; next != COMPACT_NOTHING && step < COMPACT_QUOTA; ++step) {
         bool pop = true;
@@ -58,18 +65,29 @@ bool compact_point_query(CompactRoot root, vec3 point) {
             uint owners = low.w >> COMPACT_MASK_SHIFT << 3 | high.w >> COMPACT_MASK_SHIFT;
             uint outside = compact_bits(greaterThanEqual(uintBitsToFloat(low.xyz), point)) << 3
                          | compact_bits(lessThanEqual(uintBitsToFloat(high.xyz), point));
-            bool in_left = COMPACT_ANY((owners & outside) == 0u);
-            bool in_right = COMPACT_ANY((~owners & outside) == 0u);
+            bool left_mine = mine && (owners & outside) == 0u;
+            bool right_mine = mine && (~owners & outside) == 0u;
+            bool in_left = COMPACT_ANY(left_mine);
+            bool in_right = COMPACT_ANY(right_mine);
             compact_counters.x += 2u;
             if (in_left && in_right) {
+#ifdef COMPACT_PACKET
+                stack_mine[top] = left_mine;
+#endif
                 stack[top++] = low.w & COMPACT_REFERENCE_MASK;
                 ++compact_counters.y;
             }
             pop = !in_left && !in_right;
             next = (in_right ? high.w : low.w) & COMPACT_REFERENCE_MASK;
+#ifdef COMPACT_PACKET
+            mine = in_right ? right_mine : left_mine;
+#endif
         }
         if (pop) {
             next = top > 0u ? stack[--top] : COMPACT_NOTHING;
+#ifdef COMPACT_PACKET
+            mine = next != COMPACT_NOTHING && stack_mine[top];
+#endif
         }
     }
     return next == COMPACT_NOTHING;

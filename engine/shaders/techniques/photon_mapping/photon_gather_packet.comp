@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_vote : require
 
-#define CLERESTORY_PHOTON_PACKET
+#define COMPACT_PACKET
 
 layout(local_size_x = 64) in;
 

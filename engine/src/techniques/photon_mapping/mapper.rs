@@ -165,9 +165,10 @@ impl PhotonMapper {
         {
             let [lower, upper] = self.scene.bounds();
             let diagonal = f64::from((upper - lower).length());
-            let traced = photons
-                .tracer
-                .trace(self.passes, &self.settings.kernel(self.passes, diagonal))?;
+            let traced = photons.tracer.trace(
+                self.passes,
+                &self.settings.kernel(self.passes, diagonal, self.scene.surface_area()),
+            )?;
             timings.extend(traced.timings);
             let clock = Instant::now();
             let records = photons.tracer.records().buffer().view();
@@ -185,7 +186,7 @@ impl PhotonMapper {
                 gather, map: Some(map), ..
             }) => {
                 let scale = 1.0 / (flux_scale(&self.scene) * f64::from(self.settings.photons));
-                let kernel = self.settings.kernel(self.passes, diagonal);
+                let kernel = self.settings.kernel(self.passes, diagonal, self.scene.surface_area());
                 let nearest = (
                     self.settings.neighbors_in(self.passes),
                     kernel.length_max * kernel.unit_length,

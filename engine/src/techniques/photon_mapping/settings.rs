@@ -8,6 +8,7 @@ use crate::transport::differentials::global_step;
 use crate::transport::path_set::PATH_SET_LOBES;
 use crate::transport::random::SamplerKind;
 use crate::{Error, Result};
+use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
 /// Most photons of a pass.
@@ -21,6 +22,8 @@ const UNIT_SHARE: f64 = 1.0 / 9.0;
 /// Most photons under a kernel about a point, and least: the last one only says how wide it is.
 const NEIGHBORS_MAX: u32 = 10_000;
 const NEIGHBORS_MIN: u32 = 2;
+/// Neighbours are looked for as far as this many times their number would lie.
+const NEIGHBORS_MARGIN: f64 = 4.0;
 /// Least length of an axis in unit lengths.
 const LENGTH_MIN: f64 = 1e-3;
 
@@ -48,8 +51,8 @@ pub struct PhotonSettings {
     pub neighbors: u32,
     /// How kernels fall off.
     pub profile: KernelProfile,
-    /// Radius of fixed kernels, greatest axis of others, farthest neighbour, in the first pass, m; 0 for a hundredth of the scene's diagonal for
-    /// fixed kernels, and for a ninth for the others.
+    /// Radius of fixed kernels, greatest axis of others, farthest neighbour, in the first pass, m. 0 stands for a hundredth of the scene's
+    /// diagonal for fixed kernels, a ninth for others, and four times the neighbours' area if photons were spread evenly.
     #[serde(serialize_with = "crate::settings::serialize_f32")]
     pub radius: f32,
     /// Axes of kernels that follow footprints, as multiples of these, in the first pass.
@@ -177,20 +180,24 @@ impl PhotonSettings {
         ((f64::from(self.neighbors) * kept).round() as u32).max(NEIGHBORS_MIN)
     }
 
-    /// Kernels of a pass, in a scene of that diagonal, m.
-    pub(super) fn kernel(&self, pass: u32, diagonal: f64) -> KernelSettings {
-        let automatic = |setting: f32, share: f64| match f64::from(setting) {
-            0.0 => share * if diagonal > 0.0 { diagonal } else { 1.0 },
+    /// Kernels of a pass, in a scene of that diagonal, m, and that area, m².
+    pub(super) fn kernel(&self, pass: u32, diagonal: f64, area: f64) -> KernelSettings {
+        let automatic = |setting: f32, length: f64| match f64::from(setting) {
+            0.0 if length > 0.0 => length,
+            0.0 => 1.0,
             set => set,
         };
-        let unit_length = automatic(self.unit_length, UNIT_SHARE);
-        let radius_share = if self.follows_footprints() {
-            UNIT_SHARE
-        } else {
-            RADIUS_SHARE
-        };
-        let length_max = automatic(self.radius, radius_share) / unit_length;
         let shrunk = shrinkage(pass, f64::from(self.reduction));
+        let unit_length = automatic(self.unit_length, UNIT_SHARE * diagonal);
+        let length_max = if self.neighbors > 0 {
+            // As far as so many times the neighbours would be if a deposit of each photon were spread evenly.
+            let share = NEIGHBORS_MARGIN * f64::from(self.neighbors) / f64::from(self.photons);
+            automatic(self.radius, (share * area / PI).sqrt())
+        } else if self.shape == KernelShape::Fixed {
+            automatic(self.radius, RADIUS_SHARE * diagonal)
+        } else {
+            automatic(self.radius, UNIT_SHARE * diagonal)
+        };
         KernelSettings {
             shape: if self.follows_footprints() {
                 self.shape
@@ -200,8 +207,8 @@ impl PhotonSettings {
             spread: f64::from(self.spread) * global_step(f64::from(self.photons)) * shrunk,
             exponent: f64::from(self.dampening),
             unit_length,
-            length_min: LENGTH_MIN.min(length_max) * shrunk,
-            length_max: length_max * shrunk,
+            length_min: LENGTH_MIN.min(length_max / unit_length) * shrunk,
+            length_max: length_max / unit_length * shrunk,
             flatness: f64::from(self.flatness),
         }
     }

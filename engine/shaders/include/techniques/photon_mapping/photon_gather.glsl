@@ -1,7 +1,7 @@
 // Radiance from the photon map where eye paths have arrived, at surfaces with a diffuse base: the kernels that hold the point, each times the
 // scattering function between the photon's way and the path's; or the nearest photons, under one kernel as wide as the last of them is away.
 //
-// A query is one loop, in which a step is a node or a record. With CLERESTORY_PHOTON_PACKET defined a subgroup goes through the map together,
+// A query is one loop, in which a step is a node or a record. With COMPACT_PACKET defined a subgroup goes through the map together,
 // wherever any of its points lies; the sums are the same bits, as each point meets its kernels in the same order. A query that its quota stops
 // leaves nothing, marks its place and stalls the wave: such places go through all records instead (LINEAR), so many a dispatch.
 //
@@ -58,9 +58,6 @@ float nearest_squared;  // squared distance of the last photon
 bool compact_visit_point(uint record);
 
 #define COMPACT_POINT
-#ifdef CLERESTORY_PHOTON_PACKET
-#define COMPACT_ANY(MEETS) subgroupAny(MEETS)
-#endif
 #include "accel/compact_bvh.glsl"
 
 layout(push_constant, scalar) uniform Push {
