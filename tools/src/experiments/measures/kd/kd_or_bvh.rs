@@ -297,9 +297,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     }
     answer.note(
         "By medians of the same run: the kd-tree with its traversal and the hierarchy with the highest rate of each kind of rays; those named \
-         are the best of both kinds together. On the software driver a \
-         kd-tree is worth building where rays pass through many triangles that overlap each other's boxes and rays are counted in millions; \
-         in rooms, halls and woods the hierarchy is faster to trace and several times faster to build.",
+         are the best of both kinds together. A kd-tree is worth its build where the ratio is above one and more \
+         rays are traced than the last column says: occlusion rays, which end at any hit, and rays through many triangles that overlap \
+         each other's boxes favour it; scenes of few large triangles favour the hierarchy.",
     );
     Ok(vec![indexes, answer])
 }
