@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::gather::{Gather, GatherCounts};
-use super::kernel::PhotonWords;
+use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, unpack_photon};
 use super::map::PhotonMap;
 use super::settings::PhotonSettings;
 use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
@@ -65,6 +65,13 @@ struct Photons {
     gather: Gather,
     /// Of the pass under way.
     map: Option<PhotonMap>,
+}
+
+impl Photons {
+    /// The first records that were traced last.
+    fn records(&self, gpu: &Gpu, count: u32) -> Result<Vec<PhotonWords>> {
+        gpu.read(self.tracer.records().buffer().view(), count as usize)
+    }
 }
 
 impl PhotonMapper {
@@ -119,6 +126,27 @@ impl PhotonMapper {
         self.counts
     }
 
+    /// The photons that the map of a pass is made of, in the order in which they were traced; the picture stays as it is. None where the picture
+    /// has nothing of a map.
+    ///
+    /// # Errors
+    /// As [`PhotonMapper::step`].
+    pub fn photons(&mut self, pass: u32) -> Result<Vec<PhotonRecord>> {
+        let kernel = self.kernel(pass);
+        let Some(photons) = &mut self.photons else {
+            return Ok(Vec::new());
+        };
+        let traced = photons.tracer.trace(pass, &kernel)?;
+        let words = photons.records(&self.gpu, traced.records)?;
+        Ok(words.iter().map(unpack_photon).collect())
+    }
+
+    /// How the kernels of a pass are made.
+    pub fn kernel(&self, pass: u32) -> KernelSettings {
+        let [lower, upper] = self.scene.bounds();
+        self.settings.kernel(pass, f64::from((upper - lower).length()))
+    }
+
     /// Counts of the eye paths.
     pub fn eye_counters(&self) -> PathCounters {
         self.eye.counters()
@@ -159,18 +187,14 @@ impl PhotonMapper {
         }
         let end = begun.saturating_add(self.settings.samples_per_pass).min(samples);
         let mut timings = Vec::new();
+        let kernel = self.kernel(self.passes);
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
-            let [lower, upper] = self.scene.bounds();
-            let diagonal = f64::from((upper - lower).length());
-            let traced = photons
-                .tracer
-                .trace(self.passes, &self.settings.kernel(self.passes, diagonal))?;
+            let traced = photons.tracer.trace(self.passes, &kernel)?;
             timings.extend(traced.timings);
             let clock = Instant::now();
-            let records = photons.tracer.records().buffer().view();
-            let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;
+            let records = photons.records(&self.gpu, traced.records)?;
             let map = PhotonMap::build(&self.gpu, &records, self.scene.surface_area())?;
             (self.counts.cover, self.counts.leaf_size) = (map.cover, map.leaf_size);
             photons.map = Some(map);
