@@ -76,14 +76,14 @@ impl Gather {
             ..Default::default()
         };
         let (gather_states, caustic_states) = gathering_states(settings, eye);
+        let bytes = size_of::<Counters>() as u64;
+        let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
+        // Memory may hold what another buffer left.
+        gpu.upload(&counters, 0, &[Counters::default()])?;
         Ok(Self {
             query: gpu.compute_pipeline(&spec)?,
             spec,
-            counters: gpu.buffer(&BufferDesc::storage(
-                "gather counters",
-                size_of::<Counters>() as u64,
-                Category::Work,
-            ))?,
+            counters,
             gather_states,
             caustic_states,
             bounces: [set.min_bounces(), set.max_bounces().unwrap_or(u32::MAX)],
