@@ -11,9 +11,6 @@ use crate::transport::path_tracer::ArrivalStage;
 use crate::transport::path_tracer::stages::stage_barrier;
 use crate::transport::{GpuScene, PathSet};
 
-/// Nodes and records after which a query is given up and its place goes through all records instead.
-const QUERY_QUOTA: u32 = 32_768;
-
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct GatherCounts {
@@ -71,7 +68,7 @@ impl Gather {
             tells_caustics: settings.final_gather,
             profile: settings.profile as u32,
             counts_bounces,
-            compact_quota: QUERY_QUOTA,
+            compact_quota: settings.query_quota,
             linear: false,
             ..Default::default()
         };
@@ -161,8 +158,8 @@ impl ArrivalStage for GatherStage<'_> {
     fn record_stopped(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()> {
         let (scene, map) = (self.scene.scene_set(), self.set());
         recorder.pass("photon: gather all", |pass| {
-            for first in (0..self.map.count).step_by(QUERY_QUOTA as usize) {
-                let last = first.saturating_add(QUERY_QUOTA).min(self.map.count);
+            for first in (0..self.map.count).step_by(self.gather.spec.compact_quota as usize) {
+                let last = first.saturating_add(self.gather.spec.compact_quota).min(self.map.count);
                 pass.dispatch_indirect(&self.linear, &[paths, &scene, &map], &self.push(first, last), items)?;
                 stage_barrier(pass);
             }

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::gather::{Gather, GatherCounts};
-use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, unpack_photon};
+use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::PhotonMap;
 use super::settings::PhotonSettings;
 use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
@@ -47,6 +47,17 @@ pub struct MapperCounts {
     pub map_seconds: f64,
 }
 
+/// A photon where it landed, as the map of a pass has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MappedPhoton {
+    /// Its record, with its flux in W.
+    pub record: PhotonRecord,
+    /// How often it had been scattered, at most [`PHOTON_BOUNCE_MAX`](crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX).
+    pub bounce: u32,
+    /// Whether it had been scattered diffusely; told by the final gather alone.
+    pub diffused: bool,
+}
+
 /// A progressive rendering of one view by photon mapping.
 pub struct PhotonMapper {
     gpu: Gpu,
@@ -65,13 +76,6 @@ struct Photons {
     gather: Gather,
     /// Of the pass under way.
     map: Option<PhotonMap>,
-}
-
-impl Photons {
-    /// The first records that were traced last.
-    fn records(&self, gpu: &Gpu, count: u32) -> Result<Vec<PhotonWords>> {
-        gpu.read(self.tracer.records().buffer().view(), count as usize)
-    }
 }
 
 impl PhotonMapper {
@@ -126,27 +130,6 @@ impl PhotonMapper {
         self.counts
     }
 
-    /// The photons that the map of a pass is made of, in the order in which they were traced; the picture stays as it is. None where the picture
-    /// has nothing of a map.
-    ///
-    /// # Errors
-    /// As [`PhotonMapper::step`].
-    pub fn photons(&mut self, pass: u32) -> Result<Vec<PhotonRecord>> {
-        let kernel = self.kernel(pass);
-        let Some(photons) = &mut self.photons else {
-            return Ok(Vec::new());
-        };
-        let traced = photons.tracer.trace(pass, &kernel)?;
-        let words = photons.records(&self.gpu, traced.records)?;
-        Ok(words.iter().map(unpack_photon).collect())
-    }
-
-    /// How the kernels of a pass are made.
-    pub fn kernel(&self, pass: u32) -> KernelSettings {
-        let [lower, upper] = self.scene.bounds();
-        self.settings.kernel(pass, f64::from((upper - lower).length()))
-    }
-
     /// Counts of the eye paths.
     pub fn eye_counters(&self) -> PathCounters {
         self.eye.counters()
@@ -187,14 +170,17 @@ impl PhotonMapper {
         }
         let end = begun.saturating_add(self.settings.samples_per_pass).min(samples);
         let mut timings = Vec::new();
-        let kernel = self.kernel(self.passes);
+        let (diagonal, watts) = (self.diagonal(), self.watts());
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
-            let traced = photons.tracer.trace(self.passes, &kernel)?;
+            let traced = photons
+                .tracer
+                .trace(self.passes, &self.settings.kernel(self.passes, diagonal))?;
             timings.extend(traced.timings);
             let clock = Instant::now();
-            let records = photons.records(&self.gpu, traced.records)?;
+            let records = photons.tracer.records().buffer().view();
+            let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;
             let map = PhotonMap::build(&self.gpu, &records, self.scene.surface_area())?;
             (self.counts.cover, self.counts.leaf_size) = (map.cover, map.leaf_size);
             photons.map = Some(map);
@@ -206,10 +192,7 @@ impl PhotonMapper {
         let stage = match &self.photons {
             Some(Photons {
                 gather, map: Some(map), ..
-            }) => {
-                let scale = 1.0 / (flux_scale(&self.scene) * f64::from(self.settings.photons));
-                Some(gather.stage(&self.scene, map, scale)?)
-            }
+            }) => Some(gather.stage(&self.scene, map, watts)?),
             _ => None,
         };
         let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
@@ -235,6 +218,49 @@ impl PhotonMapper {
             done: step.done,
             wanted: pixels * u64::from(samples),
         }))
+    }
+
+    /// Traces the photons of a pass, and returns them in the order of bounces and photons. The picture is not touched, and counts go on.
+    ///
+    /// # Errors
+    /// As [`PhotonMapper::step`].
+    pub fn photons(&mut self, pass: u32) -> Result<Vec<MappedPhoton>> {
+        let kernel = self.kernel(pass);
+        let scale = self.watts();
+        let Some(photons) = &mut self.photons else {
+            return Ok(Vec::new());
+        };
+        let traced = photons.tracer.trace(pass, &kernel)?;
+        self.counts.photons += traced.counts;
+        let records = photons.tracer.records().buffer().view();
+        let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;
+        let mapped = records.iter().map(|words| {
+            let (bounce, diffused) = photon_history(words);
+            let mut record = unpack_photon(words);
+            record.flux *= scale as f32;
+            MappedPhoton {
+                record,
+                bounce,
+                diffused,
+            }
+        });
+        Ok(mapped.collect())
+    }
+
+    /// How the kernels of a pass are made.
+    pub fn kernel(&self, pass: u32) -> KernelSettings {
+        self.settings.kernel(pass, self.diagonal())
+    }
+
+    /// Of the scene's box, m.
+    fn diagonal(&self) -> f64 {
+        let [lower, upper] = self.scene.bounds();
+        f64::from((upper - lower).length())
+    }
+
+    /// What stored fluxes are multiplied by, W.
+    fn watts(&self) -> f64 {
+        1.0 / (flux_scale(&self.scene) * f64::from(self.settings.photons))
     }
 
     /// The picture so far, as [`PathTracer::picture`] has it.

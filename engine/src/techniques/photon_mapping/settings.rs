@@ -18,6 +18,8 @@ const SAMPLES_MAX: u32 = 1024;
 /// the dampening. A room of 6 m × 6 m × 3 m has a diagonal of 9 m; the source's unit and greatest axis are 1 m.
 const RADIUS_SHARE: f64 = 1.0 / 100.0;
 const UNIT_SHARE: f64 = 1.0 / 9.0;
+/// Nodes and records of a query, at most: loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
+const QUERY_QUOTA: u32 = 32_768;
 /// Least length of an axis in unit lengths.
 const LENGTH_MIN: f64 = 1e-3;
 
@@ -66,6 +68,10 @@ pub struct PhotonSettings {
     /// Also gathers albedo, normal and depth of what is seen first; the view's, where settings come as text.
     #[serde(skip)]
     pub aovs: bool,
+    /// Nodes and records after which a query of the map is given up and its place goes through all records instead. Changes the order of
+    /// sums only.
+    #[serde(skip)]
+    pub query_quota: u32,
 }
 
 impl Default for PhotonSettings {
@@ -87,6 +93,7 @@ impl Default for PhotonSettings {
             sampler: SamplerKind::Sobol,
             seed: 0,
             aovs: false,
+            query_quota: QUERY_QUOTA,
         }
     }
 }
@@ -103,6 +110,7 @@ impl PhotonSettings {
         };
         in_range("photons", self.photons, 1..=PHOTONS_MAX)?;
         in_range("samples_per_pass", self.samples_per_pass, 1..=SAMPLES_MAX)?;
+        in_range("query_quota", self.query_quota, 1..=QUERY_QUOTA)?;
         let fits = |name: &str, value: f32, fits: bool, cause: &str| {
             fits.then_some(()).ok_or_else(|| Error::setting(name, value, cause))
         };

@@ -55,9 +55,10 @@ impl Statistics {
     fn of(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: PhotonSettings) -> Result<Self> {
         let mut mapper = mapper(gpu, scene, size, settings)?;
         let kernel = mapper.kernel(0);
-        let photons = mapper.photons(0)?;
         while mapper.step(1)?.is_some() {}
+        // What the first pass was made of, traced again.
         let counts = mapper.counts();
+        let photons: Vec<PhotonRecord> = mapper.photons(0)?.iter().map(|photon| photon.record).collect();
         let share = |part: u64, whole: u64| 100.0 * part as f64 / whole.max(1) as f64;
         let clamped = photons.iter().filter(|photon| is_clamped(&kernel, photon)).count();
         let lengths = |axis: fn(&PhotonRecord) -> Vec3| photons.iter().map(|p| f64::from(axis(p).length())).collect();
