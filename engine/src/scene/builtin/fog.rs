@@ -30,6 +30,7 @@ pub const FOG_BOX: Entry = Entry {
         ),
         cornell::LIGHT_RADIANCE,
         cornell::SOURCE,
+        cornell::LAMP,
         cornell::BOXES,
         cornell::SPHERE,
     ],

@@ -11,9 +11,7 @@ use crate::transport::path_tracer::stages::stage_barrier;
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
-/// Nodes and records after which a query is given up and its place goes through all records instead.
-const QUERY_QUOTA: u32 = 32_768;
-/// The same of each of the rounds in which neighbours are found, and of the sum: six of them stay below the software driver's cap.
+/// Nodes and records of each of the rounds in which neighbours are found, and of the sum: six of them stay below the software driver's cap.
 const NEAREST_QUOTA: u32 = 10_000;
 
 /// Exact counts of queries.
@@ -44,6 +42,8 @@ pub(super) struct Gather {
     gpu: Gpu,
     query: Query,
     linear: Linear,
+    /// Records of a dispatch that goes through all of them.
+    quota: u32,
     counters: Buffer,
     gather_states: u32,
     caustic_states: u32,
@@ -94,7 +94,7 @@ impl Gather {
                     compact_quota: if settings.neighbors > 0 {
                         NEAREST_QUOTA
                     } else {
-                        QUERY_QUOTA
+                        settings.query_quota
                     },
                     nearest: settings.neighbors > 0,
                     linear: $linear,
@@ -122,14 +122,15 @@ impl Gather {
             Linear::Records(gpu.compute_pipeline(&spec!(photon_gather, true))?)
         };
         let (gather_states, caustic_states) = gathering_states(settings, eye);
+        let bytes = size_of::<Counters>() as u64;
+        let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
+        // Memory may hold what another buffer left.
+        gpu.upload(&counters, 0, &[Counters::default()])?;
         Ok(Self {
             query,
             linear,
-            counters: gpu.buffer(&BufferDesc::storage(
-                "gather counters",
-                size_of::<Counters>() as u64,
-                Category::Work,
-            ))?,
+            quota: settings.query_quota,
+            counters,
             gather_states,
             caustic_states,
             bounces: [set.min_bounces(), set.max_bounces().unwrap_or(u32::MAX)],
@@ -230,8 +231,8 @@ impl ArrivalStage for GatherStage<'_> {
         };
         let (scene, map) = (self.scene.scene_set(), self.set());
         recorder.pass("photon: gather all", |pass| {
-            for first in (0..self.map.count).step_by(QUERY_QUOTA as usize) {
-                let last = first.saturating_add(QUERY_QUOTA).min(self.map.count);
+            for first in (0..self.map.count).step_by(self.gather.quota as usize) {
+                let last = first.saturating_add(self.gather.quota).min(self.map.count);
                 pass.dispatch_indirect(linear, &[paths, &scene, &map], &self.push(first, last), items)?;
                 stage_barrier(pass);
             }

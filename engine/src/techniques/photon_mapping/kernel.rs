@@ -15,7 +15,7 @@ mod tests;
 
 use crate::gpu::shaders::constants::{
     KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
-    PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
+    PHOTON_BOUNCE_SHIFT, PHOTON_DIFFUSED_BIT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
 };
 use crate::transport::differentials::Differentials;
 use crate::transport::packing::{pack_octahedral, pack_rgb9e5, unpack_octahedral, unpack_rgb9e5};
@@ -216,6 +216,14 @@ pub fn unpack_photon(words: &PhotonWords) -> PhotonRecord {
         along: vector(words[2]),
         across: vector(words[1]),
     }
+}
+
+/// How often the photon of these words had been scattered before it landed, and whether diffusely.
+pub fn photon_history(words: &PhotonWords) -> (u32, bool) {
+    (
+        words[1][3] >> PHOTON_BOUNCE_SHIFT,
+        words[0][3] & PHOTON_DIFFUSED_BIT != 0,
+    )
 }
 
 /// Whether the record is the last one of a leaf.

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::gather::{Gather, GatherCounts};
-use super::kernel::PhotonWords;
+use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::PhotonMap;
 use super::settings::PhotonSettings;
 use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
@@ -45,6 +45,17 @@ pub struct MapperCounts {
     pub gather: GatherCounts,
     /// Seconds that maps were built for by the host, with copies.
     pub map_seconds: f64,
+}
+
+/// A photon where it landed, as the map of a pass has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MappedPhoton {
+    /// Its record, with its flux in W.
+    pub record: PhotonRecord,
+    /// How often it had been scattered, at most [`PHOTON_BOUNCE_MAX`](crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX).
+    pub bounce: u32,
+    /// Whether it had been scattered diffusely; told by the final gather alone.
+    pub diffused: bool,
 }
 
 /// A progressive rendering of one view by photon mapping.
@@ -159,16 +170,11 @@ impl PhotonMapper {
         }
         let end = begun.saturating_add(self.settings.samples_per_pass).min(samples);
         let mut timings = Vec::new();
-        let diagonal = self.diagonal();
+        let (kernel, watts) = (self.kernel(self.passes), self.watts());
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
-            let [lower, upper] = self.scene.bounds();
-            let diagonal = f64::from((upper - lower).length());
-            let traced = photons.tracer.trace(
-                self.passes,
-                &self.settings.kernel(self.passes, diagonal, self.scene.surface_area()),
-            )?;
+            let traced = photons.tracer.trace(self.passes, &kernel)?;
             timings.extend(traced.timings);
             let clock = Instant::now();
             let records = photons.tracer.records().buffer().view();
@@ -185,13 +191,11 @@ impl PhotonMapper {
             Some(Photons {
                 gather, map: Some(map), ..
             }) => {
-                let scale = 1.0 / (flux_scale(&self.scene) * f64::from(self.settings.photons));
-                let kernel = self.settings.kernel(self.passes, diagonal, self.scene.surface_area());
                 let nearest = (
                     self.settings.neighbors_in(self.passes),
                     kernel.length_max * kernel.unit_length,
                 );
-                Some(gather.stage(&self.scene, map, scale, nearest))
+                Some(gather.stage(&self.scene, map, watts, nearest))
             }
             _ => None,
         };
@@ -220,10 +224,47 @@ impl PhotonMapper {
         }))
     }
 
+    /// Traces the photons of a pass, and returns them in the order of bounces and photons. The picture is not touched, and counts go on.
+    ///
+    /// # Errors
+    /// As [`PhotonMapper::step`].
+    pub fn photons(&mut self, pass: u32) -> Result<Vec<MappedPhoton>> {
+        let kernel = self.kernel(pass);
+        let scale = self.watts();
+        let Some(photons) = &mut self.photons else {
+            return Ok(Vec::new());
+        };
+        let traced = photons.tracer.trace(pass, &kernel)?;
+        self.counts.photons += traced.counts;
+        let records = photons.tracer.records().buffer().view();
+        let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;
+        let mapped = records.iter().map(|words| {
+            let (bounce, diffused) = photon_history(words);
+            let mut record = unpack_photon(words);
+            record.flux *= scale as f32;
+            MappedPhoton {
+                record,
+                bounce,
+                diffused,
+            }
+        });
+        Ok(mapped.collect())
+    }
+
+    /// How the kernels of a pass are made.
+    pub fn kernel(&self, pass: u32) -> KernelSettings {
+        self.settings.kernel(pass, self.diagonal(), self.scene.surface_area())
+    }
+
     /// Of the scene's box, m.
     fn diagonal(&self) -> f64 {
         let [lower, upper] = self.scene.bounds();
         f64::from((upper - lower).length())
+    }
+
+    /// What stored fluxes are multiplied by, W.
+    fn watts(&self) -> f64 {
+        1.0 / (flux_scale(&self.scene) * f64::from(self.settings.photons))
     }
 
     /// The picture so far, as [`PathTracer::picture`] has it.

@@ -8,5 +8,7 @@ mod mapper;
 mod settings;
 mod tracer;
 
-pub use mapper::PhotonMapper;
-pub use settings::PhotonSettings;
+pub use gather::GatherCounts;
+pub use mapper::{MappedPhoton, MapperCounts, PhotonMapper};
+pub use settings::{MapQuery, PhotonSettings};
+pub use tracer::PhotonCounts;

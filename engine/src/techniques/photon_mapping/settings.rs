@@ -24,6 +24,8 @@ const NEIGHBORS_MAX: u32 = 10_000;
 const NEIGHBORS_MIN: u32 = 2;
 /// Neighbours are looked for as far as this many times their number would lie.
 const NEIGHBORS_MARGIN: f64 = 4.0;
+/// Nodes and records of a query, at most: loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
+const QUERY_QUOTA: u32 = 32_768;
 /// Least length of an axis in unit lengths.
 const LENGTH_MIN: f64 = 1e-3;
 
@@ -87,6 +89,10 @@ pub struct PhotonSettings {
     /// Also gathers albedo, normal and depth of what is seen first; the view's, where settings come as text.
     #[serde(skip)]
     pub aovs: bool,
+    /// Nodes and records after which a query of the map is given up and its place goes through all records instead. Changes the order of
+    /// sums only.
+    #[serde(skip)]
+    pub query_quota: u32,
 }
 
 impl Default for PhotonSettings {
@@ -110,6 +116,7 @@ impl Default for PhotonSettings {
             sampler: SamplerKind::Sobol,
             seed: 0,
             aovs: false,
+            query_quota: QUERY_QUOTA,
         }
     }
 }
@@ -127,6 +134,7 @@ impl PhotonSettings {
         in_range("photons", self.photons, 1..=PHOTONS_MAX)?;
         in_range("samples_per_pass", self.samples_per_pass, 1..=SAMPLES_MAX)?;
         in_range("neighbors", self.neighbors, 0..=NEIGHBORS_MAX)?;
+        in_range("query_quota", self.query_quota, 1..=QUERY_QUOTA)?;
         let fits = |name: &str, value: f32, fits: bool, cause: &str| {
             fits.then_some(()).ok_or_else(|| Error::setting(name, value, cause))
         };

@@ -7,6 +7,7 @@ mod errors;
 mod kd;
 mod media;
 mod photon_maps;
+mod photons;
 mod pictures;
 mod rays;
 mod rendering;
@@ -89,6 +90,8 @@ pub const MEASURES: &[Measure] = &[
     on_device("path-sets", rendering::path_sets::measure),
     on_device("persistent-threads", rays::persistent_threads::measure),
     on_host("phase-functions", media::phase_functions::measure),
+    on_device("photon-frame", photons::photon_frame::measure),
+    on_device("photon-statistics", photons::photon_statistics::measure),
     on_host("picture-formats", rendering::picture_formats::measure),
     on_host("ray-offsets", rays::ray_offsets::measure),
     on_host("sample-sums", rendering::sample_sums::measure),

@@ -1,0 +1,251 @@
+//! Settings: what each changes, that parts of the light sum up, and what is refused.
+
+use super::*;
+use clerestory::Error;
+use clerestory::techniques::{View, by_id};
+use clerestory_tests::render::builtin;
+use clerestory_tests::with_gpu;
+
+/// A closed box of 2 m whose walls reflect coloured light, with a point light.
+fn room() -> Scene {
+    let mut scene = builtin("builtin:furnace-box?rho=0.5&emission=0");
+    scene.name = "room".into();
+    scene.materials[0] = Material::lambert("wall", Vec3::new(0.6, 0.5, 0.4));
+    add_point(&mut scene, Vec3::new(0.2, 0.4, -0.1), Vec3::splat(20.0));
+    // A wall, away from its edges.
+    scene.cameras = vec![clerestory_hard_cases::scenes::orthographic(
+        glam::DVec3::new(0.0, 0.0, 0.9),
+        glam::DVec3::NEG_Z,
+        glam::DVec3::Y,
+        0.6,
+    )];
+    scene
+}
+
+/// What is left of a wall's light, off its edges by more than a kernel: h²/12 ∇²E of kernels of up to 0.2 m, where indirect light bends by less
+/// than E a square metre, and the rounding of fluxes whose bands differ by less than four.
+const BIAS: f64 = 4e-3 + 4.0 * FLUX_STEP;
+
+#[test]
+fn every_shape_and_profile_agrees_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let set = "bounces=2..3";
+        let reference = traced(gpu, &scene, set, 1024);
+        for shape in [
+            KernelShape::Fixed,
+            KernelShape::Isotropic,
+            KernelShape::Principal,
+            KernelShape::Skewed,
+        ] {
+            let settings = PhotonSettings {
+                shape,
+                radius: 0.2,
+                ..settings(set)
+            };
+            let found = means(gpu, &scene, &settings, 24);
+            let photons = found.counts.photons;
+            // Photons without a kernel are light that is lost.
+            let lost = photons.without_kernel as f64 / photons.deposits as f64;
+            println!("{shape:?}: {lost:.4} without a kernel");
+            assert!(lost < 0.01);
+            found.expect_same_as(&format!("{shape:?}"), &reference, [BIAS + lost; 3]);
+        }
+    });
+}
+
+#[test]
+fn direct_photons_and_final_gather_have_the_same_light() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let base = fixed("bounces=1..3", 0.1);
+        for (direct_photons, final_gather) in [(true, false), (false, true), (false, false)] {
+            let settings = PhotonSettings {
+                direct_photons,
+                final_gather,
+                ..base.clone()
+            };
+            // Direct light bends more: 6 E a square metre at 1 m.
+            let bias = BIAS + if direct_photons { 0.01 / 12.0 * 6.0 } else { 0.0 };
+            expect_agreement(gpu, &scene, &settings, [24, 1024], [bias; 3]);
+        }
+    });
+}
+
+#[test]
+fn caustics_are_seen_directly_by_a_final_gather() {
+    with_gpu(|gpu| {
+        let mut scene = floor_and_wall(
+            "mirror beside a floor",
+            Material::lambert("floor", Vec3::splat(0.5)),
+            Material::mirror("mirror", Vec3::splat(0.9)),
+        );
+        let grey = scene.add_material(Material::lambert("grey", Vec3::splat(0.7)));
+        scene.place(upright("other wall", grey, 1.2, 1.5));
+        let lamp = scene.add_material(Material {
+            double_sided: false,
+            ..clerestory_tests::render::lamp(Vec3::splat(8.0))
+        });
+        scene.place(ceiling("lamp", lamp, Vec3::new(0.3, 1.6, 0.1), 0.5, true));
+        let settings = PhotonSettings {
+            final_gather: true,
+            photons: 1 << 14,
+            ..fixed("indirect", 0.03)
+        };
+        expect_agreement(gpu, &scene, &settings, [24, 1024], [BIAS; 3]);
+    });
+}
+
+#[test]
+fn parts_of_the_light_sum_to_the_whole() {
+    with_gpu(|gpu| {
+        let mut scene = room();
+        scene.materials[0].emission = Vec3::new(0.1, 0.2, 0.3);
+        let part = |set: &str| photons(gpu, &scene, &fixed(set, 0.1), 4);
+        let whole = part("all");
+        let parts = ["emitted", "direct", "indirect"].map(part);
+        assert!(parts.iter().all(|part| sums(part)[0].iter().all(|sum| *sum > 0.1)));
+        for (i, value) in whole.iter().enumerate() {
+            // The same random numbers: equal up to rounding, of four samples a pixel each.
+            let sum: f32 = parts.iter().map(|part| part[i]).sum();
+            assert!((sum - value).abs() <= 1e-5 * value, "{i}: {sum}, not {value}");
+        }
+    });
+}
+
+#[test]
+fn what_cannot_be_is_refused_by_name() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let uploaded = upload(gpu, &scene);
+        let refuse = |settings: PhotonSettings| match PhotonMapper::new(
+            gpu,
+            uploaded.clone(),
+            &scene.cameras[0],
+            SIZE,
+            settings.clone(),
+        ) {
+            Ok(_) => panic!("accepted: {settings:?}"),
+            Err(error) => error,
+        };
+        let fine = || settings("all");
+        let cases: [(&str, PhotonSettings); 16] = [
+            ("photons", PhotonSettings { photons: 0, ..fine() }),
+            (
+                "photons",
+                PhotonSettings {
+                    photons: (1 << 24) + 1,
+                    ..fine()
+                },
+            ),
+            (
+                "samples_per_pass",
+                PhotonSettings {
+                    samples_per_pass: 0,
+                    ..fine()
+                },
+            ),
+            (
+                "samples_per_pass",
+                PhotonSettings {
+                    samples_per_pass: 1025,
+                    ..fine()
+                },
+            ),
+            ("radius", PhotonSettings { radius: -1.0, ..fine() }),
+            (
+                "radius",
+                PhotonSettings {
+                    radius: f32::NAN,
+                    ..fine()
+                },
+            ),
+            (
+                "unit_length",
+                PhotonSettings {
+                    unit_length: f32::INFINITY,
+                    ..fine()
+                },
+            ),
+            ("spread", PhotonSettings { spread: 0.0, ..fine() }),
+            (
+                "dampening",
+                PhotonSettings {
+                    dampening: 0.0,
+                    ..fine()
+                },
+            ),
+            (
+                "dampening",
+                PhotonSettings {
+                    dampening: 1.5,
+                    ..fine()
+                },
+            ),
+            (
+                "flatness",
+                PhotonSettings {
+                    flatness: 1.0,
+                    ..fine()
+                },
+            ),
+            (
+                "reduction",
+                PhotonSettings {
+                    reduction: 0.0,
+                    ..fine()
+                },
+            ),
+            (
+                "reduction",
+                PhotonSettings {
+                    reduction: f32::NAN,
+                    ..fine()
+                },
+            ),
+            (
+                "query_quota",
+                PhotonSettings {
+                    query_quota: 0,
+                    ..fine()
+                },
+            ),
+            ("path_set", settings("bounces=0..64")),
+            (
+                "final_gather",
+                PhotonSettings {
+                    final_gather: true,
+                    direct_photons: true,
+                    ..fine()
+                },
+            ),
+        ];
+        for (wanted, settings) in cases {
+            match refuse(settings) {
+                Error::Setting { name, .. } => assert_eq!(name, wanted),
+                other => panic!("{wanted}: {other}"),
+            }
+        }
+        // More than a range of bounces.
+        for set in ["LS+DE", "LD.*E", "bounces=0..3,L[^S]*E"] {
+            let error = refuse(settings(set));
+            assert!(matches!(&error, Error::Unsupported { .. }), "{set}: {error}");
+            let text = error.to_string();
+            assert!(text.contains("range of bounces") && text.contains('L'), "{set}: {text}");
+        }
+        // Media, by the scene.
+        let fog = builtin("builtin:fog-box");
+        let view = View {
+            camera: &fog.cameras[0],
+            size: SIZE,
+            seed: 0,
+            aovs: false,
+        };
+        let prepared =
+            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &fog), &view, &serde_json::json!({})));
+        match prepared {
+            Ok(_) => panic!("fog was accepted"),
+            Err(error) => assert!(error.to_string().contains("media"), "{error}"),
+        }
+    });
+}

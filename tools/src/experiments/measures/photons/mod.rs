@@ -1,0 +1,5 @@
+//! Photon mapping on surfaces as a whole: what photons and kernels come to, and what a frame costs; pictures are compared by sweeps.
+
+mod cases;
+pub mod photon_frame;
+pub mod photon_statistics;
