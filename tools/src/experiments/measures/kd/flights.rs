@@ -12,7 +12,8 @@ use std::path::Path;
 use clerestory::accel::kd::{KdCaches, KdCounters, KdSettings, KdTraversal, KdTree, Scheme};
 use clerestory::accel::trace::{Query, RayTracer, TraceSettings};
 use clerestory::accel::{Aabb, Hit, Ray, RayIndex};
-use clerestory::gpu::Gpu;
+use clerestory::gpu::ash::vk;
+use clerestory::gpu::{Category, Gpu, TexelView};
 use clerestory::scene::Camera;
 use clerestory::{Error, Result, scene};
 use glam::{DAffine3, DQuat, Vec3};
@@ -317,14 +318,27 @@ pub fn race<'a>(
     flight: &Flight,
     indexes: impl IntoIterator<Item = (&'a dyn RayIndex, TraceSettings)>,
 ) -> Result<Vec<Raced>> {
-    let tracers = indexes.into_iter().map(|(index, settings)| {
-        let of = |query| {
-            let settings = TraceSettings { query, ..settings };
-            RayTracer::new(gpu, index, &settings.fitted(gpu.caps(), index.device_traversal()))
+    // An index that takes part with several settings is on the device once.
+    let mut uploaded: Vec<(&dyn RayIndex, TexelView)> = Vec::new();
+    let mut tracers = Vec::new();
+    for (index, settings) in indexes {
+        let known = uploaded.iter().find(|(other, _)| std::ptr::addr_eq(*other, index));
+        let texels = match known {
+            Some((_, texels)) => texels.clone(),
+            None => {
+                let format = vk::Format::R32G32B32A32_UINT;
+                let texels = gpu.texels_with(index.name(), Category::Index, format, index.texels())?;
+                uploaded.push((index, texels.clone()));
+                texels
+            }
         };
-        Ok([of(Query::Closest)?, of(Query::Any)?])
-    });
-    let tracers = tracers.collect::<Result<Vec<_>>>()?;
+        let of = |query| {
+            let traversal = index.device_traversal();
+            let settings = TraceSettings { query, ..settings }.fitted(gpu.caps(), traversal);
+            RayTracer::with_texels(gpu, texels.clone(), traversal, &settings)
+        };
+        tracers.push([of(Query::Closest)?, of(Query::Any)?]);
+    }
     let mut seconds = vec![[Vec::new(), Vec::new()]; tracers.len()];
     let mut hits = vec![[Vec::new(), Vec::new()]; tracers.len()];
     let rays = [&flight.closest(), &flight.shadow];
