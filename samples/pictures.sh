@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the pictures of samples/README.md anew, each by its sample; the viewer's on a virtual X server.
+# Makes the pictures of samples/README.md anew, each by its sample; the viewers' on a virtual X server.
 set -eu
 cd "$(dirname "$0")/.."
 cargo build --release -p clerestory-samples --bins
@@ -14,4 +14,5 @@ trap 'rm -r "$beside"' EXIT
 "$samples/render_gltf" --output "$beside/render_gltf.png" --size 240x180 --spp 256
 cp "$beside/render_gltf.png" "$out/"
 xvfb-run -a "$samples/viewer" 'builtin:cornell-box?sphere=gold' --size 180x180 --exposure 0.5 --frames 400 --screenshot "$out/viewer.png"
+xvfb-run -a "$samples/photon_viewer" --size 240x180 --photons 262144 --frames 16 --screenshot "$out/photon_viewer.png"
 ls -l "$out"

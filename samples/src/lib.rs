@@ -1,10 +1,12 @@
 //! Small programs that each show one use of the Clerestory rendering engine; here is what they share.
 
 pub mod arguments;
+pub mod carousel;
 pub mod orbit;
 pub mod progressive;
 pub mod shaders;
 pub mod small_gltf;
+pub mod window;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

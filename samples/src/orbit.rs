@@ -93,6 +93,15 @@ impl Orbit {
         self.pose.target += height * self.pose.zoom * (right * axes.x_axis + up * axes.y_axis);
     }
 
+    /// Flies on: the eye moves to its right by metres and looks further to the right by an angle in radians; the target stays ahead of it.
+    pub fn fly(&mut self, right: f64, turn: f64) {
+        let axes = rotation(&self.pose);
+        let ahead = self.eye_distance();
+        let eye = self.pose.target + ahead * axes.z_axis + right * axes.x_axis;
+        self.pose.azimuth = (self.pose.azimuth - turn) % std::f64::consts::TAU;
+        self.pose.target = eye - ahead * rotation(&self.pose).z_axis;
+    }
+
     /// Comes nearer (below 1) or goes away: distance or height of the view are multiplied by `factor`.
     pub fn zoom(&mut self, factor: f64) {
         self.pose.zoom = (self.pose.zoom * factor).clamp(ZOOM[0], ZOOM[1]);
@@ -113,18 +122,20 @@ impl Orbit {
         let Pose { target, zoom, .. } = self.pose;
         let axes = rotation(&self.pose);
         let mut camera = self.camera.clone();
-        let distance = match &mut camera.projection {
-            Projection::Perspective { .. } => {
-                camera.focus_distance *= zoom as f32;
-                self.distance * zoom
-            }
-            Projection::Orthographic { half_height } => {
-                *half_height *= zoom as f32;
-                self.distance
-            }
-        };
-        camera.transform = DAffine3::from_mat3_translation(axes, target + distance * axes.z_axis);
+        match &mut camera.projection {
+            Projection::Perspective { .. } => camera.focus_distance *= zoom as f32,
+            Projection::Orthographic { half_height } => *half_height *= zoom as f32,
+        }
+        camera.transform = DAffine3::from_mat3_translation(axes, target + self.eye_distance() * axes.z_axis);
         camera
+    }
+
+    /// From target to eye, metres.
+    fn eye_distance(&self) -> f64 {
+        match self.camera.projection {
+            Projection::Perspective { .. } => self.distance * self.pose.zoom,
+            Projection::Orthographic { .. } => self.distance,
+        }
     }
 }
 
@@ -238,6 +249,23 @@ mod tests {
             let expected = DVec3::new(0.25 * height, -0.5 * height, 0.0);
             assert!((orbit.pose().target - expected).length() < 1e-6, "{projection:?}");
         }
+    }
+
+    #[test]
+    fn flying_moves_and_turns_the_eye_to_the_right() {
+        let camera = looking(DVec3::new(5.0, 2.0, 4.0), DVec3::ZERO, DVec3::Y);
+        let mut orbit = Orbit::new(&camera, BOUNDS);
+        orbit.zoom(0.7);
+        let before = orbit.camera().transform;
+        orbit.fly(0.1, 0.25f64.to_radians());
+        let after = orbit.camera().transform;
+        let step = after.translation - before.translation;
+        assert!((step - 0.1 * before.matrix3.x_axis).length() < 1e-12, "{step}");
+        let [back, was] = [after, before].map(|place| place.matrix3.z_axis);
+        // About the vertical, so that the way ahead, which is not level, turns by less; and towards the right.
+        let turned = (back.x * was.x + back.z * was.z) / (back.x.hypot(back.z) * was.x.hypot(was.z));
+        assert!((turned - 0.25f64.to_radians().cos()).abs() < 1e-12, "{turned}");
+        assert!(back.y == was.y && (-back).dot(before.matrix3.x_axis) > 0.0);
     }
 
     #[test]

@@ -197,8 +197,13 @@ fn a_sample_that_cannot_write_says_so() {
 
 /// The viewer on a virtual X server.
 fn viewer(arguments: &[&str], screenshot: &Path) -> Output {
+    windowed(env!("CARGO_BIN_EXE_viewer"), arguments, screenshot)
+}
+
+/// A sample with a window on a virtual X server.
+fn windowed(program: &str, arguments: &[&str], screenshot: &Path) -> Output {
     Command::new("xvfb-run")
-        .args(["-a", env!("CARGO_BIN_EXE_viewer")])
+        .args(["-a", program])
         .args(arguments)
         .arg("--screenshot")
         .arg(screenshot)
@@ -281,5 +286,97 @@ fn the_viewer_refuses_what_it_does_not_know() {
         assert_eq!(output.status.code(), Some(1), "{}", said(&output));
         let error = String::from_utf8_lossy(&output.stderr);
         assert!(error.contains(arguments[0]) || error.contains(arguments[1]), "{error}");
+    }
+}
+
+/// The last frame of the photon viewer, and what it said.
+fn photon_viewer(arguments: &[&str]) -> (image::RgbImage, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    let small = ["--size", "80x60", "--photons", "4096"];
+    let arguments = [&small[..], arguments].concat();
+    let output = windowed(env!("CARGO_BIN_EXE_photon_viewer"), &arguments, &path);
+    assert!(output.status.success(), "{}", said(&output));
+    (open(&path), said(&output))
+}
+
+#[test]
+fn the_photon_viewers_light_goes_around() {
+    // The lamp stands to the right of the ring, and after half a round to its left. The wall near it is lit at a close distance.
+    let sides = |frames: &str| {
+        let (picture, text) = photon_viewer(&["--turn", "180", "--frames", frames]);
+        assert_eq!(picture.dimensions(), (80, 60));
+        let [left, right] = [[0.0, 0.3], [0.7, 1.0]].map(|across| mean(&picture, across, [0.0, 1.0])[1]);
+        (left, right, text)
+    };
+    let (left, right, _) = sides("1");
+    assert!(right > 1.2 * left && left > 5.0, "{left} {right}");
+    let (other_left, other_right, text) = sides("4");
+    assert!(other_left > 1.2 * other_right, "{other_left} {other_right}");
+    // The scene is its own mirror image, but for the facets of the ring and the photons.
+    assert!((other_left - right).abs() < 0.1 * right, "{other_left} {right}");
+    for expected in ["medians of 3 frames", "frames/s", "photons/s", "trace", "map", "render"] {
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+}
+
+#[test]
+fn the_photon_viewer_converges_while_nothing_moves() {
+    let still = |frames: &str| photon_viewer(&["--turn", "0", "--frames", frames]).0;
+    let [first, fourth, last] = ["1", "4", "16"].map(still);
+    let difference = |a: &image::RgbImage| {
+        let pairs = a.as_raw().iter().zip(last.as_raw());
+        pairs.map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum::<f64>()
+    };
+    assert!(
+        difference(&fourth) < 0.5 * difference(&first),
+        "{} {}",
+        difference(&fourth),
+        difference(&first)
+    );
+}
+
+#[test]
+fn the_photon_viewers_camera_flies() {
+    let arguments = ["--turn", "0", "--flight", "0.1", "--frames"];
+    let [before, after] = ["1", "4"].map(|frames| photon_viewer(&[&arguments[..], &[frames]].concat()).0);
+    // By how many pixels the picture has gone to the left: the floor is seen from 2.3 m at 28 pixels a metre.
+    let difference = |shift: u32| {
+        let shared = (0..60).flat_map(|y| (20..60).map(move |x| (x, y)));
+        let pairs = shared.map(|(x, y)| (before.get_pixel(x, y)[1], after.get_pixel(x - shift, y)[1]));
+        pairs.map(|(a, b)| u32::from(a.abs_diff(b))).sum::<u32>()
+    };
+    let found = (0..20).min_by_key(|shift| difference(*shift));
+    assert!(found.is_some_and(|shift| (6..14).contains(&shift)), "{found:?}");
+}
+
+#[test]
+fn the_photon_viewer_refuses_what_it_cannot_show() {
+    for (arguments, expected) in [
+        (&["--shape", "round"][..], "round"),
+        (&["--photons", "many"], "many"),
+        (&["--turn", "left"], "left"),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_photon_viewer"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(said(&output).contains(expected), "{}", said(&output));
+    }
+    // A scene without a light that could move, and one with a medium.
+    for (scene, expected) in [
+        ("builtin:cornell-box", "directional light"),
+        ("builtin:point-in-fog", "participating media"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let options = [scene, "--frames", "1"];
+        let output = windowed(
+            env!("CARGO_BIN_EXE_photon_viewer"),
+            &options,
+            &folder.path().join("picture.png"),
+        );
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(said(&output).contains(expected), "{}", said(&output));
     }
 }

@@ -3,7 +3,7 @@
 //! Readers and generators end with it, and a host that builds a [`Scene`] itself should too: what passes cannot make an upload or a
 //! traversal read outside its buffers.
 
-use super::{Camera, Light, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
+use super::{Camera, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
 use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place.
@@ -82,7 +82,7 @@ impl Scene {
             return fail(at, cause);
         }
         for (i, light) in self.lights.iter().enumerate() {
-            if !light_is_sound(light) {
+            if !light_is_sound(&light.kind) {
                 return fail(
                     format!("lights[{i}] {:?}", light.name),
                     "holds a number that is not finite or a negative intensity".into(),
@@ -243,9 +243,10 @@ fn check_material(material: &Material, images: usize) -> Result<(), Fault> {
     }
 }
 
-fn light_is_sound(light: &Light) -> bool {
+/// Whether a light's numbers are finite and in their ranges, its directions unit vectors.
+pub(crate) fn light_is_sound(kind: &LightKind) -> bool {
     let strength = |x: glam::Vec3| x.is_finite() && x.min_element() >= 0.0;
-    match light.kind {
+    match *kind {
         LightKind::Point { position, intensity } => position.is_finite() && strength(intensity),
         LightKind::Spot {
             position,

@@ -43,7 +43,9 @@ pub struct MapperCounts {
     pub leaf_size: u32,
     /// Queries.
     pub gather: GatherCounts,
-    /// Seconds that maps were built for by the host, with copies.
+    /// Seconds of wall clock that photons were traced for.
+    pub trace_seconds: f64,
+    /// Seconds of wall clock that maps were built for by the host, with copies.
     pub map_seconds: f64,
 }
 
@@ -151,11 +153,31 @@ impl PhotonMapper {
     /// [`Error::Setting`](crate::Error::Setting) for a camera that cannot be used, [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         self.eye.set_camera(camera)?;
+        self.begin();
+        Ok(())
+    }
+
+    /// Forgets everything gathered so far and begins anew with this seed, with the kernels there are: for an independent picture of the same
+    /// view, or one of another time, after a light has [moved](GpuScene::move_light).
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn restart(&mut self, seed: u32) -> Result<()> {
+        self.eye.restart(seed)?;
+        self.settings.seed = seed;
+        if let Some(photons) = &mut self.photons {
+            photons.tracer.set_seed(seed);
+        }
+        self.begin();
+        Ok(())
+    }
+
+    /// Before the first pass.
+    fn begin(&mut self) {
         self.passes = 0;
         if let Some(photons) = &mut self.photons {
             photons.map = None;
         }
-        Ok(())
     }
 
     /// Does a pass, or a part of its eye paths, towards `samples` samples a pixel; `None` when all are there.
@@ -174,8 +196,10 @@ impl PhotonMapper {
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
+            let clock = Instant::now();
             let traced = photons.tracer.trace(self.passes, &kernel)?;
             timings.extend(traced.timings);
+            self.counts.trace_seconds += clock.elapsed().as_secs_f64();
             let clock = Instant::now();
             let records = photons.tracer.records().buffer().view();
             let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;

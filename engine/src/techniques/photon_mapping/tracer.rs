@@ -177,6 +177,11 @@ impl PhotonTracer {
         })
     }
 
+    /// Goes on with another seed.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.settings.seed = seed;
+    }
+
     /// The records of the last pass, in the order of bounces and photons.
     pub fn records(&self) -> &TexelView {
         &self.records

@@ -5,6 +5,7 @@ use glam::{DVec3, UVec2, Vec3};
 
 use super::LightKinds;
 use super::geometry::{Geometry, corners_of, is_traceable};
+use super::punctual::PunctualLights;
 use crate::Result;
 use crate::gpu::shaders::constants::{
     EXPONENT_BITS, LIGHT_DARK, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE,
@@ -14,11 +15,13 @@ use crate::gpu::shaders::types::{SceneEnvironment, SceneLight, SceneMaterial, Sc
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
 use crate::transport::distribution::{build_distribution, distribution_probability_2d};
 use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
-use crate::transport::lights::{light_power, triangle_power};
+use crate::transport::lights::triangle_power;
 
 /// Everything that light sampling chooses among: emissive triangles, lights without area, the environment last.
 pub(super) struct Lights {
     pub(super) records: Vec<SceneLight>,
+    /// The scene's lights without area among them.
+    pub(super) punctual: PunctualLights,
     /// Cumulative probabilities of the lights, then of the environment's texels.
     pub(super) cdf: Vec<f32>,
     /// The environment's block: header and texels.
@@ -88,8 +91,9 @@ impl Lights {
             }
         }
         let radius = 0.5 * (upper - lower).as_dvec3().length();
+        let mut punctual = PunctualLights::new(radius);
         for light in &scene.lights {
-            let power = luminance(light_power(&light.kind, radius));
+            let power = punctual.add(&light.kind, records.len());
             if power > 0.0 {
                 powers.push(power);
                 records.push(light_record(&light.kind));
@@ -125,6 +129,7 @@ impl Lights {
         cdf.extend(environment_cdf);
         Ok(Self {
             records,
+            punctual,
             cdf,
             environment,
             power,
@@ -175,7 +180,7 @@ fn is_sampleable([a, b, c]: [Vec3; 3]) -> bool {
     size >= LEAST.0 && size / scale / scale >= LEAST.1
 }
 
-fn light_record(kind: &LightKind) -> SceneLight {
+pub(super) fn light_record(kind: &LightKind) -> SceneLight {
     match *kind {
         LightKind::Point { position, intensity } => SceneLight {
             kind: LIGHT_POINT,

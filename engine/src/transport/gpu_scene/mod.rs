@@ -8,6 +8,7 @@ mod geometry;
 mod lights;
 mod materials;
 mod media;
+mod punctual;
 mod textures;
 
 use std::path::Path;
@@ -19,6 +20,7 @@ use self::geometry::Geometry;
 use self::lights::Lights;
 use self::materials::{material_record, materials_by_use};
 use self::media::GpuMedia;
+use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
@@ -26,9 +28,9 @@ use crate::Result;
 use crate::accel::{DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::sets::{IndexSet, MediaSet, SceneSet};
-use crate::gpu::shaders::types::SceneMaterial;
+use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
 use crate::gpu::{Category, Gpu, TexelView};
-use crate::scene::{Material, Scene, SceneProfile};
+use crate::scene::{LightKind, Material, Scene, SceneProfile};
 
 /// A scene in device memory. Make it once and render it with any technique.
 #[derive(Debug)]
@@ -39,6 +41,7 @@ pub struct GpuScene {
     surface_area: f64,
     light_power: f64,
     light_kinds: LightKinds,
+    punctual_lights: PunctualLights,
     index: IndexOnDevice,
     buffers: SceneBuffers,
     media: Option<GpuMedia>,
@@ -124,6 +127,7 @@ impl GpuScene {
             surface_area: geometry.surface_area(),
             light_power: lights.power,
             light_kinds: lights.kinds(),
+            punctual_lights: lights.punctual,
             index,
             buffers,
             media,
@@ -185,6 +189,22 @@ impl GpuScene {
     /// True when some point, spot or directional light has power.
     pub fn has_punctual_lights(&self) -> bool {
         self.light_kinds.punctual
+    }
+
+    /// Moves or turns a point, spot or directional light, by its index in [`Scene::lights`]: as if the scene had been made with the light like
+    /// this. The probabilities by which light sampling chooses stay, so its kind and its power must.
+    ///
+    /// Pictures under way must begin anew ([`PathTracer::restart`](super::PathTracer::restart),
+    /// [`PhotonMapper::restart`](crate::techniques::photon_mapping::PhotonMapper::restart) or
+    /// [`Technique::set_camera`](crate::techniques::Technique::set_camera)), or they mix both; none of the scene's may be in the middle of a step.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for a light that does not exist or has no power, for one of another kind or another power, and for
+    /// numbers that [`Scene::check`] refuses; [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn move_light(&self, gpu: &Gpu, light: usize, kind: &LightKind) -> Result<()> {
+        let (record, index) = self.punctual_lights.moved(light, kind)?;
+        let offset = u64::from(index) * size_of::<SceneLight>() as u64;
+        gpu.upload(self.buffers.lights.buffer(), offset, &[record])
     }
 
     /// Set 3, of scenes with participating media.
