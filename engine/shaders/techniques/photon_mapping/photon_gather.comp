@@ -167,7 +167,9 @@ void main() {
     if (LAMBERT) {
         gathered *= gather.lobes.diffuse * INV_PI;
     }
-    atomicAdd(gather_counters.queries, 1u);
+    if (!LINEAR || push.first == 0u) {
+        atomicAdd(gather_counters.queries, 1u);
+    }
     if (atomicAdd(gather_counters.photons[0], gathered_photons) > 0xFFFFFFFFu - gathered_photons) {
         atomicAdd(gather_counters.photons[1], 1u);
     }
