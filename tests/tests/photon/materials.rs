@@ -117,7 +117,7 @@ fn expect_material(gpu: &Gpu, scene: &Scene, photons: u32) {
         photons,
         ..fixed("bounces=1..4", RADIUS)
     };
-    expect_agreement(gpu, scene, &settings, [32, 768], [BIAS; 3]);
+    expect_agreement(gpu, scene, &settings, [20, 512], [BIAS; 3]);
 }
 
 #[test]
@@ -168,6 +168,32 @@ fn floors_of_all_kinds_gather() {
             ..plastic()
         };
         expect_material(gpu, &fixture("half metal", half, wall()), 1 << 13);
+    });
+}
+
+#[test]
+fn blended_surfaces_meet_their_share_of_photons() {
+    with_gpu(|gpu| {
+        // How many photons meet a sheet as it is, and when half of it is there, whose square has half of them as variance.
+        let meet = |alpha_mode: AlphaMode| {
+            let mut scene = fixture("sheet", plain("floor"), plain("wall"));
+            let index = scene.add_material(sheet(alpha_mode));
+            scene.place(ceiling("sheet", index, Vec3::Y * 0.4, 0.5, true));
+            let settings = PhotonSettings {
+                direct_photons: true,
+                ..fixed("bounces=1..1", RADIUS)
+            };
+            let photons = mapper(gpu, &scene, &settings).photons(0);
+            let photons = photons.unwrap_or_else(|error| panic!("{error}"));
+            let on_sheet = photons
+                .iter()
+                .filter(|p| p.record.position.y > 0.3 && p.record.position.x > -0.9);
+            let up = photons.iter().filter(|p| p.record.normal.y > 0.9).count();
+            println!("{alpha_mode:?}: {} photons, {up} up", photons.len());
+            on_sheet.count() as f64
+        };
+        let (whole, half) = (meet(AlphaMode::Opaque), meet(AlphaMode::Blend));
+        expect_mean("half a sheet", half, 0.5 * whole, 0.5 * whole, 0.0);
     });
 }
 

@@ -49,6 +49,13 @@ fn thin_walls_let_no_photon_through() {
                 ..fixed("all", radius)
             };
             let mut scene = rooms();
+            scene.cameras = vec![orthographic(DVec3::X * -0.5, DVec3::ZERO, DVec3::Y, 1.0)];
+            for pass in 0..2 {
+                let landed = mapper(gpu, &scene, &settings).photons(pass);
+                let dark = landed.unwrap_or_else(|error| panic!("{error}"));
+                let dark: Vec<_> = dark.iter().filter(|p| p.record.position.x < 0.0).collect();
+                assert!(dark.is_empty(), "photons in the dark: {dark:?}");
+            }
             // The sheet from the dark side, its rims too; then from the lit side.
             scene.cameras = vec![orthographic(DVec3::X * -0.5, DVec3::ZERO, DVec3::Y, 1.0)];
             expect_black("the wall", &photons(gpu, &scene, &settings, 2));
