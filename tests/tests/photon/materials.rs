@@ -214,6 +214,7 @@ fn light_goes_through_what_lets_it_through() {
         }
         for (name, material) in [
             ("thin glass", thin()),
+            ("sheet", sheet(AlphaMode::Opaque)),
             ("blended sheet", sheet(AlphaMode::Blend)),
             ("masked sheet", sheet(AlphaMode::Mask { cutoff: 0.5 })),
         ] {
