@@ -12,9 +12,9 @@ pub fn case_section(case: &HardCase, pictured: bool) -> String {
     let documented = case
         .documented
         .map_or(String::new(), |text| format!("\n- Degrades: {text}"))
-        + &case
-            .documented_bias
-            .map_or(String::new(), |text| format!("\n- Degrades where pictures have a bias: {text}"));
+        + &case.documented_bias.map_or(String::new(), |text| {
+            format!("\n- Degrades where pictures have a bias: {text}")
+        });
     let picture = if pictured {
         format!("![{name}](hard-cases/{name}.png)\n\n", name = case.name)
     } else {
