@@ -17,7 +17,10 @@ fn fault(case: &HardCase, subject: &Subject, outcome: &Outcome) -> Option<String
         (Verdict::Degrades, Subject::Technique { info, .. }) if outcome.refused => {
             (case.picture)().is_ok_and(|scene| !(info.refusals)(&SceneProfile::of(&scene)).is_empty())
         }
-        (Verdict::Degrades, _) => case.documented.is_some() && outcome.reason.as_deref() == case.documented,
+        (Verdict::Degrades, _) => {
+            let documented = case.documented_of(subject);
+            documented.is_some() && outcome.reason.as_deref() == documented
+        }
     };
     (!expected).then(|| format!("{outcome:?}"))
 }

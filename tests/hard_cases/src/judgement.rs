@@ -143,6 +143,19 @@ impl Judgement {
         self.none(format!("{what}: pixels that are not {expected:?}"), wrong);
     }
 
+    /// Every value is exactly this, but for techniques with a bias: these degrade as documented where up to `share` of the pixels are not.
+    pub fn exactly_unless_biased(&mut self, what: &str, painted: &Painted, expected: [f32; 3], share: f64) {
+        self.sound(what, painted);
+        let wrong = painted.radiance.chunks(3).filter(|pixel| *pixel != expected).count();
+        let documented = if painted.tolerance > 0.0 {
+            share * (painted.radiance.len() / 3) as f64
+        } else {
+            0.0
+        };
+        let what = format!("{what}: pixels that are not {expected:?}");
+        self.at_most_documented(what, wrong as f64, 0.0, documented);
+    }
+
     /// Every value is this up to the rounding of f32 kernels ([`RELATIVE_DEVIATION_FLOOR`]) times `factor`: for what has no noise.
     pub fn exactly_rounded(&mut self, what: &str, painted: &Painted, expected: [f64; 3], factor: f64) {
         self.sound(what, painted);
@@ -210,8 +223,8 @@ impl Judgement {
             self.at_most_documented(
                 format!("{what}: relative error of the mean"),
                 error,
-                bound + noise,
-                documented + noise,
+                bound + noise + painted.tolerance,
+                documented + noise + painted.tolerance,
             );
         }
         Ok(())
@@ -224,10 +237,12 @@ impl Judgement {
             .mean()
             .into_iter()
             .map(|(mean, variance)| mean - Z_MAX * variance.sqrt());
+        let limit = limit * (1.0 + painted.tolerance);
         self.at_most(format!("{what}: mean less its noise"), worst.fold(0.0, f64::max), limit);
     }
 
-    /// Pixels have the expectations `expected`, or those of an independent picture with the variance of its means.
+    /// Pixels have the expectations `expected`, or those of an independent picture with the variance of its means; where the technique
+    /// has a bias, means over the picture have.
     ///
     /// # Errors
     /// That of the z-test, for pictures of different sizes.
@@ -235,6 +250,23 @@ impl Judgement {
         self.sound(what, painted);
         let none = vec![0.0; expected.len()];
         let variance = variance.unwrap_or(&none);
+        if painted.tolerance > 0.0 {
+            let other = Painted {
+                radiance: expected.to_vec(),
+                variance: variance.to_vec(),
+                ..painted.clone()
+            };
+            for ((mean, variance), (expected, other_variance)) in painted.mean().into_iter().zip(other.mean()) {
+                let scale = if expected == 0.0 { 1.0 } else { expected };
+                let noise = Z_MAX * (variance + other_variance).sqrt() / scale + RELATIVE_DEVIATION_FLOOR;
+                self.at_most(
+                    format!("{what}: relative error of the mean"),
+                    (mean - expected).abs() / scale,
+                    noise + painted.tolerance,
+                );
+            }
+            return Ok(());
+        }
         let test = z_test(&painted.radiance, &painted.variance, expected, variance, SIGNIFICANCE)?;
         self.at_most(
             format!("{what}: share of values that the z-test rejects"),

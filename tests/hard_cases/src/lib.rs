@@ -48,6 +48,8 @@ pub struct HardCase {
     pub picture: fn() -> Result<Scene>,
     /// How techniques degrade and what a user can do about it, for cases where that is so.
     pub documented: Option<&'static str>,
+    /// The same of techniques with a bias, where others do not degrade.
+    pub documented_bias: Option<&'static str>,
     /// Judges a technique; `None` for what concerns none.
     pub techniques: Option<fn(&Easel<'_>) -> Result<Judgement>>,
     /// What every ray index has to answer as a search through all triangles does.
@@ -57,6 +59,11 @@ pub struct HardCase {
 }
 
 impl HardCase {
+    /// How a subject may degrade.
+    pub fn documented_of(&self, subject: &Subject) -> Option<&'static str> {
+        self.documented.or(self.documented_bias.filter(|_| subject.has_bias()))
+    }
+
     /// What cases take for the parts that they leave out.
     const BASE: Self = Self {
         name: "",
@@ -64,6 +71,7 @@ impl HardCase {
         expects: "",
         picture: || Ok(Scene::default()),
         documented: None,
+        documented_bias: None,
         techniques: None,
         rays: None,
         lobes: None,

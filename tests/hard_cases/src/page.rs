@@ -11,7 +11,10 @@ pub const PICTURES: &str = "docs/hard-cases";
 pub fn case_section(case: &HardCase, pictured: bool) -> String {
     let documented = case
         .documented
-        .map_or(String::new(), |text| format!("\n- Degrades: {text}"));
+        .map_or(String::new(), |text| format!("\n- Degrades: {text}"))
+        + &case.documented_bias.map_or(String::new(), |text| {
+            format!("\n- Degrades where pictures have a bias: {text}")
+        });
     let picture = if pictured {
         format!("![{name}](hard-cases/{name}.png)\n\n", name = case.name)
     } else {

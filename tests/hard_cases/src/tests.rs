@@ -100,6 +100,7 @@ fn painted(value: f32) -> Painted {
         non_finite: 0,
         spp: 4,
         counters: std::collections::BTreeMap::new(),
+        tolerance: 0.0,
     }
 }
 
@@ -127,6 +128,14 @@ fn judgements_find_what_is_wrong() {
     // A deviation of 0.01 a channel and pixel.
     assert!(passes(|j| j.uniform("", &painted(1.02), [1.0; 3]).expect("picture")));
     assert!(!passes(|j| j.uniform("", &painted(1.06), [1.0; 3]).expect("picture")));
+    // Of a technique with a bias, the mean over the picture alone.
+    let biased = |value: f32| Painted {
+        tolerance: 0.05,
+        ..painted(value)
+    };
+    assert!(passes(|j| j.uniform("", &biased(1.09), [1.0; 3]).expect("picture")));
+    assert!(!passes(|j| j.uniform("", &biased(1.11), [1.0; 3]).expect("picture")));
+    assert!(!passes(|j| j.mean_at_most("", &biased(1.11), 1.0)));
     assert!(passes(|j| j.mean_at_most("", &painted(1.03), 1.0)));
     assert!(!passes(|j| j.mean_at_most("", &painted(1.06), 1.0)));
     assert!(!passes(|j| j.same_bits("", &painted(1.0), &painted(0.5))));

@@ -12,8 +12,8 @@ use glam::{Quat, Vec2};
 const BIAS: f64 = 1e-3 + FLUX_STEP;
 const RADIUS: f32 = 0.03;
 
-const PASSES: u32 = 40;
-const SAMPLES: u32 = 1024;
+const PASSES: u32 = 16;
+const SAMPLES: u32 = 384;
 
 fn expect_light(gpu: &Gpu, scene: &Scene) {
     // All light of the floor from the map, then what comes by the wall alone.

@@ -49,6 +49,13 @@ fn thin_walls_let_no_photon_through() {
                 ..fixed("all", radius)
             };
             let mut scene = rooms();
+            scene.cameras = vec![orthographic(DVec3::X * -0.5, DVec3::ZERO, DVec3::Y, 1.0)];
+            for pass in 0..2 {
+                let landed = mapper(gpu, &scene, &settings).photons(pass);
+                let dark = landed.unwrap_or_else(|error| panic!("{error}"));
+                let dark: Vec<_> = dark.iter().filter(|p| p.record.position.x < 0.0).collect();
+                assert!(dark.is_empty(), "photons in the dark: {dark:?}");
+            }
             // The sheet from the dark side, its rims too; then from the lit side.
             scene.cameras = vec![orthographic(DVec3::X * -0.5, DVec3::ZERO, DVec3::Y, 1.0)];
             expect_black("the wall", &photons(gpu, &scene, &settings, 2));
@@ -59,7 +66,8 @@ fn thin_walls_let_no_photon_through() {
                     .all(|sum| *sum > 1.0)
             );
             // The dark room's floor, ceiling and walls, off the sheet by more than a kernel.
-            let off = f64::from(radius);
+            // A skewed ellipse reaches beyond its axes where these are nearly parallel.
+            let off = f64::from(radius) * if shape == KernelShape::Skewed { 2f64.sqrt() } else { 1.0 };
             for (what, eye, target, up) in [
                 ("floor", DVec3::new(-0.5 - 0.5 * off, 0.0, 0.0), DVec3::NEG_Y, DVec3::X),
                 ("side", DVec3::new(-0.5 - 0.5 * off, 0.0, 0.0), DVec3::Z, DVec3::Y),
@@ -146,7 +154,7 @@ fn glass_is_not_black() {
         };
         // Kernels of 1 cm blur the walls' light behind glass, which bends by less than 100 E a square metre.
         let bias = 1e-4 / 12.0 * 100.0 + 10.0 * FLUX_STEP;
-        expect_agreement(gpu, &scene, &settings, [32, 1024], [bias; 3]);
+        expect_agreement(gpu, &scene, &settings, [16, 512], [bias; 3]);
     });
 }
 
@@ -215,8 +223,8 @@ fn colours_bleed_through_the_passage_as_they_should() {
             edges + 8.0 * FLUX_STEP,
             edges + 8.0 * FLUX_STEP,
         ];
-        let found = means(gpu, &scene, &settings, 24);
-        let reference = traced(gpu, &scene, "bounces=2..4", 2048);
+        let found = means(gpu, &scene, &settings, 16);
+        let reference = traced(gpu, &scene, "bounces=2..4", 1024);
         found.expect_same_as("passage", &reference, bias);
         let [red, green, _] = found.parts[0];
         let [(r, _), (g, _), _] = reference.mean();

@@ -61,6 +61,7 @@ struct Listed {
     breaks: &'static str,
     expects: &'static str,
     documented: Option<&'static str>,
+    documented_bias: Option<&'static str>,
     subjects: Vec<String>,
 }
 
@@ -145,6 +146,7 @@ fn list(cases: &[&'static HardCase], subjects: &[Subject], json: bool) -> Outcom
         breaks: case.breaks,
         expects: case.expects,
         documented: case.documented,
+        documented_bias: case.documented_bias,
         subjects: (subjects.iter())
             .filter(|subject| subject.concerns(case))
             .map(Subject::name)
@@ -164,6 +166,9 @@ fn list(cases: &[&'static HardCase], subjects: &[Subject], json: bool) -> Outcom
         );
         if let Some(documented) = case.documented {
             text += &format!("  degrades {documented}\n");
+        }
+        if let Some(documented) = case.documented_bias {
+            text += &format!("  degrades where pictures have a bias: {documented}\n");
         }
         text += &format!("  against  {}\n", case.subjects.join(", "));
     }

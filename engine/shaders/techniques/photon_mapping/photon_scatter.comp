@@ -153,7 +153,12 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
         footprint = transfer_differentials(photon_differentials[slot], hit.t, photon.direction, s.geometric_normal);
     }
     if (bounce >= push.first_deposit && bsdf_has_diffuse_base(bsdf, solid && !front)) {
-        deposit(place, photon, s.point, facing, footprint, flags);
+        PathState landed = photon;
+        if (HAS_ALPHA) {
+            // Blended surfaces stop only that share of photons, but whoever meets them sees all of their light.
+            landed.throughput /= material_coverage(m, surface_base_color(m, s).a);
+        }
+        deposit(place, landed, s.point, facing, footprint, flags);
     }
     if (bounce >= push.last_bounce) {
         return false;

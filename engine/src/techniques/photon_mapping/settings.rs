@@ -264,7 +264,13 @@ impl PhotonSettings {
             (false, false) => "LD?[SG]*E",
             (false, true) => "L[SG]*E|LD[SG]*E|LD[SG]*D[SG]*E",
         };
-        self.path_set.intersection(&seen.parse()?)
+        let seen: PathSet = seen.parse()?;
+        if !self.needs_photons() {
+            return self.path_set.intersection(&seen);
+        }
+        // The range stays beside the automaton: folded into it, it would end eye paths whose own light is too short for the range, but which
+        // gather photons that are not.
+        Ok(seen.in_range(self.path_set.min_bounces(), self.path_set.max_bounces()))
     }
 }
 

@@ -132,6 +132,7 @@ impl PhotonTracer {
             has_vertex_colors: profile.has_vertex_colors,
             has_absorption: profile.has_absorption,
             has_unlit: profile.has_unlit,
+            has_alpha: profile.has_alpha(),
             sampler_kind: settings.sampler as u32,
             has_differentials,
             tells_caustics: settings.final_gather,

@@ -112,6 +112,16 @@ impl PathSet {
         }
     }
 
+    /// The paths of a set without a range of its own that have `min`..=`max` events. States stay as they are, so that the result is not in the
+    /// one form that equal sets otherwise share.
+    pub(crate) fn in_range(&self, min: u32, max: Option<u32>) -> Self {
+        Self {
+            min_bounces: min,
+            max_bounces: max,
+            ..*self
+        }
+    }
+
     /// The words of a language that have `min`..=`max` events.
     fn normalized(min: u32, max: Option<u32>, dfa: &Dfa) -> Result<Self> {
         if max.is_some_and(|max| max < min) {

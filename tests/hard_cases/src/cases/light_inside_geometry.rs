@@ -23,6 +23,11 @@ pub(super) const CASE: HardCase = HardCase {
             scene
         })
     },
+    documented_bias: Some(
+        "Kernels of photons reach in their plane as far as they are wide, under a wall that stands on it too: what lies within a kernel's \
+         radius of a lit surface of the same plane gets a share of its light. Kernels shrink from pass to pass; choose a smaller radius, or \
+         the final gather, which sees the map from afar alone.",
+    ),
     techniques: Some(judge),
     ..HardCase::BASE
 };
@@ -51,7 +56,8 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         "in a corner",
         point(Vec3::new(-0.4, 0.7, -0.3) + Vec3::new(1.0, -1.0, 1.0) * 1e-4),
     );
-    judgement.exactly("light in a box", &easel.paint(&boxed, SMALL, 64)?, [0.0; 3]);
+    // Kernels of a hundredth of the scene reach a tenth of a metre around the box.
+    judgement.exactly_unless_biased("light in a box", &easel.paint(&boxed, SMALL, 64)?, [0.0; 3], 0.5);
 
     let mut in_plane = grey_floor();
     in_plane.add_light("in the plane", point(Vec3::ZERO));
