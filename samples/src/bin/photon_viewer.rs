@@ -227,7 +227,8 @@ impl Show for PhotonViewer {
     }
 
     fn title(&mut self) -> String {
-        self.medians(std::mem::take(&mut self.untold))
+        let untold = std::mem::take(&mut self.untold);
+        self.medians(untold)
     }
 
     fn key(&mut self, key: &Key) {
