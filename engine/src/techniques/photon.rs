@@ -43,7 +43,7 @@ pub(super) const INFO: TechniqueInfo = TechniqueInfo {
 
 fn refusals(profile: &SceneProfile) -> Vec<String> {
     if profile.media.any() {
-        vec!["the scene has participating media, and its map is of surfaces alone".into()]
+        vec!["the scene has participating media, and photon maps hold surfaces only".into()]
     } else {
         Vec::new()
     }
@@ -70,7 +70,7 @@ const SETTINGS: [SettingInfo; 16] = [
     },
     SettingInfo {
         name: "neighbors",
-        range: "0 … 10000",
+        range: "0, or 2 … 10000",
         unit: "photons",
         meaning: "takes the nearest so many photons of each point under one kernel, as wide as the last is away; 0: photons have kernels of their own",
     },
@@ -84,7 +84,7 @@ const SETTINGS: [SettingInfo; 16] = [
         name: "radius",
         range: "0 or more",
         unit: "m",
-        meaning: "of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 chooses by the size of the scene",
+        meaning: "of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 chooses by the size of the scene, for neighbours by its area and the photons",
     },
     SettingInfo {
         name: "spread",
@@ -96,7 +96,7 @@ const SETTINGS: [SettingInfo; 16] = [
         name: "dampening",
         range: "above 0, at most 1",
         unit: "exponent",
-        meaning: "evens out the sizes of footprints; 1 leaves them as they are",
+        meaning: "of kernels that follow footprints: evens out the sizes of footprints; 1 leaves them as they are",
     },
     SettingInfo {
         name: "unit_length",
@@ -106,15 +106,15 @@ const SETTINGS: [SettingInfo; 16] = [
     },
     SettingInfo {
         name: "flatness",
-        range: "0 … 1",
+        range: "0 or more, below 1",
         unit: "",
-        meaning: "photons of flatter footprints are left out",
+        meaning: "of kernels that follow footprints: photons of flatter footprints are left out",
     },
     SettingInfo {
         name: "reduction",
         range: "above 0, at most 1",
         unit: "",
-        meaning: "what passes keep of the kernels' area as they go on: less converges with less bias and more noise, 1 never loses the bias",
+        meaning: "α of progressive photon mapping: pass i + 1 has kernels of (i + α)/(i + 1) the area; less has less bias and more noise, 1 keeps the bias",
     },
     SettingInfo {
         name: "samples_per_pass",
@@ -126,19 +126,19 @@ const SETTINGS: [SettingInfo; 16] = [
         name: "direct_photons",
         range: "true | false",
         unit: "",
-        meaning: "takes direct light from the map too",
+        meaning: "takes direct light from the map too; not with final_gather",
     },
     SettingInfo {
         name: "final_gather",
         range: "true | false",
         unit: "",
-        meaning: "sees the map after one more diffuse reflection, caustics directly",
+        meaning: "sees the map after one more diffuse reflection, caustics directly; not with direct_photons",
     },
     SettingInfo {
         name: "query",
         range: "single | packet",
         unit: "",
-        meaning: "points ask the map by themselves, or those of a subgroup together; never changes the picture",
+        meaning: "points ask the map by themselves, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, last bits may differ",
     },
     SettingInfo {
         name: "sampler",

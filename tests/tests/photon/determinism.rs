@@ -99,7 +99,7 @@ fn prints_its_hash_when_asked() {
 #[test]
 fn queries_that_a_quota_stops_go_through_all_records() {
     with_gpu(|gpu| {
-        // A picture of a wall and one with mirrors and glass between: places stop at any bounce.
+        // With glass between: places stop at any bounce.
         let settings = |query_quota| PhotonSettings {
             query_quota,
             photons: 1 << 11,

@@ -20,7 +20,7 @@ use std::f64::consts::PI;
 use clerestory::gpu::Gpu;
 use clerestory::scene::{LightKind, Material, Mesh, Scene};
 use clerestory::techniques::photon_mapping::kernel::{KernelProfile, KernelShape};
-use clerestory::techniques::photon_mapping::{MapperCounts, PhotonMapper, PhotonSettings};
+use clerestory::techniques::photon_mapping::{MapQuery, MapperCounts, PhotonMapper, PhotonSettings};
 use clerestory::transport::PathSet;
 use clerestory::transport::random::SamplerKind;
 use clerestory_tests::render::{Rendered, camera_down, floor, paths, render, upload};

@@ -25,9 +25,11 @@ fn room() -> Scene {
 /// What is left of a wall's light, off its edges by more than a kernel: h²/12 ∇²E of kernels of up to 0.2 m, where indirect light bends by less
 /// than E a square metre, and the rounding of fluxes whose bands differ by less than four.
 const BIAS: f64 = 4e-3 + 4.0 * FLUX_STEP;
+/// What neighbours add: distances are told apart by 10⁻⁴ of their squares, and those that are looked for in vain within the radius, none here.
+const NEAREST_BIAS: f64 = 4e-3;
 
 #[test]
-fn every_shape_and_profile_agrees_with_the_path_tracer() {
+fn every_shape_agrees_with_the_path_tracer() {
     with_gpu(|gpu| {
         let scene = room();
         let set = "bounces=2..3";
@@ -50,6 +52,55 @@ fn every_shape_and_profile_agrees_with_the_path_tracer() {
             println!("{shape:?}: {lost:.4} without a kernel");
             assert!(lost < 0.01);
             found.expect_same_as(&format!("{shape:?}"), &reference, [BIAS + lost; 3]);
+        }
+    });
+}
+
+#[test]
+fn nearest_neighbours_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let set = "bounces=2..3";
+        let reference = traced(gpu, &scene, set, 512);
+        // The last of k neighbours only says how wide the kernel is: even, it holds k - 1 of k of its light without bias where the light is
+        // even. Others are as wide, and hold the same light.
+        let neighbors = 64;
+        let settings = PhotonSettings {
+            neighbors,
+            profile: KernelProfile::Uniform,
+            ..settings(set)
+        };
+        let found = means(gpu, &scene, &settings, 16);
+        let asked = found.counts.gather;
+        let each = asked.photons as f64 / asked.queries as f64;
+        println!("{each:.1} photons a query");
+        assert!(each > 0.9 * f64::from(neighbors) && each < 1.1 * f64::from(neighbors));
+        found.expect_same_as("nearest", &reference, [BIAS + NEAREST_BIAS; 3]);
+    });
+}
+
+#[test]
+fn points_that_ask_together_see_the_same() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let uploaded = upload(gpu, &scene);
+        for neighbors in [0, 20] {
+            let pictures = [MapQuery::Single, MapQuery::Packet].map(|query| {
+                let settings = PhotonSettings {
+                    query,
+                    neighbors,
+                    shape: KernelShape::Principal,
+                    photons: 1 << 11,
+                    ..settings("indirect")
+                };
+                let mut mapper = PhotonMapper::new(gpu, uploaded.clone(), &scene.cameras[0], SIZE, settings).unwrap();
+                while mapper.step(2).unwrap().is_some() {}
+                let (picture, _) = mapper.picture().unwrap();
+                let radiance = picture.layer(RADIANCE).unwrap().values().to_vec();
+                (radiance, mapper.counts().gather)
+            });
+            assert!(pictures[0].0.iter().any(|value| *value > 0.0));
+            assert!(pictures[0] == pictures[1], "neighbors {neighbors}");
         }
     });
 }
@@ -129,7 +180,15 @@ fn what_cannot_be_is_refused_by_name() {
             Err(error) => error,
         };
         let fine = || settings("all");
-        let cases: [(&str, PhotonSettings); 16] = [
+        let cases: [(&str, PhotonSettings); 18] = [
+            ("neighbors", PhotonSettings { neighbors: 1, ..fine() }),
+            (
+                "neighbors",
+                PhotonSettings {
+                    neighbors: 10_001,
+                    ..fine()
+                },
+            ),
             ("photons", PhotonSettings { photons: 0, ..fine() }),
             (
                 "photons",

@@ -15,7 +15,7 @@ fn add_room(scene: &mut Scene, material: u32, low: Vec3, high: Vec3) {
     scene.place(mesh);
 }
 
-/// A lit room and a dark one, with nothing between but one sheet across x = 0, or so and its floor.
+/// A lit room and a dark one, parted by one sheet across x = 0 alone.
 fn rooms() -> Scene {
     let mut scene = Scene {
         name: "rooms".into(),

@@ -1,7 +1,7 @@
 // Directions and colours in a word.
 //
 // Sources: octahedral map of Meyer et al., "On Floating-Point Normal Vectors" (2010), as surveyed by Cigolle et al. (JCGT 3(2), 2014);
-// colours in the format E5B9G9R9_UFLOAT_PACK32 of the Vulkan specification. Guarantees: directions are off by at most 1.3e-4 (15 bits) or
+// colours in the format E5B9G9R9_UFLOAT_PACK32 of the Vulkan specification. Guarantees: directions are off by at most 5.2e-4 (13 bits), 1.3e-4 (15 bits) or
 // 6.5e-5 (16 bits) radians, those along axes by nothing; bands by 2^-9 of the largest one, down to 2^-25 absolute and up to 65408.
 #ifndef CLERESTORY_TRANSPORT_PACKING_GLSL
 #define CLERESTORY_TRANSPORT_PACKING_GLSL
@@ -14,7 +14,7 @@ const int PACKING_FLOAT_MANTISSA_BITS = 23;
 
 vec2 octahedral_signs(vec2 v) { return vec2(v.x < 0.0 ? -1.0 : 1.0, v.y < 0.0 ? -1.0 : 1.0); }
 
-// A unit vector with so many bits (15 or 16) for each of the two coordinates, the first ones lowest.
+// A unit vector with so many bits (13, 15 or 16) for each of the two coordinates, the first ones lowest.
 uint pack_octahedral(vec3 n, uint bits) {
     vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
     p = n.z < 0.0 ? (1.0 - abs(p.yx)) * octahedral_signs(p) : p;

@@ -46,7 +46,18 @@ float adjoint_ratio(vec3 normal, vec3 geometric_normal, vec3 wo, vec3 wi) {
     return shown > 0.0 ? abs(dot(wo, normal) * dot(wi, geometric_normal)) / shown : 0.0;
 }
 
-void deposit(uint place, PathState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
+// Steps of a band in a record, over the power of two below the largest band (packing.glsl).
+const float FLUX_STEP_SHARE = 1.0 / 256.0;
+
+// The flux with noise of a step of its record's bands, so that rounding errs by nothing on average: photons of one history share their flux.
+vec3 dithered_flux(vec3 flux, uint slot, uint bounce) {
+    uvec3 bits = pcg4d(uvec4(push.first_sample + slot, bounce, push.first_pixel, push.seed)).xyz;
+    float below = uintBitsToFloat(floatBitsToUint(largest_component(flux)) & EXPONENT_BITS);
+    vec3 noise = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
+    return max(flux + noise * (FLUX_STEP_SHARE * below), vec3(0.0));
+}
+
+void deposit(uint slot, uint place, PathState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
     atomicAdd(photon_counters.deposits, 1u);
     PhotonKernel kernel;
     bool fit = true;
@@ -67,7 +78,8 @@ void deposit(uint place, PathState photon, SurfacePoint point, vec3 normal, Diff
     uvec4 q0;
     uvec4 q1;
     uvec4 q2;
-    pack_photon(PhotonRecord(point.position, normal, photon.direction, photon.throughput * push.flux_scale, kernel), q0, q1, q2);
+    vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, path_set_bounce(photon.bounce));
+    pack_photon(PhotonRecord(point.position, normal, photon.direction, flux, kernel), q0, q1, q2);
     add_history(path_set_bounce(photon.bounce), path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
     uint first = PHOTON_QUARTERS * place;
     photon_deposits_out[first] = q0;
@@ -158,7 +170,7 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
             // Blended surfaces stop only that share of photons, but whoever meets them sees all of their light.
             landed.throughput /= material_coverage(m, surface_base_color(m, s).a);
         }
-        deposit(place, landed, s.point, facing, footprint, flags);
+        deposit(slot, place, landed, s.point, facing, footprint, flags);
     }
     if (bounce >= push.last_bounce) {
         return false;
@@ -181,7 +193,7 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
         flux *= adjoint_ratio(z, s.geometric_normal, wo, wi);
     }
-    // Between lossless surfaces photons end by the cap alone. Also ends a photon whose flux is not a number.
+    // Between lossless surfaces photons end by SURVIVAL_MAX alone. Also ends a photon whose flux is not a number.
     float most = bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
     float survival = min(largest_component(flux) / largest_component(photon.throughput), most);
     if (!(lobe.y < survival)) {

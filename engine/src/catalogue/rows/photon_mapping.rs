@@ -110,6 +110,16 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory report kd-threads",
+        part(
+            "PM-CA-6",
+            "speculation: rays with a leaf that waits go on until all of their subgroup have one",
+            "Aila and Laine 2009; Interactive Manycore Photon Mapping 2011, §4.3.2.3",
+            "engine/src/accel/kd/cache.rs",
+            &["tests/tests/kd.rs::votes_change_no_hit"],
+        ),
+    ),
+    measured(
         "clerestory report kd-caches kd-rays",
         part(
             "PM-CA-7",
@@ -143,8 +153,18 @@ pub(super) const ROWS: &[Row] = &[
             &[
                 "engine/src/techniques/photon_mapping/kernel/tests.rs::profiles_integrate_to_one_with_their_variance",
                 "tests/tests/twins/photons.rs::weights_agree_with_their_twins",
-                "tests/tests/photon/settings.rs::every_shape_and_profile_agrees_with_the_path_tracer",
+                "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
             ],
+        ),
+    ),
+    measured(
+        "clerestory report photon-kernels",
+        part(
+            "PM-DE-3",
+            "nearest neighbours: one kernel about each point, up to its k-th photon",
+            "Jensen 2001, §7; Interactive Manycore Photon Mapping, 2011, §3.4.2.1",
+            "engine/src/techniques/photon_mapping/gather.rs",
+            &["tests/tests/photon/settings.rs::nearest_neighbours_agree_with_the_path_tracer"],
         ),
     ),
     measured(
@@ -157,7 +177,7 @@ pub(super) const ROWS: &[Row] = &[
             &[
                 "engine/src/techniques/photon_mapping/kernel/tests.rs::equal_disks_are_the_estimator_of_fixed_bandwidth",
                 "engine/src/techniques/photon_mapping/kernel/tests.rs::even_light_is_estimated_without_bias",
-                "tests/tests/photon/settings.rs::every_shape_and_profile_agrees_with_the_path_tracer",
+                "tests/tests/photon/settings.rs::every_shape_agrees_with_the_path_tracer",
             ],
         ),
     ),
@@ -619,6 +639,16 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory report photon-kernels",
+        part(
+            "PM-ST-6",
+            "queries of the photon map, a subgroup's together",
+            "Interactive Manycore Photon Mapping, 2011, §7.4.2",
+            "engine/src/techniques/photon_mapping/gather.rs",
+            &["tests/tests/photon/settings.rs::points_that_ask_together_see_the_same"],
+        ),
+    ),
+    measured(
         "clerestory report photon-frame",
         part(
             "PM-ST-5",
@@ -645,7 +675,7 @@ pub(super) const ROWS: &[Row] = &[
                 "Jensen 2001; Hachisuka and Jensen 2009; Knaus and Zwicker 2011; Interactive Manycore Photon Mapping, 2011, §6.3",
                 "engine/src/techniques/photon_mapping/mapper.rs",
                 &[
-                    "tests/tests/photon/settings.rs::every_shape_and_profile_agrees_with_the_path_tracer",
+                    "tests/tests/photon/settings.rs::every_shape_agrees_with_the_path_tracer",
                     "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
                     "tests/tests/photon/settings.rs::parts_of_the_light_sum_to_the_whole",
                     "tests/tests/photon/sphere.rs::furnaces_are_uniform",

@@ -33,7 +33,7 @@ enum Query {
 enum Linear {
     /// All records are gone through. The driver compiles it only if it is dispatched.
     Records(ComputePipeline<photon_gather::Kernel>),
-    /// Neighbours cannot be found so.
+    /// Refused: a pass through all records cannot find neighbours.
     Refuse,
 }
 

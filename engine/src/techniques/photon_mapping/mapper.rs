@@ -31,7 +31,7 @@ use crate::transport::{GpuScene, PathTracer, PathTracerSettings};
 /// Exact counts, and what the host's share took.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct MapperCounts {
-    /// Passes begun.
+    /// Maps made; 0 where the picture has nothing of one.
     pub passes: u64,
     /// Photons of all passes.
     pub photons: PhotonCounts,
@@ -85,7 +85,8 @@ impl PhotonMapper {
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a path set
-    /// that is more than a range of bounces, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for queries of subgroups on a device without
+    /// votes, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -184,7 +185,8 @@ impl PhotonMapper {
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory),
-    /// [`Error::Overflow`](crate::Error::Overflow) for more photon records than the device can hold.
+    /// [`Error::Overflow`](crate::Error::Overflow) for more photon records than the device can hold, for neighbours among too many photons,
+    /// and should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         let begun = self.passes.saturating_mul(self.settings.samples_per_pass);
         if begun >= samples {
@@ -248,7 +250,7 @@ impl PhotonMapper {
         }))
     }
 
-    /// Traces the photons of a pass, and returns them in the order of bounces and photons. The picture is not touched, and counts go on.
+    /// Traces the photons of a pass, and returns them in the order of waves, in each of bounces and photons. The picture is not touched, and counts go on.
     ///
     /// # Errors
     /// As [`PhotonMapper::step`].

@@ -69,8 +69,8 @@ pub struct PhotonSettings {
     /// Footprints flatter than this have no kernel, in [0, 1).
     #[serde(serialize_with = "crate::settings::serialize_f32")]
     pub flatness: f32,
-    /// What is kept of the photons' number as kernels shrink from pass to pass, in (0, 1]: kernels of pass i + 1 have
-    /// (i + reduction) / (i + 1) of the area of those of pass i. 1 keeps them, and the bias.
+    /// α of progressive photon mapping (Hachisuka and Jensen 2009; Knaus and Zwicker 2011), in (0, 1]: kernels of pass i + 1 have
+    /// (i + α) / (i + 1) of the area of those of pass i. 1 keeps kernels, and their bias.
     #[serde(serialize_with = "crate::settings::serialize_f32")]
     pub reduction: f32,
     /// Eye paths of a pixel in a pass.
@@ -79,7 +79,7 @@ pub struct PhotonSettings {
     pub direct_photons: bool,
     /// The map is seen after one more diffuse reflection; caustics stay directly seen.
     pub final_gather: bool,
-    /// How the map is asked; never changes the picture.
+    /// How the map is asked. The picture is the same, up to the order of sums where a query's quota stops it.
     pub query: MapQuery,
     /// Random numbers: Owen-scrambled Sobol' or PCG.
     pub sampler: SamplerKind,
@@ -133,7 +133,9 @@ impl PhotonSettings {
         };
         in_range("photons", self.photons, 1..=PHOTONS_MAX)?;
         in_range("samples_per_pass", self.samples_per_pass, 1..=SAMPLES_MAX)?;
-        in_range("neighbors", self.neighbors, 0..=NEIGHBORS_MAX)?;
+        if self.neighbors > 0 {
+            in_range("neighbors", self.neighbors, NEIGHBORS_MIN..=NEIGHBORS_MAX)?;
+        }
         in_range("query_quota", self.query_quota, 1..=QUERY_QUOTA)?;
         let fits = |name: &str, value: f32, fits: bool, cause: &str| {
             fits.then_some(()).ok_or_else(|| Error::setting(name, value, cause))

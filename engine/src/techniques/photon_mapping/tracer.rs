@@ -4,7 +4,7 @@
 //! thesis, Trinity College Dublin, 2011, §3.4.1 and §5.1. Stages: `photon_emit`, the path tracer's `path_extend`, `photon_scatter`, the path
 //! tracer's compaction, `photon_append`.
 //!
-//! Guarantees: records depend on (seed, pass, number of photons) alone and have one order, whatever the number of threads; photons that were
+//! Guarantees: records depend on (seed, pass, number of photons) alone, and their order on the slots of a wave besides, never on the number of threads; photons that were
 //! emitted have escaped or were absorbed, to the count; records that do not fit are never lost in silence, since the pass is traced again
 //! with room for them.
 
@@ -42,7 +42,7 @@ pub struct PhotonCounts {
     pub emitted: u64,
     /// Photons that left the scene.
     pub escaped: u64,
-    /// Photons that were absorbed.
+    /// Photons that ended on a surface: by roulette, where nothing is scattered, or after the last bounce.
     pub absorbed: u64,
     /// Rays traced.
     pub rays: u64,
@@ -183,7 +183,7 @@ impl PhotonTracer {
         self.settings.seed = seed;
     }
 
-    /// The records of the last pass, in the order of bounces and photons.
+    /// The records of the last pass, in the order of waves, in each of bounces and photons.
     pub fn records(&self) -> &TexelView {
         &self.records
     }

@@ -12,7 +12,7 @@ use crate::gpu::shaders::transport::{
 use crate::gpu::{Access, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::transport::GpuScene;
 
-/// What the random numbers of a wave's paths are keyed by.
+/// What the random numbers of a wave's paths are keyed by: pixels and samples; or, of photons, the pass and the photons in it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WaveKey {
     pub first_pixel: u32,
@@ -92,7 +92,8 @@ impl TracePipelines {
     }
 }
 
-/// Compaction of queues by the flags that an arrival stage leaves: paths that are alive, and what waits by place (shadow rays of paths).
+/// Compaction of queues by the flags that shading leaves (`path_shade`, `photon_scatter`): paths that are alive, and what waits by place:
+/// shadow rays, or deposits.
 pub(crate) struct Compaction {
     count: ComputePipeline<path_compact_count::Kernel>,
     scan: ComputePipeline<path_compact_scan::Kernel>,

@@ -143,7 +143,7 @@ vec3 photon_direction(uvec4 q1) { return unpack_octahedral(q1.w, PHOTON_DIRECTIO
 
 vec3 photon_flux(uvec4 q2) { return unpack_rgb9e5(q2.w); }
 
-// What a unit of the photon's flux counts for at x on a surface of normal n, 1/area; 0 where the normals differ by more than that cosine.
+// What a unit of the photon's flux counts for at x on a surface of normal n, 1/area; 0 where the cosine between the normals is not above normal_cos_min.
 float photon_weight(uint profile, uvec4 q0, uvec4 q1, uvec4 q2, vec3 x, vec3 n, float normal_cos_min) {
     PhotonKernel k = PhotonKernel(uintBitsToFloat(q2.xyz), uintBitsToFloat(q1.xyz));
     float weight = kernel_weight(profile, k, x - uintBitsToFloat(q0.xyz));

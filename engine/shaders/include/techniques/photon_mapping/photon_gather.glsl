@@ -32,8 +32,7 @@ const float PHOTON_NORMAL_COS_MIN = 0.5;
 struct Gather {
     vec3 position;
     vec3 facing;      // geometric normal, to the viewer's side
-    vec3 z;           // of the scattering frame
-    vec3 outward;     // geometric normal on the side of z
+    vec3 z;           // of the scattering frame: the base scatters on the viewer's side alone
     Bsdf bsdf;
     CosineLobes lobes;
     uint bounce;      // scatterings between the point and the eye
@@ -114,7 +113,7 @@ bool compact_visit_point(uint record) {
         } else {
             vec3 wi = -photon_direction(q1);
             float cos_i = dot(wi, gather.z);
-            float cos_g = dot(wi, gather.outward);
+            float cos_g = dot(wi, gather.facing);
             if (cos_i * cos_g > 0.0 && cos_i > 0.0) {
                 gathered += cosine_lobes_eval(gather.bsdf, gather.lobes, cos_i) * flux * (weight * (cos_i / cos_g));
             }
@@ -183,14 +182,11 @@ bool begin_gather(uint slot, uint place, out vec3 throughput) {
     }
     gather.position = s.point.position;
     gather.facing = front ? s.geometric_normal : -s.geometric_normal;
-    vec3 outward = solid ? s.geometric_normal : gather.facing;
     vec3 normal = gather.facing;
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
         normal = adapt_shading_normal(surface_mapped_normal(m, s), gather.facing, wo);
     }
-    // The base scatters on the viewer's side alone.
     gather.z = normal;
-    gather.outward = gather.facing;
     gather.lobes = cosine_lobes(gather.bsdf, max(dot(wo, normal), 0.0), false, LOBE_DIFFUSE);
     gather.caustics = (push.caustic_states >> state & 1u) != 0u;
     return true;

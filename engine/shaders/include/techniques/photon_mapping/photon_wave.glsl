@@ -29,7 +29,6 @@ layout(set = 3, binding = 0, scalar) restrict buffer PhotonCounters {
     uint absorbed;        // ended by roulette, or where nothing is scattered
     uint deposits;        // hits that were to be stored
     uint without_kernel;  // those that were not, since their footprint is degenerate
-    uint clamped;         // those whose kernel was as large as allowed
 } photon_counters;
 layout(set = 3, binding = 1, scalar) restrict buffer PhotonDifferentials { Differentials photon_differentials[]; };  // by slot
 layout(set = 3, binding = 2, scalar) restrict writeonly buffer PhotonDepositsOut { uvec4 photon_deposits_out[]; };   // by place

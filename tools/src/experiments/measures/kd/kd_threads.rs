@@ -26,17 +26,22 @@ const PUBLISHED: [(&str, f64); 5] = [
 const BEST_CACHES: KdCaches = KdCaches::COMPARED[4];
 
 /// A form by name, one thread a ray first.
-fn forms(gpu: &Gpu) -> [(&'static str, TraceSettings); 3] {
+fn forms(gpu: &Gpu) -> Vec<(&'static str, TraceSettings)> {
     let queue = TraceSettings::persistent(gpu.caps());
     let cached = TraceSettings {
         caches: BEST_CACHES,
         ..queue
     };
-    [
+    let mut forms = vec![
         ("ray per thread", TraceSettings::ray_per_thread()),
         ("queue", queue),
         ("queue, nodes and last entry cached", cached),
-    ]
+    ];
+    if gpu.caps().subgroup.vote {
+        let caches = KdCaches::SPECULATION;
+        forms.push(("queue, leaves wait for a vote", TraceSettings { caches, ..queue }));
+    }
+    forms
 }
 
 /// The settings with the number of workgroups that traces these rays fastest.
@@ -75,8 +80,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             ..KdSettings::default()
         };
         let tree = KdTree::build(&surfaces.triangles, &settings)?;
-        let forms = forms(&gpu).map(|(name, settings)| Ok((name, tuned(&gpu, &tree, settings, flight)?)));
-        let forms = forms.into_iter().collect::<Result<Vec<_>>>()?;
+        let forms = forms(&gpu).into_iter();
+        let forms = forms.map(|(name, settings)| Ok((name, tuned(&gpu, &tree, settings, flight)?)));
+        let forms = forms.collect::<Result<Vec<_>>>()?;
         let contenders = forms.iter().map(|(_, settings)| (&tree as &dyn RayIndex, *settings));
         let raced = race(context, &gpu, flight, contenders)?;
         let published = PUBLISHED
