@@ -14,5 +14,5 @@ trap 'rm -r "$beside"' EXIT
 "$samples/render_gltf" --output "$beside/render_gltf.png" --size 240x180 --spp 256
 cp "$beside/render_gltf.png" "$out/"
 xvfb-run -a "$samples/viewer" 'builtin:cornell-box?sphere=gold' --size 180x180 --exposure 0.5 --frames 400 --screenshot "$out/viewer.png"
-xvfb-run -a "$samples/photon_viewer" --size 240x180 --photons 262144 --frames 16 --screenshot "$out/photon_viewer.png"
+xvfb-run -a "$samples/photon_viewer" --size 240x180 --photons 131072 --spread 16 --exposure -1.5 --frames 12 --screenshot "$out/photon_viewer.png"
 ls -l "$out"

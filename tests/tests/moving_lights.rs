@@ -44,6 +44,9 @@ fn scene() -> Scene {
     scene
 }
 
+/// What becomes of a light.
+type Change<'a> = &'a dyn Fn(&mut LightKind);
+
 /// The same light elsewhere.
 fn moved(kind: &LightKind) -> LightKind {
     let (shift, turn) = (Vec3::new(0.12, -0.1, 0.05), Quat::from_rotation_x(0.4));
@@ -126,7 +129,7 @@ fn lights_that_cannot_move_are_refused() {
     with_gpu(|gpu| {
         let scene = scene();
         let on_device = upload(gpu, &scene);
-        let refusal = |light: usize, change: &dyn Fn(&mut LightKind)| {
+        let refusal = |light: usize, change: Change<'_>| {
             let mut kind = scene.lights[light.min(scene.lights.len() - 1)].kind;
             change(&mut kind);
             let result = on_device.move_light(gpu, light, &kind);
@@ -152,7 +155,7 @@ fn lights_that_cannot_move_are_refused() {
                 *direction *= 2.0;
             }
         };
-        let cases: [(usize, &dyn Fn(&mut LightKind), &str); 7] = [
+        let cases: [(usize, Change<'_>, &str); 7] = [
             (0, &|_| {}, "no power"),
             (1, &brighter, "chosen by power"),
             (1, &nowhere, "not finite"),
