@@ -70,9 +70,9 @@ const SETTINGS: [SettingInfo; 16] = [
     },
     SettingInfo {
         name: "neighbors",
-        range: "0, or 2 … 10000",
+        range: "0, or 2 … 1000",
         unit: "photons",
-        meaning: "takes the nearest so many photons of each point under one kernel, as wide as the last is away; 0: photons have kernels of their own",
+        meaning: "takes the nearest so many photons of each point under one kernel, as wide as the last is away, fewer as passes go on, down to 2; 0: photons have kernels of their own",
     },
     SettingInfo {
         name: "profile",
@@ -108,7 +108,7 @@ const SETTINGS: [SettingInfo; 16] = [
         name: "flatness",
         range: "0 or more, below 1",
         unit: "",
-        meaning: "of kernels that follow footprints: photons of flatter footprints are left out",
+        meaning: "of kernels that follow footprints: photons of flatter footprints are left out, with their light, in every pass",
     },
     SettingInfo {
         name: "reduction",
@@ -199,7 +199,20 @@ impl Technique for PhotonMapper {
     }
 
     fn skipped(&self) -> Vec<Skipped> {
-        Vec::new()
+        let mut skipped = Vec::new();
+        if !self.has_map() {
+            skipped.push(Skipped {
+                what: "photons and their map",
+                why: "no light can be chosen, or the path set has nothing of a map",
+            });
+        }
+        if self.profile().has_unlit {
+            skipped.push(Skipped {
+                what: "light from unlit surfaces beyond the first diffuse reflection",
+                why: "photons are sent by lights alone",
+            });
+        }
+        skipped
     }
 }
 

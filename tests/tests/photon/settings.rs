@@ -2,6 +2,7 @@
 
 use super::*;
 use clerestory::Error;
+use clerestory::film::picture::RADIANCE;
 use clerestory::techniques::{View, by_id};
 use clerestory_tests::render::builtin;
 use clerestory_tests::with_gpu;
@@ -185,7 +186,7 @@ fn what_cannot_be_is_refused_by_name() {
             (
                 "neighbors",
                 PhotonSettings {
-                    neighbors: 10_001,
+                    neighbors: 1001,
                     ..fine()
                 },
             ),

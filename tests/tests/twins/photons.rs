@@ -1,6 +1,6 @@
 //! Photon differentials, kernels of photons and their records.
 
-use clerestory::gpu::shaders::constants::PHOTON_LEAF_END;
+use clerestory::gpu::shaders::constants::{PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS};
 use clerestory::techniques::photon_mapping::kernel::{
     KernelProfile, KernelSettings, KernelShape, PhotonKernel, PhotonRecord, kernel_area, kernel_extent, kernel_profile,
     kernel_weight, pack_photon, photon_ends_leaf, photon_kernel, photon_weight, unpack_photon,
@@ -376,7 +376,7 @@ fn records_agree_with_their_twins() {
             };
             let mut words = pack_photon(&record);
             // Divisions may round otherwise than the twin's: a step of one coordinate.
-            for (i, bits) in [(0usize, 15u32), (1, 16)] {
+            for (i, bits) in [(0usize, PHOTON_NORMAL_BITS), (1, PHOTON_DIRECTION_BITS)] {
                 let coordinate = |word: u32, k: u32| i64::from((word >> (k * bits)) & ((1 << bits) - 1));
                 for k in 0..2 {
                     let step = (coordinate(result.bits(i), k) - coordinate(words[i][3], k)).abs();

@@ -79,6 +79,9 @@ Emission emit(uint slot, out float probability) {
         return parallel_emission(light.direction, light.strength / probability, u);
     }
     Emission e;
+    // Where no light can be chosen, photons carry nothing, somewhere.
+    e.direction = vec3(0.0, 0.0, 1.0);
+    e.differentials = Differentials(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
     if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
         Surface s = surface_at(Hit(0.0, square_to_triangle(u).yz, light.triangle), push.scene_lower, push.scene_upper);
         SceneMaterial m = load_material(s.material);

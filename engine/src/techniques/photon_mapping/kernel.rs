@@ -205,7 +205,7 @@ pub fn pack_photon(p: &PhotonRecord) -> PhotonWords {
     ]
 }
 
-/// The record of these words. Normal and direction are good to 1.3·10⁻⁴ and 6.5·10⁻⁵ radians, flux to 2⁻⁹ of its largest band.
+/// The record of these words. Normal and direction are good to 1.3·10⁻⁴ and 5.2·10⁻⁴ radians, flux to 2⁻⁹ of its largest band.
 pub fn unpack_photon(words: &PhotonWords) -> PhotonRecord {
     let vector = |q: [u32; 4]| Vec3::new(f32::from_bits(q[0]), f32::from_bits(q[1]), f32::from_bits(q[2]));
     PhotonRecord {

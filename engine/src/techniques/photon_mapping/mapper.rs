@@ -7,7 +7,9 @@
 //!
 //! Light paths are parted without overlap: what the eye sees through specular and glossy scattering alone, and the light that arrives
 //! directly where it first sees a diffuse surface, are the path tracer's; everything else that arrives there is the map's. Glossy lobes are
-//! never estimated from the map.
+//! never estimated from the map. Three kinds of light are the eye paths' alone, so that what they give beyond the first diffuse reflection
+//! is missing: unlit surfaces, emitters behind others with alpha in the same place, and slivers that light sampling leaves out. A photon
+//! that starts inside a solid knows it from where it first meets the inside of one.
 //!
 //! Guarantees: deterministic in (seed, pass, photon) and (seed, pixel, sample), on any number of threads; scaling a scene, with lengths among
 //! the settings, scales the picture.
@@ -24,7 +26,7 @@ use crate::Result;
 use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
-use crate::scene::Camera;
+use crate::scene::{Camera, SceneProfile};
 use crate::transport::path_tracer::{ArrivalStage, PathCounters};
 use crate::transport::{GpuScene, PathTracer, PathTracerSettings};
 
@@ -68,7 +70,7 @@ pub struct PhotonMapper {
     eye: PathTracer,
     /// None where the picture has nothing of a map.
     photons: Option<Photons>,
-    /// Passes whose eye paths are done.
+    /// The pass under way.
     passes: u32,
     counts: MapperCounts,
 }
@@ -133,6 +135,16 @@ impl PhotonMapper {
         self.counts
     }
 
+    /// Whether there are photons, and a map of them.
+    pub fn has_map(&self) -> bool {
+        self.photons.is_some()
+    }
+
+    /// What the scene needs.
+    pub fn profile(&self) -> &SceneProfile {
+        self.scene.profile()
+    }
+
     /// Counts of the eye paths.
     pub fn eye_counters(&self) -> PathCounters {
         self.eye.counters()
@@ -188,11 +200,13 @@ impl PhotonMapper {
     /// [`Error::Overflow`](crate::Error::Overflow) for more photon records than the device can hold, for neighbours among too many photons,
     /// and should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        let begun = self.passes.saturating_mul(self.settings.samples_per_pass);
-        if begun >= samples {
+        let (done, each) = (self.eye.samples_done(), self.settings.samples_per_pass);
+        if done >= samples {
             return Ok(None);
         }
-        let end = begun.saturating_add(self.settings.samples_per_pass).min(samples);
+        // Whatever the target of each call, a pass has its samples.
+        self.passes = done / each;
+        let end = (self.passes + 1).saturating_mul(each).min(samples);
         let mut timings = Vec::new();
         let (kernel, watts) = (self.kernel(self.passes), self.watts());
         if let Some(photons) = &mut self.photons
@@ -235,11 +249,11 @@ impl PhotonMapper {
         let Some(mut step) = step else {
             return Ok(None);
         };
-        if self.eye.samples_done() >= end {
-            self.passes += 1;
-            if let Some(photons) = &mut self.photons {
-                photons.map = None;
-            }
+        if self.eye.samples_done().is_multiple_of(each)
+            && self.eye.samples_done() > done
+            && let Some(photons) = &mut self.photons
+        {
+            photons.map = None;
         }
         timings.append(&mut step.timings);
         let pixels = self.eye.size().iter().map(|side| u64::from(*side)).product::<u64>();

@@ -20,7 +20,7 @@ const SAMPLES_MAX: u32 = 1024;
 const RADIUS_SHARE: f64 = 1.0 / 100.0;
 const UNIT_SHARE: f64 = 1.0 / 9.0;
 /// Most photons under a kernel about a point, and least: the last one only says how wide it is.
-const NEIGHBORS_MAX: u32 = 10_000;
+const NEIGHBORS_MAX: u32 = 1000;
 const NEIGHBORS_MIN: u32 = 2;
 /// Neighbours are looked for as far as this many times their number would lie.
 const NEIGHBORS_MARGIN: f64 = 4.0;
@@ -257,9 +257,10 @@ impl PhotonSettings {
                 )],
             });
         }
-        if let Some(max) = self.path_set.max_bounces().filter(|max| *max > PHOTON_BOUNCE_MAX) {
-            let cause = format!("counts more than {PHOTON_BOUNCE_MAX} bounces: leave the end open");
-            return Err(Error::setting("path_set", format!("bounces=..{max}"), cause));
+        let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
+        if min.max(max.unwrap_or(0)) > PHOTON_BOUNCE_MAX {
+            let cause = format!("counts more than {PHOTON_BOUNCE_MAX} bounces, which records of photons cannot");
+            return Err(Error::setting("path_set", self.path_set, cause));
         }
         let seen = match (self.direct_photons, self.final_gather) {
             (true, _) => "L[SG]*E",

@@ -442,10 +442,14 @@ type Counters = photon_scatter::PhotonCounters;
 /// Loop iterations that a ray may take in all, as of the path tracer's.
 const RAY_ITERATIONS_MAX: u64 = 1 << 31;
 
-/// What fluxes are multiplied by before they are stored: one over the lights' power, so that a record's is near one.
+/// What fluxes are multiplied by before they are stored: over the lights' power, so that a record's is about this. Records hold up to 65408,
+/// with full precision down to 2⁻¹⁶; choices that share less than by power are within a factor of thirty.
+const STORED_FLUX: f64 = 256.0;
+
+/// See [`STORED_FLUX`].
 pub(super) fn flux_scale(scene: &GpuScene) -> f64 {
     let power = scene.light_power();
-    if power > 0.0 { 1.0 / power } else { 1.0 }
+    if power > 0.0 { STORED_FLUX / power } else { 1.0 }
 }
 
 /// Records that a buffer of the device can hold.

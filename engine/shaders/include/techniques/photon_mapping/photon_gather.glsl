@@ -51,6 +51,7 @@ uint nearest_bins[NEAREST_BINS];
 vec2 nearest_span;
 bool nearest_counts;
 float nearest_squared;  // squared distance of the last photon
+bool nearest_all;       // there are as many as asked for
 
 // Adds a photon's kernel times its scattering function, or counts it; what all photons have in common is left to the end. Whether the leaf
 // goes on.
@@ -113,9 +114,10 @@ bool compact_visit_point(uint record) {
         } else {
             vec3 wi = -photon_direction(q1);
             float cos_i = dot(wi, gather.z);
-            float cos_g = dot(wi, gather.facing);
-            if (cos_i * cos_g > 0.0 && cos_i > 0.0) {
-                gathered += cosine_lobes_eval(gather.bsdf, gather.lobes, cos_i) * flux * (weight * (cos_i / cos_g));
+            // Photons lie as densely as the cosine on their own facet has it.
+            float cos_photon = dot(wi, photon_normal(q0));
+            if (cos_photon > 0.0 && cos_i > 0.0) {
+                gathered += cosine_lobes_eval(gather.bsdf, gather.lobes, cos_i) * flux * (weight * (cos_i / cos_photon));
             }
         }
     }
@@ -128,6 +130,7 @@ bool find_nearest(float radius) {
     nearest_counts = true;
     nearest_span = vec2(0.0, radius * radius);
     nearest_squared = nearest_span.y;
+    nearest_all = false;
     for (uint round = 0u; round < NEAREST_ROUNDS && nearest_span.y - nearest_span.x > NEAREST_PRECISION * nearest_span.x; ++round) {
         for (uint i = 0u; i < NEAREST_BINS; ++i) {
             nearest_bins[i] = 0u;
@@ -144,6 +147,7 @@ bool find_nearest(float radius) {
         if (found < push.neighbors) {
             break;
         }
+        nearest_all = true;
         nearest_span = vec2(nearest_span.x + float(bin) * width, nearest_span.x + float(bin + 1u) * width);
         nearest_squared = nearest_span.y;
     }
@@ -229,6 +233,10 @@ void main() {
     }
     if (LAMBERT) {
         gathered *= gather.lobes.diffuse * INV_PI;
+    }
+    if (NEAREST && PROFILE == KERNEL_UNIFORM && nearest_all) {
+        // The last photon only says how wide the kernel is, which others leave out by themselves.
+        gathered *= float(push.neighbors - 1u) / float(push.neighbors);
     }
     if (!LINEAR || push.first == 0u) {
         atomicAdd(gather_counters.queries, 1u);
