@@ -582,7 +582,7 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
         "scales",
         "breaks",
         "expects",
-        "path (sobol), path (pcg), bvh2",
+        "path (sobol), path (pcg), photon, bvh2",
         "degrades",
     ] {
         assert!(list.contains(word), "{word}: {list}");

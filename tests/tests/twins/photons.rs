@@ -388,8 +388,9 @@ fn records_agree_with_their_twins() {
             let back = unpack_photon(&words);
             for (i, value) in [(3, back.normal), (6, back.direction), (9, back.flux)] {
                 let error = (result.vector(i) - value.as_dvec3()).abs().max_element();
+                // A coordinate is a quotient of up to 2, good to 2.5 units in its last place, less one; normalised it errs by √3 of that.
                 assert!(
-                    error <= 8.0 * U * f64::from(value.abs().max_element()),
+                    error <= 24.0 * U * f64::from(value.abs().max_element()),
                     "{i}: {:?}",
                     case.0
                 );
