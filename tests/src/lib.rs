@@ -4,6 +4,7 @@
 //! `CLERESTORY_VALIDATION` (`off`, `core`, `gpu`). Unlike for programs, unset means `core` here, so that a bare `cargo test` checks every
 //! call; an unknown value fails the tests.
 
+pub mod child;
 pub mod render;
 pub mod shaders;
 pub mod statistics;

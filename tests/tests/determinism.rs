@@ -1,11 +1,10 @@
 //! Same scene, settings, seed and driver: the same bits, however the work is cut up and whoever does it.
 
-use std::process::Command;
-
 use clerestory::gpu::Gpu;
 use clerestory::scene::{Environment, Material, Mesh, Scene};
 use clerestory::transport::PathTracerSettings;
 use clerestory::transport::random::SamplerKind;
+use clerestory_tests::child::hash_in_child;
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{Rendered, builtin, finish, render, tracer};
 use clerestory_tests::{gpu, with_gpu};
@@ -122,25 +121,7 @@ fn rays_that_a_quota_stops_go_on_where_they_were() {
 
 #[test]
 fn threads_of_the_driver_and_of_the_host_never_show() {
-    // Software drivers read their number of threads when a process begins, so each number has a process of its own.
-    let hash = |variables: &[(&str, &str)]| {
-        let output = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", CHILD_TEST, "--nocapture"])
-            .env(CHILD, "1")
-            .envs(variables.iter().copied())
-            .output()
-            .unwrap();
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(
-            output.status.success(),
-            "{variables:?}: {text}{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let line = text.lines().find_map(|line| line.split_once("hash "));
-        line.unwrap_or_else(|| panic!("{variables:?}: no hash in {text}"))
-            .1
-            .to_owned()
-    };
+    let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
     let truth = hash(&[("LP_NUM_THREADS", "1")]);
     for variables in [
         &[("LP_NUM_THREADS", "0")][..],

@@ -1,9 +1,9 @@
 //! The same bits on every run and any number of threads, and however much had to be done twice.
 
 use super::*;
+use clerestory_tests::child::hash_in_child;
 use clerestory_tests::render::builtin;
 use clerestory_tests::{gpu, with_gpu};
-use std::process::Command;
 
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_PHOTON_HASH";
@@ -52,25 +52,7 @@ fn runs_are_equal_and_seeds_are_not() {
 
 #[test]
 fn threads_never_show() {
-    // Software drivers read their number of threads when a process begins, so each number has a process of its own.
-    let hash = |variables: &[(&str, &str)]| {
-        let output = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", CHILD_TEST, "--nocapture"])
-            .env(CHILD, "1")
-            .envs(variables.iter().copied())
-            .output()
-            .unwrap();
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(
-            output.status.success(),
-            "{variables:?}: {text}{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let line = text.lines().find_map(|line| line.split_once("hash "));
-        line.unwrap_or_else(|| panic!("{variables:?}: no hash in {text}"))
-            .1
-            .to_owned()
-    };
+    let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
     let truth = hash(&[("LP_NUM_THREADS", "1"), ("RAYON_NUM_THREADS", "1")]);
     assert_eq!(hash(&[("LP_NUM_THREADS", "2")]), truth, "two threads");
     assert_eq!(

@@ -2,6 +2,7 @@
 
 use super::map::PhotonMap;
 use super::settings::{MapQuery, PhotonSettings};
+use crate::accel::trace::wide_counter;
 use crate::gpu::shaders::constants::{LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD, PATH_SET_STATE_BITS};
 use crate::gpu::shaders::sets::{PathBuffers, PhotonMapSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
@@ -169,7 +170,7 @@ impl Gather {
         self.gpu.upload(&self.counters, 0, &[Counters::default()])?;
         Ok(GatherCounts {
             queries: u64::from(counters.queries),
-            photons: u64::from(counters.photons[0]) | u64::from(counters.photons[1]) << 32,
+            photons: wide_counter(counters.photons),
         })
     }
 }

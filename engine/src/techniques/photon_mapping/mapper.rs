@@ -70,8 +70,6 @@ pub struct PhotonMapper {
     eye: PathTracer,
     /// None where the picture has nothing of a map.
     photons: Option<Photons>,
-    /// The pass under way.
-    passes: u32,
     counts: MapperCounts,
 }
 
@@ -120,7 +118,6 @@ impl PhotonMapper {
             scene,
             settings,
             photons,
-            passes: 0,
             counts: MapperCounts::default(),
         })
     }
@@ -187,7 +184,6 @@ impl PhotonMapper {
 
     /// Before the first pass.
     fn begin(&mut self) {
-        self.passes = 0;
         if let Some(photons) = &mut self.photons {
             photons.map = None;
         }
@@ -205,15 +201,15 @@ impl PhotonMapper {
             return Ok(None);
         }
         // Whatever the target of each call, a pass has its samples.
-        self.passes = done / each;
-        let end = (self.passes + 1).saturating_mul(each).min(samples);
+        let pass = done / each;
+        let end = (pass + 1).saturating_mul(each).min(samples);
         let mut timings = Vec::new();
-        let (kernel, watts) = (self.kernel(self.passes), self.watts());
+        let (kernel, watts) = (self.kernel(pass), self.watts());
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
             let clock = Instant::now();
-            let traced = photons.tracer.trace(self.passes, &kernel)?;
+            let traced = photons.tracer.trace(pass, &kernel)?;
             timings.extend(traced.timings);
             self.counts.trace_seconds += clock.elapsed().as_secs_f64();
             let clock = Instant::now();
@@ -231,10 +227,7 @@ impl PhotonMapper {
             Some(Photons {
                 gather, map: Some(map), ..
             }) => {
-                let nearest = (
-                    self.settings.neighbors_in(self.passes),
-                    kernel.length_max * kernel.unit_length,
-                );
+                let nearest = (self.settings.neighbors_in(pass), kernel.length_max * kernel.unit_length);
                 Some(gather.stage(&self.scene, map, watts, nearest))
             }
             _ => None,

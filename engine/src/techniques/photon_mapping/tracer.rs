@@ -12,18 +12,21 @@ use std::sync::Arc;
 
 use super::kernel::KernelSettings;
 use super::settings::PhotonSettings;
+use crate::accel::trace::wide_counter;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{PATH_GROUP, PHOTON_QUARTERS, STALLED_NOT};
 use crate::gpu::shaders::sets::PhotonWave;
 use crate::gpu::shaders::techniques::photon_mapping::{photon_append, photon_emit, photon_scatter};
 use crate::gpu::shaders::types::{self, Differentials};
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, PipelineInfo, Recorder};
+use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder};
 use crate::gpu::{TexelView, Timings};
 use crate::transport::GpuScene;
 use crate::transport::path_tracer::PathTracerSettings;
 use crate::transport::path_tracer::pipelines::{TracePipelines, ray_quota};
-use crate::transport::path_tracer::stages::{Compaction, WaveKey, indirect, stage_barrier};
-use crate::transport::path_tracer::wave::{Status, WaveBuffers, WaveNeeds, group_counts, slots_of_device};
+use crate::transport::path_tracer::stages::{Compaction, StallWatch, WaveKey, indirect, stage_barrier};
+use crate::transport::path_tracer::wave::{
+    Status, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device,
+};
 use crate::{Error, Result};
 
 /// Bounces recorded into one command buffer.
@@ -139,12 +142,7 @@ impl PhotonTracer {
             ..Default::default()
         };
         let wanted = settings.photons.next_multiple_of(PATH_GROUP);
-        let most = if gpu.caps().kind == DeviceKind::Cpu {
-            1 << 18
-        } else {
-            1 << 20
-        };
-        let slots = wanted.min(most).min(slots_of_device(gpu));
+        let slots = wanted.min(default_slots(gpu)).min(slots_of_device(gpu));
         let needs = WaveNeeds {
             lights: true,
             media: false,
@@ -253,8 +251,7 @@ impl PhotonTracer {
             active_count: photons,
             ..Status::default()
         };
-        let quota = u64::from(ray_quota(&self.gpu, &self.scene, &self.paths)?);
-        let mut iterations = 0u64;
+        let mut watch = StallWatch::new(ray_quota(&self.gpu, &self.scene, &self.paths)?);
         let mut begins = true;
         while status.active_count > 0 || status.stalled != STALLED_NOT {
             let before = status.rounds;
@@ -264,21 +261,12 @@ impl PhotonTracer {
                 .push(self.submit(&key, &mut status, begins, first, kernel)?);
             begins = false;
             let stands = status.stalled != STALLED_NOT && status.rounds == before;
-            iterations = if stands { iterations + quota } else { 0 };
-            if iterations > RAY_ITERATIONS_MAX {
-                return Err(Error::Overflow {
-                    kernel: "path_extend".into(),
-                    what: "iterations of a ray".into(),
-                    needed: iterations,
-                    capacity: RAY_ITERATIONS_MAX,
-                    instead: "rebuild the index".into(),
-                });
-            }
+            watch.submitted(stands)?;
         }
         let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
         // Those of the queue are the deposits with a kernel: one word holds a wave's.
         traced.records = traced.records.saturating_add(status.shadow_rays[0]);
-        traced.counts.rays += u64::from(status.extend_rays[0]) | u64::from(status.extend_rays[1]) << 32;
+        traced.counts.rays += wide_counter(status.extend_rays);
         traced.counts.escaped += u64::from(counters.escaped);
         traced.counts.absorbed += u64::from(counters.absorbed);
         traced.counts.deposits += u64::from(counters.deposits);
@@ -438,9 +426,6 @@ impl PhotonTracer {
 }
 
 type Counters = photon_scatter::PhotonCounters;
-
-/// Loop iterations that a ray may take in all, as of the path tracer's.
-const RAY_ITERATIONS_MAX: u64 = 1 << 31;
 
 /// What fluxes are multiplied by before they are stored: over the lights' power, so that a record's is about this. Records hold up to 65408,
 /// with full precision down to 2⁻¹⁶; choices that share less than by power are within a factor of thirty.

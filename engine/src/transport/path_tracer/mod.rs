@@ -23,27 +23,27 @@ use std::time::Instant;
 
 use self::pipelines::{Pipelines, TracePipelines, camera_pipeline, ray_quota};
 pub use self::settings::PathTracerSettings;
+use self::stages::StallWatch;
 use self::wave::{
-    Cursor, MediumCounters, Status, Wave, WaveBuffers, WaveNeeds, group_counts, slots_of_device, slots_of_picture,
+    Cursor, MediumCounters, Status, Wave, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device,
+    slots_of_picture,
 };
 use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
+use crate::Result;
+use crate::accel::trace::wide_counter;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, Step};
 use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::{Access, Buffer, BufferView, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
 use crate::scene::Camera;
-use crate::{Error, Result};
 use glam::DVec3;
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
 const BOUNCES_PER_SUBMISSION: usize = 12;
 /// Device time that a submission may take where a driver watches: they end what runs for some seconds.
 const SUBMISSION_SECONDS: f64 = 0.25;
-/// Loop iterations that a ray may take in all before the tracer gives up, since no index of 2²⁸ triangles has as many: submissions in a row
-/// that end without finishing a bounce advance every stopped ray by a whole quota each.
-const RAY_ITERATIONS_MAX: u64 = 1 << 31;
 
 /// Exact counts of what the device did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -100,7 +100,7 @@ impl PathTracer {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a setting or size out of range, [`Error::OutOfMemory`], [`Error::MissingFeature`].
+    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::MissingFeature`](crate::Error::MissingFeature).
     pub fn new(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -111,9 +111,7 @@ impl PathTracer {
         settings.check()?;
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let slots = match settings.paths_in_flight {
-            // Enough for a dispatch to be worth its overhead, few enough for the caches of a processor.
-            0 if gpu.caps().kind == DeviceKind::Cpu => 1 << 18,
-            0 => 1 << 20,
+            0 => default_slots(gpu),
             wanted => wanted.next_multiple_of(PATH_GROUP),
         };
         let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
@@ -146,7 +144,7 @@ impl PathTracer {
     /// Forgets everything gathered so far and looks through another camera.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
+    /// [`Error::Setting`](crate::Error::Setting) for a camera that cannot be used, [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         let frame = CameraFrame::new(camera, self.film.size())?;
         let pipeline = camera_pipeline(&self.gpu, &self.settings, &frame, camera)?;
@@ -163,7 +161,7 @@ impl PathTracer {
     /// Forgets everything gathered so far and goes on with another seed: an independent picture of the same view, with the kernels there are.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear()?;
         self.settings.seed = seed;
@@ -175,7 +173,7 @@ impl PathTracer {
     /// Renders one more wave towards `samples` samples a pixel; `None` when all are there. The first wave also compiles the kernels.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         self.step_with(samples, None)
     }
@@ -235,7 +233,7 @@ impl PathTracer {
     /// samples that were left out because they were not finite.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
         self.flush()?;
         self.film.picture()
@@ -245,7 +243,7 @@ impl PathTracer {
     /// and sRGB-encoded, blue first where `bgra` says so.
     ///
     /// # Errors
-    /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
+    /// [`Error::Setting`](crate::Error::Setting) when the buffer is too small, [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
         self.flush()?;
         self.film.display(target, exposure, bgra)
@@ -259,34 +257,24 @@ impl PathTracer {
             ..Status::default()
         };
         let mut timings = vec![self.submit_bounces(wave, &mut status, true, arrival)?];
-        let quota = u64::from(ray_quota(&self.gpu, &self.scene, &self.settings)?);
-        let mut iterations = 0;
+        let mut watch = StallWatch::new(ray_quota(&self.gpu, &self.scene, &self.settings)?);
         while status.active_count > 0 || status.stalled != STALLED_NOT {
             let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);
             self.counters.stalls += u64::from(stalled);
             timings.push(self.submit_bounces(wave, &mut status, false, arrival)?);
             let stands = stalled && status.stalled != STALLED_NOT && status.rounds == rounds;
-            iterations = if stands { iterations + quota } else { 0 };
-            if iterations > RAY_ITERATIONS_MAX {
-                return Err(Error::Overflow {
-                    kernel: "path_extend".into(),
-                    what: "iterations of a ray".into(),
-                    needed: iterations,
-                    capacity: RAY_ITERATIONS_MAX,
-                    instead: "rebuild the index".into(),
-                });
-            }
+            watch.submitted(stands)?;
         }
         self.counters.paths += u64::from(paths);
-        self.counters.extend_rays += wide(status.extend_rays);
-        self.counters.shadow_rays += wide(status.shadow_rays);
+        self.counters.extend_rays += wide_counter(status.extend_rays);
+        self.counters.shadow_rays += wide_counter(status.shadow_rays);
         if let Some(media) = &self.buffers.media {
             let counts = media.readback.read::<MediumCounters>(0, 1)?[0];
-            self.counters.medium_collisions += wide(counts.collisions);
-            self.counters.null_collisions += wide(counts.null_collisions);
-            self.counters.density_lookups += wide(counts.density_lookups);
+            self.counters.medium_collisions += wide_counter(counts.collisions);
+            self.counters.null_collisions += wide_counter(counts.null_collisions);
+            self.counters.density_lookups += wide_counter(counts.density_lookups);
             // A place's two rays are counted as one before.
-            self.counters.shadow_rays += wide(counts.second_rays);
+            self.counters.shadow_rays += wide_counter(counts.second_rays);
         }
         self.counters.waves += 1;
         self.pending = Some(*wave);
@@ -365,9 +353,9 @@ impl PathTracer {
         let seconds = timings
             .untimed
             .map_or(timings.seconds(), |_| clock.elapsed().as_secs_f64());
-        let rays_before = wide(status.extend_rays);
+        let rays_before = wide_counter(status.extend_rays);
         *status = self.buffers.readback.read::<Status>(0, 1)?[0];
-        let rays = wide(status.extend_rays) - rays_before;
+        let rays = wide_counter(status.extend_rays) - rays_before;
         // A stalled submission counts its rays when they have gone on to their end.
         self.uncounted_seconds += seconds;
         if rays > 0 {
@@ -399,9 +387,4 @@ impl PathTracer {
         submission.wait()?;
         Ok(())
     }
-}
-
-/// A 64-bit counter of two words, the low one first.
-fn wide(words: [u32; 2]) -> u64 {
-    u64::from(words[0]) | u64::from(words[1]) << 32
 }

@@ -2,7 +2,6 @@
 
 use super::pipelines::TracePipelines;
 use super::wave::{Status, WaveBuffers};
-use crate::Result;
 use crate::gpu::shaders::constants::NO_MEDIUM;
 use crate::gpu::shaders::sets::{PathBuffers, PathMedia};
 use crate::gpu::shaders::transport::{
@@ -11,6 +10,7 @@ use crate::gpu::shaders::transport::{
 };
 use crate::gpu::{Access, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::transport::GpuScene;
+use crate::{Error, Result};
 
 /// What the random numbers of a wave's paths are keyed by: pixels and samples; or, of photons, the pass and the photons in it.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +19,43 @@ pub(crate) struct WaveKey {
     pub first_sample: u32,
     pub sample_count: u32,
     pub seed: u32,
+}
+
+/// Loop iterations that a ray may take in all before a tracer gives up, since no index of 2²⁸ triangles has as many: submissions in a row
+/// that end without finishing a bounce advance every stopped ray by a whole quota each.
+const RAY_ITERATIONS_MAX: u64 = 1 << 31;
+
+/// Counts what rays have taken since a bounce was finished last.
+pub(crate) struct StallWatch {
+    quota: u64,
+    iterations: u64,
+}
+
+impl StallWatch {
+    pub fn new(quota: u32) -> Self {
+        Self {
+            quota: u64::from(quota),
+            iterations: 0,
+        }
+    }
+
+    /// After each submission: whether it went on with stopped rays and finished no bounce.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`] should the index have rays that never end.
+    pub fn submitted(&mut self, stands: bool) -> Result<()> {
+        self.iterations = if stands { self.iterations + self.quota } else { 0 };
+        if self.iterations <= RAY_ITERATIONS_MAX {
+            return Ok(());
+        }
+        Err(Error::Overflow {
+            kernel: "path_extend".into(),
+            what: "iterations of a ray".into(),
+            needed: self.iterations,
+            capacity: RAY_ITERATIONS_MAX,
+            instead: "rebuild the index".into(),
+        })
+    }
 }
 
 /// Indirect arguments at an offset of the status.

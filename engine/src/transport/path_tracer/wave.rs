@@ -13,7 +13,7 @@ use crate::gpu::shaders::types::{
     FilmAov, FilmPixel, GatheredLight, Hit, MediumEvent, MediumState, PathAov, PathState, ShadowRay, ShadowStart,
     ShadowState,
 };
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
+use crate::gpu::{Buffer, BufferDesc, Category, DeviceKind, Gpu, TexelView};
 use crate::{Error, Result};
 
 /// Samples of a pixel in one wave: the resolve stage loops over them, which must stay below
@@ -126,6 +126,14 @@ impl Cursor {
         }
         c.done += u64::from(pixels) * u64::from(wave.samples);
         Some((wave, c))
+    }
+}
+
+/// Slots where nothing else is asked for: enough for a dispatch to be worth its overhead, few enough for the caches of a processor.
+pub(crate) fn default_slots(gpu: &Gpu) -> u32 {
+    match gpu.caps().kind {
+        DeviceKind::Cpu => 1 << 18,
+        _ => 1 << 20,
     }
 }
 
