@@ -177,12 +177,18 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         text,
         "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
          spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    fingerprint: {},\n    local_size: [{}],\n    \
-         subgroups: {},\n    bindings: &[",
+         subgroups: {},\n    capabilities: &[{}],\n    bindings: &[",
         shader.name,
         interface.stage,
         interface.fingerprint(),
         local_size.join(", "),
         interface.subgroups,
+        interface
+            .capabilities
+            .iter()
+            .map(|name| format!("Capability::{name}"))
+            .collect::<Vec<_>>()
+            .join(", "),
     );
     for binding in &interface.bindings {
         let kind = match &binding.resource {

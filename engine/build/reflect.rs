@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, ExecutionModel, Op, StorageClass};
+use rspirv::spirv::{BuiltIn, Capability, Decoration, Dim, ExecutionMode, ExecutionModel, Op, StorageClass};
 
 /// A type inside a buffer, as the device lays it out.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,6 +115,8 @@ pub struct Interface {
     pub local_size: [Result<u32, u32>; 3],
     /// It has subgroup operations.
     pub subgroups: bool,
+    /// What graphics stages need that not every device has, by its name in `gpu::interface::Capability`.
+    pub capabilities: Vec<&'static str>,
 }
 
 struct Reader {
@@ -132,8 +134,8 @@ impl Interface {
     pub fn fingerprint(&self) -> u64 {
         let spec: Vec<_> = self.spec.iter().map(|c| (c.id, &c.name, c.kind)).collect();
         let text = format!(
-            "{} {:?} {:?} {spec:?} {:?} {}",
-            self.stage, self.bindings, self.push, self.local_size, self.subgroups
+            "{} {:?} {:?} {spec:?} {:?} {} {:?}",
+            self.stage, self.bindings, self.push, self.local_size, self.subgroups, self.capabilities
         );
         fnv1a(text.bytes())
     }
@@ -180,22 +182,42 @@ pub fn reflect(module: &[u8], optimized: &[u8]) -> Result<Interface, String> {
         }
     }
     bindings.sort_by_key(|b| (b.set, b.binding));
+    let optimized = rspirv::dr::load_bytes(without_sources(optimized)).map_err(|error| error.to_string())?;
     let local_size = reader.local_size(&spec);
     let subgroups = reader.has_subgroup_operations();
     Ok(Interface {
         stage,
         bindings,
-        used: used_bindings(optimized)?,
+        used: used_bindings(&optimized),
         push,
         spec,
         local_size,
         subgroups,
+        capabilities: capabilities(&optimized),
     })
 }
 
+/// The capabilities among those declared that the host asks devices for.
+fn capabilities(module: &Module) -> Vec<&'static str> {
+    let declared: BTreeSet<_> = module
+        .capabilities
+        .iter()
+        .flat_map(|declared| &declared.operands)
+        .filter_map(|operand| match operand {
+            Operand::Capability(Capability::Geometry) => Some("Geometry"),
+            Operand::Capability(Capability::ClipDistance) => Some("ClipDistance"),
+            Operand::Capability(Capability::MultiView) => Some("MultiView"),
+            Operand::Capability(Capability::ShaderViewportIndexLayerEXT | Capability::ShaderLayer) => {
+                Some("VertexLayer")
+            }
+            _ => None,
+        })
+        .collect();
+    declared.into_iter().collect()
+}
+
 /// The bindings that an instruction of a function refers to.
-fn used_bindings(module: &[u8]) -> Result<BTreeSet<(u32, u32)>, String> {
-    let module = rspirv::dr::load_bytes(without_sources(module)).map_err(|error| error.to_string())?;
+fn used_bindings(module: &Module) -> BTreeSet<(u32, u32)> {
     let touched: BTreeSet<u32> = module
         .functions
         .iter()
@@ -222,9 +244,8 @@ fn used_bindings(module: &[u8]) -> Result<BTreeSet<(u32, u32)>, String> {
         }
     }
     let used = bindings.into_iter().filter(|(id, _)| touched.contains(id));
-    Ok(used
-        .map(|(id, binding)| (sets.get(&id).copied().unwrap_or(0), binding))
-        .collect())
+    used.map(|(id, binding)| (sets.get(&id).copied().unwrap_or(0), binding))
+        .collect()
 }
 
 /// A module without sources and line numbers: the compiler cuts its sources in the middle of multi-byte characters, which `rspirv` refuses.

@@ -106,6 +106,14 @@ pub enum Error {
         /// The way round it.
         instead: String,
     },
+    /// Something that holds for every input does not: a fault of the engine itself.
+    #[error("{what} {fault}; this is a fault of the engine")]
+    Internal {
+        /// What was made.
+        what: String,
+        /// What is wrong with it.
+        fault: String,
+    },
     /// A shader did not compile or reflect (run-time compilation only).
     #[error("shader {name}: {message}")]
     Shader {

@@ -67,7 +67,8 @@ void main() {
         break;
     }
     case 3u: {  // kernels
-        KernelSettings s = KernelSettings(in_bits(18u), in1(9u), in1(10u), in1(11u), in1(12u), in1(13u), in1(14u));
+        KernelSettings s = KernelSettings(in_bits(18u), in1(9u), in1(10u), in1(11u), in1(12u), in1(13u), in1(14u),
+                                          uint(in1(15u)));
         Differentials d = Differentials(in3(0u), in3(3u), vec3(0.0), vec3(0.0));
         PhotonKernel k;
         bool has = photon_kernel(s, d, in3(6u), k);

@@ -7,5 +7,6 @@ pub mod least_squares;
 pub mod machine;
 pub mod mitsuba;
 pub mod page;
+mod python;
 pub mod random;
 pub mod timing;

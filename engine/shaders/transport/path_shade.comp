@@ -9,12 +9,11 @@
 layout(local_size_x = 64) in;
 
 #include "transport/path_features.glsl"
-#include "transport/path_buffers.glsl"
+#include "transport/arrival.glsl"
 #include "transport/path_set.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/bsdf_label.glsl"
 #include "transport/path_media.glsl"
-#include "transport/surface.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -64,36 +63,25 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         return false;
     }
 
-    Surface s = surface_at(hit, push.scene_lower, push.scene_upper);
-    SceneMaterial m = load_material(s.material);
-    vec3 wo = -path.direction;
-    bool front = dot(wo, s.geometric_normal) > 0.0;
-    bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
-    // A camera inside a solid does not know it until it looks out.
-    uint interior = HAS_TRANSMISSION || HAS_MEDIA ? path_gathered[slot].interior : OUTSIDE;
+    Arrival a = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
+    Surface s = a.surface;
+    SceneMaterial m = a.material;
+    Bsdf bsdf = a.bsdf;
     uint around = HAS_MEDIA ? s.around : OUTSIDE;
-    interior = interior == OUTSIDE && solid && !front ? s.material : interior;
-    if (HAS_ABSORPTION && !HAS_MEDIA) {
-        if (interior != OUTSIDE) {
-            path.throughput *= exp(-load_material(interior).absorption * hit.t);
-        }
+    uint interior = arrival_interior(a, HAS_TRANSMISSION || HAS_MEDIA ? path_gathered[slot].interior : OUTSIDE);
+    if (!HAS_MEDIA) {
+        path.throughput = absorbed(path.throughput, interior, hit.t);
     }
 
     if ((HAS_AREA_LIGHTS || HAS_UNLIT) && counted) {
-        vec3 emission = surface_emission(m, s, wo);
+        vec3 emission = surface_emission(m, s, a.wo);
         if (emission != vec3(0.0)) {
             float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? triangle_light_pdf(s, path.direction, hit.t) : 0.0;
             radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
         }
     }
 
-    Bsdf bsdf = surface_bsdf(m, s);
-    vec3 facing = front ? s.geometric_normal : -s.geometric_normal;
-    vec3 outward = solid ? s.geometric_normal : facing;
-    vec3 normal = facing;
-    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
-        normal = adapt_shading_normal(surface_mapped_normal(m, s), facing, wo);
-    }
+    vec3 normal = arrival_normal(a);
     if (WRITE_AOVS && path.bounce == 0u) {
         vec3 albedo = HAS_CONDUCTOR && (bsdf.flags & BSDF_CONDUCTOR) != 0u ? bsdf.conductor_average : bsdf.base_color;
         path_aovs[slot] = PathAov(albedo, hit.t, normal, 1u);
@@ -107,17 +95,12 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         mask = path_set_lobes_to(successors, PATH_SET_LIVE);
         lit_mask = path_set_lobes_to(successors, push.accepting);
     }
-    bool ends = (HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u) || !path_set_continues(push.path_set, path.bounce);
+    bool ends = arrival_is_unlit(a) || !path_set_continues(push.path_set, path.bounce);
     ends = ends || (HAS_PATH_AUTOMATON && mask == 0u);
     if (ends) {
         return false;
     }
-    // z of the scattering frame points out of a solid body, and towards the viewer elsewhere.
-    vec3 z = dot(outward, facing) < 0.0 ? -normal : normal;
-    vec3 x;
-    vec3 y;
-    orthonormal_basis(z, x, y);
-    vec3 wo_local = vec3(dot(wo, x), dot(wo, y), dot(wo, z));
+    ScatteringFrame frame = scattering_frame(a, normal);
     uint bounce = path.bounce;
 
     bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
@@ -128,9 +111,9 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         vec2 within = HAS_ENVIRONMENT ? bounce_sample(slot, bounce, DIMENSION_LIGHT_WITHIN) : vec2(0.0);
         LightSample light = sample_light(s.point.position, choice.x, u, within, push.scene_lower, push.scene_upper);
         vec3 wi = light.direction;
-        if (light.radiance != vec3(0.0) && sides_agree(z, outward, wi)) {
+        if (light.radiance != vec3(0.0) && sides_agree(frame.z, frame.outward, wi)) {
             // The density is that of the directions sampled below, whatever part of them finds light that counts.
-            vec4 f = bsdf_eval_part(bsdf, wo_local, vec3(dot(wi, x), dot(wi, y), dot(wi, z)), mask, lit_mask);
+            vec4 f = bsdf_eval_part(bsdf, frame.wo, world_to_frame(frame, wi), mask, lit_mask);
             if (f.rgb != vec3(0.0)) {
                 float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, f.a) : 1.0;
                 ShadowRay ray_to_light;
@@ -145,10 +128,10 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
                 }
                 ray_to_light.origin = start;
                 ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
-                uint passed = solid ? (dot(wi, outward) < 0.0 ? s.material : around) : interior;
-                if (HAS_ABSORPTION && !HAS_MEDIA && passed != OUTSIDE && !light.infinite) {
+                uint passed = a.solid ? (dot(wi, frame.outward) < 0.0 ? s.material : around) : interior;
+                if (!HAS_MEDIA && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
-                    ray_to_light.contribution *= exp(-load_material(passed).absorption * way);
+                    ray_to_light.contribution = absorbed(ray_to_light.contribution, passed, way);
                 }
                 path_shadow_rays_out[place] = ray_to_light;
                 if (HAS_MEDIA) {
@@ -161,23 +144,23 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     }
 
     vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
-    BsdfSample scattered = bsdf_sample(bsdf, wo_local, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), mask);
+    BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), mask);
     if (HAS_PATH_AUTOMATON) {
         uint after_base = path_set_successor(successors, LOBE_DIFFUSE & LOBE_REFLECTION);
         uint after_microfacets = path_set_successor(successors, LOBE_GLOSSY & LOBE_REFLECTION);
         bool alike = !HAS_LOBE_LABELS || after_base == after_microfacets;
-        scattered = bsdf_label(bsdf, wo_local, scattered, mask, alike, lobe.y);
+        scattered = bsdf_label(bsdf, frame.wo, scattered, mask, alike, lobe.y);
         state = scattered.flags != 0u ? path_set_successor(successors, scattered.flags) : 0u;
     }
-    vec3 wi = scattered.wi.x * x + scattered.wi.y * y + scattered.wi.z * z;
+    vec3 wi = frame_to_world(frame, scattered.wi);
     path.throughput *= scattered.weight;
-    if (scattered.flags == 0u || !sides_agree(z, outward, wi) || path.throughput == vec3(0.0)) {
+    if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi) || path.throughput == vec3(0.0)) {
         return false;
     }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
-        float eta = wo_local.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
+        float eta = frame.wo.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
         path.eta_scale *= eta * eta;
-        path_gathered[slot].interior = wo_local.z > 0.0 ? s.material : around;
+        path_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : around;
     }
     path.bounce = bounce + 1u;
     if (path.bounce >= push.roulette_start) {
@@ -189,11 +172,7 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
         }
         path.throughput /= survival;
     }
-    path.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
-    if (HAS_ABSORPTION && solid && dot(wi, s.geometric_normal) < 0.0) {
-        // The way through the body that the offset of the start leaves out.
-        path.throughput *= exp(m.absorption * (distance(path.origin, s.point.position) / dot(wi, s.geometric_normal)));
-    }
+    path.origin = departure(a, wi, path.throughput);
     path.direction = normalize(wi);
     if (HAS_MEDIA) {
         path_medium_states[slot].start = -way_left_out(s, path.origin, path.direction);

@@ -1,7 +1,7 @@
 //! The catalogue: one row for every system that the engine carries, so that a reader finds where a publication lives in the code.
 //!
-//! Ids with the prefixes `BG-`, `DP-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility and media,
-//! photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
+//! Ids with the prefixes `BG-`, `DP-`, `OEM-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility
+//! and media, photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
 //! the prefix `CL-` are the engine's own, for published methods outside of those documents. Guarantee: the tests below check that the
 //! module, every test and every row's experiment exist, and that `docs/catalogue.md` is [`markdown`].
 

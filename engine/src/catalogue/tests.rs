@@ -26,7 +26,7 @@ fn ids_are_unique_and_have_a_known_prefix() {
     for row in all() {
         assert!(seen.insert(row.id), "{} twice", row.id);
         assert!(
-            ["BG-", "DP-", "PM-", "MET-", "CL-"]
+            ["BG-", "DP-", "OEM-", "PM-", "MET-", "CL-"]
                 .iter()
                 .any(|prefix| row.id.starts_with(prefix)),
             "{}",

@@ -30,6 +30,16 @@ pub struct Caps {
     pub full_subgroups: bool,
     /// `geometryShader`.
     pub geometry_shader: bool,
+    /// `maxClipDistances`; 0 without `shaderClipDistance`.
+    pub max_clip_distances: u32,
+    /// `maxMultiviewViewCount`; 0 without `multiview`.
+    pub max_views: u32,
+    /// Vertex shaders may write `gl_Layer`: `VK_EXT_shader_viewport_index_layer` is enabled (of devices in a list: offered).
+    pub vertex_layer: bool,
+    /// `maxColorAttachments`.
+    pub max_color_attachments: u32,
+    /// `subPixelPrecisionBits`: the places of vertices are rounded to so many binary digits of a pixel.
+    pub sub_pixel_bits: u32,
     /// `shaderInt64`.
     pub int64: bool,
     /// `shaderFloat64`.
@@ -214,13 +224,17 @@ impl Caps {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut sizes = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
         let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut multiview = vk::PhysicalDeviceMultiviewProperties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut multiview)
             .push_next(&mut subgroup)
             .push_next(&mut sizes)
             .push_next(&mut maintenance);
+        let mut vulkan11 = vk::PhysicalDeviceVulkan11Features::default();
         let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
         let mut features = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut vulkan11)
             .push_next(&mut vulkan12)
             .push_next(&mut vulkan13);
         // SAFETY: the physical device belongs to the instance, and the chained structs live on this stack.
@@ -252,6 +266,7 @@ impl Caps {
             .iter()
             .map(|byte| format!("{byte:02x}"))
             .collect();
+        let has_extension = |name| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         Self {
             device: summary.name,
             driver: summary.driver,
@@ -268,6 +283,21 @@ impl Caps {
             },
             full_subgroups: vulkan13.compute_full_subgroups != 0,
             geometry_shader: features.geometry_shader != 0,
+            max_clip_distances: if features.shader_clip_distance != 0 {
+                limits.max_clip_distances
+            } else {
+                0
+            },
+            max_views: if vulkan11.multiview != 0 {
+                multiview.max_multiview_view_count
+            } else {
+                0
+            },
+            vertex_layer: vulkan12.shader_output_layer != 0
+                && vulkan12.shader_output_viewport_index != 0
+                && has_extension(ash::ext::shader_viewport_index_layer::NAME),
+            max_color_attachments: limits.max_color_attachments,
+            sub_pixel_bits: limits.sub_pixel_precision_bits,
             int64: features.shader_int64 != 0,
             float64: features.shader_float64 != 0,
             int64_atomics: vulkan12.shader_buffer_int64_atomics != 0,
@@ -278,9 +308,7 @@ impl Caps {
             graphics: families
                 .get(queue_family as usize)
                 .is_some_and(|family| family.queue_flags.contains(vk::QueueFlags::GRAPHICS)),
-            ray_query: extensions
-                .iter()
-                .any(|e| e.extension_name_as_c_str() == Ok(ash::khr::ray_query::NAME)),
+            ray_query: has_extension(ash::khr::ray_query::NAME),
             descriptor_indexing: vulkan12.runtime_descriptor_array != 0
                 && vulkan12.shader_sampled_image_array_non_uniform_indexing != 0,
             timestamp_period: if timestamp_valid_bits > 0 {

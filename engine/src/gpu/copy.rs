@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::barrier::Access;
 use super::buffer::BufferView;
-use super::image::{Image, aspect, texel_bytes};
+use super::image::{Image, texel_bytes};
 use super::recorder::Pass;
 use crate::{Error, Result};
 
@@ -103,7 +103,7 @@ impl Pass<'_> {
         Ok(())
     }
 
-    /// Copies a whole image of one layer, in layout `TRANSFER_SRC_OPTIMAL`, to a buffer, rows packed.
+    /// Copies all layers of an image's first mip level, in layout `TRANSFER_SRC_OPTIMAL`, to a buffer, rows and layers packed.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
@@ -126,7 +126,7 @@ impl Pass<'_> {
         Ok(())
     }
 
-    /// Copies packed rows to a whole image of one layer, in layout `TRANSFER_DST_OPTIMAL`.
+    /// Copies packed rows and layers to an image's first mip level, in layout `TRANSFER_DST_OPTIMAL`.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
@@ -150,7 +150,7 @@ impl Pass<'_> {
     }
 }
 
-/// Fails when the packed rows of the image do not fit into the view.
+/// Fails when the packed rows of the image's layers do not fit into the view.
 fn image_rows(image: &Image, view: BufferView<'_>) -> Result<()> {
     let [width, height] = image.size().map(u64::from);
     let texel = texel_bytes(image.format()).ok_or_else(|| Error::Picture {
@@ -158,7 +158,7 @@ fn image_rows(image: &Image, view: BufferView<'_>) -> Result<()> {
         cause: format!("copies of format {:?} are not supported", image.format()),
     })?;
     let rows = BufferView {
-        bytes: width * height * texel,
+        bytes: width * height * texel * u64::from(image.layers()),
         ..view
     };
     rows.check(texel.max(4))?;
@@ -174,12 +174,14 @@ fn image_rows(image: &Image, view: BufferView<'_>) -> Result<()> {
 }
 
 fn whole_image(image: &Image, buffer_offset: u64) -> vk::BufferImageCopy {
+    let range = image.inner.range;
     vk::BufferImageCopy {
         buffer_offset,
         image_subresource: vk::ImageSubresourceLayers {
-            aspect_mask: aspect(image.format()),
-            layer_count: 1,
-            ..Default::default()
+            aspect_mask: range.aspect_mask,
+            mip_level: range.base_mip_level,
+            base_array_layer: range.base_array_layer,
+            layer_count: range.layer_count,
         },
         image_extent: vk::Extent3D {
             width: image.size()[0],

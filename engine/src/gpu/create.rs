@@ -11,7 +11,7 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use super::caps::{Caps, DeviceKind};
 use super::device::{Gpu, Inner, Queue};
 use super::fault;
-use super::host::{DeviceFeatures, EnabledFeatures, HostDevice};
+use super::host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures};
 use super::instance::{DeviceSummary, Instance, surface_extensions, vulkan};
 use super::memory::Memory;
 use super::options::{GpuOptions, Validation};
@@ -148,6 +148,11 @@ impl Gpu {
                 instead: "choose another device".into(),
             })?;
         let mut caps = Caps::read(&instance, physical_device, queue_family);
+        let wanted = options.lesser.features.unwrap_or(OptionalFeatures {
+            shader_viewport_index_layer: true,
+            ..OptionalFeatures::NONE
+        });
+        enabled.optional.shader_viewport_index_layer = caps.vertex_layer && wanted.shader_viewport_index_layer;
         enabled.restrict(&mut caps);
         let device = create_device(
             &instance,
@@ -259,11 +264,17 @@ fn create_device(
         .queue_priorities(&priorities)];
     let mut features = enabled.to_vulkan();
     features.vulkan12.buffer_device_address = (instance.validation == Validation::GpuAssisted).into();
-    let extensions: Vec<&CStr> = if present {
-        vec![khr::swapchain::NAME]
-    } else {
-        Vec::new()
-    };
+    let optional = &enabled.optional;
+    let extensions: Vec<&CStr> = [
+        (present, khr::swapchain::NAME),
+        (
+            optional.shader_viewport_index_layer,
+            ext::shader_viewport_index_layer::NAME,
+        ),
+    ]
+    .into_iter()
+    .filter_map(|(wanted, name)| wanted.then_some(name))
+    .collect();
     let extension_names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)

@@ -52,6 +52,12 @@ pub struct OptionalFeatures {
     pub robust_buffer_access: bool,
     /// `geometryShader`.
     pub geometry_shader: bool,
+    /// `shaderClipDistance`.
+    pub shader_clip_distance: bool,
+    /// `VkPhysicalDeviceVulkan11Features::multiview`.
+    pub multiview: bool,
+    /// `VK_EXT_shader_viewport_index_layer` with `shaderOutputLayer` and `shaderOutputViewportIndex`.
+    pub shader_viewport_index_layer: bool,
     /// `pipelineStatisticsQuery`.
     pub pipeline_statistics_query: bool,
     /// `shaderInt64`.
@@ -77,6 +83,9 @@ impl OptionalFeatures {
     pub const NONE: Self = Self {
         robust_buffer_access: false,
         geometry_shader: false,
+        shader_clip_distance: false,
+        multiview: false,
+        shader_viewport_index_layer: false,
         pipeline_statistics_query: false,
         shader_int64: false,
         shader_float64: false,
@@ -93,6 +102,9 @@ impl OptionalFeatures {
         Self {
             robust_buffer_access: self.robust_buffer_access && other.robust_buffer_access,
             geometry_shader: self.geometry_shader && other.geometry_shader,
+            shader_clip_distance: self.shader_clip_distance && other.shader_clip_distance,
+            multiview: self.multiview && other.multiview,
+            shader_viewport_index_layer: self.shader_viewport_index_layer && other.shader_viewport_index_layer,
             pipeline_statistics_query: self.pipeline_statistics_query && other.pipeline_statistics_query,
             shader_int64: self.shader_int64 && other.shader_int64,
             shader_float64: self.shader_float64 && other.shader_float64,
@@ -133,6 +145,13 @@ impl EnabledFeatures {
         let optional = &self.optional;
         caps.robust_buffer_access &= optional.robust_buffer_access;
         caps.geometry_shader &= optional.geometry_shader;
+        if !optional.shader_clip_distance {
+            caps.max_clip_distances = 0;
+        }
+        if !optional.multiview {
+            caps.max_views = 0;
+        }
+        caps.vertex_layer &= optional.shader_viewport_index_layer;
         caps.pipeline_statistics &= optional.pipeline_statistics_query;
         caps.int64 &= optional.shader_int64;
         caps.float64 &= optional.shader_float64;
@@ -144,20 +163,24 @@ impl EnabledFeatures {
         caps.full_subgroups &= optional.compute_full_subgroups;
     }
 
-    /// The Vulkan structs that switch these features on, for a host that creates a device. `ray_query` is an extension and has to be asked
-    /// for beside them.
+    /// The Vulkan structs that switch these features on, for a host that creates a device. `ray_query` and
+    /// `shader_viewport_index_layer` are extensions and have to be asked for beside them.
     pub fn to_vulkan(&self) -> DeviceFeatures {
         let optional = &self.optional;
         DeviceFeatures {
             vulkan10: vk::PhysicalDeviceFeatures::default()
                 .robust_buffer_access(optional.robust_buffer_access)
                 .geometry_shader(optional.geometry_shader)
+                .shader_clip_distance(optional.shader_clip_distance)
                 .pipeline_statistics_query(optional.pipeline_statistics_query)
                 .shader_int64(optional.shader_int64)
                 .shader_float64(optional.shader_float64)
                 .fragment_stores_and_atomics(optional.fragment_stores_and_atomics)
                 .vertex_pipeline_stores_and_atomics(optional.vertex_pipeline_stores_and_atomics),
+            vulkan11: vk::PhysicalDeviceVulkan11Features::default().multiview(optional.multiview),
             vulkan12: vk::PhysicalDeviceVulkan12Features::default()
+                .shader_output_layer(optional.shader_viewport_index_layer)
+                .shader_output_viewport_index(optional.shader_viewport_index_layer)
                 .timeline_semaphore(self.timeline_semaphore)
                 .scalar_block_layout(self.scalar_block_layout)
                 .host_query_reset(self.host_query_reset)
@@ -172,9 +195,11 @@ impl EnabledFeatures {
     }
 
     /// What the Vulkan structs switch on (or offer): the inverse of [`EnabledFeatures::to_vulkan`], for a host that filled them itself.
+    /// Extensions are not in the structs and count as off.
     pub fn from_vulkan(features: &DeviceFeatures) -> Self {
         let DeviceFeatures {
             vulkan10,
+            vulkan11,
             vulkan12,
             vulkan13,
         } = features;
@@ -188,6 +213,9 @@ impl EnabledFeatures {
             optional: OptionalFeatures {
                 robust_buffer_access: on(vulkan10.robust_buffer_access),
                 geometry_shader: on(vulkan10.geometry_shader),
+                shader_clip_distance: on(vulkan10.shader_clip_distance),
+                multiview: on(vulkan11.multiview),
+                shader_viewport_index_layer: false,
                 pipeline_statistics_query: on(vulkan10.pipeline_statistics_query),
                 shader_int64: on(vulkan10.shader_int64),
                 shader_float64: on(vulkan10.shader_float64),
@@ -234,6 +262,8 @@ impl EnabledFeatures {
 pub struct DeviceFeatures {
     /// Features of Vulkan 1.0.
     pub vulkan10: vk::PhysicalDeviceFeatures,
+    /// Features of Vulkan 1.1.
+    pub vulkan11: vk::PhysicalDeviceVulkan11Features<'static>,
     /// Features of Vulkan 1.2.
     pub vulkan12: vk::PhysicalDeviceVulkan12Features<'static>,
     /// Features of Vulkan 1.3.
@@ -244,6 +274,7 @@ impl DeviceFeatures {
     /// Hangs the structs into a device's creation. The host may set more of their members before.
     pub fn chain<'a>(&'a mut self, info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
         info.enabled_features(&self.vulkan10)
+            .push_next(&mut self.vulkan11)
             .push_next(&mut self.vulkan12)
             .push_next(&mut self.vulkan13)
     }
@@ -252,12 +283,14 @@ impl DeviceFeatures {
     pub(super) fn offered(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut offered = Self::default();
         let mut features = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut offered.vulkan11)
             .push_next(&mut offered.vulkan12)
             .push_next(&mut offered.vulkan13);
         // SAFETY: the device belongs to the instance; the chain lives on this stack.
         unsafe { instance.get_physical_device_features2(device, &mut features) };
         offered.vulkan10 = features.features;
         // The chain ends here: these structs outlive each other's addresses.
+        offered.vulkan11.p_next = std::ptr::null_mut();
         offered.vulkan12.p_next = std::ptr::null_mut();
         offered.vulkan13.p_next = std::ptr::null_mut();
         offered

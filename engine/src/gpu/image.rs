@@ -10,7 +10,8 @@ use super::device::{Gpu, Inner};
 use super::memory::Category;
 use crate::{Error, Result};
 
-/// What image to allocate: two-dimensional, one sample, in device memory.
+/// What image to allocate: two-dimensional, one sample, in device memory. Square images with a multiple of six layers can be seen as cubes
+/// ([`ImagePart`](super::ImagePart)).
 #[derive(Debug, Clone, Copy)]
 pub struct ImageDesc<'a> {
     /// Shown by debuggers, validation messages and memory reports.
@@ -37,7 +38,10 @@ const VIEWED: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
         | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
 );
 
-/// A device image with a view of all of it. Cloning shares it.
+/// Faces of a cube.
+pub(super) const CUBE_FACES: u32 = 6;
+
+/// A device image, or a part of one, with a view of all of it. Cloning shares it.
 #[derive(Clone)]
 pub struct Image {
     pub(super) inner: Arc<ImageInner>,
@@ -53,18 +57,32 @@ impl std::fmt::Debug for Image {
 }
 
 pub(super) struct ImageInner {
-    gpu: Arc<Inner>,
+    pub gpu: Arc<Inner>,
     pub raw: vk::Image,
     pub view: vk::ImageView,
     pub name: String,
+    /// Of the first mip level that is in `range`.
     pub size: [u32; 2],
     pub format: vk::Format,
-    pub layers: u32,
-    allocated: u64,
-    category: Category,
-    /// `None` for images that a swapchain owns.
-    allocation: Option<Allocation>,
-    borrowed: bool,
+    /// Six of its layers can be seen as a cube.
+    pub cubes: bool,
+    /// What of `raw` this is.
+    pub range: vk::ImageSubresourceRange,
+    pub owner: Owner,
+}
+
+/// Who destroys an image.
+pub(super) enum Owner {
+    /// The handle here, with its memory.
+    Own {
+        allocated: u64,
+        category: Category,
+        allocation: Option<Allocation>,
+    },
+    /// A swapchain.
+    Swapchain,
+    /// The image that this one is a part of.
+    Whole(#[expect(dead_code, reason = "it is kept alive")] Arc<ImageInner>),
 }
 
 impl Gpu {
@@ -88,6 +106,7 @@ impl Gpu {
             .array_layers(desc.layers)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
+            .flags(image_flags(desc))
             .usage(desc.usage);
         // SAFETY: `info` is complete; the image is destroyed in `ImageInner::drop`.
         let raw = unsafe { gpu.device.create_image(&info, None) }
@@ -101,26 +120,30 @@ impl Gpu {
             name: desc.name.into(),
             size: desc.size,
             format: desc.format,
-            layers: desc.layers,
-            allocated: requirements.size,
-            category: desc.category,
-            allocation: None,
-            borrowed: false,
+            cubes: image_flags(desc).contains(vk::ImageCreateFlags::CUBE_COMPATIBLE),
+            range: whole_range(desc.format, desc.layers, desc.mips),
+            owner: Owner::Own {
+                allocated: requirements.size,
+                category: desc.category,
+                allocation: None,
+            },
         };
-        let allocation = gpu
+        let memory = gpu
             .memory
             .allocate(desc.name, desc.category, requirements, MemoryLocation::GpuOnly, false)?;
         // SAFETY: the allocation satisfies the requirements and is not bound to anything else.
-        let bound = unsafe {
-            gpu.device
-                .bind_image_memory(raw, allocation.memory(), allocation.offset())
-        };
-        inner.allocation = Some(allocation);
+        let bound = unsafe { gpu.device.bind_image_memory(raw, memory.memory(), memory.offset()) };
+        if let Owner::Own { allocation, .. } = &mut inner.owner {
+            *allocation = Some(memory);
+        }
         bound.map_err(|result| gpu.error("vkBindImageMemory", result))?;
+        gpu.name(raw, desc.name);
         if desc.usage.intersects(VIEWED) {
-            inner.make_view(desc.layers, desc.mips)?;
-        } else {
-            gpu.name(raw, desc.name);
+            inner.make_view(if desc.layers > 1 {
+                vk::ImageViewType::TYPE_2D_ARRAY
+            } else {
+                vk::ImageViewType::TYPE_2D
+            })?;
         }
         Ok(Image { inner: Arc::new(inner) })
     }
@@ -137,7 +160,7 @@ impl Inner {
                 vk::ImageType::TYPE_2D,
                 vk::ImageTiling::OPTIMAL,
                 desc.usage,
-                vk::ImageCreateFlags::empty(),
+                image_flags(desc),
             )
         };
         let properties = properties.map_err(|_| Error::MissingFeature {
@@ -176,47 +199,49 @@ impl ImageInner {
             name: name.into(),
             size,
             format,
-            layers: 1,
-            allocated: 0,
-            category: Category::Film,
-            allocation: None,
-            borrowed: true,
+            cubes: false,
+            range: whole_range(format, 1, 1),
+            owner: Owner::Swapchain,
         };
-        inner.make_view(1, 1)?;
+        gpu.name(raw, name);
+        inner.make_view(vk::ImageViewType::TYPE_2D)?;
         Ok(inner)
     }
 
-    fn make_view(&mut self, layers: u32, mips: u32) -> Result<()> {
-        let kind = if layers > 1 {
-            vk::ImageViewType::TYPE_2D_ARRAY
-        } else {
-            vk::ImageViewType::TYPE_2D
-        };
-        let range = vk::ImageSubresourceRange {
-            aspect_mask: aspect(self.format),
-            base_mip_level: 0,
-            level_count: mips,
-            base_array_layer: 0,
-            layer_count: layers,
-        };
+    /// Makes the view of what this is.
+    pub fn make_view(&mut self, kind: vk::ImageViewType) -> Result<()> {
         let info = vk::ImageViewCreateInfo::default()
             .image(self.raw)
             .view_type(kind)
             .format(self.format)
-            .subresource_range(range);
+            .subresource_range(self.range);
         // SAFETY: the image is alive and bound.
         self.view = unsafe { self.gpu.device.create_image_view(&info, None) }
             .map_err(|result| self.gpu.error("vkCreateImageView", result))?;
-        self.gpu.name(self.raw, &self.name);
         self.gpu.name(self.view, &self.name);
         Ok(())
     }
 }
 
 impl Image {
-    /// Texels across and down.
+    /// The name it was made with.
+    pub fn name(&self) -> &str {
+        &self.inner.name
+    }
+
+    /// Texels across and down, of its first mip level.
     pub fn size(&self) -> [u32; 2] {
         self.inner.size
+    }
+
+    /// Array layers.
+    pub fn layers(&self) -> u32 {
+        self.inner.range.layer_count
+    }
+
+    /// Mip levels.
+    pub fn mips(&self) -> u32 {
+        self.inner.range.level_count
     }
 
     /// Texel format.
@@ -237,16 +262,40 @@ impl Image {
 
 impl Drop for ImageInner {
     fn drop(&mut self) {
-        // SAFETY: the last owner is gone, and submissions own what they use; a swapchain's images are its own.
+        // SAFETY: the last owner is gone, and submissions own what they use; other owners destroy their images themselves.
         unsafe {
             self.gpu.device.destroy_image_view(self.view, None);
-            if !self.borrowed {
+            if let Owner::Own { .. } = self.owner {
                 self.gpu.device.destroy_image(self.raw, None);
             }
         }
-        if let Some(allocation) = self.allocation.take() {
-            self.gpu.memory.free(self.category, self.allocated, allocation);
+        if let Owner::Own {
+            allocated,
+            category,
+            allocation,
+        } = &mut self.owner
+            && let Some(allocation) = allocation.take()
+        {
+            self.gpu.memory.free(*category, *allocated, allocation);
         }
+    }
+}
+
+fn image_flags(desc: &ImageDesc<'_>) -> vk::ImageCreateFlags {
+    if desc.size[0] == desc.size[1] && desc.layers.is_multiple_of(CUBE_FACES) {
+        vk::ImageCreateFlags::CUBE_COMPATIBLE
+    } else {
+        vk::ImageCreateFlags::empty()
+    }
+}
+
+fn whole_range(format: vk::Format, layers: u32, mips: u32) -> vk::ImageSubresourceRange {
+    vk::ImageSubresourceRange {
+        aspect_mask: aspect(format),
+        base_mip_level: 0,
+        level_count: mips,
+        base_array_layer: 0,
+        layer_count: layers,
     }
 }
 

@@ -240,6 +240,18 @@ const IGNORED: [&str; 2] = [
     "UNASSIGNED-GPU-Assisted",
 ];
 
+/// A warning that older layers give of shader outputs whose attachment is `UNDEFINED`. By the specification what is written there is
+/// discarded.
+const UNUSED_OUTPUT: [&str; 2] = [
+    "UNASSIGNED-CoreValidation-Shader-InterfaceTypeMismatch",
+    "of type `VK_FORMAT_UNDEFINED` does not match fragment shader output type",
+];
+
+fn is_ignored(id: &str, text: &str) -> bool {
+    let [unused, words] = UNUSED_OUTPUT;
+    IGNORED.contains(&id) || (id == unused && text.contains(words))
+}
+
 fn messenger_info(messages: &Messages) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
@@ -268,7 +280,7 @@ unsafe extern "system" fn on_message(
         (read(data.p_message_id_name), read(data.p_message))
     };
     let error = severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR);
-    if error || !IGNORED.contains(&id.as_str()) {
+    if error || !is_ignored(&id, &text) {
         tracing::warn!(%id, "{text}");
         if let Ok(mut list) = messages.lock() {
             list.push(ValidationMessage { error, id, text });

@@ -20,6 +20,8 @@ pub struct ShaderInfo {
     /// It has subgroup operations. Such a compute shader runs in full subgroups where [`Caps::full_subgroups`](crate::gpu::Caps) says so
     /// and its workgroup along x is a multiple of a subgroup.
     pub subgroups: bool,
+    /// What graphics shaders need that not every device has.
+    pub capabilities: &'static [Capability],
     /// Bindings by set and number, those included that the shader declares and does not use.
     pub bindings: &'static [BindingInfo],
     /// Specialization constants by id.
@@ -37,6 +39,19 @@ pub enum Stage {
     Geometry,
     /// Fragment.
     Fragment,
+}
+
+/// What a graphics shader may need of a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Capability {
+    /// It is a geometry shader, or reads what only such a stage writes.
+    Geometry,
+    /// `gl_ClipDistance`.
+    ClipDistance,
+    /// `gl_ViewIndex`.
+    MultiView,
+    /// `gl_Layer` written by a vertex shader.
+    VertexLayer,
 }
 
 /// One axis of a workgroup's size.

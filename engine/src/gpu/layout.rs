@@ -289,6 +289,7 @@ mod tests {
             fingerprint: 0,
             local_size: [LocalSize::Fixed(1); 3],
             subgroups: false,
+            capabilities: &[],
             bindings,
             spec_constants: &[],
         }

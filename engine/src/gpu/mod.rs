@@ -21,6 +21,7 @@ mod host;
 #[cfg(feature = "hot-reload")]
 mod hot_reload;
 mod image;
+mod image_part;
 mod instance;
 pub mod interface;
 mod layout;
@@ -33,6 +34,7 @@ mod recorder;
 #[cfg(feature = "hot-reload")]
 #[path = "../../build/reflect.rs"]
 mod reflect;
+mod rendering;
 mod resources;
 pub mod shaders;
 mod submission;
@@ -50,16 +52,18 @@ pub use barrier::{
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, DescriptorLimits, DeviceKind, SOFTWARE_LOOP_CAP, SubgroupOperations};
 pub use device::{Gpu, QueueGuard};
-pub use graphics::{ColorTarget, Cull, DepthTarget, GraphicsDesc, GraphicsPipeline, Render, Targets};
+pub use graphics::{Cull, DepthBias, GeometryStage, GraphicsDesc, GraphicsPipeline, NoGeometry};
 pub use host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures};
 #[cfg(feature = "hot-reload")]
 pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
+pub use image_part::ImagePart;
 pub use instance::{DeviceSummary, VALIDATION_LAYER, ValidationLog, ValidationMessage};
 pub use memory::{AllocationInfo, Category, MemoryReport};
 pub use options::{DeviceSelection, GpuOptions, Lesser, Validation};
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorder::{Pass, Recorder};
+pub use rendering::{Area, ClearColor, ColorTarget, DepthTarget, Render, Targets};
 pub use submission::Submission;
 pub use surface::{Presented, Surface};
 pub use texels::TexelView;

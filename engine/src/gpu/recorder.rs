@@ -9,7 +9,6 @@ use ash::vk;
 use super::barrier::{Access, BufferBarrier, ImageBarrier};
 use super::buffer::{Buffer, BufferDesc, BufferView, Residency};
 use super::device::Gpu;
-use super::image::aspect;
 use super::interface::{BindingSet, ComputeShader, PushConstants};
 use super::marker::BEGUN;
 use super::memory::Category;
@@ -416,12 +415,7 @@ impl Pass<'_> {
                 let (from, to) = self.usable(barrier.from, barrier.to);
                 vk::ImageMemoryBarrier2::default()
                     .image(barrier.image.raw())
-                    .subresource_range(vk::ImageSubresourceRange {
-                        aspect_mask: aspect(barrier.image.format()),
-                        level_count: vk::REMAINING_MIP_LEVELS,
-                        layer_count: vk::REMAINING_ARRAY_LAYERS,
-                        ..Default::default()
-                    })
+                    .subresource_range(barrier.image.inner.range)
                     .src_stage_mask(from.stages())
                     .src_access_mask(from.writes().kinds())
                     .dst_stage_mask(to.stages())

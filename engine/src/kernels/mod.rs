@@ -64,4 +64,5 @@ pub use reduce::{
     BoxElements, ReduceBox, ReduceWords, float_of_ordered, nan_bits, ordered_float, reduce_box, reduce_words,
 };
 pub use scan::{Scan, ScanBuffers, ScanOptions, scan};
+pub(crate) use stream::IndirectCount;
 pub use stream::{Count, StreamStatus, stream_block, stream_range, stream_teams};

@@ -107,6 +107,43 @@ pub(super) struct Prepare {
     pipeline: ComputePipeline<stream_prepare::Kernel>,
 }
 
+/// Arguments of indirect dispatches of an invocation an element, for as many elements as a buffer says.
+#[derive(Debug)]
+pub(crate) struct IndirectCount {
+    prepare: Prepare,
+}
+
+impl IndirectCount {
+    /// Of the buffer that the arguments are written to.
+    pub const BYTES: u64 = STREAM_HEADER_WORDS as u64 * size_of::<u32>() as u64;
+
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let prepare = Prepare::new(gpu)?;
+        Ok(Self { prepare })
+    }
+
+    /// Writes three words of arguments for workgroups of `lanes`, at least one, and the number of elements behind them. Barriers as kernels
+    /// have them.
+    pub fn record(
+        &self,
+        pass: &mut Pass<'_>,
+        count: BufferView<'_>,
+        capacity: u32,
+        lanes: u32,
+        arguments: &Buffer,
+    ) -> Result<()> {
+        let shape = Shape {
+            tile: lanes,
+            quota: lanes,
+            teams_per_group: 1,
+            teams: 1,
+        };
+        let count = Count::Device { view: count, capacity };
+        self.prepare.begin(pass, &shape, count, arguments)?;
+        Ok(())
+    }
+}
+
 /// A kernel's dispatches over one stream.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stream<'a> {

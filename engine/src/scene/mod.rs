@@ -4,6 +4,7 @@
 //! right-handed with +Y up, as in glTF 2.0; a camera looks along its local −Z.
 
 pub mod builtin;
+pub(crate) mod camera_frame;
 pub mod check;
 mod files;
 pub mod gltf;

@@ -221,3 +221,25 @@ impl TechniqueInfo {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setting_is_explained() {
+        for technique in all() {
+            let defaults = (technique.default_settings)();
+            let mut known: Vec<&str> = defaults
+                .as_object()
+                .expect("object")
+                .keys()
+                .map(String::as_str)
+                .collect();
+            let mut named: Vec<&str> = technique.settings.iter().map(|setting| setting.name).collect();
+            known.sort_unstable();
+            named.sort_unstable();
+            assert_eq!(named, known, "{}", technique.id);
+        }
+    }
+}

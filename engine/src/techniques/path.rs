@@ -231,21 +231,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_setting_is_explained() {
-        let defaults = (INFO.default_settings)();
-        let mut names: Vec<&str> = INFO.settings.iter().map(|setting| setting.name).collect();
-        names.sort_unstable();
-        let mut known: Vec<&str> = defaults
-            .as_object()
-            .expect("object")
-            .keys()
-            .map(String::as_str)
-            .collect();
-        known.sort_unstable();
-        assert_eq!(names, known);
-    }
-
-    #[test]
     fn features_are_constants_of_the_shading_stage() {
         let constants: Vec<&str> = path_shade::INFO.spec_constants.iter().map(|c| c.name).collect();
         for (i, (name, ..)) in FEATURES.iter().enumerate() {

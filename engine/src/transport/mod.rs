@@ -24,7 +24,5 @@ pub use gpu_scene::GpuScene;
 pub use path_set::PathSet;
 pub use path_tracer::{PathTracer, PathTracerSettings};
 
-mod camera_frame;
-
 #[cfg(test)]
 pub(crate) mod testing;

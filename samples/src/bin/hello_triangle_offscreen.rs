@@ -6,13 +6,17 @@ use std::process::ExitCode;
 use clerestory::Result;
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::{
-    Access, BufferDesc, Category, ColorTarget, Gpu, GpuOptions, GraphicsDesc, ImageBarrier, ImageDesc, Targets,
+    Access, BufferDesc, Category, ColorTarget, Gpu, GpuOptions, GraphicsDesc, GraphicsPipeline, ImageBarrier,
+    ImageDesc, Targets,
 };
 use clerestory_samples::shaders::types::TriangleVertex;
 use clerestory_samples::shaders::{triangle_frag, triangle_vert};
 
 const SIZE: [u32; 2] = [512, 512];
 const BACKGROUND: [f32; 4] = [0.05, 0.05, 0.08, 1.0];
+
+/// The pipeline of the sample's two shaders.
+type Pipeline = GraphicsPipeline<triangle_vert::Shader, triangle_frag::Shader>;
 
 fn main() -> ExitCode {
     clerestory_samples::run("hello_triangle_offscreen", sample)
@@ -41,7 +45,7 @@ fn sample(path: &Path) -> Result<()> {
             corner([-0.8, 0.6], [0.0, 0.0, 1.0]),
         ],
     )?;
-    let pipeline = gpu.graphics_pipeline::<triangle_vert::Shader, triangle_frag::Shader>(&GraphicsDesc {
+    let pipeline: Pipeline = gpu.graphics_pipeline(&GraphicsDesc {
         colors: &[format],
         ..GraphicsDesc::default()
     })?;
@@ -61,11 +65,11 @@ fn sample(path: &Path) -> Result<()> {
             new_layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
         }]);
         let targets = Targets {
-            colors: &[ColorTarget {
+            colors: &[Some(ColorTarget {
                 image: &image,
-                clear: Some(BACKGROUND),
-            }],
-            depth: None,
+                clear: Some(BACKGROUND.into()),
+            })],
+            ..Targets::default()
         };
         let set = triangle_vert::Set0 {
             vertices: vertices.view(),

@@ -6,10 +6,12 @@
 //! rate of 10⁻⁶ a channel and part. Where a difference is allowed besides, its reason stands with it. Each test prints what it found, for
 //! `--nocapture`.
 
+mod convergence;
 mod determinism;
 mod flux;
 mod lights;
 mod materials;
+mod queues;
 mod scale;
 mod settings;
 mod sphere;
@@ -30,10 +32,6 @@ use glam::Vec3;
 /// Pixels a side.
 const SIDE: u32 = 16;
 const SIZE: [u32; 2] = [SIDE; 2];
-
-/// Largest relative error of a stored flux's band, against the largest band: nine bits, rounded. Photons with one history have one error,
-/// which no number of them averages out.
-const FLUX_STEP: f64 = 1.0 / 1024.0;
 
 /// Kernels that do not shrink, independent samples, a path set.
 fn settings(set: &str) -> PhotonSettings {

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec4};
 /// Kernels of 3 cm blur by h²/12 ∇²E, under a wide lamp at 1.6 m 0.02 %, and by a hundredth of a picture's quarter where the rim of an image of
 /// the lamp crosses its border, at most a fifth of that in its mean. Bands of flux are rounded to a 2⁻¹⁰ of the largest, here three times
 /// the smallest at most.
-const BIAS: f64 = 2e-3 + 3.0 * FLUX_STEP;
+const BIAS: f64 = 2e-3;
 const RADIUS: f32 = 0.03;
 
 fn texture(scene: &mut Scene, texels: Vec<[u8; 4]>) -> Option<Texture> {

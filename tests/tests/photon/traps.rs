@@ -153,7 +153,7 @@ fn glass_is_not_black() {
             ..fixed("all", 0.01)
         };
         // Kernels of 1 cm blur the walls' light behind glass, which bends by less than 100 E a square metre.
-        let bias = 1e-4 / 12.0 * 100.0 + 10.0 * FLUX_STEP;
+        let bias = 1e-4 / 12.0 * 100.0;
         expect_agreement(gpu, &scene, &settings, [16, 512], [bias; 3]);
     });
 }
@@ -215,17 +215,11 @@ fn colours_bleed_through_the_passage_as_they_should() {
             photons: 1 << 14,
             ..fixed("bounces=2..4", 0.03)
         };
-        // Red light has sevenfold the flux of the others after a reflection, of which they are rounded. Kernels of 3 cm lose up to 4/(15 π)
-        // of their width at each of the room's edges, at most ten metres of them in view of a square metre.
+        // Kernels of 3 cm lose up to 4/(15 π) of their width at each of the room's edges, at most ten metres of them in view of a square metre.
         let edges = 0.03 * 8.0 / (15.0 * PI) * 10.0;
-        let bias = [
-            edges + 2.0 * FLUX_STEP,
-            edges + 8.0 * FLUX_STEP,
-            edges + 8.0 * FLUX_STEP,
-        ];
         let found = means(gpu, &scene, &settings, 16);
         let reference = traced(gpu, &scene, "bounces=2..4", 1024);
-        found.expect_same_as("passage", &reference, bias);
+        found.expect_same_as("passage", &reference, [edges; 3]);
         let [red, green, _] = found.parts[0];
         let [(r, _), (g, _), _] = reference.mean();
         println!(

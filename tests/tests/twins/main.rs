@@ -6,6 +6,7 @@
 mod directions;
 mod geometry;
 mod lights;
+mod maps;
 mod media;
 mod photons;
 mod random;

@@ -1,10 +1,7 @@
 //! Mitsuba 3 in a process of its own, through `tools/mitsuba/reference.py`, which is part of this program.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::thread;
-use std::time::Duration;
+use std::process::Command;
 
 use clerestory::film::atomic;
 use clerestory::scene::{Medium, Scene};
@@ -12,12 +9,16 @@ use clerestory::{Error, Result};
 
 use super::{AgreementOptions, Fault};
 use crate::experiments::watch::{Unwatched, Watch};
+use crate::python;
 
 /// The script that renders with Mitsuba.
 const SCRIPT: &str = include_str!("../../mitsuba/reference.py");
 const SCRIPT_NAME: &str = "reference.py";
 /// Prints the version; fails where there is no Mitsuba.
 const PROBE: &str = "import mitsuba, numpy; print(mitsuba.__version__)";
+
+/// What a failure says is wanted.
+const NEEDED: &str = "Mitsuba 3; see tools/mitsuba/README.md";
 
 /// Which of Mitsuba's variants renders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -202,64 +203,9 @@ impl Answer {
     }
 }
 
-/// How often a running Python is looked at.
-const POLL: Duration = Duration::from_millis(20);
-
 /// Runs Python and returns what it printed; [`Fault::Stopped`] when `watch` says to stop before it ends, which ends it.
 fn run(python: &Path, command: &mut Command, watch: &dyn Watch) -> Result<String, Fault> {
-    let failed = |cause: String| Error::setting("python", python.display(), cause);
-    command
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    // In the terminal's group Ctrl-C would reach it too, and its death would look like a failure.
-    #[cfg(unix)]
-    std::os::unix::process::CommandExt::process_group(command, 0);
-    let mut child = command
-        .spawn()
-        .map_err(|cause| failed(format!("cannot be run: {cause}")))?;
-    // Read beside it: a full pipe would block it for ever.
-    let printed = read_beside(child.stdout.take());
-    let complaint = read_beside(child.stderr.take());
-    let status = wait(&mut child, watch).map_err(|cause| failed(format!("cannot be waited for: {cause}")))?;
-    let Some(status) = status else {
-        return Err(Fault::Stopped);
-    };
-    let text = |reader: thread::JoinHandle<Vec<u8>>| {
-        let bytes = reader.join().unwrap_or_default();
-        String::from_utf8_lossy(&bytes).trim().to_owned()
-    };
-    if status.success() {
-        return Ok(text(printed));
-    }
-    let text = text(complaint);
-    let last = text.lines().last().unwrap_or("no message");
-    let cause = format!("did not run Mitsuba 3 ({status}): {last}; see tools/mitsuba/README.md");
-    Err(failed(cause).into())
-}
-
-/// Waits for the end; `None` when it was ended because `watch` says to stop.
-fn wait(child: &mut Child, watch: &dyn Watch) -> std::io::Result<Option<ExitStatus>> {
-    loop {
-        if let Some(status) = child.try_wait()? {
-            return Ok(Some(status));
-        }
-        if watch.stopped() {
-            child.kill()?;
-            child.wait()?;
-            return Ok(None);
-        }
-        thread::sleep(POLL);
-    }
-}
-
-/// Reads to the end in a thread of its own; what was read before an error counts.
-fn read_beside(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
-    thread::spawn(move || {
-        let mut bytes = Vec::new();
-        let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
-        bytes
-    })
+    python::run(python, command, NEEDED, watch)?.ok_or(Fault::Stopped)
 }
 
 /// The version of Mitsuba that a Python has.
@@ -398,37 +344,5 @@ mod tests {
     fn a_python_that_is_not_there_is_an_error() {
         let refused = mitsuba_version(Path::new("no/such/python")).unwrap_err().to_string();
         assert!(refused.contains("cannot be run"), "{refused}");
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_wish_to_stop_ends_the_child() {
-        /// Wishes to stop from the first question on.
-        struct Stopping;
-        impl Watch for Stopping {
-            fn begin(&self, _what: &str, _done: usize, _all: usize) {}
-            fn step(&self, _progress: clerestory::render::Progress) {}
-            fn note(&self, _line: &str) {}
-            fn stopped(&self) -> bool {
-                true
-            }
-        }
-        let shell = Path::new("sh");
-        // The child would outlive every other test.
-        let stopped = run(shell, Command::new(shell).args(["-c", "exec sleep 600"]), &Stopping);
-        assert!(matches!(stopped, Err(Fault::Stopped)), "{stopped:?}");
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn what_a_child_prints_and_how_it_fails_is_read() {
-        let shell = Path::new("sh");
-        let run = |script: &str| run(shell, Command::new(shell).args(["-c", script]), &Unwatched);
-        assert_eq!(run("echo 3.9.1").unwrap(), "3.9.1");
-        // More than a pipe holds.
-        assert_eq!(run("head -c 300000 /dev/zero | tr '\\0' x").unwrap().len(), 300_000);
-        let failed = run("echo first >&2; echo last >&2; exit 3").unwrap_err();
-        let failed = failed.into_error("sh").to_string();
-        assert!(failed.contains("exit status: 3): last;"), "{failed}");
     }
 }

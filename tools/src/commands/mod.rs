@@ -7,6 +7,7 @@ mod index;
 mod index_peers;
 mod info;
 mod list;
+mod maps;
 mod progress;
 mod render;
 mod report;
@@ -41,6 +42,7 @@ Examples:
   clerestory info                       devices, and what each technique needs of them
   clerestory scenes                     generated scenes and their parameters
   clerestory compare picture.exr reference.exr --threshold rmse=1e-3
+  clerestory maps sky.hdr sky.exr --to octahedron --size 512
   clerestory report --smoke             error against time, into RESULTS.md
 
 Each command explains itself: clerestory render --help
@@ -62,6 +64,7 @@ enum Command {
     Scenes(scenes::Arguments),
     Index(index::Arguments),
     List(list::Arguments),
+    Maps(maps::Arguments),
     Bench(bench::Arguments),
     Report(report::Arguments),
     Agreement(agreement::Arguments),
@@ -113,6 +116,7 @@ fn run(program: &Program) -> Outcome<ExitCode> {
         Command::Scenes(arguments) => scenes::run(arguments),
         Command::Index(arguments) => index::run(arguments),
         Command::List(arguments) => list::run(arguments),
+        Command::Maps(arguments) => maps::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Agreement(arguments) => agreement::run(arguments),

@@ -8,6 +8,7 @@
 pub mod bars;
 pub mod equal_error;
 pub mod fingerprint;
+pub mod lines;
 pub mod measurement;
 pub mod measures;
 pub mod pareto;

@@ -43,9 +43,9 @@ pub struct Words<'a> {
 }
 
 const SIZE: (u32, u32) = (560, 400);
-const FONT: &str = "sans-serif";
+pub(super) const FONT: &str = "sans-serif";
 /// Okabe and Ito without yellow, which white paper swallows.
-const COLORS: [RGBColor; 7] = [
+pub(super) const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -55,7 +55,7 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 /// Dash and gap in pixels; no gap is a full line.
-const DASHES: [(u32, u32); 4] = [(1, 0), (8, 4), (2, 3), (14, 5)];
+pub(super) const DASHES: [(u32, u32); 4] = [(1, 0), (8, 4), (2, 3), (14, 5)];
 const GUIDE_GREY: RGBColor = RGBColor(120, 120, 120);
 const GUIDE_DASH: (u32, u32) = (3, 5);
 /// The slope of the guide.
@@ -213,7 +213,7 @@ impl<C, DB: DrawingBackend> Drawable<DB> for Glyph<C> {
 }
 
 /// A line with dashes of some pixels, or a full one.
-fn line<DB, C>(points: Vec<C>, (dash, gap): (u32, u32), style: ShapeStyle) -> DynElement<'static, DB, C>
+pub(super) fn line<DB, C>(points: Vec<C>, (dash, gap): (u32, u32), style: ShapeStyle) -> DynElement<'static, DB, C>
 where
     DB: DrawingBackend,
     C: Clone + 'static,

@@ -43,11 +43,17 @@ uvec2 compact_counters = uvec2(0u);
 #define COMPACT_ANY(MEETS) (MEETS)
 #endif
 
+// Includers whose queries reach less far than the boxes allow for move the boxes' planes inwards, all by one distance.
+#ifndef COMPACT_LOWER
+#define COMPACT_LOWER(PLANES) (PLANES)
+#define COMPACT_UPPER(PLANES) (PLANES)
+#endif
+
 // Bits of the three components, x highest.
 uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z); }
 
 bool compact_point_query(CompactRoot root, vec3 point) {
-    bool mine = all(lessThan(root.lower, point)) && all(lessThan(point, root.upper));
+    bool mine = all(lessThan(COMPACT_LOWER(root.lower), point)) && all(lessThan(point, COMPACT_UPPER(root.upper)));
     uint next = COMPACT_ANY(mine) ? root.reference : COMPACT_NOTHING;
     uint stack[COMPACT_STACK_SIZE];
 #ifdef COMPACT_PACKET
@@ -63,8 +69,8 @@ bool compact_point_query(CompactRoot root, vec3 point) {
             uvec4 low = compact_quarter(2u * next);
             uvec4 high = compact_quarter(2u * next + 1u);
             uint owners = low.w >> COMPACT_MASK_SHIFT << 3 | high.w >> COMPACT_MASK_SHIFT;
-            uint outside = compact_bits(greaterThanEqual(uintBitsToFloat(low.xyz), point)) << 3
-                         | compact_bits(lessThanEqual(uintBitsToFloat(high.xyz), point));
+            uint outside = compact_bits(greaterThanEqual(COMPACT_LOWER(uintBitsToFloat(low.xyz)), point)) << 3
+                         | compact_bits(lessThanEqual(COMPACT_UPPER(uintBitsToFloat(high.xyz)), point));
             bool left_mine = mine && (owners & outside) == 0u;
             bool right_mine = mine && (~owners & outside) == 0u;
             bool in_left = COMPACT_ANY(left_mine);

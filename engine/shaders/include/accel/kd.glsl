@@ -6,8 +6,9 @@
 // drivers run a loop's body once more where it is tested at the beginning. A subgroup may run as many iterations as its lanes
 // have in sum, and the quota must be that much smaller. A ray that it stops returns the flags of what is left; call again with them and the
 // same hit. A stack keeps no flags under way: they are read off it where the ray stops, and the way back is gone before the first round, so
-// that the loops know nothing of either. A round adds KD_ROUND_ITERATIONS, 2 × KD_MAX_DEPTH and the triangles of a leaf to the quota at most; two
-// rounds may follow it, where one leaf is left and where a leaf waits, and each candidate that is asked about is a round of its own.
+// that the loops know nothing of either. A round adds KD_ROUND_ITERATIONS, 2 × KD_MAX_DEPTH and the triangles of a leaf to the quota at most, or with
+// KD_POSTPONES, where a leaf waits for the next, KD_PAIR_ITERATIONS instead and the triangles of two leaves; one round may follow it where one leaf is
+// left, another where a leaf waits, and each candidate that is asked about is a round of its own.
 //
 // With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);

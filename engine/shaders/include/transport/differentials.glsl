@@ -159,7 +159,7 @@ bool differentials_exceed(vec3 v, float bound) {
     return any(greaterThan(floatBitsToUint(v) & uvec3(0x7FFFFFFFu), uvec3(floatBitsToUint(bound))));
 }
 
-// Zeroes differentials that are not numbers or too large; whether they were fit. The photon goes on either way, without a kernel.
+// Zeroes differentials that are not numbers or too large; whether they were fit.
 bool guard_differentials(inout Differentials d, float unit_length) {
     float bound = DIFFERENTIAL_MAX * unit_length;
     bool fit = !(differentials_exceed(d.z1, bound) || differentials_exceed(d.z2, bound) ||

@@ -9,7 +9,7 @@ const uint DIMENSION_FIRST_BOUNCE = 2u;
 const uint DIMENSIONS_PER_BOUNCE = 5u;
 const uint DIMENSION_DIRECTION = 0u;    // direction within a lobe
 const uint DIMENSION_LOBE = 1u;         // lobe; Russian roulette
-const uint DIMENSION_LIGHT = 2u;        // which light; which side of an alpha-blended surface
+const uint DIMENSION_LIGHT = 2u;        // which light
 const uint DIMENSION_LIGHT_POINT = 3u;  // point of a triangle, or texel of the environment
 const uint DIMENSION_LIGHT_WITHIN = 4u; // direction within the texel
 

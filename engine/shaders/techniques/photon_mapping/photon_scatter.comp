@@ -14,10 +14,9 @@ layout(local_size_x = 64) in;
 #include "transport/path_features.glsl"
 #include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_wave.glsl"
-#include "scene/bindings.glsl"
+#include "transport/arrival.glsl"
 #include "transport/bsdf_label.glsl"
 #include "transport/path_set.glsl"
-#include "transport/surface.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -62,16 +61,17 @@ vec3 dithered_flux(vec3 flux, uint slot, uint bounce) {
 void deposit(uint slot, uint place, PathState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
     atomicAdd(photon_counters.deposits, 1u);
     PhotonKernel kernel;
-    bool fit = true;
+    bool fit;
     KernelSettings settings = push.kernel;
     float resolution = KERNEL_RESOLUTION * largest_component(point.error) / settings.unit_length;
     settings.length_min = max(settings.length_min, resolution);
     settings.length_max = max(settings.length_max, resolution);
-    if (HAS_DIFFERENTIALS) {
-        fit = guard_differentials(footprint, settings.unit_length);
-        fit = photon_kernel(settings, footprint, normal, kernel) && fit;
+    if (HAS_DIFFERENTIALS && guard_differentials(footprint, settings.unit_length)) {
+        fit = photon_kernel(settings, footprint, normal, kernel);
     } else {
+        // Of fixed size, or a footprint beyond all bounds.
         kernel = disk_kernel(settings.length_max * settings.unit_length, normal);
+        fit = !HAS_DIFFERENTIALS || settings.widens_flat != 0u;
     }
     if (!fit) {
         atomicAdd(photon_counters.without_kernel, 1u);
@@ -139,61 +139,45 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
     }
     uint diffused = path_set_state(photon.bounce);
     uint bounce = path_set_bounce(photon.bounce);
-    Surface s = surface_at(hit, push.scene_lower, push.scene_upper);
-    SceneMaterial m = load_material(s.material);
-    if (photon.throughput == vec3(0.0) || (HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u)) {
+    Arrival a = arrival_at(hit, photon.direction, push.scene_lower, push.scene_upper);
+    Surface s = a.surface;
+    if (photon.throughput == vec3(0.0) || arrival_is_unlit(a)) {
         return false;
     }
-    vec3 wo = -photon.direction;
-    bool front = dot(wo, s.geometric_normal) > 0.0;
-    bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
     if (HAS_ABSORPTION) {
-        uint interior = path_gathered[slot].interior;
-        interior = interior == OUTSIDE && solid && !front ? s.material : interior;
-        if (interior != OUTSIDE) {
-            photon.throughput *= exp(-load_material(interior).absorption * hit.t);
-        }
+        photon.throughput = absorbed(photon.throughput, arrival_interior(a, path_gathered[slot].interior), hit.t);
     }
-    Bsdf bsdf = surface_bsdf(m, s);
+    Bsdf bsdf = a.bsdf;
     bsdf.flags |= BSDF_IMPORTANCE;
-    vec3 facing = front ? s.geometric_normal : -s.geometric_normal;
-    vec3 outward = solid ? s.geometric_normal : facing;
-    vec3 normal = facing;
-    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
-        normal = adapt_shading_normal(surface_mapped_normal(m, s), facing, wo);
-    }
+    vec3 normal = arrival_normal(a);
     Differentials footprint;
     if (HAS_DIFFERENTIALS) {
         footprint = transfer_differentials(photon_differentials[slot], hit.t, photon.direction, s.geometric_normal);
     }
-    if (bounce >= push.first_deposit && bsdf_has_diffuse_base(bsdf, solid && !front)) {
+    if (bounce >= push.first_deposit && arrival_has_diffuse_base(a)) {
         PathState landed = photon;
         if (HAS_ALPHA) {
             // Blended surfaces stop only that share of photons, but whoever meets them sees all of their light.
-            landed.throughput /= material_coverage(m, surface_base_color(m, s).a);
+            landed.throughput /= material_coverage(a.material, surface_base_color(a.material, s).a);
         }
-        deposit(slot, place, landed, s.point, facing, footprint, flags);
+        deposit(slot, place, landed, s.point, a.facing, footprint, flags);
     }
     if (bounce >= push.last_bounce) {
         return false;
     }
-    vec3 z = dot(outward, facing) < 0.0 ? -normal : normal;
-    vec3 x;
-    vec3 y;
-    orthonormal_basis(z, x, y);
-    vec3 wo_local = vec3(dot(wo, x), dot(wo, y), dot(wo, z));
+    ScatteringFrame frame = scattering_frame(a, normal);
     vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
-    BsdfSample scattered = bsdf_sample(bsdf, wo_local, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), LOBE_ALL);
+    BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), LOBE_ALL);
     if (TELLS_CAUSTICS && (HAS_METAL || HAS_SPECULAR_LAYER)) {
-        scattered = bsdf_label(bsdf, wo_local, scattered, LOBE_ALL, false, lobe.y);
+        scattered = bsdf_label(bsdf, frame.wo, scattered, LOBE_ALL, false, lobe.y);
     }
-    vec3 wi = scattered.wi.x * x + scattered.wi.y * y + scattered.wi.z * z;
-    if (scattered.flags == 0u || !sides_agree(z, outward, wi)) {
+    vec3 wi = frame_to_world(frame, scattered.wi);
+    if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi)) {
         return false;
     }
     vec3 flux = photon.throughput * scattered.weight;
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
-        flux *= adjoint_ratio(z, s.geometric_normal, wo, wi);
+        flux *= adjoint_ratio(frame.z, s.geometric_normal, a.wo, wi);
     }
     // Between lossless surfaces photons end by SURVIVAL_MAX alone. Also ends a photon whose flux is not a number.
     float most = bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
@@ -202,23 +186,22 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
         return false;
     }
     if (HAS_DIFFERENTIALS) {
-        footprint = scattered_differentials(footprint, hit, bsdf, photon.direction, normal, wo_local.z > 0.0, scattered, wi);
+        if ((scattered.flags & (LOBE_DIFFUSE | LOBE_GLOSSY)) != 0u) {
+            // A re-emission takes nothing but the footprint's area along; specular lobes keep what is beyond all bounds.
+            guard_differentials(footprint, push.kernel.unit_length);
+        }
+        footprint = scattered_differentials(footprint, hit, bsdf, photon.direction, normal, frame.wo.z > 0.0, scattered, wi);
         footprint = roulette_differentials(footprint, survival);
-        guard_differentials(footprint, push.kernel.unit_length);
         photon_differentials[slot] = footprint;
     }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
-        path_gathered[slot].interior = wo_local.z > 0.0 ? s.material : OUTSIDE;
+        path_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : OUTSIDE;
     }
     if ((scattered.flags & LOBE_DIFFUSE) != 0u) {
         diffused = PHOTON_DIFFUSED;
     }
     photon.throughput = flux / survival;
-    photon.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
-    if (HAS_ABSORPTION && solid && dot(wi, s.geometric_normal) < 0.0) {
-        // The way through the body that the offset of the start leaves out.
-        photon.throughput *= exp(m.absorption * (distance(photon.origin, s.point.position) / dot(wi, s.geometric_normal)));
-    }
+    photon.origin = departure(a, wi, photon.throughput);
     photon.direction = normalize(wi);
     photon.bounce = path_set_joined(bounce + 1u, diffused);
     path_states_out[slot] = photon;

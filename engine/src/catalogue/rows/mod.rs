@@ -1,5 +1,6 @@
-//! The rows, ordered by document and id: one file a document.
+//! The rows, ordered by document, topic and id: one file a document, or a topic of it.
 
+mod maps;
 mod metals;
 mod own;
 mod photon_mapping;
@@ -7,7 +8,21 @@ mod visibility;
 
 use super::Row;
 
-const FILES: [&[Row]; 4] = [visibility::ROWS, photon_mapping::ROWS, metals::ROWS, own::ROWS];
+const FILES: [&[Row]; 10] = {
+    let [kernels, trees, photon_maps, photons, media, rendering] = photon_mapping::FILES;
+    [
+        visibility::ROWS,
+        maps::ROWS,
+        kernels,
+        trees,
+        photon_maps,
+        photons,
+        media,
+        rendering,
+        metals::ROWS,
+        own::ROWS,
+    ]
+};
 
 const COUNT: usize = {
     let (mut file, mut count) = (0, 0);

@@ -406,4 +406,65 @@ pub(super) const ROWS: &[Row] = &[
             ],
         ),
     ),
+    measured(
+        "clerestory report map-density map-error",
+        part(
+            "CL-EQUAL-AREA",
+            "equal-area octahedron map",
+            "Clarberg 2008",
+            "engine/src/maps/equal_area.rs",
+            &[
+                "engine/src/maps/tests/density.rs::statistics_are_those_of_the_table",
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report map-glossiness",
+        part(
+            "CL-PREFILTER",
+            "environment maps filtered by the GGX lobe, a map for each roughness",
+            "Kautz et al. 2000; Karis 2013",
+            "engine/src/maps/prefilter.rs",
+            &[
+                "tests/tests/directional_maps.rs::filtered_maps_are_sums_over_the_lobe",
+                "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+                "engine/src/maps/tests/glossy.rs::filtered_maps_are_integrals_of_the_lobe",
+                "engine/src/maps/tests/glossy.rs::lobes_have_the_width_that_is_said",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory maps sky.hdr sky.exr --to octahedron",
+        part(
+            "CL-RESAMPLE",
+            "conversion between maps by solid angle, `clerestory maps`",
+            "this engine",
+            "engine/src/maps/resample.rs",
+            &[
+                "engine/src/maps/tests/conversions.rs::constant_radiance_stays_constant_in_every_map",
+                "engine/src/maps/tests/conversions.rs::halves_of_a_map_are_means_of_its_texels",
+                "engine/src/maps/tests/conversions.rs::conversions_keep_the_integral",
+                "engine/src/maps/tests/conversions.rs::smooth_light_comes_back",
+                "tools/tests/maps.rs::directions_are_those_of_environments",
+                "tools/tests/maps.rs::scenes_look_the_same_after_a_round_trip",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report map-density",
+        part(
+            "CL-PACKED",
+            "directions in a word",
+            "Meyer et al. 2010; Cigolle et al. 2014",
+            "engine/src/maps/packed_direction.rs",
+            &[
+                "engine/src/maps/packed_direction.rs::directions_come_back_within_their_bounds",
+                "engine/src/maps/packed_direction.rs::the_nearest_of_four_is_two_thirds_as_far_off",
+                "tests/tests/twins/maps.rs::levels_borders_and_words_agree_with_their_twins",
+            ],
+        ),
+    ),
 ];

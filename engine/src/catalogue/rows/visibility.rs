@@ -1,4 +1,4 @@
-//! Rows of the documents on visibility and media (`BG-`, `DP-`). Tests that speak for several systems have a name of their own.
+//! Rows of the document on visibility and media (`BG-`). Tests that speak for several systems have a name of their own.
 
 use super::super::{Row, measured, part, unbiased};
 use crate::transport::PathSet;
@@ -104,17 +104,9 @@ pub(super) const ROWS: &[Row] = &[
                 "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
                 "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
                 "tests/tests/hard_cases.rs::ray_indexes_answer_as_a_search_through_all_triangles",
+                "tests/tests/raster/gbuffer.rs::what_is_seen_is_what_rays_meet",
+                "tests/tests/raster/gbuffer.rs::hard_cases_are_seen_as_rays_meet_them",
             ],
-        ),
-    ),
-    measured(
-        "clerestory agreement --scene box-city-sky",
-        part(
-            "DP-1",
-            "latitude–longitude map (y up, as glTF)",
-            "Blinn and Newell 1976",
-            "engine/src/transport/environment.rs",
-            &["engine/src/transport/environment.rs::directions_and_coordinates_agree"],
         ),
     ),
 ];

@@ -1,19 +1,34 @@
 //! Queries of the photon map where eye paths have arrived: a stage of the path tracer's bounces.
 
+use std::sync::OnceLock;
+
 use super::map::PhotonMap;
+use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
 use crate::accel::trace::wide_counter;
-use crate::gpu::shaders::constants::{LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD, PATH_SET_STATE_BITS};
+use crate::gpu::interface::BindingSet;
+use crate::gpu::shaders::constants::{
+    LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_GROUP, PATH_SET_DEAD,
+    PATH_SET_STATE_BITS, QUEUE_SLOTS,
+};
 use crate::gpu::shaders::sets::{PathBuffers, PhotonMapSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
-use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, PipelineInfo, Recorder};
-use crate::transport::path_tracer::ArrivalStage;
+use crate::gpu::shaders::types::AskSettings;
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
+use crate::transport::path_tracer::pipelines::surface_spec;
 use crate::transport::path_tracer::stages::stage_barrier;
+use crate::transport::path_tracer::{ArrivalStage, Places, StoppedPlaces};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
-/// Nodes and records of each of the rounds in which neighbours are found, and of the sum: six of them stay below the software driver's cap.
-const NEAREST_QUOTA: u32 = 10_000;
+/// Nodes and records of each of the rounds in which neighbours are found, and of the sum. With the loops over rounds and bins, which are
+/// emptied and summed up, they stay below what software drivers run.
+const NEAREST_QUOTA: u32 = (SOFTWARE_LOOP_CAP - NEAREST_SEARCHES * (1 + 2 * NEAREST_BINS)) / (NEAREST_SEARCHES + 1);
+/// Searches for the last neighbour, at most.
+const NEAREST_SEARCHES: u32 = NEAREST_ROUNDS + NEAREST_HALVINGS;
+
+/// Records that a submission takes at all of its places, where no hierarchy helps: a fraction of a second on devices that a driver watches.
+const LINEAR_RECORDS: u64 = 1 << 28;
 
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -32,8 +47,11 @@ enum Query {
 
 /// What is done where a quota has stopped a query.
 enum Linear {
-    /// All records are gone through. The driver compiles it only if it is dispatched.
-    Records(ComputePipeline<photon_gather::Kernel>),
+    /// All records are gone through, by a kernel that is made when it is first needed.
+    Records(
+        Box<photon_gather::Spec>,
+        OnceLock<ComputePipeline<photon_gather::Kernel>>,
+    ),
     /// Refused: a pass through all records cannot find neighbours.
     Refuse,
 }
@@ -41,6 +59,7 @@ enum Linear {
 /// The kernels of queries.
 pub(super) struct Gather {
     gpu: Gpu,
+    queue: Queue,
     query: Query,
     linear: Linear,
     /// Records of a dispatch that goes through all of them.
@@ -65,47 +84,38 @@ pub(super) struct GatherStage<'a> {
 type Counters = photon_gather::GatherCounters;
 
 impl Gather {
-    /// For eye paths of the set `eye`.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &PhotonSettings, eye: &PathSet) -> Result<Self> {
-        let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
+    /// For eye paths of the set `eye`, up to `slots` at once.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &PhotonSettings, eye: &PathSet, slots: u32) -> Result<Self> {
         let set = &settings.path_set;
         // Photons have been scattered once before they land, and at the point that gathers them.
         let least = if settings.direct_photons { 1 } else { 2 };
-        let counts_bounces = set.min_bounces() > least || set.max_bounces().is_some();
+        let ask = AskSpec {
+            has_path_automaton: eye.has_automaton(),
+            counts_bounces: set.min_bounces() > least || set.max_bounces().is_some(),
+        };
+        let queue = Queue::new(gpu, scene, settings.queue, ask, slots)?;
+        let nearest = settings.neighbors > 0;
         // Both entry points have the same constants.
         macro_rules! spec {
-            ($shader:ident, $linear:expr) => {
-                $shader::Spec {
-                    has_metal: bsdf.metal,
-                    has_conductor: bsdf.conductor,
-                    has_specular_layer: bsdf.specular_layer,
-                    has_transmission: bsdf.transmission,
+            ($shader:ident, $queue:expr, $linear:expr) => {
+                surface_spec!($shader, scene, {
                     has_multiple_scattering: false,
                     separable_masking: false,
-                    has_textures: profile.has_textures,
-                    has_shading_normals: profile.has_shading_normals,
-                    has_normal_maps: profile.has_normal_maps,
-                    has_vertex_colors: profile.has_vertex_colors,
-                    has_absorption: profile.has_absorption,
-                    has_unlit: profile.has_unlit,
-                    has_path_automaton: eye.has_automaton(),
+                    has_path_automaton: ask.has_path_automaton,
                     tells_caustics: settings.final_gather,
                     profile: settings.profile as u32,
-                    counts_bounces,
-                    compact_quota: if settings.neighbors > 0 {
-                        NEAREST_QUOTA
-                    } else {
-                        settings.query_quota
-                    },
-                    nearest: settings.neighbors > 0,
+                    counts_bounces: ask.counts_bounces,
+                    compact_quota: if nearest { NEAREST_QUOTA } else { settings.query_quota },
+                    nearest,
                     linear: $linear,
+                    queue: $queue,
                     ..Default::default()
-                }
+                })
             };
         }
         let query = match settings.query {
             MapQuery::Packet if gpu.caps().subgroup.vote => {
-                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, false))?)
+                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, queue.kind(), false))?)
             }
             MapQuery::Packet => {
                 return Err(Error::MissingFeature {
@@ -115,12 +125,12 @@ impl Gather {
                     instead: "ask the map point by point: \"query\": \"single\"".into(),
                 });
             }
-            MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_gather, false))?),
+            MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_gather, queue.kind(), false))?),
         };
-        let linear = if settings.neighbors > 0 {
+        let linear = if nearest {
             Linear::Refuse
         } else {
-            Linear::Records(gpu.compute_pipeline(&spec!(photon_gather, true))?)
+            Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
         };
         let (gather_states, caustic_states) = gathering_states(settings, eye);
         let bytes = size_of::<Counters>() as u64;
@@ -128,6 +138,7 @@ impl Gather {
         // Memory may hold what another buffer left.
         gpu.upload(&counters, 0, &[Counters::default()])?;
         Ok(Self {
+            queue,
             query,
             linear,
             quota: settings.query_quota,
@@ -139,11 +150,13 @@ impl Gather {
         })
     }
 
-    pub fn pipeline(&self) -> PipelineInfo {
-        match &self.query {
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let mut all = self.queue.pipelines();
+        all.push(match &self.query {
             Query::Single(kernel) => kernel.info(),
             Query::Packet(kernel) => kernel.info(),
-        }
+        });
+        all
     }
 
     /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for.
@@ -176,21 +189,27 @@ impl Gather {
 }
 
 impl GatherStage<'_> {
-    fn push(&self, first: u32, last: u32) -> photon_gather::Push {
+    fn ask(&self) -> AskSettings {
         let [lower, upper] = self.scene.bounds();
-        photon_gather::Push {
+        AskSettings {
             scene_lower: lower.to_array(),
-            gather_states: self.gather.gather_states,
+            states: self.gather.gather_states,
             scene_upper: upper.to_array(),
-            caustic_states: self.gather.caustic_states,
-            root: self.map.root,
-            least_bounces: self.gather.bounces[0],
             most_bounces: self.gather.bounces[1],
+        }
+    }
+
+    /// Of queries; those that go through records say besides which ones, and of which places.
+    fn push(&self) -> photon_gather::Push {
+        photon_gather::Push {
+            ask: self.ask(),
+            root: self.map.root,
+            caustic_states: self.gather.caustic_states,
+            least_bounces: self.gather.bounces[0],
             scale: self.scale,
-            first,
-            last,
             neighbors: self.neighbors,
             radius: self.radius,
+            ..Default::default()
         }
     }
 
@@ -204,41 +223,124 @@ impl GatherStage<'_> {
 }
 
 impl ArrivalStage for GatherStage<'_> {
-    fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()> {
-        let (scene, map) = (self.scene.scene_set(), self.set());
+    fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, places: Places<'_>) -> Result<()> {
+        let gather = self.gather;
+        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
+        let mut groups = places.items;
+        if !matches!(gather.queue, Queue::Slots) {
+            recorder.pass("photon: gather queue", |pass| {
+                groups = gather
+                    .queue
+                    .record(pass, self.scene, paths, places, self.ask(), &queue)?;
+                Ok(())
+            })?;
+        }
         recorder.pass("photon: gather", |pass| {
-            match &self.gather.query {
-                Query::Single(kernel) => {
-                    pass.dispatch_indirect(kernel, &[paths, &scene, &map], &self.push(0, 0), items)?;
-                }
-                Query::Packet(kernel) => {
-                    pass.dispatch_indirect(kernel, &[paths, &scene, &map], &bytemuck::cast(self.push(0, 0)), items)?;
-                }
+            let (sets, push): ([&dyn BindingSet<'_>; 4], _) = ([paths, &scene, &queue, &map], self.push());
+            match &gather.query {
+                Query::Single(kernel) => pass.dispatch_indirect(kernel, &sets, &push, groups)?,
+                Query::Packet(kernel) => pass.dispatch_indirect(kernel, &sets, &bytemuck::cast(push), groups)?,
             }
             stage_barrier(pass);
             Ok(())
         })
     }
 
-    fn record_stopped(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()> {
-        let Linear::Records(linear) = &self.gather.linear else {
+    fn record_stopped(
+        &self,
+        recorder: &mut Recorder,
+        paths: &PathBuffers<'_>,
+        stopped: StoppedPlaces,
+        part: u64,
+    ) -> Result<Option<u64>> {
+        let gather = self.gather;
+        let Linear::Records(spec, made) = &gather.linear else {
             return Err(Error::Overflow {
                 kernel: "photon_gather".into(),
                 what: "steps of a query for neighbours".into(),
                 needed: u64::from(NEAREST_QUOTA) + 1,
                 capacity: u64::from(NEAREST_QUOTA),
-                instead: "look for neighbours within a smaller radius, or trace fewer photons a pass".into(),
+                instead: "look for neighbours within a smaller radius, trace fewer photons a pass, or ask point by point (\"query\": \"single\")"
+                    .into(),
             });
         };
-        let (scene, map) = (self.scene.scene_set(), self.set());
+        let linear = match made.get() {
+            Some(linear) => linear,
+            None => {
+                let linear = gather.gpu.compute_pipeline(spec.as_ref())?;
+                made.get_or_init(|| linear)
+            }
+        };
+        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
+        let parts = LinearParts::new(gather.quota, self.map.count, stopped);
+        let (mut part, mut taken) = (part, 0);
         recorder.pass("photon: gather all", |pass| {
-            for first in (0..self.map.count).step_by(self.gather.quota as usize) {
-                let last = first.saturating_add(self.gather.quota).min(self.map.count);
-                pass.dispatch_indirect(linear, &[paths, &scene, &map], &self.push(first, last), items)?;
+            while part < parts.count() && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {
+                let [first, last] = parts.records(part);
+                let push = photon_gather::Push {
+                    first_place: parts.first_place(part),
+                    first,
+                    last,
+                    ..self.push()
+                };
+                let groups = linear.groups_for(parts.places);
+                pass.dispatch(linear, &[paths, &scene, &queue, &map], &push, [groups, 1, 1])?;
                 stage_barrier(pass);
+                taken += parts.cost();
+                part += 1;
             }
             Ok(())
-        })
+        })?;
+        Ok((part < parts.count()).then_some(part))
+    }
+}
+
+/// How a pass through all records is cut: some records at a time, which says in what order sums are formed, each of them for some places at a
+/// time, which nothing depends on.
+#[derive(Debug, Clone, Copy)]
+struct LinearParts {
+    quota: u32,
+    count: u32,
+    stopped: StoppedPlaces,
+    /// Places of a part: whole workgroups.
+    places: u32,
+}
+
+impl LinearParts {
+    /// Of `count` records, `quota` at a time.
+    fn new(quota: u32, count: u32, stopped: StoppedPlaces) -> Self {
+        let most = (LINEAR_RECORDS / u64::from(quota)).min(u64::from(u32::MAX / 2)) as u32;
+        let places = if stopped.stopped <= most { stopped.places } else { most };
+        Self {
+            quota,
+            count,
+            stopped,
+            places: places.max(1).next_multiple_of(PATH_GROUP),
+        }
+    }
+
+    /// Parts for the same records.
+    fn ranges(&self) -> u64 {
+        u64::from(self.stopped.places.div_ceil(self.places))
+    }
+
+    fn count(&self) -> u64 {
+        self.ranges() * u64::from(self.count.div_ceil(self.quota))
+    }
+
+    /// Records that a part takes, at most.
+    fn cost(&self) -> u64 {
+        u64::from(self.quota) * u64::from(self.stopped.stopped.min(self.places))
+    }
+
+    fn first_place(&self, part: u64) -> u32 {
+        (part % self.ranges()) as u32 * self.places
+    }
+
+    /// The first record and the one past the last.
+    fn records(&self, part: u64) -> [u32; 2] {
+        let first = (part / self.ranges()) as u32 * self.quota;
+        [first, first.saturating_add(self.quota).min(self.count)]
     }
 }
 
@@ -266,4 +368,39 @@ fn gathering_states(settings: &PhotonSettings, eye: &PathSet) -> (u32, u32) {
         caustic |= u32::from(settings.final_gather && asks && goes_on) << state;
     }
     (gathering, caustic)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn linear_parts_take_every_record_at_every_place_once_in_order() {
+        for (quota, count, places, stopped) in [
+            (1, 5, 1, 1),
+            (64, 6000, 256, 3),
+            (32_768, 40_000, 100_000, 100_000),
+            (32_768, 1 << 16, 100_000, 7),
+            (32_768, 32_768, 8192, 8192),
+            (3, 10, 65, 65),
+        ] {
+            let parts = LinearParts::new(quota, count, StoppedPlaces { places, stopped });
+            // Records that the places of each range have gone through.
+            let mut done = std::collections::BTreeMap::new();
+            for part in 0..parts.count() {
+                let [first, last] = parts.records(part);
+                assert!(last > first && last - first <= quota, "{parts:?}");
+                let before = done.insert(parts.first_place(part), last);
+                assert_eq!(before.unwrap_or(0), first, "{parts:?}");
+            }
+            assert!(done.values().all(|last| *last == count), "{parts:?}");
+            let firsts: Vec<u32> = done.into_keys().collect();
+            let expected: Vec<u32> = (0..places).step_by(parts.places as usize).collect();
+            assert_eq!(firsts, expected, "{parts:?}");
+            assert!(
+                parts.places.is_multiple_of(PATH_GROUP) && parts.cost() <= LINEAR_RECORDS,
+                "{parts:?}"
+            );
+        }
+    }
 }

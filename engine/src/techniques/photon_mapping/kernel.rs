@@ -17,8 +17,9 @@ use crate::gpu::shaders::constants::{
     KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
     PHOTON_BOUNCE_SHIFT, PHOTON_DIFFUSED_BIT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
 };
+use crate::maps::packed_direction::{pack_octahedral, unpack_octahedral};
 use crate::transport::differentials::Differentials;
-use crate::transport::packing::{pack_octahedral, pack_rgb9e5, unpack_octahedral, unpack_rgb9e5};
+use crate::transport::packing::{pack_rgb9e5, unpack_rgb9e5};
 use crate::transport::warp::orthonormal_basis;
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::FRAC_1_PI;
@@ -66,9 +67,14 @@ pub struct KernelSettings {
     pub length_min: f64,
     /// Greatest length of an axis, in unit lengths.
     pub length_max: f64,
-    /// Least |z1 × z2| / longer² of a photon with a kernel.
+    /// Least |z1 × z2| / longer² of a footprint that is not flat.
     pub flatness: f64,
+    /// Widens flat footprints to the least flatness, and points to the least length, instead of leaving them without a kernel.
+    pub widens_flat: bool,
 }
+
+/// Least flatness that footprints are widened to.
+const WIDENED_FLATNESS_MIN: f64 = 1.0 / 1024.0;
 
 /// An ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,9 +118,9 @@ pub fn principal_axes(a: DVec3, b: DVec3) -> [DVec3; 2] {
 }
 
 /// The kernel of a photon with differentials in the tangent plane across the unit normal `n`; `None` for footprints too flat, or without
-/// area.
+/// area, unless these are widened.
 ///
-/// In this order: discard, dampen, spread, clamp. Energy is kept by clamping and lost by discarding.
+/// In this order: discard or widen, dampen, spread, clamp. Energy is kept by widening and clamping, and lost by discarding.
 pub fn photon_kernel(s: &KernelSettings, d: &Differentials, n: DVec3) -> Option<PhotonKernel> {
     if s.shape == KernelShape::Fixed {
         return Some(disk_kernel(s.length_max * s.unit_length, n));
@@ -126,10 +132,20 @@ pub fn photon_kernel(s: &KernelSettings, d: &Differentials, n: DVec3) -> Option<
     if a.length() < b.length() {
         (a, b) = (b, a);
     }
-    let lengths = DVec2::new(a.length(), b.length());
-    let area = a.cross(b).length();
+    let mut lengths = DVec2::new(a.length(), b.length());
+    let mut area = a.cross(b).length();
     if !(area > 0.0 && area >= s.flatness * lengths.x * lengths.x) {
-        return None;
+        if !s.widens_flat {
+            return None;
+        }
+        if lengths.x <= 0.0 {
+            return Some(disk_kernel(s.length_min * s.unit_length, n));
+        }
+        a = principal_axes(a, b)[0];
+        let flatness = s.flatness.max(WIDENED_FLATNESS_MIN);
+        b = flatness * n.cross(a);
+        lengths = a.length() * DVec2::new(1.0, flatness);
+        area = lengths.x * lengths.y;
     }
     if s.shape == KernelShape::Isotropic {
         let radius = s.spread * area.powf(0.5 * s.exponent);

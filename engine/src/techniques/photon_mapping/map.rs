@@ -48,8 +48,10 @@ impl PhotonMap {
         let leaf_size = automatic_leaf_size(areas(), scene_area, LEAF_SHARE);
         let sorted = SortedCodes::of_boxes(&boxes, MORTON_30_AXIS_BITS);
         let complete = CompleteBvh::new(&merged_hierarchy(&boxes, &sorted, leaf_size, |_| {}))?;
-        let compact = CompactBvh::encode(&complete)
-            .map_err(|fault| Error::setting("photon map", "tree", format!("is not tight: {fault:?}")))?;
+        let compact = CompactBvh::encode(&complete).map_err(|fault| Error::Internal {
+            what: "photon map".into(),
+            fault: format!("is not tight: {fault:?}"),
+        })?;
         let leaves = complete.order.par_iter().zip(&complete.ends);
         let ordered: Vec<PhotonWords> = leaves
             .map(|(index, ends)| {
@@ -85,7 +87,9 @@ fn box_and_area(record: &PhotonWords) -> (Aabb, f64) {
     let photon = unpack_photon(record);
     let kernel = photon.kernel();
     let centre = photon.position.as_dvec3();
-    let half = kernel_extent(&kernel) * (1.0 + BOX_SLACK) + centre.abs() * f64::from(f32::EPSILON);
+    // Skewed axes lose digits to their product, by which weights are divided.
+    let skew = kernel.along.length() * kernel.across.length() / kernel_area(&kernel);
+    let half = kernel_extent(&kernel) * (1.0 + BOX_SLACK * skew) + centre.abs() * f64::from(f32::EPSILON);
     let bounds = Aabb {
         lower: (centre - half).as_vec3(),
         upper: (centre + half).as_vec3(),

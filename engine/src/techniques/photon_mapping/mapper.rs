@@ -85,8 +85,8 @@ impl PhotonMapper {
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a path set
-    /// that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for queries of subgroups on a device without
-    /// votes, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for queries or queues of subgroups on
+    /// a device without votes or ballots, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -103,18 +103,22 @@ impl PhotonMapper {
             aovs: settings.aovs,
             ..PathTracerSettings::default()
         };
-        let photons = if settings.needs_photons() && scene.has_lights() {
-            Some(Photons {
-                tracer: PhotonTracer::new(gpu, Arc::clone(&scene), &settings, settings.stored())?,
-                gather: Gather::new(gpu, &scene, &settings, &eye_paths)?,
+        let has_map = settings.needs_photons() && scene.has_lights();
+        let tracer = has_map.then(|| PhotonTracer::new(gpu, Arc::clone(&scene), &settings, settings.stored()));
+        let tracer = tracer.transpose()?;
+        // Takes as much memory as is left, if it must.
+        let eye = PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?;
+        let photons = match tracer {
+            Some(tracer) => Some(Photons {
+                tracer,
+                gather: Gather::new(gpu, &scene, &settings, &eye_paths, eye.slots())?,
                 map: None,
-            })
-        } else {
-            None
+            }),
+            None => None,
         };
         Ok(Self {
             gpu: gpu.clone(),
-            eye: PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?,
+            eye,
             scene,
             settings,
             photons,
@@ -152,7 +156,7 @@ impl PhotonMapper {
         let mut all = self.eye.pipelines();
         if let Some(photons) = &self.photons {
             all.extend(photons.tracer.pipelines());
-            all.push(photons.gather.pipeline());
+            all.extend(photons.gather.pipelines());
         }
         all
     }

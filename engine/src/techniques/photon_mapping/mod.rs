@@ -5,10 +5,11 @@ pub mod kernel;
 mod gather;
 mod map;
 mod mapper;
+mod queue;
 mod settings;
 mod tracer;
 
 pub use gather::GatherCounts;
 pub use mapper::{MappedPhoton, MapperCounts, PhotonMapper};
-pub use settings::{MapQuery, PhotonSettings};
+pub use settings::{MapQuery, MapQueue, PhotonSettings};
 pub use tracer::PhotonCounts;

@@ -39,6 +39,20 @@ pub enum MapQuery {
     Packet,
 }
 
+/// Which places of a wave the invocations of queries are for.
+///
+/// Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapQueue {
+    /// An invocation a place of the wave's paths under way; those that ask nothing idle (type I).
+    Slots,
+    /// Places that ask, listed in order by stream compaction (type II).
+    Compacted,
+    /// Places that ask, in blocks as wide as the subgroups that append them, where the device has full subgroups with ballots (type III).
+    Blocks,
+}
+
 /// Settings of photon mapping.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -66,9 +80,11 @@ pub struct PhotonSettings {
     /// Unit length of the dampening, m; 0 for a ninth of the scene's diagonal.
     #[serde(serialize_with = "crate::settings::serialize_f32")]
     pub unit_length: f32,
-    /// Footprints flatter than this have no kernel, in [0, 1).
+    /// Footprints are flat whose area over the square of their longer axis is less than this, in [0, 1).
     #[serde(serialize_with = "crate::settings::serialize_f32")]
     pub flatness: f32,
+    /// Widens flat footprints, so that no light is lost; the source leaves them without a kernel.
+    pub widen_flat: bool,
     /// α of progressive photon mapping (Hachisuka and Jensen 2009; Knaus and Zwicker 2011), in (0, 1]: kernels of pass i + 1 have
     /// (i + α) / (i + 1) of the area of those of pass i. 1 keeps kernels, and their bias.
     #[serde(serialize_with = "crate::settings::serialize_f32")]
@@ -79,8 +95,11 @@ pub struct PhotonSettings {
     pub direct_photons: bool,
     /// The map is seen after one more diffuse reflection; caustics stay directly seen.
     pub final_gather: bool,
-    /// How the map is asked. The picture is the same, up to the order of sums where a query's quota stops it.
+    /// How the map is asked. The picture is the same, up to the order of sums where a query's quota stops it; with neighbours, where a quota
+    /// is an error, points that ask together meet it sooner.
     pub query: MapQuery,
+    /// How queries are queued, and so which points ask together. The picture is the same, as with `query`.
+    pub queue: MapQueue,
     /// Random numbers: Owen-scrambled Sobol' or PCG.
     pub sampler: SamplerKind,
     /// Seed of the random numbers; the view's, where settings come as text.
@@ -108,11 +127,13 @@ impl Default for PhotonSettings {
             dampening: 0.25,
             unit_length: 0.0,
             flatness: 0.05,
+            widen_flat: true,
             reduction: 2.0 / 3.0,
             samples_per_pass: 1,
             direct_photons: false,
             final_gather: false,
             query: MapQuery::Single,
+            queue: MapQueue::Slots,
             sampler: SamplerKind::Sobol,
             seed: 0,
             aovs: false,
@@ -220,6 +241,7 @@ impl PhotonSettings {
             length_min: LENGTH_MIN.min(length_max / unit_length) * shrunk,
             length_max: length_max / unit_length * shrunk,
             flatness: f64::from(self.flatness),
+            widens_flat: self.widen_flat,
         }
     }
 

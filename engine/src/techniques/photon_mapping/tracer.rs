@@ -22,7 +22,7 @@ use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pip
 use crate::gpu::{TexelView, Timings};
 use crate::transport::GpuScene;
 use crate::transport::path_tracer::PathTracerSettings;
-use crate::transport::path_tracer::pipelines::{TracePipelines, ray_quota};
+use crate::transport::path_tracer::pipelines::{TracePipelines, ray_quota, surface_spec};
 use crate::transport::path_tracer::stages::{Compaction, StallWatch, WaveKey, indirect, stage_barrier};
 use crate::transport::path_tracer::wave::{
     Status, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device,
@@ -122,25 +122,15 @@ impl PhotonTracer {
             has_differentials,
             ..Default::default()
         };
-        let scatter = photon_scatter::Spec {
-            has_metal: bsdf.metal,
-            has_conductor: bsdf.conductor,
-            has_specular_layer: bsdf.specular_layer,
-            has_transmission: bsdf.transmission,
+        let scatter = surface_spec!(photon_scatter, scene, {
             has_multiple_scattering: bsdf.multiple_scattering,
             separable_masking: false,
-            has_textures: profile.has_textures,
-            has_shading_normals: profile.has_shading_normals,
-            has_normal_maps: profile.has_normal_maps,
-            has_vertex_colors: profile.has_vertex_colors,
-            has_absorption: profile.has_absorption,
-            has_unlit: profile.has_unlit,
             has_alpha: profile.has_alpha(),
             sampler_kind: settings.sampler as u32,
             has_differentials,
             tells_caustics: settings.final_gather,
             ..Default::default()
-        };
+        });
         let wanted = settings.photons.next_multiple_of(PATH_GROUP);
         let slots = wanted.min(default_slots(gpu)).min(slots_of_device(gpu));
         let needs = WaveNeeds {
@@ -401,6 +391,7 @@ impl PhotonTracer {
                 length_min: kernel.length_min as f32,
                 length_max: kernel.length_max as f32,
                 flatness: kernel.flatness as f32,
+                widens_flat: u32::from(kernel.widens_flat),
             },
         };
         let wave = self.wave_set();

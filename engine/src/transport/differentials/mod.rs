@@ -204,7 +204,7 @@ pub fn roulette_differentials(d: &Differentials, survival: f64) -> Differentials
     }
 }
 
-/// The differentials, or zero and `false` where they are not numbers or too large. The photon goes on either way, without a kernel.
+/// The differentials, or zero and `false` where they are not numbers or too large.
 pub fn guard_differentials(d: &Differentials, unit_length: f64) -> (Differentials, bool) {
     let within = |v: DVec3, bound: f64| v.is_finite() && v.abs().max_element() <= bound;
     let fit = within(d.z1, DIFFERENTIAL_MAX * unit_length)

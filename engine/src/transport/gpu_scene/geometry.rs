@@ -11,6 +11,7 @@ use glam::{DMat3, Vec3};
 use crate::accel::MAX_COORDINATE;
 use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
+use crate::raster::ObjectTriangles;
 use crate::scene::{Instance, Scene, SceneProfile};
 use crate::{Error, Result};
 
@@ -28,16 +29,36 @@ pub(super) struct Geometry {
 
 /// Instances in the order of their triangles.
 pub(super) fn instances_in_order(scene: &Scene) -> impl Iterator<Item = &Instance> {
-    let bounds_medium = |instance: &&Instance| {
-        let material = scene.meshes[instance.mesh as usize].material;
-        material.is_some_and(|index| scene.materials[index as usize].boundary)
-    };
-    let boundaries = scene.instances.iter().filter(bounds_medium);
-    scene
-        .instances
-        .iter()
-        .filter(move |instance| !bounds_medium(instance))
-        .chain(boundaries)
+    numbered_instances(scene).map(|(_, instance)| instance)
+}
+
+/// The same with their numbers in the scene.
+fn numbered_instances(scene: &Scene) -> impl Iterator<Item = (usize, &Instance)> {
+    let all = || scene.instances.iter().enumerate();
+    all()
+        .filter(|(_, instance)| !bounds_medium(scene, instance))
+        .chain(all().filter(|(_, instance)| bounds_medium(scene, instance)))
+}
+
+fn bounds_medium(scene: &Scene, instance: &Instance) -> bool {
+    let material = scene.meshes[instance.mesh as usize].material;
+    material.is_some_and(|index| scene.materials[index as usize].boundary)
+}
+
+/// The triangles of each instance that is visible, from the first triangle on.
+pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
+    let mut end = 0;
+    numbered_instances(scene)
+        .take_while(|(_, instance)| !bounds_medium(scene, instance))
+        .map(|(object, instance)| {
+            let start = end;
+            end += scene.meshes[instance.mesh as usize].triangles.len() as u32;
+            ObjectTriangles {
+                object: object as u32,
+                triangles: start..end,
+            }
+        })
+        .collect()
 }
 
 impl Geometry {

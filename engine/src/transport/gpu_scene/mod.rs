@@ -16,7 +16,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
-use self::geometry::Geometry;
+use self::geometry::{Geometry, visible_objects};
 use self::lights::Lights;
 use self::materials::{material_record, materials_by_use};
 use self::media::GpuMedia;
@@ -30,6 +30,7 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::sets::{IndexSet, MediaSet, SceneSet};
 use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
 use crate::gpu::{Category, Gpu, TexelView};
+use crate::raster::{ObjectTriangles, SurfaceFeatures, Surfaces};
 use crate::scene::{LightKind, Material, Scene, SceneProfile};
 
 /// A scene in device memory. Make it once and render it with any technique.
@@ -37,6 +38,7 @@ use crate::scene::{LightKind, Material, Scene, SceneProfile};
 pub struct GpuScene {
     profile: SceneProfile,
     bsdf: BsdfFeatures,
+    objects: Vec<ObjectTriangles>,
     bounds: [Vec3; 2],
     surface_area: f64,
     light_power: f64,
@@ -123,6 +125,7 @@ impl GpuScene {
         Ok(Self {
             profile,
             bsdf,
+            objects: visible_objects(scene),
             bounds,
             surface_area: geometry.surface_area(),
             light_power: lights.power,
@@ -162,6 +165,17 @@ impl GpuScene {
     /// Least and greatest corner, world space, metres.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.bounds
+    }
+
+    /// What is rasterized of it: all triangles but those of invisible boundaries.
+    pub fn surfaces(&self) -> Surfaces<'_> {
+        Surfaces {
+            set: self.scene_set(),
+            triangles: self.objects.last().map_or(0, |last| last.triangles.end),
+            objects: &self.objects,
+            features: SurfaceFeatures::of(&self.profile),
+            bounds: self.bounds,
+        }
     }
 
     /// Area of all triangles, m².

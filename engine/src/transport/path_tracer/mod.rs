@@ -28,7 +28,6 @@ use self::wave::{
     Cursor, MediumCounters, Status, Wave, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device,
     slots_of_picture,
 };
-use super::camera_frame::CameraFrame;
 use super::gpu_scene::GpuScene;
 use crate::Result;
 use crate::accel::trace::wide_counter;
@@ -38,6 +37,7 @@ use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_ARRIVAL, STALLED_EXTEND
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::{Access, Buffer, BufferView, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
 use crate::scene::Camera;
+use crate::scene::camera_frame::CameraFrame;
 use glam::DVec3;
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
@@ -69,10 +69,34 @@ pub struct PathCounters {
 /// What a technique gathers where the rays of a bounce have arrived, before the surfaces there are shaded.
 pub(crate) trait ArrivalStage {
     /// Records it for all places of the queue. Places that its quota stops stall the wave with `STALLED_ARRIVAL`.
-    fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()>;
+    fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, places: Places<'_>) -> Result<()>;
 
-    /// Records what the places that it has stopped at still lack.
-    fn record_stopped(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, items: BufferView<'_>) -> Result<()>;
+    /// Records what the places that it has stopped at still lack, from a part on, as much of it as a watchdog has time for; the part to go
+    /// on with, in a submission of its own.
+    fn record_stopped(
+        &self,
+        recorder: &mut Recorder,
+        paths: &PathBuffers<'_>,
+        stopped: StoppedPlaces,
+        part: u64,
+    ) -> Result<Option<u64>>;
+}
+
+/// The places of a wave's queue: indirect arguments of dispatches over them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Places<'a> {
+    /// One invocation a place.
+    pub items: BufferView<'a>,
+    /// One invocation for each [`COMPACT_CHUNK`](crate::gpu::shaders::constants::COMPACT_CHUNK) places.
+    pub chunks: BufferView<'a>,
+}
+
+/// How many places an arrival stage has stopped at.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoppedPlaces {
+    /// Of so many places in the queue.
+    pub places: u32,
+    pub stopped: u32,
 }
 
 /// A progressive rendering of one view.
@@ -209,6 +233,11 @@ impl PathTracer {
         self.counters
     }
 
+    /// Paths under way together, at most.
+    pub(crate) fn slots(&self) -> u32 {
+        self.slots
+    }
+
     /// Samples that every pixel has got.
     pub(crate) fn samples_done(&self) -> u32 {
         self.cursor.sample
@@ -261,6 +290,9 @@ impl PathTracer {
         while status.active_count > 0 || status.stalled != STALLED_NOT {
             let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);
             self.counters.stalls += u64::from(stalled);
+            if let Some(arrival) = arrival.filter(|_| status.stalled == STALLED_ARRIVAL) {
+                self.submit_stopped(&status, arrival, &mut timings)?;
+            }
             timings.push(self.submit_bounces(wave, &mut status, false, arrival)?);
             let stands = stalled && status.stalled != STALLED_NOT && status.rounds == rounds;
             watch.submitted(stands)?;
@@ -279,6 +311,22 @@ impl PathTracer {
         self.counters.waves += 1;
         self.pending = Some(*wave);
         Ok(timings)
+    }
+
+    /// Submits what an arrival stage lacks at the places that it has stopped at.
+    fn submit_stopped(&self, status: &Status, arrival: &dyn ArrivalStage, timings: &mut Vec<Timings>) -> Result<()> {
+        let paths = self.buffers.set(status.rounds as usize % 2);
+        let stopped = StoppedPlaces {
+            places: status.active_count,
+            stopped: status.unfinished,
+        };
+        let mut part = Some(0);
+        while let Some(first) = part {
+            let mut recorder = self.gpu.recorder("path arrivals")?;
+            part = arrival.record_stopped(&mut recorder, &paths, stopped, first)?;
+            timings.push(recorder.submit()?.wait()?);
+        }
+        Ok(())
     }
 
     /// Submits some bounces of a wave, the first ones with its camera rays and the last wave's way to the film, and reads how far they came.
@@ -329,7 +377,8 @@ impl PathTracer {
             let trace = resumed.unwrap_or(&self.pipelines.trace);
             let parity = (status.rounds as usize + bounce) % 2;
             if stalled == STALLED_ARRIVAL && bounce == 0 {
-                self.record_arrivals(&mut recorder, wave, parity, arrival, true)?;
+                // The stage has gone on already.
+                self.record_arrivals(&mut recorder, wave, parity, None)?;
             } else {
                 self.record_bounce(&mut recorder, wave, parity, trace, arrival)?;
             }

@@ -11,8 +11,8 @@ use crate::gpu::shaders::transport::{
 };
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
 use crate::scene::Camera;
+use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
-use crate::transport::camera_frame::CameraFrame;
 
 /// Iterations after which a ray among surfaces with alpha goes on in a later dispatch, at most: a software driver's subgroup of 16 then
 /// stays below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP), even if its lanes take turns.
@@ -40,6 +40,27 @@ pub(crate) fn ray_quota(gpu: &Gpu, scene: &GpuScene, settings: &PathTracerSettin
         .index_traversal()
         .quota_within(gpu.caps(), quota, iterations, filters)
 }
+
+/// Specialization of a kernel that knows surfaces (`transport/arrival.glsl`) to those of a scene, with further fields.
+macro_rules! surface_spec {
+    ($shader:ident, $scene:expr, { $($further:tt)* }) => {{
+        let (profile, bsdf) = ($scene.profile(), $scene.bsdf_features());
+        $shader::Spec {
+            has_metal: bsdf.metal,
+            has_conductor: bsdf.conductor,
+            has_specular_layer: bsdf.specular_layer,
+            has_transmission: bsdf.transmission,
+            has_textures: profile.has_textures,
+            has_shading_normals: profile.has_shading_normals,
+            has_normal_maps: profile.has_normal_maps,
+            has_vertex_colors: profile.has_vertex_colors,
+            has_absorption: profile.has_absorption,
+            has_unlit: profile.has_unlit,
+            $($further)*
+        }
+    }};
+}
+pub(crate) use surface_spec;
 
 /// One kernel a stage.
 pub(super) struct Pipelines {
@@ -99,19 +120,9 @@ impl Pipelines {
     ) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let overlapping = bsdf.metal || bsdf.specular_layer;
-        let shade = path_shade::Spec {
-            has_metal: bsdf.metal,
-            has_conductor: bsdf.conductor,
-            has_specular_layer: bsdf.specular_layer,
-            has_transmission: bsdf.transmission,
+        let shade = surface_spec!(path_shade, scene, {
             has_multiple_scattering: bsdf.multiple_scattering && settings.multiple_scattering,
             separable_masking: settings.separable_masking && (bsdf.metal || bsdf.specular_layer || bsdf.transmission),
-            has_textures: profile.has_textures,
-            has_shading_normals: profile.has_shading_normals,
-            has_normal_maps: profile.has_normal_maps,
-            has_vertex_colors: profile.has_vertex_colors,
-            has_absorption: profile.has_absorption,
-            has_unlit: profile.has_unlit,
             has_environment: profile.has_environment(),
             has_area_lights: scene.has_area_lights(),
             has_punctual_lights: scene.has_punctual_lights(),
@@ -121,7 +132,7 @@ impl Pipelines {
             has_media: profile.media.any(),
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
-        };
+        });
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.
             has_textures: shade.has_textures,

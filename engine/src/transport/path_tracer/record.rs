@@ -3,7 +3,7 @@
 use super::pipelines::TracePipelines;
 use super::stages::{WaveKey, indirect, stage_barrier};
 use super::wave::{Status, Wave};
-use super::{ArrivalStage, PathTracer};
+use super::{ArrivalStage, PathTracer, Places};
 use crate::Result;
 use crate::gpu::shaders::constants::{NO_MEDIUM, OUTSIDE};
 use crate::gpu::shaders::transport::{
@@ -56,17 +56,16 @@ impl PathTracer {
         recorder.pass("path: extend", |pass| {
             trace.record_extend(pass, &self.scene, &paths, &path_media, self.key(wave), items)
         })?;
-        self.record_arrivals(recorder, wave, parity, arrival, false)
+        self.record_arrivals(recorder, wave, parity, arrival)
     }
 
-    /// What happens where the rays of a bounce have arrived, and the next queue; `stopped` goes on with what an arrival stage has left.
+    /// What happens where the rays of a bounce have arrived, and the next queue.
     pub(super) fn record_arrivals(
         &self,
         recorder: &mut Recorder,
         wave: &Wave,
         parity: usize,
         arrival: Option<&dyn ArrivalStage>,
-        stopped: bool,
     ) -> Result<()> {
         let p = &self.pipelines;
         let paths = self.buffers.set(parity);
@@ -74,10 +73,9 @@ impl PathTracer {
         let items = indirect(&self.buffers, std::mem::offset_of!(Status, item_groups));
         let path_media = self.buffers.media_set();
         let surrounding = self.scene.surrounding().unwrap_or(NO_MEDIUM);
-        match arrival {
-            Some(arrival) if stopped => arrival.record_stopped(recorder, &paths, items)?,
-            Some(arrival) => arrival.record(recorder, &paths, items)?,
-            None => {}
+        if let Some(arrival) = arrival {
+            let chunks = indirect(&self.buffers, std::mem::offset_of!(Status, chunk_groups));
+            arrival.record(recorder, &paths, Places { items, chunks })?;
         }
         let [lower, upper] = self.scene.bounds();
         if let (Some(medium), Some(media)) = (&p.medium, self.scene.media_set()) {

@@ -5,6 +5,7 @@ mod clock;
 mod device;
 mod errors;
 mod kd;
+mod maps;
 mod media;
 mod photon_maps;
 mod photons;
@@ -82,7 +83,12 @@ pub const MEASURES: &[Measure] = &[
     on_device("kd-threads", kd::kd_threads::measure),
     on_device("kd-traversal", kd::kd_traversal::measure),
     on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
+    on_host("map-borders", maps::map_borders::measure),
     on_device("map-construction", photon_maps::map_construction::measure),
+    on_host("map-density", maps::map_density::measure),
+    on_host("map-error", maps::map_error::measure),
+    on_device("map-glossiness", maps::map_glossiness::measure),
+    on_host("map-levels", maps::map_levels::measure),
     on_host("map-quality", photon_maps::map_quality::measure),
     on_host("merge-example", photon_maps::merge_example::measure),
     on_device("mitsuba", rendering::mitsuba::measure),
@@ -91,6 +97,8 @@ pub const MEASURES: &[Measure] = &[
     on_device("persistent-threads", rays::persistent_threads::measure),
     on_host("phase-functions", media::phase_functions::measure),
     on_device("photon-frame", photons::photon_frame::measure),
+    on_device("photon-peers", photons::photon_peers::measure),
+    on_device("photon-queues", photons::photon_queues::measure),
     on_device("photon-statistics", photons::photon_statistics::measure),
     on_host("picture-formats", rendering::picture_formats::measure),
     on_host("ray-offsets", rays::ray_offsets::measure),

@@ -8,6 +8,7 @@
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_KERNEL_GLSL
 
 #include "transport/differentials.glsl"
+#include "maps/packed_direction.glsl"
 #include "transport/packing.glsl"
 
 const uint KERNEL_UNIFORM = 0u;
@@ -32,7 +33,11 @@ struct KernelSettings {
     float length_min;   // of axes, in unit lengths
     float length_max;
     float flatness;     // least |z1 x z2| / longer^2
+    uint widens_flat;   // flatter footprints are widened to it, instead of being left without a kernel
 };
+
+// Least flatness that footprints are widened to.
+const float WIDENED_FLATNESS_MIN = 1.0 / 1024.0;
 
 struct PhotonKernel {
     vec3 along;
@@ -88,7 +93,18 @@ bool photon_kernel(KernelSettings s, Differentials d, vec3 n, out PhotonKernel k
     }
     float area = length(cross(a, b));
     if (!(area > 0.0 && area >= s.flatness * lengths.x * lengths.x)) {
-        return false;
+        if (s.widens_flat == 0u) {
+            return false;
+        }
+        if (lengths.x <= 0.0) {
+            kernel = disk_kernel(s.length_min * s.unit_length, n);
+            return true;
+        }
+        principal_axes(a, b);
+        float flatness = max(s.flatness, WIDENED_FLATNESS_MIN);
+        b = flatness * cross(n, a);
+        lengths = length(a) * vec2(1.0, flatness);
+        area = lengths.x * lengths.y;
     }
     if (s.shape == KERNEL_ISOTROPIC) {
         float radius = s.spread * pow(area, 0.5 * s.exponent);

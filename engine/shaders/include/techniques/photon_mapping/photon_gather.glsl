@@ -3,25 +3,23 @@
 //
 // A query is one loop, in which a step is a node or a record. With COMPACT_PACKET defined a subgroup goes through the map together,
 // wherever any of its points lies; the sums are the same bits, as each point meets its kernels in the same order. A query that its quota stops
-// leaves nothing, marks its place and stalls the wave: such places go through all records instead (LINEAR), so many a dispatch.
+// leaves nothing, marks its place and stalls the wave: such places go through all records instead (LINEAR), so many a dispatch, whatever queue they
+// came from.
 //
 // PM-DE-1, PM-DE-3 to PM-DE-5, PM-ST-5, PM-ST-6: "Interactive Manycore Photon Mapping", 2011, §3.4.2, §5.2, §6.2.3 and §7.4.2. Deterministic: a
 // path's sum has the order of the map's leaves, or of its records.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_GATHER_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_GATHER_GLSL
 
-#include "transport/path_features.glsl"
+#include "techniques/photon_mapping/photon_asks.glsl"
 #include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_map.glsl"
-#include "scene/bindings.glsl"
-#include "transport/path_buffers.glsl"
-#include "transport/path_set.glsl"
-#include "transport/surface.glsl"
+#include "techniques/photon_mapping/photon_queue.glsl"
 
 layout(constant_id = 42) const uint PROFILE = KERNEL_EPANECHNIKOV;
 layout(constant_id = 43) const bool LINEAR = false;        // goes through records, for places that have stopped
-layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
 layout(constant_id = 45) const bool NEAREST = false;       // one kernel about the point, up to its `neighbors`-th photon
+layout(constant_id = 46) const uint QUEUE = QUEUE_SLOTS;
 
 // Stands in path_resume for a query that its quota stopped.
 const uint GATHER_STOPPED = 0xFFFFFFFEu;
@@ -45,6 +43,10 @@ uint gathered_photons;
 // Photons about the point by their squared distance, of which more rounds see less, but finer.
 const uint NEAREST_BINS = 32u;
 const uint NEAREST_ROUNDS = 5u;
+// How often what is searched is halved, by its area, where there are more photons than a query has steps for.
+const uint NEAREST_HALVINGS = 6u;
+// Units in the last place of coordinates by which boxes stay wider than what is searched.
+const float NEAREST_SLACK = 4.0 / 8388608.0;
 // Least part of the squared distance that is told apart.
 const float NEAREST_PRECISION = 1e-4;
 uint nearest_bins[NEAREST_BINS];
@@ -52,27 +54,28 @@ vec2 nearest_span;
 bool nearest_counts;
 float nearest_squared;  // squared distance of the last photon
 bool nearest_all;       // there are as many as asked for
+float nearest_inset;    // by how much boxes are too wide for what is searched
 
 // Adds a photon's kernel times its scattering function, or counts it; what all photons have in common is left to the end. Whether the leaf
 // goes on.
 bool compact_visit_point(uint record);
 
 #define COMPACT_POINT
+#define COMPACT_LOWER(PLANES) (NEAREST ? (PLANES) + nearest_inset : (PLANES))
+#define COMPACT_UPPER(PLANES) (NEAREST ? (PLANES) - nearest_inset : (PLANES))
 #include "accel/compact_bvh.glsl"
 
 layout(push_constant, scalar) uniform Push {
-    vec3 scene_lower;
-    uint gather_states;   // states of a path whose diffuse surfaces gather, a bit each
-    vec3 scene_upper;
-    uint caustic_states;  // those that gather photons not scattered diffusely alone
+    AskSettings ask;
     CompactRoot root;
+    uint caustic_states;  // of those that ask, those that gather photons not scattered diffusely alone
     uint least_bounces;   // scatterings in all, with that at the point
-    uint most_bounces;
     float scale;          // of stored fluxes
-    uint first;           // of the records that a linear query goes through
-    uint last;
     uint neighbors;       // of NEAREST
     float radius;         // within which they are looked for
+    uint first_place;     // of LINEAR
+    uint first;           // of the records that a linear query goes through
+    uint last;
 } push;
 
 // Where all photons are scattered alike, up to their kernels.
@@ -98,7 +101,7 @@ bool compact_visit_point(uint record) {
     }
     if (COUNTS_BOUNCES) {
         uint bounces = photon_bounce(q1) + 1u + gather.bounce;
-        weight = bounces < push.least_bounces || bounces > push.most_bounces ? 0.0 : weight;
+        weight = bounces < push.least_bounces || bounces > push.ask.most_bounces ? 0.0 : weight;
     }
     if (NEAREST && nearest_counts) {
         if (weight > 0.0) {
@@ -124,19 +127,33 @@ bool compact_visit_point(uint record) {
     return !photon_ends_leaf(q0);
 }
 
+// Searches between two squared distances of the point, `radius` away at most.
+void search_nearest(vec2 span, float radius) {
+    nearest_span = span;
+    nearest_squared = span.y;
+    float slack = NEAREST_SLACK * largest_component(abs(gather.position));
+    nearest_inset = max(radius - sqrt(span.y) - slack, 0.0);
+}
+
 // Finds the squared distance of the point's last neighbour among those within `radius`, or that of the radius where there are fewer; false when
-// a quota stops it.
+// a quota stops it even in the least radius. Where a quota stops it in a larger one, neighbours in the next may be fewer than asked for.
 bool find_nearest(float radius) {
     nearest_counts = true;
-    nearest_span = vec2(0.0, radius * radius);
-    nearest_squared = nearest_span.y;
     nearest_all = false;
-    for (uint round = 0u; round < NEAREST_ROUNDS && nearest_span.y - nearest_span.x > NEAREST_PRECISION * nearest_span.x; ++round) {
+    search_nearest(vec2(0.0, radius * radius), radius);
+    uint halvings = 0u;
+    for (uint round = 0u; round < NEAREST_ROUNDS + halvings && nearest_span.y - nearest_span.x > NEAREST_PRECISION * nearest_span.x; ++round) {
         for (uint i = 0u; i < NEAREST_BINS; ++i) {
             nearest_bins[i] = 0u;
         }
         if (!compact_point_query(push.root, gather.position)) {
-            return false;
+            if (halvings == NEAREST_HALVINGS) {
+                return false;
+            }
+            ++halvings;
+            nearest_all = false;
+            search_nearest(vec2(0.0, 0.5 * nearest_span.y), radius);
+            continue;
         }
         uint bin = 0u;
         uint found = nearest_bins[0];
@@ -148,8 +165,7 @@ bool find_nearest(float radius) {
             break;
         }
         nearest_all = true;
-        nearest_span = vec2(nearest_span.x + float(bin) * width, nearest_span.x + float(bin + 1u) * width);
-        nearest_squared = nearest_span.y;
+        search_nearest(vec2(nearest_span.x + float(bin) * width, nearest_span.x + float(bin + 1u) * width), radius);
     }
     nearest_counts = false;
     return true;
@@ -159,40 +175,20 @@ bool find_nearest(float radius) {
 bool begin_gather(uint slot, uint place, out vec3 throughput) {
     PathState path = load_path(slot);
     throughput = path.throughput;
-    uint state = HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u;
-    gather.bounce = HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce;
-    Hit hit = load_hit(place);
-    if ((push.gather_states >> state & 1u) == 0u || hit.triangle == NO_HIT) {
+    Arrival a;
+    if (!asks_map(push.ask, path, place, a)) {
         return false;
     }
-    if (COUNTS_BOUNCES && gather.bounce + 1u > push.most_bounces) {
-        return false;
-    }
-    Surface s = surface_at(hit, push.scene_lower, push.scene_upper);
-    SceneMaterial m = load_material(s.material);
-    vec3 wo = -path.direction;
-    bool front = dot(wo, s.geometric_normal) > 0.0;
-    bool solid = HAS_TRANSMISSION && m.transmission > 0.0 && m.thickness > 0.0;
-    gather.bsdf = surface_bsdf(m, s);
-    if ((HAS_UNLIT && (m.flags & MATERIAL_UNLIT) != 0u) || !bsdf_has_diffuse_base(gather.bsdf, solid && !front)) {
-        return false;
-    }
+    gather.bounce = asking_bounce(path);
     if (HAS_ABSORPTION) {
-        uint interior = path_gathered[slot].interior;
-        interior = interior == OUTSIDE && solid && !front ? s.material : interior;
-        if (interior != OUTSIDE) {
-            throughput *= exp(-load_material(interior).absorption * hit.t);
-        }
+        throughput = absorbed(throughput, arrival_interior(a, path_gathered[slot].interior), a.distance);
     }
-    gather.position = s.point.position;
-    gather.facing = front ? s.geometric_normal : -s.geometric_normal;
-    vec3 normal = gather.facing;
-    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
-        normal = adapt_shading_normal(surface_mapped_normal(m, s), gather.facing, wo);
-    }
-    gather.z = normal;
-    gather.lobes = cosine_lobes(gather.bsdf, max(dot(wo, normal), 0.0), false, LOBE_DIFFUSE);
-    gather.caustics = (push.caustic_states >> state & 1u) != 0u;
+    gather.bsdf = a.bsdf;
+    gather.position = a.surface.point.position;
+    gather.facing = a.facing;
+    gather.z = arrival_normal(a);
+    gather.lobes = cosine_lobes(gather.bsdf, max(dot(a.wo, gather.z), 0.0), false, LOBE_DIFFUSE);
+    gather.caustics = (push.caustic_states >> asking_state(path) & 1u) != 0u;
     return true;
 }
 
@@ -213,11 +209,11 @@ bool gather_photons() {
 }
 
 void main() {
-    uint place = gl_GlobalInvocationID.x;
-    if (status.stalled == STALLED_EXTEND || status.stalled == STALLED_SHADOW || place >= status.active_count) {
-        return;
+    uint place = gl_GlobalInvocationID.x + (LINEAR ? push.first_place : 0u);
+    if (QUEUE != QUEUE_SLOTS) {
+        place = queued_place(QUEUE, place);
     }
-    if (LINEAR && path_resume[place] != GATHER_STOPPED) {
+    if (!wave_has_arrived() || place >= status.active_count || (LINEAR && path_resume[place] != GATHER_STOPPED)) {
         return;
     }
     uint slot = load_slot(place);

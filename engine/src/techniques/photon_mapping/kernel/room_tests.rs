@@ -57,6 +57,7 @@ fn room_settings(shape: KernelShape) -> KernelSettings {
         length_min: 1e-3,
         length_max: 1.0,
         flatness: 1.0 / 20.0,
+        widens_flat: false,
     }
 }
 

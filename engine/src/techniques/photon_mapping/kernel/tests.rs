@@ -17,6 +17,7 @@ const SETTINGS: KernelSettings = KernelSettings {
     length_min: 1e-3,
     length_max: 1e3,
     flatness: 0.05,
+    widens_flat: false,
 };
 
 fn footprint(z1: DVec3, z2: DVec3) -> Differentials {
@@ -278,6 +279,40 @@ fn flat_and_empty_footprints_have_no_kernel_and_long_ones_are_clamped() {
     // The Jacobian follows the clamped axes.
     let b = DVec3::new(0.01, 0.02, 0.0).normalize() * 0.1;
     assert!((kernel_area(&k) - (2.0 * DVec3::X).cross(b).length()).abs() < 1e-12);
+}
+
+#[test]
+fn flat_footprints_are_widened_where_asked_for() {
+    let widening = KernelSettings {
+        length_min: 1e-6,
+        widens_flat: true,
+        ..SETTINGS
+    };
+    let kernel = |a: DVec3, b: DVec3, s: &KernelSettings| photon_kernel(s, &footprint(a, b), DVec3::Z).unwrap();
+    // Nothing changes above the limit, and below it nothing but the width across the ellipse's longer axis.
+    let b = DVec3::new(0.3, 0.051, 0.0);
+    assert_eq!(kernel(DVec3::X, b, &widening), kernel(DVec3::X, b, &SETTINGS));
+    for b in [0.049 * DVec3::Y, DVec3::X * 0.9 + 0.049 * DVec3::Y, DVec3::ZERO] {
+        let k = kernel(DVec3::X, b, &widening);
+        let longer = principal_axes(DVec3::X, b)[0];
+        assert!((k.along - longer).length() < 1e-15, "{k:?}");
+        let area = 0.05 * longer.length_squared();
+        assert!((kernel_area(&k) - area).abs() < 1e-15, "{k:?}");
+        let disk = KernelSettings {
+            shape: KernelShape::Isotropic,
+            ..widening
+        };
+        assert!((kernel_area(&kernel(DVec3::X, b, &disk)) - area).abs() < 1e-12);
+    }
+    let point = kernel(DVec3::ZERO, DVec3::ZERO, &widening);
+    assert!((kernel_area(&point) - 1e-12).abs() < 1e-24, "{point:?}");
+    // Without a limit there is one nevertheless.
+    let unlimited = KernelSettings {
+        flatness: 0.0,
+        ..widening
+    };
+    let k = kernel(DVec3::X, 1e-300 * DVec3::X, &unlimited);
+    assert_eq!(kernel_area(&k), WIDENED_FLATNESS_MIN);
 }
 
 #[test]

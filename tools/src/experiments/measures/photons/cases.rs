@@ -163,6 +163,7 @@ pub fn settings(photons: u32, spread: f32, smoke: bool) -> Result<PhotonSettings
         profile: KernelProfile::Uniform,
         radius: LENGTH,
         unit_length: LENGTH,
+        widen_flat: false,
         spread: spread / (share as f32).sqrt(),
         ..PhotonSettings::default()
     })

@@ -2,4 +2,6 @@
 
 mod cases;
 pub mod photon_frame;
+pub mod photon_peers;
+pub mod photon_queues;
 pub mod photon_statistics;

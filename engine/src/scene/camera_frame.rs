@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::scene::{Camera, Projection};
+use super::{Camera, Projection};
 use crate::{Error, Result};
 
 /// An orthonormal frame with what maps pixels, lens and distance.

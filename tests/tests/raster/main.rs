@@ -1,4 +1,10 @@
-//! Rendering: exact coverage, depth, kept contents, refused mistakes, and barriers of what vertex and fragment shaders read.
+//! Rendering: exact coverage, depth, kept contents, refused mistakes, and barriers of what vertex and fragment shaders read. The rest of the
+//! raster floor has files of its own.
+
+mod directions;
+mod gbuffer;
+mod layers;
+mod oracle;
 
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::{
@@ -87,14 +93,15 @@ impl Scene {
 
     fn draw(&self, pass: &mut clerestory::gpu::Pass<'_>, clear: bool, quads: &[quad_vert::Push]) -> Result<()> {
         let targets = Targets {
-            colors: &[ColorTarget {
+            colors: &[Some(ColorTarget {
                 image: &self.color,
-                clear: clear.then_some([0.0, 0.0, 1.0, 1.0]),
-            }],
+                clear: clear.then_some([0.0, 0.0, 1.0, 1.0].into()),
+            })],
             depth: Some(DepthTarget {
                 image: &self.depth,
                 clear: clear.then_some(1.0),
             }),
+            ..Targets::default()
         };
         let set = quad_frag::Set0 {
             palette: self.palette.view(),
@@ -234,10 +241,10 @@ fn mistakes_are_refused() {
             [4, 4],
             vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
         );
-        let color = [ColorTarget {
+        let color = [Some(ColorTarget {
             image: &scene.color,
-            clear: Some([0.0; 4]),
-        }];
+            clear: Some([0.0; 4].into()),
+        })];
         let depth = |image| {
             Some(DepthTarget {
                 image,
@@ -251,6 +258,7 @@ fn mistakes_are_refused() {
                 let targets = Targets {
                     colors: &color,
                     depth: depth(&scene.depth),
+                    ..Targets::default()
                 };
                 let push = quad([0, 1], [0, 1], 0.0, 0);
                 let result = pass.render(&targets, |render| render.draw(&other, &[&set], &push, 4, 1));

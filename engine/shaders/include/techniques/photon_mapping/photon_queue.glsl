@@ -1,0 +1,42 @@
+// The queue of eye paths that ask the photon map (descriptor set 3), of one of three types.
+//
+// QUEUE_SLOTS: an invocation a place of the wave; those that ask nothing idle. QUEUE_COMPACTED: flags by place and a stable compaction.
+// QUEUE_BLOCKS: subgroups collect places in shared memory and append whole blocks, as wide as they are, to a list. A block number is all that
+// a consumer needs, so that consumers take the blocks of their own numbers instead of drawing tickets.
+//
+// PM-ST-2 to PM-ST-4: "Interactive Manycore Photon Mapping", 2011, §7.4.1. The order of blocks may differ from run to run, what is in a block
+// does not; each place's sum is its own.
+#ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_QUEUE_GLSL
+#define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_QUEUE_GLSL
+
+// descriptor set 3: GatherQueue
+
+const uint QUEUE_SLOTS = 0u;
+const uint QUEUE_COMPACTED = 1u;
+const uint QUEUE_BLOCKS = 2u;
+// Subgroups' worth of places that a subgroup collects before it appends them.
+const uint QUEUE_BUFFER_BLOCKS = 7u;
+
+const uint NO_PLACE = 0xFFFFFFFFu;
+
+layout(set = 3, binding = 0, scalar) restrict buffer GatherQueueHead {
+    uint groups[3];   // indirect arguments of queries
+    uint count;       // places, or blocks of them
+    uint block_size;  // places of a block that is full
+} gather_head;
+layout(set = 3, binding = 1, scalar) restrict buffer GatherPlaces { uint gather_places[]; };
+layout(set = 3, binding = 2, scalar) restrict buffer GatherFlags { uint gather_flags[]; };    // by place: whether it asks
+layout(set = 3, binding = 3, scalar) restrict buffer GatherBlocks { uint gather_blocks[]; };  // places of each block
+layout(set = 3, binding = 4, scalar) restrict buffer GatherFlagCount { uint gather_flag_count[]; };  // one word: places with a flag, 0 or 1
+
+// The place of an invocation's query, or NO_PLACE.
+uint queued_place(uint queue, uint index) {
+    if (queue == QUEUE_COMPACTED) {
+        return index < gather_head.count ? gather_places[index] : NO_PLACE;
+    }
+    uint size = gather_head.block_size;
+    uint block = index / size;
+    return block < gather_head.count && index % size < gather_blocks[block] ? gather_places[index] : NO_PLACE;
+}
+
+#endif

@@ -1,0 +1,191 @@
+//! Rows of the document on visibility and media about maps of directions (`DP-`, `OEM-`).
+
+use super::super::{Row, measured, part};
+
+const DENSITY: &str = "clerestory report map-density";
+const DENSITY_AND_ERROR: &str = "clerestory report map-density map-error";
+
+pub(super) const ROWS: &[Row] = &[
+    measured(
+        DENSITY_AND_ERROR,
+        part(
+            "DP-1",
+            "latitude–longitude map; environments take it with y up, as glTF",
+            "Blinn and Newell 1976",
+            "engine/src/maps/lat_long.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/solid_angles.rs::midpoint_sums_are_off_as_stated",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+                "engine/src/transport/environment.rs::directions_and_coordinates_agree",
+            ],
+        ),
+    ),
+    measured(
+        DENSITY_AND_ERROR,
+        part(
+            "DP-2",
+            "sphere map (mirror ball)",
+            "Miller and Hoffman 1984",
+            "engine/src/maps/sphere_map.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/printed.rs::the_printed_sphere_map_is_that_of_the_negated_direction",
+                "engine/src/maps/tests/density.rs::anisotropies_are_those_of_the_table",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        DENSITY_AND_ERROR,
+        part(
+            "DP-3",
+            "cube map",
+            "Greene 1986",
+            "engine/src/maps/cube.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/places.rs::the_poles_and_axes_are_where_they_belong",
+                "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        DENSITY_AND_ERROR,
+        part(
+            "DP-4",
+            "dual paraboloid map",
+            "Heidrich and Seidel 1998",
+            "engine/src/maps/paraboloid.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/solid_angles.rs::rectangles_have_the_integral_of_the_density",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        DENSITY,
+        part(
+            "DP-5",
+            "Nusselt's map of the hemisphere",
+            "Nusselt 1928",
+            "engine/src/maps/nusselt.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/solid_angles.rs::rectangles_have_the_integral_of_the_density",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        DENSITY_AND_ERROR,
+        part(
+            "OEM-1",
+            "octahedron map, square layout",
+            "Praun and Hoppe 2003; Engelhardt and Dachsbacher 2008",
+            "engine/src/maps/octahedron.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/printed.rs::a_sign_of_zero_that_is_zero_folds_the_map_onto_itself",
+                "engine/src/maps/tests/printed.rs::matrices_of_octants_are_the_map",
+                "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+                "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
+                "engine/src/maps/tests/levels.rs::the_mirrored_direction_repairs_the_lower_seams",
+                "engine/src/maps/tests/irradiance.rs::constant_radiance_gives_pi_for_every_normal",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        DENSITY_AND_ERROR,
+        part(
+            "OEM-2",
+            "octahedron map, rectangular layout",
+            "Engelhardt and Dachsbacher 2008",
+            "engine/src/maps/octahedron.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/printed.rs::a_second_half_that_is_not_mirrored_tears_the_rectangle",
+                "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+                "engine/src/maps/tests/levels.rs::the_octants_own_map_has_no_seams",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        DENSITY_AND_ERROR,
+        part(
+            "OEM-3",
+            "octahedron maps by other central projections",
+            "Engelhardt 2013, 7.1.2",
+            "engine/src/maps/octahedron.rs",
+            &[
+                "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+                "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+                "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+                "engine/src/maps/tests/density.rs::the_perspective_family_is_best_at_one",
+                "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+                "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report map-levels map-borders",
+        part(
+            "OEM-5",
+            "look-ups in octahedron maps: unfiltered, repaired levels of detail, borders at each level",
+            "Engelhardt and Dachsbacher 2008; Engelhardt 2013, 7.2.2",
+            "engine/src/maps/directional_map.rs",
+            &[
+                "tests/tests/directional_maps.rs::borders_are_texels_of_the_inside",
+                "tests/tests/directional_maps.rs::levels_keep_the_integral",
+                "tests/tests/directional_maps.rs::look_ups_are_seamless",
+                "tests/tests/directional_maps.rs::seams_hold_no_energy",
+                "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+                "engine/src/maps/tests/levels.rs::the_mirrored_direction_repairs_the_lower_seams",
+                "engine/src/maps/tests/levels.rs::the_octants_own_map_has_no_seams",
+                "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+                "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
+                "engine/src/maps/tests/glossy.rs::levels_keep_the_integral",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report map-glossiness",
+        part(
+            "OEM-6",
+            "spherical summed-area table: means over boxes for continuous glossiness",
+            "Crow 1984; Engelhardt and Dachsbacher 2008",
+            "engine/src/maps/spherical_sat.rs",
+            &[
+                "tests/tests/directional_maps.rs::tables_hold_means_of_boxes_under_a_sun",
+                "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+                "engine/src/maps/tests/glossy.rs::tables_hold_the_means_of_boxes",
+                "engine/src/maps/tests/glossy.rs::boxes_have_no_seams",
+            ],
+        ),
+    ),
+];

@@ -1,0 +1,42 @@
+//! The latitude–longitude map: azimuth about z against polar angle.
+//!
+//! Source: J. Blinn and M. Newell, "Texture and Reflection in Computer Generated Images", CACM 19(10), 1976. The polar angle is an arc tangent of two
+//! arguments, which keeps its precision at the poles; the periodic seam is in longitude. Twin of `maps/lat_long.glsl`.
+
+use super::turn::{turn_vector, vector_turn};
+use glam::{DVec2, DVec3};
+use std::f64::consts::{PI, TAU};
+
+/// Coordinates in \[0, 1\]² of a direction of any length; the first is 0 at the poles.
+pub fn lat_long_encode(d: DVec3) -> DVec2 {
+    let turn = vector_turn(DVec2::new(d.x, d.y));
+    let u = if turn < 0.0 { turn + 1.0 } else { turn };
+    DVec2::new(u, 2.0 * vector_turn(DVec2::new(d.z, d.x.hypot(d.y))))
+}
+
+/// The unit direction.
+pub fn lat_long_decode(uv: DVec2) -> DVec3 {
+    let down = turn_vector(0.5 * uv.y);
+    (turn_vector(uv.x) * down.y).extend(down.x)
+}
+
+/// Solid angle over the area of coordinates, sr.
+pub fn lat_long_density(uv: DVec2) -> f64 {
+    2.0 * PI * PI * (PI * uv.y).sin()
+}
+
+/// Derivatives of the direction by the two coordinates.
+pub(super) fn derivatives(uv: DVec2) -> [DVec3; 2] {
+    let (sin_phi, cos_phi) = (TAU * uv.x).sin_cos();
+    let (sin, cos) = (PI * uv.y).sin_cos();
+    [
+        TAU * sin * DVec3::new(-sin_phi, cos_phi, 0.0),
+        PI * DVec3::new(cos_phi * cos, sin_phi * cos, -sin),
+    ]
+}
+
+/// Solid angle of a rectangle, exact: cos a − cos b as a product, which keeps its precision at the poles.
+pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
+    let (middle, half) = (0.5 * PI * (lower.y + upper.y), 0.5 * PI * (upper.y - lower.y));
+    TAU * (upper.x - lower.x) * 2.0 * middle.sin() * half.sin()
+}

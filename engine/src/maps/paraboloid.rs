@@ -1,0 +1,41 @@
+//! The dual paraboloid map: two discs, front (z ≥ 0) and back.
+//!
+//! Source: W. Heidrich and H.-P. Seidel, "View-Independent Environment Maps", Graphics Hardware 1998. The paraboloid's reflections make
+//! it the stereographic projection, which keeps angles. The back divides by 1 − z, as the front by 1 + z. Twin of `maps/paraboloid.glsl`.
+
+use super::disc;
+use glam::{DVec2, DVec3};
+
+/// Layer, 1 for z < 0, and coordinates on the unit disc of a unit direction.
+pub fn paraboloid_encode(d: DVec3) -> (u32, DVec2) {
+    (u32::from(d.z < 0.0), DVec2::new(d.x, d.y) / (1.0 + d.z.abs()))
+}
+
+/// The unit direction; beyond the rim it goes on into the other half.
+pub fn paraboloid_decode(layer: u32, uv: DVec2) -> DVec3 {
+    let squared = uv.length_squared();
+    let z = if layer == 0 { 1.0 - squared } else { squared - 1.0 };
+    (2.0 * uv).extend(z) / (1.0 + squared)
+}
+
+/// Solid angle over area of the disc, sr.
+pub fn paraboloid_density(uv: DVec2) -> f64 {
+    let h = 1.0 + uv.length_squared();
+    4.0 / (h * h)
+}
+
+/// Derivatives of the direction by the two coordinates.
+pub(super) fn derivatives(layer: u32, uv: DVec2) -> [DVec3; 2] {
+    let h = 1.0 + uv.length_squared();
+    let d = paraboloid_decode(layer, uv);
+    let side = if layer == 0 { -1.0 } else { 1.0 };
+    [DVec2::X, DVec2::Y].map(|axis| {
+        let along = 2.0 * uv.dot(axis);
+        ((2.0 * axis).extend(side * along) - d * along) / h
+    })
+}
+
+/// Solid angle of the part of a rectangle within the disc, exact.
+pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
+    disc::integrate(disc::stereographic, lower, upper)
+}

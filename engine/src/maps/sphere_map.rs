@@ -1,0 +1,46 @@
+//! The sphere map: what a mirror ball shows a distant orthographic camera that looks along −z.
+//!
+//! Source: G. Miller and C. Hoffman, "Illumination and Reflection Maps", SIGGRAPH course notes, 1984. With the ball's normal n and the
+//! view (0, 0, −1), ω = 2 n_z n − (0, 0, 1), so ω_z = 2n_z² − 1. It is Lambert's azimuthal map: every texel has the same solid angle and
+//! only its shape degrades, without bound at the rim, which is (0, 0, −1) all round. Twin of `maps/sphere_map.glsl`.
+
+use super::disc;
+use glam::{DVec2, DVec3};
+
+/// Coordinates on the unit disc of a unit direction; (1, 0) for (0, 0, −1).
+pub fn sphere_map_encode(d: DVec3) -> DVec2 {
+    let across = DVec2::new(d.x, d.y);
+    if d.z >= 0.0 {
+        return across / (2.0 * (1.0 + d.z)).sqrt();
+    }
+    // Behind, 1 + z = (x² + y²)/(1 − z), which does not cancel.
+    let length = across.length();
+    let along = if length > 0.0 { across / length } else { DVec2::X };
+    along * (0.5 * (1.0 - d.z)).sqrt()
+}
+
+/// The unit direction; outside of the disc as at its rim.
+pub fn sphere_map_decode(uv: DVec2) -> DVec3 {
+    let z = (1.0 - uv.length_squared()).max(0.0).sqrt();
+    DVec3::new(2.0 * z * uv.x, 2.0 * z * uv.y, 2.0 * z * z - 1.0)
+}
+
+/// Solid angle over area of the disc, sr: the same everywhere.
+pub fn sphere_map_density(_uv: DVec2) -> f64 {
+    4.0
+}
+
+/// Derivatives of the direction by the two coordinates.
+pub(super) fn derivatives(uv: DVec2) -> [DVec3; 2] {
+    let z = (1.0 - uv.length_squared()).max(0.0).sqrt();
+    let n = uv.extend(z);
+    [DVec2::X, DVec2::Y].map(|axis| {
+        let along = -uv.dot(axis) / z;
+        2.0 * (along * n + z * axis.extend(along))
+    })
+}
+
+/// Solid angle of the part of a rectangle within the disc, exact.
+pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
+    sphere_map_density(lower) * disc::area(lower, upper)
+}

@@ -1,0 +1,24 @@
+//! Floor 3: rasterization. Surfaces of a scene seen from a camera or, in all directions, from a point, by what is asked for of each pixel.
+//!
+//! A [`GBuffer`] draws the triangles of [`Surfaces`], pulled from the buffers that rays use, in one [`View`] or in several at once
+//! ([`Layering`]): six faces of a cube in six passes, by views or by layers, or the eight octants of an octahedron side by side. Sources:
+//! T. Saito and T. Takahashi, "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); T. Engelhardt, "Efficient Visibility for
+//! Realistic Rendering", 2013, §2.1 (both forms of visibility) and §7.2 (octahedra rendered live).
+//!
+//! Guarantee: what is seen at a pixel is what the ray through its centre meets, but where that centre lies within the rounding of vertices
+//! from an edge of a triangle, or where triangles are equally far within the rounding of depths; distances and weights are the ray caster's
+//! own. Deterministic, and equal bits in every way to several layers.
+
+mod gbuffer;
+mod octahedron;
+mod output;
+mod pipelines;
+mod surfaces;
+mod view;
+
+pub use gbuffer::{GBuffer, GBufferDesc};
+pub use octahedron::OCTANTS;
+pub use output::Output;
+pub use pipelines::Layering;
+pub use surfaces::{ObjectTriangles, SurfaceFeatures, Surfaces};
+pub use view::View;

@@ -1,0 +1,155 @@
+//! Views: how points come to pixels, and the ray that goes through a pixel.
+//!
+//! A view is a linear map of points from its origin to clip space, and its inverse. Depth is stored reversed, near plane over distance, from 1 at
+//! the near plane to 0 at infinity: a float has as many digits near 0 as near 1, so that the step of the stored distance z is 2⁻²⁴ z
+//! anywhere, where the ordinary way, 1 − n/z, has one of 2⁻²⁴ z²/n (N. Reed, "Depth Precision Visualized", 2015). There is no far plane.
+//! Parallel views cannot have that: there depth falls linearly from 1 at the origin to 0 behind the scene. Twin of
+//! `raster/bindings.glsl`.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::Surfaces;
+use crate::accel::Ray;
+use crate::gpu::Area;
+use crate::gpu::shaders::types::RasterView;
+use crate::maps::cube::{CUBE_FACES, cube_axes};
+use crate::scene::Camera;
+use crate::scene::camera_frame::CameraFrame;
+use crate::{Error, Result};
+
+/// The near plane's share of the scene's reach. Clipping there moves what it cuts by 2⁻²⁴ / 2⁻¹⁴ of half the picture at most.
+const NEAR: f32 = 1.0 / 16_384.0;
+
+/// How points come to the pixels of an area.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    pub(super) record: RasterView,
+}
+
+impl View {
+    /// What a camera sees of surfaces, as a pinhole: a lens is left out.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a camera that cannot be used.
+    pub fn of_camera(camera: &Camera, surfaces: &Surfaces<'_>, area: Area) -> Result<Self> {
+        let frame = CameraFrame::new(camera, area.size)?;
+        let axis = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let forward = axis(frame.forward);
+        let rows = [
+            axis(frame.right) / f64::from(frame.half_width),
+            -axis(frame.up) / f64::from(frame.half_height),
+            forward,
+        ];
+        let origin = Vec3::from_array(frame.origin);
+        let reach = surfaces.reach(origin);
+        if !frame.orthographic {
+            return Self::central(origin, rows, reach * NEAR, area);
+        }
+        let mut view = Self::central(origin, rows, 0.0, area)?;
+        // Behind all of the scene, if there is any.
+        let far = f64::from(if reach > 0.0 { 2.0 * reach } else { 1.0 });
+        let record = &mut view.record;
+        record.z = (-forward / far).as_vec3().extend(1.0).to_array();
+        record.w = [0.0, 0.0, 0.0, 1.0];
+        record.parallel = 1;
+        Ok(view)
+    }
+
+    /// What is seen from a point through a face of a cube map ([`crate::maps::cube`]).
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a face that does not exist, or a place or near plane that is not finite.
+    pub fn of_cube_face(origin: Vec3, face: u32, near: f32, area: Area) -> Result<Self> {
+        if face >= CUBE_FACES {
+            return Err(Error::setting("cube face", face, "is not below 6"));
+        }
+        Self::central(origin, cube_axes(face), near, area)
+    }
+
+    /// The near plane that [`View::of_camera`] takes from here: 2⁻¹⁴ of the distance to the farthest surface, metres.
+    pub fn near_plane(origin: Vec3, surfaces: &Surfaces<'_>) -> f32 {
+        surfaces.reach(origin) * NEAR
+    }
+
+    /// The central projection whose clip coordinates x, y and w are these rows times the point from the origin.
+    pub(super) fn central(origin: Vec3, [x, y, w]: [DVec3; 3], near: f32, area: Area) -> Result<Self> {
+        if !(origin.is_finite() && near.is_finite() && near >= 0.0) {
+            return Err(Error::setting(
+                "view",
+                origin,
+                "has a place or a near plane that is not finite",
+            ));
+        }
+        // The inverse of what is stored, not of what was meant.
+        let rounded = [x, y, w].map(|row| row.as_vec3().as_dvec3());
+        let rows = DMat3::from_cols(rounded[0], rounded[1], rounded[2]).transpose();
+        if rows.determinant() == 0.0 {
+            return Err(Error::setting("view", origin, "sees a line"));
+        }
+        let inverse = rows.inverse();
+        let row = |row: DVec3, constant: f32| row.as_vec3().extend(constant).to_array();
+        let column = |column: DVec3| column.as_vec3().to_array();
+        let scale = |axis: usize| 2.0 / f64::from(area.size[axis]);
+        let offset = |axis: usize| (-1.0 - scale(axis) * f64::from(area.offset[axis])) as f32;
+        Ok(Self {
+            record: RasterView {
+                x: row(x, 0.0),
+                y: row(y, 0.0),
+                // Where depths would be 0 at all distances, nothing hides anything.
+                z: [0.0, 0.0, 0.0, near.max(f32::MIN_POSITIVE)],
+                w: row(w, 0.0),
+                origin: origin.to_array(),
+                parallel: 0,
+                right: column(inverse.x_axis),
+                scale_x: scale(0) as f32,
+                down: column(inverse.y_axis),
+                scale_y: scale(1) as f32,
+                forward: column(inverse.z_axis),
+                offset_x: offset(0),
+                signs: [0.0; 3],
+                offset_y: offset(1),
+            },
+        })
+    }
+
+    /// The ray through a place of the target, in pixels: half numbers are centres of pixels. Its parameter is the clip coordinate w of what it
+    /// meets (of parallel views, the distance), and it begins at the near plane. The same bits as the fragment shader's.
+    pub fn ray(&self, x: f32, y: f32) -> Ray {
+        let r = &self.record;
+        let vector = Vec3::from_array;
+        let place = [r.scale_x * x + r.offset_x, r.scale_y * y + r.offset_y];
+        let across = place[0] * vector(r.right) + place[1] * vector(r.down);
+        let (origin, forward) = (vector(r.origin), vector(r.forward));
+        let (origin, direction, t_min) = if r.parallel != 0 {
+            (origin + across, forward, 0.0)
+        } else {
+            (origin, forward + across, r.z[3])
+        };
+        Ray {
+            origin: origin.to_array(),
+            t_min,
+            direction: direction.to_array(),
+            t_max: f32::INFINITY,
+        }
+    }
+
+    /// Where rays begin, metres; of parallel views, the middle of where they do.
+    pub fn origin(&self) -> Vec3 {
+        Vec3::from_array(self.record.origin)
+    }
+
+    /// The signs of the octant that it shows; zeros for other views.
+    pub fn octant(&self) -> Vec3 {
+        Vec3::from_array(self.record.signs)
+    }
+
+    /// Clip coordinates x, y, z and w of a point, metres, without rounding what the device rounds.
+    pub fn project(&self, point: DVec3) -> [f64; 4] {
+        let r = &self.record;
+        let from = point - Vec3::from_array(r.origin).as_dvec3();
+        [r.x, r.y, r.z, r.w].map(|row| {
+            let [x, y, z, constant] = row.map(f64::from);
+            DVec3::new(x, y, z).dot(from) + constant
+        })
+    }
+}

@@ -1,0 +1,235 @@
+//! Queues of the eye paths that ask the photon map: which places of a wave a query's invocations are for.
+//!
+//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1. Each place's sum is its own, so that the
+//! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
+
+use super::settings::MapQueue;
+use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP, QUEUE_BLOCKS, QUEUE_COMPACTED, QUEUE_SLOTS};
+use crate::gpu::shaders::sets::{GatherQueue, PathBuffers};
+use crate::gpu::shaders::techniques::photon_mapping::{photon_queue_blocks, photon_queue_flags};
+use crate::gpu::shaders::types::AskSettings;
+use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::kernels::{Count, IndirectCount, Partition, PartitionBuffers, PartitionOptions};
+use crate::transport::GpuScene;
+use crate::transport::path_tracer::Places;
+use crate::transport::path_tracer::pipelines::surface_spec;
+use crate::transport::path_tracer::stages::stage_barrier;
+use crate::{Error, Result};
+
+/// Places that a workgroup of the queue in blocks walks.
+const PLACES_PER_GROUP: u32 = COMPACT_CHUNK * PATH_GROUP;
+
+type Head = photon_queue_blocks::GatherQueueHead;
+
+/// What the decision whether a place asks is specialized to, beside the scene.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AskSpec {
+    pub has_path_automaton: bool,
+    pub counts_bounces: bool,
+}
+
+/// A queue with its memory.
+pub(super) enum Queue {
+    /// The places themselves.
+    Slots,
+    Compacted(Box<Compacted>),
+    Blocks(Box<Blocks>),
+}
+
+/// Flags by place, and their compaction.
+pub(super) struct Compacted {
+    flag: ComputePipeline<photon_queue_flags::Kernel>,
+    partition: Partition,
+    arguments: IndirectCount,
+    slots: u32,
+    head: Buffer,
+    places: Buffer,
+    flags: Buffer,
+    flag_count: Buffer,
+    /// Places that ask: one word.
+    asking: Buffer,
+    scratch: Buffer,
+}
+
+/// Blocks of places, appended by subgroups.
+pub(super) struct Blocks {
+    append: ComputePipeline<photon_queue_blocks::Kernel>,
+    head: Buffer,
+    places: Buffer,
+    blocks: Buffer,
+}
+
+impl Queue {
+    /// A queue for waves of up to `slots` paths.
+    ///
+    /// # Errors
+    /// [`Error::MissingFeature`] for blocks on a device without full subgroups or ballots, [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, scene: &GpuScene, queue: MapQueue, spec: AskSpec, slots: u32) -> Result<Self> {
+        let words = |name: &str, words: u32| {
+            let bytes = u64::from(words) * size_of::<u32>() as u64;
+            gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work))
+        };
+        let AskSpec {
+            has_path_automaton,
+            counts_bounces,
+        } = spec;
+        match queue {
+            MapQueue::Slots => Ok(Self::Slots),
+            MapQueue::Compacted => {
+                let partition = PartitionOptions {
+                    numbers: true,
+                    ..PartitionOptions::default()
+                };
+                let partition = Partition::new(gpu, partition)?;
+                let scratch = BufferDesc::storage("gather scratch", partition.scratch_bytes(slots), Category::Work);
+                let head = BufferDesc::storage("gather queue", IndirectCount::BYTES, Category::Work);
+                let flag = surface_spec!(photon_queue_flags, scene, {
+                    has_path_automaton,
+                    counts_bounces,
+                    ..Default::default()
+                });
+                Ok(Self::Compacted(Box::new(Compacted {
+                    flag: gpu.compute_pipeline(&flag)?,
+                    arguments: IndirectCount::new(gpu)?,
+                    slots,
+                    head: gpu.buffer(&head)?,
+                    places: words("gather places", slots)?,
+                    flags: words("gather flags", slots)?,
+                    flag_count: words("gather flag count", 1)?,
+                    asking: words("gather count", 1)?,
+                    scratch: gpu.buffer(&scratch)?,
+                    partition,
+                })))
+            }
+            MapQueue::Blocks => {
+                let caps = gpu.caps();
+                let divides = caps.subgroup_size > 0 && PATH_GROUP.is_multiple_of(caps.subgroup_size);
+                if !(caps.subgroup.basic && caps.subgroup.ballot && caps.full_subgroups && divides) {
+                    return Err(Error::MissingFeature {
+                        feature: "VK_SUBGROUP_FEATURE_BALLOT_BIT in full subgroups (computeFullSubgroups) of at most 64 lanes".into(),
+                        needed_by: "photon_queue_blocks".into(),
+                        device: caps.device.clone(),
+                        instead: "queue points without subgroups: \"queue\": \"slots\" or \"compacted\"".into(),
+                    });
+                }
+                let append = surface_spec!(photon_queue_blocks, scene, {
+                    has_path_automaton,
+                    counts_bounces,
+                    ..Default::default()
+                });
+                // Only the last block of a subgroup is partial, and its subgroup had walked a block's places for it.
+                let places = slots.next_multiple_of(PLACES_PER_GROUP);
+                let head = BufferDesc::storage("gather queue", size_of::<Head>() as u64, Category::Work);
+                Ok(Self::Blocks(Box::new(Blocks {
+                    append: gpu.compute_pipeline(&append)?,
+                    head: gpu.buffer(&head)?,
+                    places: words("gather places", places)?,
+                    // However narrow subgroups are.
+                    blocks: words("gather blocks", places)?,
+                })))
+            }
+        }
+    }
+
+    /// How shaders call it.
+    pub fn kind(&self) -> u32 {
+        match self {
+            Self::Slots => QUEUE_SLOTS,
+            Self::Compacted(_) => QUEUE_COMPACTED,
+            Self::Blocks(_) => QUEUE_BLOCKS,
+        }
+    }
+
+    /// The kernels that decide who asks; a compaction's own are any buffer's.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        match self {
+            Self::Slots => Vec::new(),
+            Self::Compacted(queue) => vec![queue.flag.info()],
+            Self::Blocks(queue) => vec![queue.append.info()],
+        }
+    }
+
+    /// What queries read it by; where there is nothing to read, `other` stands there.
+    pub fn set<'a>(&'a self, other: &'a Buffer) -> GatherQueue<'a> {
+        let none = GatherQueue {
+            gather_head: other.view(),
+            gather_places: other.view(),
+            gather_flags: other.view(),
+            gather_blocks: other.view(),
+            gather_flag_count: other.view(),
+        };
+        match self {
+            Self::Slots => none,
+            Self::Compacted(queue) => GatherQueue {
+                gather_head: queue.head.view(),
+                gather_places: queue.places.view(),
+                gather_flags: queue.flags.view(),
+                gather_flag_count: queue.flag_count.view(),
+                ..none
+            },
+            Self::Blocks(queue) => GatherQueue {
+                gather_head: queue.head.view(),
+                gather_places: queue.places.view(),
+                gather_blocks: queue.blocks.view(),
+                ..none
+            },
+        }
+    }
+
+    /// Records what fills it from the places of a wave; where the arguments of its queries' dispatch are.
+    pub fn record<'a>(
+        &'a self,
+        pass: &mut Pass<'_>,
+        scene: &GpuScene,
+        paths: &PathBuffers<'_>,
+        places: Places<'a>,
+        ask: AskSettings,
+        set: &GatherQueue<'_>,
+    ) -> Result<BufferView<'a>> {
+        // What an earlier bounce has left must not be taken for this one's, should nothing have arrived.
+        let reset = |pass: &mut Pass<'_>, head: &Buffer, words: &[u32]| {
+            pass.memory_barrier(Access::COMPUTE | Access::INDIRECT_READ, Access::TRANSFER_WRITE);
+            pass.update(head.view(), words)?;
+            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE | Access::INDIRECT_READ);
+            Ok::<(), Error>(())
+        };
+        let scene = scene.scene_set();
+        match self {
+            Self::Slots => Ok(places.items),
+            Self::Compacted(queue) => {
+                reset(pass, &queue.flag_count, &[0])?;
+                let push = photon_queue_flags::Push { ask };
+                pass.dispatch_indirect(&queue.flag, &[paths, &scene, set], &push, places.items)?;
+                stage_barrier(pass);
+                let buffers = PartitionBuffers {
+                    flags: queue.flags.view(),
+                    input: None,
+                    output: queue.places.view(),
+                    flagged: queue.asking.view(),
+                };
+                let count = Count::Device {
+                    view: queue.flag_count.view(),
+                    capacity: queue.slots,
+                };
+                queue.partition.record(pass, &buffers, count, &queue.scratch)?;
+                stage_barrier(pass);
+                queue
+                    .arguments
+                    .record(pass, queue.asking.view(), queue.slots, PATH_GROUP, &queue.head)?;
+                stage_barrier(pass);
+                Ok(queue.head.slice(0, size_of::<[u32; 3]>() as u64))
+            }
+            Self::Blocks(queue) => {
+                let empty = Head {
+                    groups: [0, 1, 1],
+                    ..Head::default()
+                };
+                reset(pass, &queue.head, bytemuck::cast_slice(&[empty]))?;
+                let push = photon_queue_blocks::Push { ask };
+                pass.dispatch_indirect(&queue.append, &[paths, &scene, set], &push, places.chunks)?;
+                stage_barrier(pass);
+                Ok(queue.head.slice(0, size_of::<[u32; 3]>() as u64))
+            }
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! `clerestory maps`: environment maps from one parametrization to another.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use clerestory::film::{Picture, exr, hdr};
+use clerestory::maps::resample::{MAX_SAMPLES, Reconstruction, ResampleSettings, resample};
+use clerestory::maps::{MapImage, Parametrization};
+use clerestory::{Error, Result};
+use glam::{DVec3, UVec2, Vec3};
+
+use crate::failure::{Failure, Outcome};
+use crate::output::{self, Table};
+use crate::pictures;
+
+/// Converts environment maps between parametrizations, each texel to the mean radiance over its solid angle
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  clerestory maps sky.hdr sky.exr --to octahedron --size 512
+  clerestory maps sky.exr back.hdr --from octahedron --to lat-long
+  clerestory maps sky.hdr faces.exr --to cube --size 256 --border 1
+
+Maps: lat-long, cube, paraboloid, octahedron, octahedron-rectangular, octahedron-c=NUMBER, equal-area, sphere, nusselt (the upper \
+hemisphere alone). Layers lie side by side from left to right: the cube's +x −x +y −y +z −z with the axes of Vulkan's cube images, the \
+paraboloid's upper and lower disc. Latitude–longitude files are those that [environment] in a scene reads: +y is up, −z in the middle, +x to \
+the right of it. All other maps but the cube have the world's up as their pole, and the map's x and y are the world's +x and −z. Texels \
+outside of discs are black.
+
+It prints the integral of radiance over the sphere before and after. They differ by what texels share: 4 samples a side of the finer map's texels \
+are off by less than 1e-3 for most maps, maps of which one refines the other by much less; more --samples bring them closer.")]
+pub struct Arguments {
+    /// The map to read: EXR or Radiance HDR
+    input: PathBuf,
+    /// The map to write: EXR or Radiance HDR, by its ending
+    output: PathBuf,
+    /// Parametrization of the input
+    #[arg(long, value_name = "MAP", default_value = "lat-long", value_parser = map)]
+    from: Parametrization,
+    /// Parametrization of the output
+    #[arg(long, value_name = "MAP", value_parser = map)]
+    to: Parametrization,
+    /// Rows of a layer of the output; maps of two squares are twice as wide. By default as many as give about the input's number of texels
+    #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    size: Option<u32>,
+    /// Texels of border about each layer of the output, repeated from where the map goes on
+    #[arg(long, value_name = "TEXELS", default_value_t = 0)]
+    border: u32,
+    /// Texels of border about each layer of the input
+    #[arg(long, value_name = "TEXELS", default_value_t = 0)]
+    from_border: u32,
+    /// Samples along the side of the finer map's texels
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+    samples: u32,
+    /// What the input is between the centres of its texels
+    #[arg(long, value_enum, default_value_t = Filter::Box)]
+    filter: Filter,
+    /// Prints JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a map is between its texels' centres.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Filter {
+    /// Constant over each texel; keeps the integral
+    Box,
+    /// Bilinear, smooth where the output is finer
+    Bilinear,
+}
+
+fn map(text: &str) -> std::result::Result<Parametrization, String> {
+    text.parse::<Parametrization>().map_err(|error| match error {
+        Error::Setting { cause, .. } => cause,
+        other => other.to_string(),
+    })
+}
+
+/// Runs the command.
+pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let (from, to) = (arguments.from, arguments.to);
+    let ending = pictures::extension(&arguments.output);
+    if !matches!(ending.as_str(), "exr" | "hdr") {
+        return Err(Failure::usage(format!(
+            "{} cannot be written: maps are .exr or .hdr files",
+            arguments.output.display()
+        )));
+    }
+    let picture = pictures::read(&arguments.input)?;
+    let source = source(arguments, &picture)?;
+    let size = arguments
+        .size
+        .map_or_else(|| size_like(&source, to), |rows| UVec2::new(rows * to.aspect(), rows));
+    let settings = ResampleSettings {
+        samples: arguments.samples,
+        reconstruction: match arguments.filter {
+            Filter::Box => Reconstruction::Box,
+            Filter::Bilinear => Reconstruction::Bilinear,
+        },
+    };
+    // Axes are orthonormal: the transpose leads back to the world.
+    let turn = from.world_axes() * to.world_axes().transpose();
+    let converted = resample(&source, to, size, turn, &settings)?;
+    let (extent, texels) = converted.to_strip(arguments.border)?;
+    let mut written = Picture::from_radiance(extent.x, extent.y, texels.iter().flat_map(Vec3::to_array).collect())?;
+    written.metadata = picture.metadata.clone();
+    let facts = [("map", to.to_string()), ("map_border", arguments.border.to_string())];
+    let facts = facts.map(|(key, value)| (format!("clerestory.{key}"), value));
+    written.metadata.other.extend(facts);
+    write(&arguments.output, &written)?;
+    report(arguments, &source, &converted)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn source(arguments: &Arguments, picture: &Picture) -> Outcome<MapImage> {
+    let layer = picture.main_layer()?;
+    let bad = layer.count_non_finite();
+    if bad.nan + bad.infinite > 0 {
+        let cause = format!("holds {} NaN and {} infinite values", bad.nan, bad.infinite);
+        let path = arguments.input.display().to_string();
+        return Err(Error::Picture { path, cause }.into());
+    }
+    let texels: Vec<Vec3> = layer.pixels().map(Vec3::from_array).collect();
+    let extent = UVec2::new(picture.width(), picture.height());
+    Ok(MapImage::from_strip(
+        arguments.from,
+        extent,
+        arguments.from_border,
+        &texels,
+    )?)
+}
+
+/// The size of a layer that comes next to as many texels with directions as a map has; of even height, so that the lat-long map has borders.
+fn size_like(source: &MapImage, to: Parametrization) -> UVec2 {
+    let texels = source.texels().len() as f64 * source.map().coverage();
+    let rows = (texels / (f64::from(to.layers() * to.aspect()) * to.coverage())).sqrt();
+    let rows = 2 * ((0.5 * rows).round() as u32).max(1);
+    UVec2::new(rows * to.aspect(), rows)
+}
+
+fn write(path: &Path, picture: &Picture) -> Result<()> {
+    if let Some(folder) = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty() && !folder.exists())
+    {
+        std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?;
+        output::note(&format!("made folder {}", folder.display()));
+    }
+    match pictures::extension(path).as_str() {
+        "hdr" => hdr::write(path, picture),
+        _ => exr::write(path, picture),
+    }
+}
+
+/// The integral of radiance over the sphere.
+#[derive(Debug, serde::Serialize)]
+struct Held {
+    file: PathBuf,
+    map: String,
+    /// Columns and rows of a layer.
+    size: [u32; 2],
+    layers: u32,
+    /// ∫ L dω of red, green and blue.
+    integral: [f64; 3],
+}
+
+fn held(file: &Path, image: &MapImage) -> Held {
+    Held {
+        file: file.into(),
+        map: image.map().to_string(),
+        size: image.size().to_array(),
+        layers: image.map().layers(),
+        integral: image.integral().to_array(),
+    }
+}
+
+fn report(arguments: &Arguments, source: &MapImage, converted: &MapImage) -> Outcome {
+    let both = [held(&arguments.input, source), held(&arguments.output, converted)];
+    let [before, after] = &both;
+    let difference = DVec3::from(after.integral) - DVec3::from(before.integral);
+    let relative: Vec<Option<f64>> = (0..3)
+        .map(|i| (before.integral[i] != 0.0).then(|| difference[i] / before.integral[i]))
+        .collect();
+    if arguments.json {
+        return output::print_json(
+            &serde_json::json!({ "before": before, "after": after, "relative_difference": relative }),
+        );
+    }
+    let mut table = Table::new(&["", "map", "texels of a layer", "∫ L dω: red", "green", "blue"], &[1]);
+    for (what, one) in ["before", "after"].into_iter().zip(&both) {
+        let size = match one.layers {
+            1 => format!("{} × {}", one.size[0], one.size[1]),
+            layers => format!("{layers} × {} × {}", one.size[0], one.size[1]),
+        };
+        let [red, green, blue] = one.integral.map(|value| format!("{value:.6e}"));
+        table.row([what.into(), one.map.clone(), size, red, green, blue]);
+    }
+    let cells = relative
+        .iter()
+        .map(|value| value.map_or("–".into(), |value| format!("{value:+.2e}")));
+    table.row(
+        ["relative difference".into(), String::new(), String::new()]
+            .into_iter()
+            .chain(cells),
+    );
+    let mut text = table.text();
+    if arguments.to == Parametrization::Nusselt && arguments.from != Parametrization::Nusselt {
+        text += "the output holds the upper hemisphere alone\n";
+    }
+    output::print(&text)
+}

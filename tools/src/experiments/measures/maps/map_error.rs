@@ -1,0 +1,137 @@
+//! Error of bilinear look-ups in maps of as many texels each.
+//!
+//! Oracle: the light field itself, lobes of three widths in random directions, at random directions.
+
+use clerestory::film::atomic;
+use clerestory::maps::Parametrization;
+use clerestory::{Error, Result};
+use glam::{DVec3, UVec2};
+
+use crate::experiments::measures::Context;
+use crate::experiments::plot::{self, Curve, PlotPoint, Words};
+use crate::experiments::table::Table;
+use crate::random::Random;
+
+const MAPS: [Parametrization; 8] = [
+    Parametrization::Cube,
+    Parametrization::EqualArea,
+    Parametrization::OctahedronQuadratic,
+    Parametrization::OctahedronRectangular,
+    Parametrization::OctahedronPerspective { c: 0.5 },
+    Parametrization::DualParaboloid,
+    Parametrization::LatLong,
+    Parametrization::Sphere,
+];
+/// Concentrations of the lobes, exp(κ(cos − 1)); widths are 1/√κ.
+const CONCENTRATIONS: [f64; 3] = [4.0, 64.0, 1024.0];
+const LOBES: usize = 32;
+
+/// Lobes: concentration, middle.
+fn field() -> Vec<(f64, DVec3)> {
+    let mut random = Random::new(11);
+    let mut lobes = Vec::new();
+    for concentration in CONCENTRATIONS {
+        lobes.extend((0..LOBES).map(|_| (concentration, random.direction())));
+    }
+    lobes
+}
+
+fn radiance(field: &[(f64, DVec3)], d: DVec3) -> f64 {
+    field.iter().map(|(k, middle)| (k * (middle.dot(d) - 1.0)).exp()).sum()
+}
+
+/// The size of a layer that comes closest to a number of texels in all, of even height.
+fn size(map: Parametrization, texels: u64) -> UVec2 {
+    let rows = (texels as f64 / f64::from(map.layers() * map.aspect())).sqrt();
+    let height = (2.0 * (0.5 * rows).round().max(1.0)) as u32;
+    UVec2::new(height * map.aspect(), height)
+}
+
+/// The measure.
+pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
+    let (budgets, count) = if context.smoke {
+        (10..=12, 300)
+    } else {
+        (10..=18, 40_000)
+    };
+    let budgets: Vec<u64> = budgets.step_by(2).map(|power| 1u64 << power).collect();
+    let field = field();
+    let mut random = Random::new(12);
+    let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
+    let exact: Vec<f64> = directions.iter().map(|d| radiance(&field, *d)).collect();
+    let mean = exact.iter().sum::<f64>() / f64::from(count);
+    let spread = (exact.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / f64::from(count)).sqrt();
+    let mut table = Table::new(
+        "Error of bilinear look-ups",
+        &[
+            "map",
+            "budget (texels)",
+            "size of a layer",
+            "texels",
+            "RMS error over the field's deviation",
+            "greatest error over it",
+            "RMS error × texels over that of the first",
+        ],
+    );
+    let mut curves: Vec<Curve> = Vec::new();
+    let mut first = vec![f64::NAN; budgets.len()];
+    for map in MAPS {
+        let mut points = Vec::new();
+        for (at, budget) in budgets.iter().enumerate() {
+            let size = size(map, *budget);
+            let texels = f64::from(size.element_product() * map.layers());
+            let (mut squares, mut worst) = (0.0, 0.0f64);
+            for (d, value) in directions.iter().zip(&exact) {
+                let taps = map.taps(size, *d);
+                let taps = taps.iter().flatten().filter(|tap| tap.weight > 0.0);
+                // The texel of a rim whose centre is outside of the disc holds what is at the rim.
+                let held = taps.map(|tap| {
+                    let centre = map.texel_direction(size, tap.texel).unwrap_or(*d);
+                    tap.weight * radiance(&field, centre)
+                });
+                let error = held.sum::<f64>() - value;
+                squares += error * error;
+                worst = worst.max(error.abs());
+            }
+            let rms = (squares / f64::from(count)).sqrt() / spread;
+            if first[at].is_nan() {
+                first[at] = rms * texels;
+            }
+            points.push(PlotPoint {
+                x: texels,
+                y: rms,
+                y_range: [rms; 2],
+                ringed: false,
+            });
+            table.row([
+                map.to_string().into(),
+                (*budget).into(),
+                format!("{} × {}", size.x, size.y).into(),
+                (texels as u64).into(),
+                rms.into(),
+                (worst / spread).into(),
+                (rms * texels / first[at]).into(),
+            ]);
+        }
+        curves.push(Curve {
+            name: map.to_string(),
+            points,
+        });
+    }
+    table.note(format!(
+        "The field: {LOBES} lobes each of widths {}, in random directions, the same for all maps; {count} uniform directions. Texels hold \
+         the field at their centres; borders are those of each map. All texels of a layer count, those outside of discs as well. \
+         The last column is how many times the texels of the first map give as small an error, where errors fall as one over the texels. Plot beside this table: `error.svg`.",
+        CONCENTRATIONS.map(|k| format!("{:.2}", 1.0 / k.sqrt())).join(", "),
+    ));
+    let words = Words {
+        title: "Bilinear look-ups of a light field",
+        x: "texels, unused ones included",
+        y: "RMS error over the field's deviation",
+    };
+    if let Some(svg) = plot::log_log(words, &curves)? {
+        std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
+        atomic::write(&context.folder.join("error.svg"), svg.as_bytes())?;
+    }
+    Ok(vec![table])
+}

@@ -1,0 +1,9 @@
+//! Directional maps: how even they are, how well they hold a light field, and look-ups in them.
+
+mod heat;
+pub mod map_borders;
+pub mod map_density;
+pub mod map_error;
+pub mod map_glossiness;
+pub mod map_levels;
+mod sphere;
