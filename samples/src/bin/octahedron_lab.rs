@@ -43,6 +43,8 @@ const TURN: f64 = 2.0;
 const SIZE: [u32; 2] = [1200, 480];
 /// How far the point goes from the middle of the scene, as a share of its extent, and where it is in height.
 const ORBIT: DVec3 = DVec3::new(0.22, 0.08, 0.22);
+/// Of surfaces without a material.
+const GREY: Vec3 = Vec3::splat(0.5);
 const OUTPUTS: [Output; 3] = [Output::Triangle, Output::Object, Output::Distance];
 /// The least relative error that is shown, as a power of ten.
 const LEAST_ERROR: f64 = -7.0;
@@ -265,6 +267,8 @@ struct Facts {
     texels: usize,
     /// Texels with another object.
     other: usize,
+    /// Those of them that show nothing.
+    empty: usize,
     /// Greatest relative error of the distance where the triangle is the same.
     distance: f64,
     milliseconds: f64,
@@ -275,6 +279,7 @@ struct Lab {
     scene: GpuScene,
     triangles: Vec<SceneTriangle>,
     objects: Vec<u32>,
+    /// By object.
     albedos: Vec<Vec3>,
     index: Bvh2,
     bgra: bool,
@@ -305,11 +310,14 @@ impl Lab {
             let range = object.triangles.start as usize..object.triangles.end as usize;
             objects[range].fill(object.object);
         }
-        let bright = |m: &scene::Material| m.emission.max_element() > 0.0;
-        let albedos = scene
-            .materials
-            .iter()
-            .map(|m| if bright(m) { Vec3::ONE } else { m.base_color.truncate() });
+        let albedos = scene.instances.iter().map(|instance| {
+            let material = scene.meshes[instance.mesh as usize].material;
+            match material.and_then(|index| scene.materials.get(index as usize)) {
+                Some(lamp) if lamp.emission.max_element() > 0.0 => Vec3::ONE,
+                Some(material) => material.base_color.truncate(),
+                None => GREY,
+            }
+        });
         Ok(Self {
             gpu: gpu.clone(),
             live: Live::new(gpu, &on_device, choice.layout, texels)?,
@@ -346,8 +354,8 @@ impl Lab {
         let [a, b, c] = [t.a, t.b, t.c].map(Vec3::from_array);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let facing = normal.dot(direction.as_vec3()).abs();
-        let albedo = self.albedos.get(t.material as usize).copied();
-        albedo.unwrap_or(Vec3::splat(0.5)) * (AMBIENT + (1.0 - AMBIENT) * facing)
+        let albedo = self.albedos.get(seen.object as usize).copied();
+        albedo.unwrap_or(GREY) * (AMBIENT + (1.0 - AMBIENT) * facing)
     }
 
     fn shown(&self, seen: Seen, direction: DVec3, reach: f64) -> [u8; 3] {
@@ -410,6 +418,11 @@ impl Lab {
         self.facts = Facts {
             texels: seen.len(),
             other: seen.iter().zip(&right).filter(|(a, b)| a.object != b.object).count(),
+            empty: seen
+                .iter()
+                .zip(&right)
+                .filter(|(a, b)| a.triangle == NO_HIT && b.triangle != NO_HIT)
+                .count(),
             distance: seen
                 .iter()
                 .zip(&right)
@@ -490,7 +503,7 @@ impl Lab {
             page.line(&mut sheet, 0, &format!("{:.2} {:.2} {:.2}", point.x, point.y, point.z));
         }
         page.scale(&mut sheet, 1, DIVERGING, ["half", "twice"]);
-        page.scale(&mut sheet, 2, ERRORS, ["0", "1"]);
+        page.scale(&mut sheet, 2, ERRORS, [&format!("1e{LEAST_ERROR}"), "1"]);
         sheet
     }
 }
@@ -523,7 +536,7 @@ struct Page<'a> {
 impl<'a> Page<'a> {
     fn new(size: [u32; 2], live: &'a Live) -> Self {
         let dot = (size[0] / 500).max(1);
-        let margin = 5 * dot;
+        let margin = 8 * dot;
         let width = size[0].saturating_sub(4 * margin) / 3;
         // A line of words above and a scale below.
         let line = lettering::height(dot) + 2 * margin;
@@ -549,7 +562,8 @@ impl<'a> Page<'a> {
     fn panel(&self, sheet: &mut Sheet, panel: u32, name: &str, of: impl Fn(Texel) -> [u8; 3]) {
         let (grid, places) = self.live.layout.faces();
         let left = self.left(panel) + (self.width - self.extent[0].min(self.width)) / 2;
-        sheet.write(name, [self.left(panel), self.margin], self.dot, INK);
+        let above = self.top.saturating_sub(lettering::height(self.dot) + self.margin);
+        sheet.write(name, [self.left(panel), above], self.dot, INK);
         sheet.fill([left, self.top], self.extent, |share| {
             let p = [0, 1].map(|axis| share[axis] * f64::from(grid[axis]));
             let cell = p.map(|p| p as u32);
@@ -600,12 +614,13 @@ impl Show for Lab {
         let Facts {
             texels,
             other,
+            empty,
             distance,
             milliseconds,
         } = self.facts;
         let against = if self.choice.against_cube { "the cube" } else { "rays" };
         format!(
-            "{} of {texels} texels in {milliseconds:.1} ms; {other} with another object than {against}, distances of equal triangles within {distance:.1e}",
+            "{} of {texels} texels in {milliseconds:.1} ms; {other} with another object than {against}, {empty} of them empty, distances of equal triangles within {distance:.1e}",
             self.live.layout.name(),
         )
     }

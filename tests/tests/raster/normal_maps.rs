@@ -33,7 +33,7 @@ fn scene(scale: f32, handedness: f32, mapped: bool) -> Scene {
     let texture = Texture {
         image,
         uv_set: 0,
-        wrap: [Wrap::Clamp; 2],
+        wrap: [Wrap::ClampToEdge; 2],
         filter: Filter::Nearest,
         transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
     };

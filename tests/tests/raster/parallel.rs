@@ -92,7 +92,8 @@ fn parallel_layers_are_as_rays_see_them_in_every_way() {
                     }
                 }
             }
-            assert!(covered > PIXELS, "{address}: {covered}");
+            // A tenth of six layers; the soup is thin.
+            assert!(covered > 6 * PIXELS / 10, "{address}: {covered}");
         }
     });
 }

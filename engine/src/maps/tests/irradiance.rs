@@ -100,8 +100,9 @@ fn a_sun_of_one_texel_is_lamberts_polygon() {
             for normal in [n, (n + 0.7 * n.any_orthonormal_vector()).normalize()] {
                 let found = sun.irradiance(normal).unwrap();
                 let expected = normal.dot(exact);
-                // The square of a quarter of a texel's side over 24: 2·10⁻⁴ of a fifth of a face, 4·10⁻⁶ of smaller ones.
-                let bound = if rows < 8 { 1e-3 } else { 2e-5 };
+                // A twelfth of the solid angle of a 256th of the texel, or of 1.2·10⁻⁴ sr, times half of the shear of 2.6 and its inverse, and
+                // a higher order of large ones.
+                let bound = 1.6 * (map.texel_solid_angle(size, texel) / 256.0).max(1.2e-4) / 12.0;
                 assert!(
                     (found.x / (1e3 * expected) - 1.0).abs() < bound,
                     "{map} {texel:?} {normal}: {found} {expected}"

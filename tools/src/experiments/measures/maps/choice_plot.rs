@@ -17,7 +17,7 @@ const TITLE: u32 = 16;
 const LABEL: u32 = 13;
 const GREY: RGBColor = RGBColor(210, 210, 210);
 /// Where ratios end: those beyond leave the frame.
-const RATIOS: [f64; 2] = [0.5, 3.0];
+const RATIOS: [f64; 2] = [0.35, 5.0];
 const MARGIN: f64 = 1.3;
 
 /// A map, with texels and errors by environment.
@@ -151,14 +151,12 @@ fn panel_of_bars(area: &Area<'_>, bars: &Bars<'_>) -> Drawn {
             Text::new(more, (0.98 * bars.top, y), text(LABEL, HPos::Right).color(&WHITE))
         } else {
             let value = if *from > 0.0 { format!("{from:.2} – {to:.2}") } else { label(*to) };
-            let (at, side) = if *to > 0.7 * bars.top && *from < 0.3 * bars.top {
-                (to - 0.01 * bars.top, HPos::Right)
+            // Beside the bar, or in it where there is no room.
+            if *to > 0.7 * bars.top && *from < 0.3 * bars.top {
+                Text::new(value, (to - 0.01 * bars.top, y), text(LABEL, HPos::Right).color(&WHITE))
             } else {
-                (to + 0.015 * bars.top, HPos::Left)
-            };
-            let style = text(LABEL, side);
-            let style = if side == HPos::Right { style.color(&WHITE) } else { style };
-            Text::new(value, (at, y), style)
+                Text::new(value, (to + 0.015 * bars.top, y), text(LABEL, HPos::Left))
+            }
         };
         chart.draw_series([shown]).map_err(failed)?;
     }
@@ -194,7 +192,9 @@ fn panel_of_curves(area: &Area<'_>, title: &str, curves: &[Vec<(f64, f64)>], hei
         .y_label_area_size(46)
         .build_cartesian_2d(
             (x.0..x.1).log_scale().with_key_points(ticks(x)),
-            (y.0..y.1).log_scale().with_key_points(steps(y)),
+            (y.0..y.1)
+                .log_scale()
+                .with_key_points(heights.map_or_else(|| ticks(y), |_| steps_of_ratios())),
         )
         .map_err(failed)?;
     chart
@@ -205,7 +205,7 @@ fn panel_of_curves(area: &Area<'_>, title: &str, curves: &[Vec<(f64, f64)>], hei
         .bold_line_style(GREY)
         .light_line_style(TRANSPARENT)
         .x_label_formatter(&tick_text)
-        .y_label_formatter(&tick_text)
+        .y_label_formatter(&|value| heights.map_or_else(|| tick_text(value), |_| value.to_string()))
         .draw()
         .map_err(failed)?;
     for (index, curve) in curves.iter().enumerate() {
@@ -227,13 +227,9 @@ fn panel_of_curves(area: &Area<'_>, title: &str, curves: &[Vec<(f64, f64)>], hei
     Ok(())
 }
 
-/// Round numbers within a range; finer ones where it is less than a decade.
-fn steps((least, most): (f64, f64)) -> Vec<f64> {
-    if most / least >= 10.0 {
-        return ticks((least, most));
-    }
-    let all = [0.5, 0.7, 1.0, 1.5, 2.0, 3.0];
-    all.into_iter().filter(|step| (least..=most).contains(step)).collect()
+/// Round numbers within the frame of ratios.
+fn steps_of_ratios() -> Vec<f64> {
+    vec![0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0]
 }
 
 #[cfg(test)]

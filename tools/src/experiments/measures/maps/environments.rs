@@ -17,8 +17,8 @@ pub struct Environment {
     pub radiance: Box<dyn Fn(DVec3) -> f64 + Sync>,
 }
 
-/// 1/variance of the sun's angle: a standard deviation of 0.025 rad.
-const SUN: f64 = 1600.0;
+/// 1/variance of the sun's angle: a standard deviation of 0.05 rad.
+const SUN: f64 = 400.0;
 /// Of the sky's.
 const SUN_RADIANCE: f64 = 40.0;
 /// Cells along an axis from −1 to 1.
@@ -78,7 +78,7 @@ pub fn all() -> Result<Vec<Environment>> {
     };
     Ok(vec![
         of("smooth sky", "polynomials and a lobe of 40°", sky),
-        of("sun", "that sky and a sun of 1.4°, 40 times as bright", sunny),
+        of("sun", "that sky and a sun of 2.9°, 40 times as bright", sunny),
         of("sharp edges", "black and white cells of 0.4 along each axis", edges),
         Environment {
             name: "live map",

@@ -36,7 +36,7 @@ const MAPS: [Parametrization; 12] = [
 ];
 
 /// Turns of each environment, over which squares of errors are averaged: features lie elsewhere on the maps.
-const TURNS: u32 = 3;
+const TURNS: u32 = 6;
 /// Rows of the maps of which densities are taken.
 const DENSITY_ROWS: u32 = 256;
 /// Maps whose need of texels differs by less than this factor are as good as each other.
@@ -164,7 +164,7 @@ fn measured(context: &Context<'_>, environments: &[Environment]) -> Vec<Found> {
     let (powers, count): (Vec<u32>, u32) = if context.smoke {
         (vec![8, 10], 300)
     } else {
-        (vec![10, 12, 14, 16, 18], 20_000)
+        (vec![10, 12, 14, 16, 18], 40_000)
     };
     let mut random = Random::new(61);
     let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
@@ -231,7 +231,7 @@ fn choice(all: &[Found], environments: &[Environment]) -> Table {
     table.note(format!(
         "Need of texels: times as many texels in all, unused ones included, as the cube map has at the largest budget, for its error; from the errors there and \
          the cube's slope. Environments ({}), each in {TURNS} turns, are held by their values at the centres of texels and looked up bilinearly over all \
-         seams at random directions. Nusselt's map is judged over its hemisphere with half of the texels. Ratios: solid angle of texels over the mean, \
+         seams at random directions. Where the map folds, smooth light has a kink in it, which costs a quarter of the power by which errors fall. Nusselt's map is judged over its hemisphere with half of the texels. Ratios: solid angle of texels over the mean, \
          {DENSITY_ROWS} rows a layer. Plot beside this table: `choice.svg`.",
         abouts.join("; "),
     ));
@@ -396,9 +396,10 @@ mod tests {
         assert_eq!(name(MAPS[7]), "octahedron c = 2");
     }
 
-    /// Bilinear look-ups of smooth light are off by the square of a texel: a quarter with four times the texels.
+    /// Bilinear look-ups of smooth light are off by the square of a texel: a quarter with four times the texels. Over folds the map itself has
+    /// a kink, where they are off by a texel in a strip as wide: the root of its square over all is the power 3/2.
     #[test]
-    fn errors_of_smooth_light_fall_as_one_over_the_texels() {
+    fn errors_of_smooth_light_fall_as_the_texels_do() {
         let smooth = [Environment {
             name: "smooth",
             about: "a quadric",
@@ -406,10 +407,13 @@ mod tests {
         }];
         let mut random = Random::new(62);
         let directions: Vec<DVec3> = (0..2000).map(|_| random.direction()).collect();
-        for map in [Parametrization::Cube, Parametrization::OctahedronQuadratic, Parametrization::LatLong] {
+        for (map, expected) in [
+            (Parametrization::LatLong, 4.0f64),
+            (Parametrization::OctahedronQuadratic, 4f64.powf(0.75)),
+        ] {
             let at = |power: u32| errors(map, size(map, 1 << power), &smooth, &directions)[0];
             let ratio = at(12) / at(14);
-            assert!((3.3..4.7).contains(&ratio), "{map}: {ratio}");
+            assert!((ratio / expected - 1.0).abs() < 0.15, "{map}: {ratio}");
         }
     }
 }
