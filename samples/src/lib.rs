@@ -2,7 +2,9 @@
 
 pub mod arguments;
 pub mod carousel;
+pub mod lettering;
 pub mod orbit;
+pub mod panels;
 pub mod progressive;
 pub mod shaders;
 pub mod small_gltf;

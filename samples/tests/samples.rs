@@ -380,3 +380,90 @@ fn the_photon_viewer_refuses_what_it_cannot_show() {
         assert!(said(&output).contains(expected), "{}", said(&output));
     }
 }
+
+/// A picture of the octahedron lab without a window, and what it said.
+fn octahedron_lab(arguments: &[&str]) -> (image::RgbImage, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new folder/picture.png");
+    let small = ["--size", "360x150", "--texels", "64", "--output", path.to_str().unwrap()];
+    let output = run(env!("CARGO_BIN_EXE_octahedron_lab"), &[&small[..], arguments].concat());
+    (open(&path), said(&output))
+}
+
+/// Shares of the picture's width at which its three panels are.
+const PANELS: [[f32; 2]; 3] = [[0.05, 0.3], [0.38, 0.62], [0.7, 0.95]];
+/// Shares of its height at which maps of all layouts are.
+const MIDDLE: [f32; 2] = [0.45, 0.6];
+
+#[test]
+fn the_octahedron_lab_shows_map_density_and_error() {
+    for layout in ["square", "rectangle", "cube"] {
+        for channel in ["colour", "distance", "object"] {
+            let (picture, text) = octahedron_lab(&["--layout", layout, "--channel", channel]);
+            assert_eq!(picture.dimensions(), (360, 150));
+            let [map, density, error] = PANELS.map(|across| mean(&picture, across, MIDDLE));
+            // The map shows something; against rays there is no error but at silhouettes, and black stands for none.
+            assert!(map.iter().sum::<f32>() > 60.0, "{layout}, {channel}: {map:?}");
+            assert!(error.iter().sum::<f32>() < 0.5 * map.iter().sum::<f32>(), "{layout}, {channel}: {error:?}");
+            assert!(density.iter().sum::<f32>() > 250.0, "{layout}, {channel}: {density:?}");
+            assert!(text.contains(layout) && text.contains("another object than rays"), "{text}");
+            // Of some 4000 texels those next to edges may differ.
+            let other: u32 = text
+                .split(" with another object")
+                .next()
+                .and_then(|before| before.rsplit(' ').next()?.parse().ok())
+                .unwrap();
+            assert!(other < 40 && text.contains(" 0 of them empty"), "{text}");
+        }
+    }
+}
+
+#[test]
+fn the_octahedron_labs_density_is_the_maps() {
+    let (picture, _) = octahedron_lab(&[]);
+    let at = |x: f32, y: f32| mean(&picture, [x, x + 0.012], [y, y + 0.03]);
+    // In the middle of the square is a vertex of the octahedron, the finest place: blue. Half-way to a corner, the middle of a face: red.
+    let (vertex, face) = (at(0.494, 0.485), at(0.435, 0.36));
+    assert!(vertex[2] > vertex[0] + 60.0, "vertex {vertex:?}");
+    assert!(face[0] > face[2] + 40.0, "face {face:?}");
+}
+
+#[test]
+fn the_octahedron_labs_point_moves_and_a_cube_is_another_map() {
+    let still = octahedron_lab(&["--turn", "0", "--frames", "3"]).0;
+    assert!(still == octahedron_lab(&[]).0);
+    assert!(still != octahedron_lab(&["--turn", "20", "--frames", "3"]).0);
+    let (_, text) = octahedron_lab(&["--against", "cube"]);
+    let other: u32 = text
+        .split(" with another object")
+        .next()
+        .and_then(|before| before.rsplit(' ').next()?.parse().ok())
+        .unwrap();
+    assert!(text.contains("than the cube") && other > 5, "{text}");
+}
+
+#[test]
+fn the_octahedron_lab_has_a_window_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    let arguments = ["--size", "360x150", "--texels", "64", "--frames", "3"];
+    let output = windowed(env!("CARGO_BIN_EXE_octahedron_lab"), &arguments, &path);
+    assert!(output.status.success(), "{}", said(&output));
+    let picture = open(&path);
+    assert_eq!(picture.dimensions(), (360, 150));
+    // The third frame is that without a window.
+    assert!(picture == octahedron_lab(&["--frames", "3"]).0);
+    for (arguments, expected) in [
+        (["--layout", "round"], "rectangle"),
+        (["--channel", "smell"], "distance"),
+        (["--texels", "4"], "8 to 2048"),
+        (["builtin:nowhere", "--output"], "--output"),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_octahedron_lab"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(said(&output).contains(expected), "{}", said(&output));
+    }
+}

@@ -84,6 +84,12 @@ void main() {
         out_texel(4u, lat_long_wrap(p, size));
         break;
     }
+    case 7u: {  // borders of the cube
+        ivec2 p = ivec2(in2(0u));
+        out1(0u, float(cube_wrap(in_bits(2u), p, int(in1(3u)))));
+        out_texel(1u, p);
+        break;
+    }
     case 6u: {  // words
         uint word = pack_octahedral(d, in_bits(3u));
         out_bits(0u, word & 0xFFFFu);

@@ -76,6 +76,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("maps/directional_look_up.comp", "SpecConstantOp"),
     ("maps/prefilter_ggx.comp", "SpecConstantOp"),
     ("maps/sat_columns.comp", "SpecConstantOp"),
+    ("maps/sat_lobe.comp", "SpecConstantOp"),
     ("maps/sat_look_up.comp", "SpecConstantOp"),
     ("maps/sat_rows.comp", "SpecConstantOp"),
     ("kernels/partition.comp", "SpecConstantOp"),

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use clerestory::film::{Picture, exr};
+use clerestory::film::{Picture, exr, hdr};
 use clerestory::maps::{MapImage, Parametrization};
 use clerestory::transport::environment::{environment_direction, environment_uv};
 use glam::{DVec2, DVec3, UVec2, Vec3};
@@ -191,6 +191,95 @@ fn the_integral_is_said_and_kept() -> Tested {
             assert!(table.contains(word), "{word}: {table}");
         }
     }
+    Ok(())
+}
+
+/// EXR and Radiance HDR, in and out, through three maps: the same light, but for the shared exponent of HDR files.
+#[test]
+fn every_format_leads_to_every_other() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let at = |name: String| folder.path().join(name);
+    write_sky(&at("sky.exr".into()))?;
+    let (width, height, values) = {
+        let picture = exr::read(at("sky.exr".into()))?;
+        let values: Vec<f32> = picture.main_layer()?.pixels().flatten().collect();
+        (picture.width(), picture.height(), values)
+    };
+    hdr::write(at("sky.hdr".into()), &Picture::from_radiance(width, height, values)?)?;
+    for to in ["cube", "octahedron", "paraboloid"] {
+        let map: Parametrization = to.parse()?;
+        let mut images = Vec::new();
+        for from in ["exr", "hdr"] {
+            for out in ["exr", "hdr", "EXR"] {
+                let (file, written) = (at(format!("sky.{from}")), at(format!("{to}-{from}.{out}")));
+                let output = succeed(&[text(&file), text(&written), "--to", to, "--size", "24", "--json"])?;
+                let said: Value = serde_json::from_slice(&output.stdout)?;
+                assert_eq!(said["after"]["map"], to);
+                let picture = if out == "hdr" { hdr::read(&written)? } else { exr::read(&written)? };
+                let extent = UVec2::new(picture.width(), picture.height());
+                let texels: Vec<Vec3> = picture.main_layer()?.pixels().map(Vec3::from_array).collect();
+                images.push((from, out, MapImage::from_strip(map, extent, 0, &texels)?));
+            }
+        }
+        let (_, _, first) = &images[0];
+        for (from, out, image) in &images {
+            let exact = *from == "exr" && *out != "hdr";
+            assert!(!exact || image == first, "{to}, {from} to {out}");
+            for (found, expected) in image.texels().iter().zip(first.texels()) {
+                // Eight bits of the greatest component, once for a file that is read and once for one that is written.
+                let allowed = if exact { 0.0 } else { 2.0 / 256.0 * 2.0 * expected.max_element() };
+                let off = (*found - *expected).abs().max_element();
+                assert!(off <= allowed, "{to}, {from} to {out}: {found} {expected}");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// In a pipe there is no bar and no line but the table.
+#[test]
+fn a_pipe_holds_nothing_but_the_table() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let at = |name: &str| folder.path().join(name);
+    write_sky(&at("sky.exr"))?;
+    let output = succeed(&[text(&at("sky.exr")), text(&at("out.exr")), "--to", "cube", "--samples", "32"])?;
+    assert_eq!(String::from_utf8(output.stderr)?, "");
+    let said = String::from_utf8(output.stdout)?;
+    assert!(said.lines().count() == 4 && !said.contains('\u{1b}') && !said.contains('%'), "{said}");
+    Ok(())
+}
+
+/// Ctrl-C in the midst of a long conversion: it ends soon with the code for that, an older output stays, and nothing lies beside it.
+#[test]
+fn a_conversion_that_is_stopped_leaves_the_old_file() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let (file, out) = (folder.path().join("sky.exr"), folder.path().join("out.exr"));
+    write_sky(&file)?;
+    succeed(&[text(&file), text(&out), "--to", "octahedron", "--size", "8"])?;
+    let before = std::fs::read(&out)?;
+    let mut program = Command::new(env!("CARGO_BIN_EXE_clerestory"));
+    program.args(["-v", "maps", text(&file), text(&out), "--to", "octahedron"]);
+    let mut child = program
+        .args(["--size", "4096", "--samples", "64"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()?;
+    // The program says at `-v` when it has begun to listen.
+    let mut stderr = std::io::BufReader::new(child.stderr.take().ok_or("no error output")?);
+    let mut heard = String::new();
+    while !heard.contains("converting") {
+        if std::io::BufRead::read_line(&mut stderr, &mut heard)? == 0 {
+            return Err(format!("ended too early: {heard}").into());
+        }
+    }
+    let kill = format!("kill -INT {}", child.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status()?.success());
+    std::io::Read::read_to_string(&mut stderr, &mut heard)?;
+    assert_eq!(child.wait()?.code(), Some(130), "{heard}");
+    assert!(heard.contains("stopped") && heard.contains("not written"), "{heard}");
+    assert_eq!(std::fs::read(&out)?, before);
+    assert_eq!(std::fs::read_dir(folder.path())?.count(), 2);
     Ok(())
 }
 

@@ -10,6 +10,7 @@ layout(local_size_x = 64) in;
 layout(push_constant, scalar) uniform Push {
     MapLevel fine;
     MapLevel coarse;
+    int layers;
 } push;
 
 layout(set = 0, binding = 0, scalar) restrict buffer Texels { vec3 texels[]; };
@@ -17,17 +18,19 @@ layout(set = 0, binding = 1, scalar) restrict readonly buffer Angles { float ang
 
 void main() {
     int i = int(gl_GlobalInvocationID.x);
-    if (i >= push.coarse.size.x * push.coarse.size.y) {
+    if (i >= push.coarse.size.x * push.coarse.size.y * push.layers) {
         return;
     }
+    // Layers lie one below the other; several have no border.
     ivec2 p = ivec2(i % push.coarse.size.x, i / push.coarse.size.x);
     vec3 sum = vec3(0.0);
     float whole = 0.0;
     for (int child = 0; child < 4; ++child) {
         ivec2 q = 2 * p + ivec2(child & 1, child >> 1);
-        float angle = angles[directional_angle(push.fine, q)];
+        float angle = angles[directional_angle(push.fine, ivec2(q.x, q.y % push.fine.size.y))];
         sum += angle * texels[directional_texel(push.fine, q)];
         whole += angle;
     }
-    texels[directional_texel(push.coarse, p)] = sum / whole;
+    // Outside of discs there are no directions.
+    texels[directional_texel(push.coarse, p)] = whole > 0.0 ? sum / whole : vec3(0.0);
 }

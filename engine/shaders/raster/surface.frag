@@ -13,10 +13,12 @@ layout(constant_id = 6) const bool HAS_TEXTURES = true;
 layout(constant_id = 7) const bool HAS_VERTEX_COLORS = true;
 layout(constant_id = 8) const bool HAS_SHADING_NORMALS = true;
 layout(constant_id = 9) const bool HAS_ALPHA = true;
+layout(constant_id = 10) const bool HAS_NORMAL_MAPS = true;
 
 #include "maps/packed_direction.glsl"
 #include "raster/hit.glsl"
 #include "scene/material.glsl"
+#include "scene/normal_map.glsl"
 
 const uint RASTER_NORMAL_BITS = 16u;  // of each coordinate of a packed normal
 
@@ -56,7 +58,7 @@ void main() {
         RasterHit hit = raster_hit(view, t, gl_FragCoord.xy);
         vec3 w = hit.weights;
         uvec3 v = uvec3(0u);
-        if (HAS_TEXTURES || HAS_VERTEX_COLORS || HAS_SHADING_NORMALS) {
+        if (HAS_TEXTURES || HAS_VERTEX_COLORS || HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
             v = load_vertices(raster_triangle);
         }
         vec4 uvs = vec4(0.0);
@@ -85,6 +87,13 @@ void main() {
                 float squared = dot(n, n);
                 shading = squared > 0.0 ? n * inversesqrt(squared) : front;
                 shading = dot(shading, front) < 0.0 ? -shading : shading;
+            }
+            if (HAS_NORMAL_MAPS) {
+                SceneMaterial m = load_material(t.material);
+                if (m.normal_texture != NO_TEXTURE) {
+                    vec4 tangent = interpolate_attribute(scene_tangents, v, w);
+                    shading = mapped_normal(shading, tangent, sample_texture(m.normal_texture, uvs).xyz, m.normal_scale);
+                }
             }
             normals_out = uvec2(pack_octahedral(front, RASTER_NORMAL_BITS), pack_octahedral(shading, RASTER_NORMAL_BITS));
         }

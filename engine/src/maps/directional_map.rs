@@ -3,7 +3,8 @@
 //! Sources: T. Engelhardt, C. Dachsbacher, "Octahedron Environment Maps", VMV 2008 (borders); L. Williams, "Pyramidal Parametrics", SIGGRAPH
 //! 1983 (levels), here with means by solid angle, which keep ∫ L dω, as plain means of four do not. A border at level 0 alone serves
 //! log₂ of its width in levels; here each level has one, so that one texel is enough for bilinear look-ups in all. Without borders
-//! look-ups find their way over edges by the topology.
+//! look-ups find their way over edges by the topology. The cube and the discs have no borders: beyond a corner of the cube's face no texel
+//! repeats, and discs end at their rim. There the texels that are there share the weight of those that are not.
 //!
 //! Guarantees: bits of a border are those of the inside; deterministic; constant radiance stays constant but for the rounding of a mean of
 //! four. Levels are filled in f32: a level's texels are off by at most 8·2⁻²⁴ relatively against its own children. GLSL: `maps/directional_map_set.glsl`;
@@ -11,7 +12,8 @@
 
 use super::{MapImage, Parametrization};
 use crate::gpu::shaders::constants::{
-    DIRECTIONAL_EQUAL_AREA, DIRECTIONAL_LAT_LONG, DIRECTIONAL_OCTAHEDRON, DIRECTIONAL_OCTAHEDRON_RECTANGULAR,
+    DIRECTIONAL_CUBE, DIRECTIONAL_EQUAL_AREA, DIRECTIONAL_LAT_LONG, DIRECTIONAL_NUSSELT, DIRECTIONAL_OCTAHEDRON,
+    DIRECTIONAL_OCTAHEDRON_RECTANGULAR, DIRECTIONAL_PARABOLOID, DIRECTIONAL_SPHERE,
 };
 use crate::gpu::shaders::maps::{directional_border, directional_coarser, directional_look_up};
 use crate::gpu::shaders::sets::DirectionalMapSet;
@@ -23,7 +25,7 @@ use crate::gpu::{
 use crate::{Error, Result};
 use glam::{DVec3, UVec2, Vec3, Vec4};
 
-/// A map of one layer, in levels.
+/// A map in levels.
 #[derive(Debug)]
 pub struct DirectionalMap {
     gpu: Gpu,
@@ -46,8 +48,17 @@ fn kind(map: Parametrization) -> Option<u32> {
         Parametrization::OctahedronRectangular => Some(DIRECTIONAL_OCTAHEDRON_RECTANGULAR),
         Parametrization::EqualArea => Some(DIRECTIONAL_EQUAL_AREA),
         Parametrization::LatLong => Some(DIRECTIONAL_LAT_LONG),
-        _ => None,
+        Parametrization::Cube => Some(DIRECTIONAL_CUBE),
+        Parametrization::DualParaboloid => Some(DIRECTIONAL_PARABOLOID),
+        Parametrization::Sphere => Some(DIRECTIONAL_SPHERE),
+        Parametrization::Nusselt => Some(DIRECTIONAL_NUSSELT),
+        Parametrization::OctahedronPerspective { .. } => None,
     }
+}
+
+/// Whether texels of a map's borders are texels of its one layer.
+fn has_borders(map: Parametrization) -> bool {
+    map.layers() == 1 && !map.is_disc()
 }
 
 /// The specialization constants of kernels that look maps up.
@@ -63,16 +74,15 @@ impl DirectionalMap {
     /// A black map of `levels` levels, each half the last, with `border` texels about each.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a map other than the octahedra with c = 1, the equal-area one and the latitude–longitude map, for a size that
-    /// the map cannot have or that cannot be halved as often, for one of odd width over poles, or for a border wider than the last level;
-    /// [`Error::OutOfMemory`].
+    /// [`Error::Setting`] for an octahedron with c other than 1, for a size that the map cannot have or that cannot be halved as often, for
+    /// one of odd width over poles, for a border of the cube or of discs, or for one wider than the last level; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, map: Parametrization, size: UVec2, levels: u32, border: u32) -> Result<Self> {
         let wrong = |name: &str, value: String, cause: &str| Err(Error::setting(name, value, cause));
         let Some(kind) = kind(map) else {
             return wrong(
                 "map",
                 map.to_string(),
-                "has no look-ups on the device; octahedron, equal-area and lat-long have",
+                "has no look-ups on the device; octahedra with c = 1 and all others have",
             );
         };
         map.check_size(size)?;
@@ -95,8 +105,11 @@ impl DirectionalMap {
         if border > least >> halvings {
             return wrong("border", border.to_string(), "is wider than the last level");
         }
+        if border > 0 && !has_borders(map) {
+            return wrong("border", border.to_string(), "is none that the cube and discs have");
+        }
         let limit = gpu.caps().max_storage_buffer_range;
-        let tile = (size + 2 * border).as_u64vec2().element_product();
+        let tile = (size + 2 * border).as_u64vec2().element_product() * u64::from(map.layers());
         // All levels together are at most twice the first, borders included.
         if 2 * tile * size_of::<[f32; 3]>() as u64 > limit {
             return Err(Error::LimitExceeded {
@@ -116,8 +129,10 @@ impl DirectionalMap {
                 size: size.as_ivec2().to_array(),
             });
             let of = MapImage::from_fn(map, size, |texel| DVec3::splat(map.texel_solid_angle(size, texel)))?;
-            angles.extend(of.texels().iter().map(|angle| angle.x));
-            first += (size + 2 * border).element_product();
+            // Layers are alike.
+            let layer = size.element_product() as usize;
+            angles.extend(of.texels()[..layer].iter().map(|angle| angle.x));
+            first += (size + 2 * border).element_product() * map.layers();
         }
         let bytes = u64::from(first) * size_of::<[f32; 3]>() as u64;
         let constants = DirectionalConstants {
@@ -193,6 +208,17 @@ impl DirectionalMap {
         }
     }
 
+    /// Refuses maps of several layers or of discs, for what cannot do with them.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(super) fn check_one_layer(&self) -> Result<()> {
+        if has_borders(self.map) {
+            return Ok(());
+        }
+        Err(Error::setting("map", self.map, "has several layers, or discs"))
+    }
+
     /// Solid angle of the map's texels at level 0 at most, sr.
     pub(super) fn greatest_angle(&self) -> f64 {
         self.greatest_angle
@@ -218,6 +244,10 @@ impl DirectionalMap {
             let value = format!("{} of {}", image.map(), image.size());
             return Err(Error::setting("image", value, format!("is not {} of {size}", self.map)));
         }
+        if self.border == 0 {
+            let texels: Vec<[f32; 3]> = image.texels().iter().map(Vec3::to_array).collect();
+            return self.gpu.upload(&self.texels, self.tile_view(at).offset, &texels);
+        }
         let mut tile: Vec<[f32; 3]> = self.gpu.read(self.tile_view(at), self.tile_texels(at))?;
         for (y, row) in image.texels().chunks_exact(size.x as usize).enumerate() {
             let from = (y + self.border as usize) * (size.x + 2 * self.border) as usize + self.border as usize;
@@ -230,7 +260,7 @@ impl DirectionalMap {
 
     fn tile_texels(&self, level: MapLevel) -> usize {
         let [x, y] = level.size.map(|side| side as usize + 2 * self.border as usize);
-        x * y
+        x * y * self.map.layers() as usize
     }
 
     fn tile_view(&self, level: MapLevel) -> crate::gpu::BufferView<'_> {
@@ -239,14 +269,15 @@ impl DirectionalMap {
             .slice(bytes * u64::from(level.first), bytes * self.tile_texels(level) as u64)
     }
 
-    /// A level with its border: extent and texels row by row.
+    /// A level with its border: extent and texels row by row, layers one below the other.
     ///
     /// # Errors
     /// [`Error::Setting`] beyond the last level; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn read_tile(&self, level: u32) -> Result<(UVec2, Vec<Vec3>)> {
         let at = self.level(level)?;
         let texels: Vec<[f32; 3]> = self.gpu.read(self.tile_view(at), self.tile_texels(at))?;
-        let extent = UVec2::from_array(at.size.map(i32::cast_unsigned)) + 2 * self.border;
+        let mut extent = UVec2::from_array(at.size.map(i32::cast_unsigned)) + 2 * self.border;
+        extent.y *= self.map.layers();
         Ok((extent, texels.into_iter().map(Vec3::from_array).collect()))
     }
 
@@ -256,6 +287,10 @@ impl DirectionalMap {
     /// As [`DirectionalMap::read_tile`].
     pub fn read(&self, level: u32) -> Result<MapImage> {
         let (extent, texels) = self.read_tile(level)?;
+        if self.border == 0 {
+            let rows = extent.y / self.map.layers();
+            return MapImage::new(self.map, UVec2::new(extent.x, rows), texels);
+        }
         MapImage::from_strip(self.map, extent, self.border, &texels)
     }
 
@@ -273,8 +308,13 @@ impl DirectionalMap {
                 texels: self.texels.view(),
                 angles: self.angles.view(),
             };
-            let count = (coarse.size[0] * coarse.size[1]).cast_unsigned();
-            let push = directional_coarser::Push { fine, coarse };
+            let layers = self.map.layers();
+            let count = (coarse.size[0] * coarse.size[1]).cast_unsigned() * layers;
+            let push = directional_coarser::Push {
+                fine,
+                coarse,
+                layers: layers.cast_signed(),
+            };
             pass.dispatch(&self.coarser, &[&set], &push, [self.coarser.groups_for(count), 1, 1])?;
             pass.barrier(&[rw_compute_to_compute(&self.texels)]);
         }
@@ -321,7 +361,8 @@ impl DirectionalMap {
         Ok(())
     }
 
-    /// Radiance from unit directions (x, y, z of the map's axes) at levels of detail (w), trilinear, by the device.
+    /// Radiance from unit directions (x, y, z of the map's axes) at levels of detail (w), trilinear, by the device. Black where the map holds
+    /// none.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], and as [`Pass::dispatch`].
@@ -355,12 +396,21 @@ pub(super) fn answer(
     queries: &[Vec4],
     record: impl FnOnce(&mut Pass<'_>, &Buffer, &Buffer, u32) -> Result<()>,
 ) -> Result<Vec<Vec3>> {
+    let words: Vec<[f32; 4]> = queries.iter().map(Vec4::to_array).collect();
+    answer_of(gpu, &words, record)
+}
+
+/// The same of queries of any kind.
+pub(super) fn answer_of<Q: bytemuck::Pod>(
+    gpu: &Gpu,
+    queries: &[Q],
+    record: impl FnOnce(&mut Pass<'_>, &Buffer, &Buffer, u32) -> Result<()>,
+) -> Result<Vec<Vec3>> {
     if queries.is_empty() {
         return Ok(Vec::new());
     }
     let count = queries.len() as u32;
-    let words: Vec<[f32; 4]> = queries.iter().map(Vec4::to_array).collect();
-    let asked = gpu.buffer_with("directional map: queries", Category::Light, &words)?;
+    let asked = gpu.buffer_with("directional map: queries", Category::Light, queries)?;
     let bytes = u64::from(count) * size_of::<[f32; 3]>() as u64;
     let values = gpu.buffer(&BufferDesc::storage("directional map: values", bytes, Category::Light))?;
     let mut recorder = gpu.recorder("directional map")?;

@@ -7,7 +7,8 @@
 //! - [`Parametrization`]: encode, decode, density, derivatives, exact solid angles of texels;
 //! - [`topology`]: which texel a border texel repeats; [`taps`]: weights of seamless look-ups and of mips; [`level`]: the level of detail;
 //! - [`MapImage`]: radiance in the texels of a map; [`resample`]: from one map to another; [`statistics`]: how even a map is;
-//! - [`directional_map`]: levels with borders on the device; [`spherical_sat`] and [`prefilter`]: glossy look-ups;
+//! - [`directional_map`]: levels with borders on the device; [`spherical_sat`], [`box_lobe`] and [`prefilter`]: glossy look-ups;
+//! - [`irradiance`]: what a surface receives;
 //! - [`packed_direction`]: directions in a word; [`turn`]: the angles that maps take.
 //!
 //! Guarantees: all is exact up to rounding and deterministic; solid angles of texels are closed forms or spherical polygons, cut at the rims
@@ -25,11 +26,13 @@
 //! assert!((sum - 4.0 * std::f64::consts::PI).abs() < 1e-12);
 //! ```
 
+pub mod box_lobe;
 pub mod cube;
 pub mod directional_map;
 mod disc;
 pub mod equal_area;
 mod image;
+pub mod irradiance;
 pub mod lat_long;
 pub mod level;
 mod name;

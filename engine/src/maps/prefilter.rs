@@ -10,6 +10,8 @@
 //! of the source by solid angle, no samples: what is left is that a texel has one direction, so lobes should be wider than texels (α above the
 //! texel's side in radians); narrower ones interpolate between texel centres. Deterministic. GLSL: `maps/ggx_lobe.glsl`; twins: [`ggx_lobe`],
 //! [`prefilter_ggx`].
+//!
+//! With α = 1 the lobe is n·l: the filtered map times π is the irradiance ([`irradiance`](super::irradiance)).
 
 use super::MapImage;
 use super::directional_map::DirectionalMap;
@@ -25,7 +27,7 @@ pub fn ggx_lobe(r: DVec3, d: DVec3, alpha: f64) -> f64 {
 }
 
 /// The same of 1 − (n·h)², the squared sine of half the angle.
-fn lobe(sine: f64, alpha: f64) -> f64 {
+pub(super) fn lobe(sine: f64, alpha: f64) -> f64 {
     let a = alpha * alpha;
     let shape = a / (a + (1.0 - a) * sine);
     (1.0 - 2.0 * sine).max(0.0) * shape * shape
@@ -95,8 +97,9 @@ impl PrefilterGgx {
     /// Makes the pipeline for maps as this one.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`Error::Setting`] for maps of several layers or of discs; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, map: &DirectionalMap) -> Result<Self> {
+        map.check_one_layer()?;
         let constants = map.constants();
         let pipeline = gpu.compute_pipeline(&kernel::Spec {
             directional_kind: constants.kind,

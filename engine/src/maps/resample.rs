@@ -11,6 +11,7 @@
 use super::{MapImage, MapPoint, Parametrization, Texel};
 use crate::{Error, Result};
 use glam::{DMat3, DVec2, DVec3, UVec2};
+use rayon::prelude::*;
 
 /// What a map is between the centres of its texels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,20 +58,80 @@ pub fn resample(
     turn: DMat3,
     settings: &ResampleSettings,
 ) -> Result<MapImage> {
-    let samples = settings.samples;
-    if !(1..=MAX_SAMPLES).contains(&samples) {
-        return Err(Error::setting(
-            "samples",
-            samples,
-            format!("is not in 1..={MAX_SAMPLES}"),
-        ));
+    let conversion = Conversion::new(source, to, size, turn, settings)?;
+    MapImage::from_fn(to, size, |texel| conversion.texel(texel))
+}
+
+/// As [`resample`], telling `go_on` the share that is done before each row of texels and at the end; `None` when it has said no.
+///
+/// # Errors
+/// As [`resample`].
+pub fn resample_watched(
+    source: &MapImage,
+    to: Parametrization,
+    size: UVec2,
+    turn: DMat3,
+    settings: &ResampleSettings,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Result<Option<MapImage>> {
+    let conversion = Conversion::new(source, to, size, turn, settings)?;
+    let rows = to.layers() * size.y;
+    let mut texels = Vec::with_capacity((rows * size.x) as usize);
+    for row in 0..rows {
+        if !go_on(f64::from(row) / f64::from(rows)) {
+            return Ok(None);
+        }
+        let (layer, y) = (row / size.y, row % size.y);
+        let of_row = (0..size.x).into_par_iter();
+        texels.par_extend(of_row.map(|x| conversion.texel(Texel { layer, x, y }).as_vec3()));
     }
-    let value = |d: DVec3| match settings.reconstruction {
-        Reconstruction::Box => source.nearest(turn * d).map(|v| v.as_dvec3()),
-        Reconstruction::Bilinear => source.look_up(turn * d),
-    };
-    MapImage::from_fn(to, size, |texel| {
-        let steps = steps(source, to, size, texel, turn, samples);
+    go_on(1.0);
+    MapImage::new(to, size, texels).map(Some)
+}
+
+/// A map on its way to another.
+struct Conversion<'a> {
+    source: &'a MapImage,
+    to: Parametrization,
+    size: UVec2,
+    turn: DMat3,
+    settings: &'a ResampleSettings,
+}
+
+impl<'a> Conversion<'a> {
+    fn new(
+        source: &'a MapImage,
+        to: Parametrization,
+        size: UVec2,
+        turn: DMat3,
+        settings: &'a ResampleSettings,
+    ) -> Result<Self> {
+        to.check_size(size)?;
+        let samples = settings.samples;
+        if !(1..=MAX_SAMPLES).contains(&samples) {
+            let cause = format!("is not in 1..={MAX_SAMPLES}");
+            return Err(Error::setting("samples", samples, cause));
+        }
+        Ok(Self {
+            source,
+            to,
+            size,
+            turn,
+            settings,
+        })
+    }
+
+    /// Of the source, in a direction of the target's axes.
+    fn value(&self, d: DVec3) -> Option<DVec3> {
+        match self.settings.reconstruction {
+            Reconstruction::Box => self.source.nearest(self.turn * d).map(|v| v.as_dvec3()),
+            Reconstruction::Bilinear => self.source.look_up(self.turn * d),
+        }
+    }
+
+    fn texel(&self, texel: Texel) -> DVec3 {
+        let Self { to, size, .. } = *self;
+        let steps = steps(self.source, to, size, texel, self.turn, self.settings.samples);
         let [lower, upper] = texel.bounds(size);
         let step = (upper - lower) / f64::from(steps);
         let (mut sum, mut whole) = (DVec3::ZERO, 0.0);
@@ -79,7 +140,7 @@ pub fn resample(
                 let uv = lower + (UVec2::new(x, y).as_dvec2() + 0.5) * step;
                 if let Some(d) = to.decode(MapPoint { layer: texel.layer, uv }) {
                     let weight = to.solid_angle_density(uv);
-                    sum += weight * value(d).unwrap_or_default();
+                    sum += weight * self.value(d).unwrap_or_default();
                     whole += weight;
                 }
             }
@@ -90,8 +151,8 @@ pub fn resample(
         // The rim of a disc cuts off less than a rectangle: the texel's point next to the middle.
         let uv = DVec2::splat(0.5).clamp(lower, upper);
         let rim = to.decode(MapPoint { layer: texel.layer, uv });
-        rim.and_then(value).unwrap_or_default()
-    })
+        rim.and_then(|d| self.value(d)).unwrap_or_default()
+    }
 }
 
 /// Rectangles along a side of a target's texel: the samples times a power of two, so that maps of which one refines the other meet edge to

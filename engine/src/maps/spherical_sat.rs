@@ -106,9 +106,10 @@ impl SphericalSat {
     /// A table for level 0 of a map with its border, not yet filled.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a range that is not finite or without extent; [`Error::LimitExceeded`] for a map with its border wider than 4096
+    /// [`Error::Setting`] for a range that is not finite or without extent, or for a map of several layers or of discs; [`Error::LimitExceeded`] for a map with its border wider than 4096
     /// texels or for a table beyond what buffers hold; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, map: &DirectionalMap, numbers: SatNumbers, range: SatRange) -> Result<Self> {
+        map.check_one_layer()?;
         let level = map.level(0)?;
         let size = UVec2::from_array(level.size.map(i32::cast_unsigned));
         let tile = size + 2 * map.border();
@@ -160,6 +161,19 @@ impl SphericalSat {
             })?,
             shape,
         })
+    }
+
+    pub(super) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    pub(super) fn constants(&self) -> super::directional_map::DirectionalConstants {
+        self.constants
+    }
+
+    /// `SAT_NUMBERS`.
+    pub(super) fn numbers(&self) -> u32 {
+        self.numbers.constant()
     }
 
     /// The set that `maps/spherical_sat.glsl` reads.

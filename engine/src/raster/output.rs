@@ -18,7 +18,8 @@ pub enum Output {
     Position,
     /// Geometric and shading normal, to the front of the surface, each a word of
     /// [`pack_octahedral`](crate::maps::packed_direction::pack_octahedral) with 16 bits, `R32G32_UINT`. The shading normal is the interpolated one,
-    /// on the geometric one's side; normal maps are left to who shades.
+    /// on the geometric one's side, with the material's normal map, which may lead it to the
+    /// other: who shades adapts it to the viewer.
     Normals,
     /// Weights of the triangle's corners 1 and 2, `R32G32_SFLOAT`.
     Weights,

@@ -159,6 +159,7 @@ fn make<V: VertexShader, G: GeometryStage>(
 ) -> Result<GraphicsPipeline<V, surface_frag::Shader, G>> {
     let has = |output| outputs.contains(&output);
     let uvs = has(Output::TextureCoordinates);
+    let has_normal_maps = features.normal_maps && has(Output::Normals);
     // Attributes are read where a picture or a material's coverage wants them.
     let fragment = surface_frag::Spec {
         write_distance: has(Output::Distance),
@@ -167,10 +168,11 @@ fn make<V: VertexShader, G: GeometryStage>(
         write_weights: has(Output::Weights),
         write_texture_coordinates: uvs,
         write_object: has(Output::Object),
-        has_textures: features.textures && (uvs || features.alpha),
+        has_textures: features.textures && (uvs || features.alpha || has_normal_maps),
         has_vertex_colors: features.vertex_colors && features.alpha,
         has_shading_normals: features.shading_normals && has(Output::Normals),
         has_alpha: features.alpha,
+        has_normal_maps,
     };
     let format = |output: Output| {
         if has(output) {

@@ -25,6 +25,8 @@ pub struct SurfaceFeatures {
     pub vertex_colors: bool,
     /// Normals of vertices.
     pub shading_normals: bool,
+    /// Normal maps.
+    pub normal_maps: bool,
     /// Materials that are not there in part.
     pub alpha: bool,
 }
@@ -36,6 +38,7 @@ impl SurfaceFeatures {
             textures: profile.has_textures,
             vertex_colors: profile.has_vertex_colors,
             shading_normals: profile.has_shading_normals,
+            normal_maps: profile.has_normal_maps,
             alpha: profile.has_alpha(),
         }
     }

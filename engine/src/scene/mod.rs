@@ -11,6 +11,7 @@ pub mod gltf;
 pub mod medium;
 pub mod metals;
 mod mtl;
+pub mod normal_map;
 mod obj;
 mod ply;
 mod profile;

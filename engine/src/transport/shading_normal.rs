@@ -6,14 +6,11 @@
 //! normal| is integrated over a part of its domain. Reciprocity is lost, as with every shading normal. Twin of
 //! `transport/shading_normal.glsl`.
 
-use super::warp::orthonormal_basis;
 use crate::gpu::shaders::constants;
-use glam::{DVec3, DVec4};
+use glam::DVec3;
 
 /// Least cosine between the adapted normal and ωo: far above rounding errors, far below what the eye sees of a bent normal.
 pub const VISIBLE_COS_MIN: f64 = constants::VISIBLE_COS_MIN as f64;
-/// Tangents whose part normal to n is shorter than this are replaced.
-const TANGENT_LENGTH_MIN: f64 = constants::TANGENT_LENGTH_MIN as f64;
 
 /// The shading normal to use, on the side of `wo`; `ng` must already face `wo`.
 ///
@@ -33,19 +30,6 @@ pub fn sides_agree(ns: DVec3, ng: DVec3, wi: DVec3) -> bool {
     ns.dot(wi) * ng.dot(wi) > 0.0
 }
 
-/// World-space normal of a tangent-space normal map (glTF 2.0 §3.9.3): `texel` in [0, 1], `tangent.w` the sign of the bitangent.
-pub fn mapped_normal(n: DVec3, tangent: DVec4, texel: DVec3, scale: f64) -> DVec3 {
-    let m = (2.0 * texel - 1.0) * DVec3::new(scale, scale, 1.0);
-    let t = tangent.truncate() - n * n.dot(tangent.truncate());
-    let (t, b) = if t.length_squared() < TANGENT_LENGTH_MIN * TANGENT_LENGTH_MIN {
-        orthonormal_basis(n)
-    } else {
-        let t = t.normalize();
-        (t, n.cross(t) * if tangent.w < 0.0 { -1.0 } else { 1.0 })
-    };
-    (t * m.x + b * m.y + n * m.z).try_normalize().unwrap_or(n)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::albedo::AlbedoTable;
@@ -53,6 +37,7 @@ mod tests {
     use super::super::testing::random3;
     use super::super::warp::square_to_sphere;
     use super::*;
+    use crate::scene::normal_map::orthonormal_basis;
 
     #[test]
     fn adapted_normals_face_the_viewer_and_lose_energy_only() {
@@ -90,29 +75,5 @@ mod tests {
             // Weights of this material lie in [0, 2]: Hoeffding's bound at 1e-9 each, 2e-7 for all.
             assert!(sum / f64::from(samples) <= 1.005 + 2.0 * (20.7 / (2.0 * f64::from(samples))).sqrt());
         }
-    }
-
-    #[test]
-    fn flat_maps_keep_the_normal() {
-        let n = DVec3::new(0.6, 0.0, 0.8);
-        let flat = DVec3::new(0.5, 0.5, 1.0);
-        for tangent in [
-            DVec4::new(0.8, 0.0, -0.6, 1.0),
-            DVec4::new(0.6, 0.0, 0.8, -1.0),
-            DVec4::ZERO,
-        ] {
-            assert!((mapped_normal(n, tangent, flat, 1.0) - n).length() < 1e-15);
-        }
-        let tilted = mapped_normal(
-            DVec3::Z,
-            DVec4::new(1.0, 0.0, 0.0, -1.0),
-            DVec3::new(0.5, 1.0, 1.0),
-            1.0,
-        );
-        assert!(
-            (tilted - DVec3::new(0.0, -1.0, 1.0).normalize()).length() < 1e-15,
-            "w = -1 turns the bitangent"
-        );
-        assert_eq!(mapped_normal(n, DVec4::ZERO, DVec3::splat(0.5), 1.0), n, "a null texel");
     }
 }

@@ -1,8 +1,10 @@
-//! Warps from the unit square to the domains that a renderer samples, with their densities, and orthonormal bases.
+//! Warps from the unit square to the domains that a renderer samples, with their densities.
 //!
 //! Sources: concentric disk of Shirley and Chiu (1997); triangle of Heitz, "A Low-Distortion Map Between Triangle and Square"
-//! (2019); basis of Duff et al., "Building an Orthonormal Basis, Revisited" (JCGT 6(1), 2017). Guarantees: densities integrate to
-//! one over their domain (solid angle for directions); directions have unit length. Twin of `transport/warp.glsl`.
+//! (2019). Guarantees: densities integrate to one over their domain (solid angle for directions); directions have unit length. Twin of
+//! `transport/warp.glsl`.
+
+pub use crate::scene::normal_map::orthonormal_basis;
 
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
@@ -69,17 +71,6 @@ pub fn square_to_triangle(u: DVec2) -> DVec3 {
     let low = 0.5 * u.x.min(u.y);
     let (b1, b2) = if u.x < u.y { (low, u.y - low) } else { (u.x - low, low) };
     DVec3::new(1.0 - b1 - b2, b1, b2)
-}
-
-/// Tangent and bitangent of a right-handed frame about the unit vector `n`.
-pub fn orthonormal_basis(n: DVec3) -> (DVec3, DVec3) {
-    let s = if n.z < 0.0 { -1.0 } else { 1.0 };
-    let a = -1.0 / (s + n.z);
-    let c = n.x * n.y * a;
-    (
-        DVec3::new(1.0 + s * n.x * n.x * a, s * c, -s * n.x),
-        DVec3::new(c, s + n.y * n.y * a, -n.y),
-    )
 }
 
 #[cfg(test)]

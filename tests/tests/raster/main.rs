@@ -4,7 +4,9 @@
 mod directions;
 mod gbuffer;
 mod layers;
+mod normal_maps;
 mod oracle;
+mod parallel;
 
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::{

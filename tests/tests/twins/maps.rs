@@ -16,7 +16,7 @@ use clerestory_tests::random::Random;
 use clerestory_tests::shaders::maps_round_trip;
 use clerestory_tests::twin::{Case, Tolerance, compare};
 use clerestory_tests::{twin_kernel, with_gpu};
-use glam::{DVec2, DVec3, IVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, IVec2, UVec2, Vec2, Vec3};
 
 use crate::{cases, direction, join, list, shift, ulps, v2, v3};
 
@@ -186,6 +186,21 @@ fn levels_borders_and_words_agree_with_their_twins() {
             ];
             let found = [0, 2, 4].map(|i| Vec2::from_slice(&result.0[i..]).as_ivec2());
             assert_eq!(found, expected, "{p} {size}");
+        }
+
+        let table = cases(48, |r| {
+            let n = r.choose(&[1i32, 2, 7, 32]);
+            // Beyond one edge at most, as far as the face is wide.
+            let mut p = [r.below(n as usize) as i32, r.below(n as usize) as i32];
+            p[r.below(2)] = r.below(3 * n as usize) as i32 - n;
+            vec![p[0] as f32, p[1] as f32, f32::from_bits(r.below(6) as u32), n as f32]
+        });
+        for (case, result) in table.iter().zip(twin_maps(gpu, 7, &table, &[])) {
+            let [x, y, face, n] = [case.0[0], case.0[1], case.0[2], case.0[3]];
+            let size = UVec2::splat(n as u32);
+            let expected = Parametrization::Cube.wrap(size, face.to_bits(), x as i32, y as i32).unwrap();
+            let found = result.0[..3].iter().map(|v| *v as u32).collect::<Vec<_>>();
+            assert_eq!(found, [expected.layer, expected.x, expected.y], "({x}, {y}) of {n}");
         }
 
         for bits in [8u32, 12, 13, 15, 16] {

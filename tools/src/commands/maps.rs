@@ -5,14 +5,15 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use clerestory::film::{Picture, exr, hdr};
-use clerestory::maps::resample::{MAX_SAMPLES, Reconstruction, ResampleSettings, resample};
+use clerestory::maps::resample::{MAX_SAMPLES, Reconstruction, ResampleSettings, resample_watched};
 use clerestory::maps::{MapImage, Parametrization};
 use clerestory::{Error, Result};
-use glam::{DVec3, UVec2, Vec3};
+use glam::{DMat3, DVec3, UVec2, Vec3};
 
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Code, Failure, Outcome};
 use crate::output::{self, Table};
 use crate::pictures;
+use crate::stop::Stop;
 
 /// Converts environment maps between parametrizations, each texel to the mean radiance over its solid angle
 #[derive(Debug, Args)]
@@ -29,7 +30,9 @@ the right of it. All other maps but the cube have the world's up as their pole, 
 outside of discs are black.
 
 It prints the integral of radiance over the sphere before and after. They differ by what texels share: 4 samples a side of the finer map's texels \
-are off by less than 1e-3 for most maps, maps of which one refines the other by much less; more --samples bring them closer.")]
+are off by less than 1e-3 for most maps, maps of which one refines the other by much less; more --samples bring them closer.
+
+Ctrl-C ends the conversion before anything is written: an older output stays as it was.")]
 pub struct Arguments {
     /// The map to read: EXR or Radiance HDR
     input: PathBuf,
@@ -101,7 +104,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     };
     // Axes are orthonormal: the transpose leads back to the world.
     let turn = from.world_axes() * to.world_axes().transpose();
-    let converted = resample(&source, to, size, turn, &settings)?;
+    let Some(converted) = convert(&source, to, size, turn, &settings)? else {
+        output::note(&format!("stopped; {} was not written", arguments.output.display()));
+        return Ok(Code::Interrupted.into());
+    };
     let (extent, texels) = converted.to_strip(arguments.border)?;
     let mut written = Picture::from_radiance(extent.x, extent.y, texels.iter().flat_map(Vec3::to_array).collect())?;
     written.metadata = picture.metadata.clone();
@@ -111,6 +117,30 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     write(&arguments.output, &written)?;
     report(arguments, &source, &converted)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+/// Converts under a bar, which shows itself on a terminal alone; `None` when somebody wished it to stop.
+fn convert(
+    source: &MapImage,
+    to: Parametrization,
+    size: UVec2,
+    turn: DMat3,
+    settings: &ResampleSettings,
+) -> Outcome<Option<MapImage>> {
+    let bar = output::bar(STEPS);
+    let stop = Stop::listen(&bar, "stopping; nothing is written")?;
+    tracing::info!("converting {} to {to}", source.map());
+    bar.set_message(format!("{} to {to}", source.map()));
+    bar.enable_steady_tick(output::TICK);
+    let converted = resample_watched(source, to, size, turn, settings, &mut |share| {
+        bar.set_position((share * STEPS as f64) as u64);
+        !stop.wished()
+    });
+    bar.finish_and_clear();
+    Ok(converted?)
 }
 
 fn source(arguments: &Arguments, picture: &Picture) -> Outcome<MapImage> {

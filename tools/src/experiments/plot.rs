@@ -119,7 +119,7 @@ fn span(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// Powers of ten within a range, with their double and fivefold where the powers are few.
-fn ticks((least, most): (f64, f64)) -> Vec<f64> {
+pub(super) fn ticks((least, most): (f64, f64)) -> Vec<f64> {
     let decades = least.log10().floor() as i32..=most.log10().ceil() as i32;
     let with = |steps: &[f64]| -> Vec<f64> {
         let all = decades
@@ -135,7 +135,7 @@ fn ticks((least, most): (f64, f64)) -> Vec<f64> {
     }
 }
 
-fn tick_text(value: &f64) -> String {
+pub(super) fn tick_text(value: &f64) -> String {
     if (0.000_99..10_000.0).contains(value) {
         // Ticks have one digit that counts; their product with a power of ten is not exact.
         let digits = (-value.log10().floor()).max(0.0) as usize;
@@ -146,13 +146,13 @@ fn tick_text(value: &f64) -> String {
 }
 
 /// A marker at each of its points; in a legend with a piece of its line.
-struct Glyph<C> {
-    points: Vec<C>,
+pub(super) struct Glyph<C> {
+    pub points: Vec<C>,
     /// Which marker; `None` draws none.
-    shape: Option<usize>,
+    pub shape: Option<usize>,
     /// Dash and gap of the line, in a legend.
-    legend: Option<(u32, u32)>,
-    color: RGBColor,
+    pub legend: Option<(u32, u32)>,
+    pub color: RGBColor,
 }
 
 impl<'a, C: 'a> PointCollection<'a, C> for &'a Glyph<C> {

@@ -19,13 +19,15 @@ vec2 cube_encode(vec3 d, out uint face) {
     return vec2(-d.z / d.x, -d.y / a.x);
 }
 
-vec3 cube_decode(uint face, vec2 uv) {
+// The point of a face's coordinates in space, at a height along its normal.
+vec3 cube_point(uint face, vec2 uv, float height) {
     float side = (face & 1u) == 0u ? 1.0 : -1.0;
-    vec3 p = face >= 4u ? vec3(side * uv.x, -uv.y, side)
-           : face >= 2u ? vec3(uv.x, side, side * uv.y)
-                        : vec3(side, -uv.y, -side * uv.x);
-    return normalize(p);
+    return face >= 4u ? vec3(side * uv.x, -uv.y, side * height)
+         : face >= 2u ? vec3(uv.x, side * height, side * uv.y)
+                      : vec3(side * height, -uv.y, -side * uv.x);
 }
+
+vec3 cube_decode(uint face, vec2 uv) { return normalize(cube_point(face, uv, 1.0)); }
 
 // Solid angle over area of the face.
 float cube_density(vec2 uv) {

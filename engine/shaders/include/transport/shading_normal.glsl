@@ -7,12 +7,10 @@
 #ifndef CLERESTORY_TRANSPORT_SHADING_NORMAL_GLSL
 #define CLERESTORY_TRANSPORT_SHADING_NORMAL_GLSL
 
-#include "transport/warp.glsl"
+#include "scene/normal_map.glsl"
 
 // Least cosine between the adapted normal and wo: far above rounding errors, far below what the eye sees of a bent normal.
 const float VISIBLE_COS_MIN = 1e-3;
-// Tangents whose part normal to n is shorter than this are replaced.
-const float TANGENT_LENGTH_MIN = 1e-4;
 
 // The shading normal to use, on the side of wo; `ng` must already face wo. For the inside of a solid the caller turns the result
 // back, since a scattering frame's z points out of the body.
@@ -24,21 +22,5 @@ vec3 adapt_shading_normal(vec3 ns, vec3 ng, vec3 wo) {
 
 // Whether a direction lies on the same side of both normals; what does not is rejected by sampling and evaluation alike.
 bool sides_agree(vec3 ns, vec3 ng, vec3 wi) { return dot(ns, wi) * dot(ng, wi) > 0.0; }
-
-// World-space normal of a tangent-space normal map (glTF 2.0 3.9.3): texel in [0, 1], tangent.w the sign of the bitangent.
-vec3 mapped_normal(vec3 n, vec4 tangent, vec3 texel, float scale) {
-    vec3 m = (2.0 * texel - 1.0) * vec3(scale, scale, 1.0);
-    vec3 t = tangent.xyz - n * dot(n, tangent.xyz);
-    vec3 b;
-    if (dot(t, t) < TANGENT_LENGTH_MIN * TANGENT_LENGTH_MIN) {
-        orthonormal_basis(n, t, b);
-    } else {
-        t = normalize(t);
-        b = cross(n, t) * (tangent.w < 0.0 ? -1.0 : 1.0);
-    }
-    vec3 mapped = t * m.x + b * m.y + n * m.z;
-    float l = dot(mapped, mapped);
-    return l > 0.0 ? mapped * inversesqrt(l) : n;
-}
 
 #endif

@@ -1,12 +1,12 @@
-// Warps from the unit square to the domains that a renderer samples, with their densities, and orthonormal bases.
+// Warps from the unit square to the domains that a renderer samples, with their densities.
 //
-// Sources: concentric disk of Shirley and Chiu (1997); triangle of Heitz, "A Low-Distortion Map Between Triangle and Square" (2019);
-// basis of Duff et al., "Building an Orthonormal Basis, Revisited" (JCGT 6(1), 2017).
+// Sources: concentric disk of Shirley and Chiu (1997); triangle of Heitz, "A Low-Distortion Map Between Triangle and Square" (2019).
 // Guarantees: densities integrate to one over their domain (solid angle for directions); directions have unit length.
 #ifndef CLERESTORY_TRANSPORT_WARP_GLSL
 #define CLERESTORY_TRANSPORT_WARP_GLSL
 
 #include "pi.glsl"
+#include "scene/normal_map.glsl"
 
 const float UNIFORM_SPHERE_PDF = 0.07957747154594766788;
 const float UNIFORM_HEMISPHERE_PDF = 0.15915494309189533577;
@@ -52,15 +52,6 @@ vec3 square_to_triangle(vec2 u) {
     float low = 0.5 * min(u.x, u.y);
     vec2 b = u.x < u.y ? vec2(low, u.y - low) : vec2(u.x - low, low);
     return vec3(1.0 - b.x - b.y, b);
-}
-
-// Tangent and bitangent of a right-handed frame about the unit vector n.
-void orthonormal_basis(vec3 n, out vec3 t, out vec3 b) {
-    float s = n.z < 0.0 ? -1.0 : 1.0;
-    float a = -1.0 / (s + n.z);
-    float c = n.x * n.y * a;
-    t = vec3(1.0 + s * n.x * n.x * a, s * c, -s * n.x);
-    b = vec3(c, s + n.y * n.y * a, -n.y);
 }
 
 #endif

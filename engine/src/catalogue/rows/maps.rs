@@ -2,8 +2,8 @@
 
 use super::super::{Row, measured, part};
 
-const DENSITY: &str = "clerestory report map-density";
-const DENSITY_AND_ERROR: &str = "clerestory report map-density map-error";
+const DENSITY: &str = "clerestory report map-density map-choice";
+const DENSITY_AND_ERROR: &str = "clerestory report map-density map-error map-choice";
 
 pub(super) const ROWS: &[Row] = &[
     measured(
@@ -21,6 +21,8 @@ pub(super) const ROWS: &[Row] = &[
                 "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
                 "engine/src/transport/environment.rs::directions_and_coordinates_agree",
+                "engine/src/maps/tests/printed.rs::a_longitude_of_a_quotient_folds_half_turns",
+                "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
             ],
         ),
     ),
@@ -39,6 +41,7 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/maps/tests/density.rs::anisotropies_are_those_of_the_table",
                 "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+                "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
             ],
         ),
     ),
@@ -57,6 +60,8 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
                 "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+                "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
+                "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
             ],
         ),
     ),
@@ -74,6 +79,8 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/maps/tests/solid_angles.rs::rectangles_have_the_integral_of_the_density",
                 "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+                "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
+                "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
             ],
         ),
     ),
@@ -91,6 +98,7 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/maps/tests/solid_angles.rs::rectangles_have_the_integral_of_the_density",
                 "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+                "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
             ],
         ),
     ),
@@ -113,6 +121,8 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/maps/tests/irradiance.rs::constant_radiance_gives_pi_for_every_normal",
                 "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+                "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
+                "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
             ],
         ),
     ),
@@ -132,6 +142,7 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/maps/tests/levels.rs::the_octants_own_map_has_no_seams",
                 "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+                "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
             ],
         ),
     ),
@@ -177,7 +188,7 @@ pub(super) const ROWS: &[Row] = &[
         "clerestory report map-glossiness",
         part(
             "OEM-6",
-            "spherical summed-area table: means over boxes for continuous glossiness",
+            "spherical summed-area table: means over boxes, and lobes of several, for continuous glossiness",
             "Crow 1984; Engelhardt and Dachsbacher 2008",
             "engine/src/maps/spherical_sat.rs",
             &[
@@ -185,6 +196,9 @@ pub(super) const ROWS: &[Row] = &[
                 "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
                 "engine/src/maps/tests/glossy.rs::tables_hold_the_means_of_boxes",
                 "engine/src/maps/tests/glossy.rs::boxes_have_no_seams",
+                "tests/tests/directional_maps.rs::lobes_are_their_twins",
+                "engine/src/maps/tests/box_lobes.rs::borders_hold_the_largest_box",
+                "engine/src/maps/tests/box_lobes.rs::lobes_on_folds_and_edges_are_as_good_as_elsewhere",
             ],
         ),
     ),

@@ -64,7 +64,7 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/transport/shading_normal.rs",
             &[
                 "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_lose_energy_only",
-                "engine/src/transport/shading_normal.rs::flat_maps_keep_the_normal",
+                "engine/src/scene/normal_map.rs::flat_maps_keep_the_normal",
             ],
         ),
     ),
@@ -407,7 +407,7 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
-        "clerestory report map-density map-error",
+        "clerestory report map-density map-error map-choice",
         part(
             "CL-EQUAL-AREA",
             "equal-area octahedron map",
@@ -437,6 +437,38 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     measured(
+        "clerestory report map-glossiness",
+        part(
+            "CL-BOX-LOBE",
+            "lobes of glossy reflections as staircases of boxes of a summed-area table",
+            "this engine; Bellman 1961 (the best staircase)",
+            "engine/src/maps/box_lobe.rs",
+            &[
+                "engine/src/maps/tests/box_lobes.rs::weights_share_the_lobe",
+                "engine/src/maps/tests/box_lobes.rs::the_staircase_is_the_best_one",
+                "engine/src/maps/tests/box_lobes.rs::borders_hold_the_largest_box",
+                "engine/src/maps/tests/box_lobes.rs::constant_radiance_is_constant_through_every_lobe",
+                "tests/tests/directional_maps.rs::lobes_are_their_twins",
+            ],
+        ),
+    ),
+    measured(
+        "clerestory report map-error",
+        part(
+            "CL-IRRADIANCE",
+            "irradiance under a map, and maps of it over normals",
+            "Lambert 1760; Ramamoorthi and Hanrahan 2001",
+            "engine/src/maps/irradiance.rs",
+            &[
+                "engine/src/maps/tests/irradiance.rs::constant_radiance_gives_pi_for_every_normal",
+                "engine/src/maps/tests/irradiance.rs::a_sky_that_fades_to_the_horizon_gives_two_thirds_of_pi",
+                "engine/src/maps/tests/irradiance.rs::a_sun_of_one_texel_is_lamberts_polygon",
+                "engine/src/maps/tests/irradiance.rs::maps_of_irradiance_hold_it_for_every_normal",
+                "tests/tests/directional_maps.rs::the_widest_lobe_is_irradiance",
+            ],
+        ),
+    ),
+    measured(
         "clerestory maps sky.hdr sky.exr --to octahedron",
         part(
             "CL-RESAMPLE",
@@ -448,6 +480,9 @@ pub(super) const ROWS: &[Row] = &[
                 "engine/src/maps/tests/conversions.rs::halves_of_a_map_are_means_of_its_texels",
                 "engine/src/maps/tests/conversions.rs::conversions_keep_the_integral",
                 "engine/src/maps/tests/conversions.rs::smooth_light_comes_back",
+                "engine/src/maps/tests/conversions.rs::conversions_can_be_watched_and_stopped",
+                "tools/tests/maps.rs::every_format_leads_to_every_other",
+                "tools/tests/maps.rs::a_conversion_that_is_stopped_leaves_the_old_file",
                 "tools/tests/maps.rs::directions_are_those_of_environments",
                 "tools/tests/maps.rs::scenes_look_the_same_after_a_round_trip",
             ],

@@ -1,6 +1,6 @@
 //! Conversions between maps: what they keep, how wrong they are, and which way up files are.
 
-use super::super::resample::{Reconstruction, ResampleSettings, resample};
+use super::super::resample::{Reconstruction, ResampleSettings, resample, resample_watched};
 use super::super::*;
 use super::directions;
 use crate::test_random::Random;
@@ -159,6 +159,28 @@ fn smooth_light_comes_back() {
         let mean_error = (mean_error / (4.0 * PI)).sqrt();
         assert!(mean_error < mean_bound, "{through}: {mean_error}");
     }
+}
+
+/// A conversion that is watched is the same to the bit, tells of its progress row by row, and stops when it is told to.
+#[test]
+fn conversions_can_be_watched_and_stopped() {
+    let source = noise(Parametrization::LatLong, 12);
+    let (to, size) = (Parametrization::Cube, UVec2::splat(8));
+    let settings = ResampleSettings::default();
+    let mut told = Vec::new();
+    let watched = resample_watched(&source, to, size, DMat3::IDENTITY, &settings, &mut |share| {
+        told.push(share);
+        true
+    });
+    let plain = resample(&source, to, size, DMat3::IDENTITY, &settings).unwrap();
+    assert!(watched.unwrap() == Some(plain));
+    assert!(told.len() == 49 && told[0] == 0.0 && told[48] == 1.0 && told.is_sorted());
+    let mut rows = 0;
+    let stopped = resample_watched(&source, to, size, DMat3::IDENTITY, &settings, &mut |_| {
+        rows += 1;
+        rows < 5
+    });
+    assert!(stopped.unwrap().is_none() && rows == 5);
 }
 
 #[test]

@@ -62,6 +62,33 @@ fn extremes_are_where_the_table_says() {
     assert!((ratio(Parametrization::EqualArea, face) - 1.0).abs() < 1e-15);
 }
 
+/// Figures 5.1 to 5.4: ratios along a great circle from the pole of the map.
+#[test]
+fn ratios_along_great_circles_are_those_of_the_figures() {
+    let circle = |degrees: u32| {
+        let at = f64::from(degrees).to_radians();
+        DVec3::new(at.sin(), 0.0, at.cos())
+    };
+    for degrees in 0..=360 {
+        let d = circle(degrees);
+        let of = |map| ratio(map, d);
+        near(of(Parametrization::LatLong), 0.5 * PI * d.x.abs(), 12);
+        near(of(Parametrization::Sphere), 1.0, 12);
+        // Through the middles of faces and edges the cube is never off by a factor of two.
+        let cube = of(Parametrization::Cube);
+        near(cube, 6.0 / PI * d.abs().max_element().powi(3), 12);
+        assert!((0.675..1.910).contains(&cube) && cube < 2.0 && 1.0 / cube < 1.482, "{degrees}: {cube}");
+        // From the middle of a disc to its rim, by ρ = tan of half the angle.
+        let rho = d.x.abs() / (1.0 + d.z.abs());
+        near(of(Parametrization::DualParaboloid), 2.0 / (1.0 + rho * rho).powi(2), 12);
+        for map in OCTAHEDRA {
+            // 1/‖p‖³ of the mean π, with p on the octahedron.
+            near(of(map), d.abs().element_sum().powi(3) / PI, 12);
+        }
+    }
+    assert!((1.0 / ratio(Parametrization::Cube, DVec3::new(1.0, 0.0, 1.0)) - 1.481).abs() < 1e-3);
+}
+
 #[test]
 fn statistics_are_those_of_the_table() {
     let of = |map: Parametrization, n: u32| map.density_statistics(UVec2::new(n * map.aspect(), n));

@@ -1,5 +1,6 @@
 //! The maps against their definitions, closed forms and the tables of the source; where a printed form is wrong, that it fails.
 
+mod box_lobes;
 mod conversions;
 mod density;
 mod glossy;

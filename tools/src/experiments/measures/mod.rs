@@ -84,6 +84,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("kd-traversal", kd::kd_traversal::measure),
     on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
     on_host("map-borders", maps::map_borders::measure),
+    on_host("map-choice", maps::map_choice::measure),
     on_device("map-construction", photon_maps::map_construction::measure),
     on_host("map-density", maps::map_density::measure),
     on_host("map-error", maps::map_error::measure),

@@ -1,9 +1,11 @@
-//! Error of bilinear look-ups in maps of as many texels each.
+//! Error of bilinear look-ups in maps of as many texels each, and of irradiance by them.
 //!
-//! Oracle: the light field itself, lobes of three widths in random directions, at random directions.
+//! Oracle: the light field itself, lobes of three widths in random directions, at random directions; the closed form of irradiance under a
+//! sky that fades to the horizon.
 
 use clerestory::film::atomic;
-use clerestory::maps::Parametrization;
+use clerestory::maps::irradiance::IrradianceSource;
+use clerestory::maps::{MapImage, Parametrization};
 use clerestory::{Error, Result};
 use glam::{DVec3, UVec2};
 
@@ -45,6 +47,80 @@ fn size(map: Parametrization, texels: u64) -> UVec2 {
     let rows = (texels as f64 / f64::from(map.layers() * map.aspect())).sqrt();
     let height = (2.0 * (0.5 * rows).round().max(1.0)) as u32;
     UVec2::new(height * map.aspect(), height)
+}
+
+/// Greatest errors of irradiance for random normals: by the function and by texels of one direction each.
+fn irradiance(smoke: bool) -> Result<Table> {
+    let (budgets, count): (&[u64], u32) = if smoke { (&[256], 5) } else { (&[256, 1024, 4096, 16384], 100) };
+    let mut random = Random::new(13);
+    let normals: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
+    // ∫ over the half spaces about z and about the normal.
+    let of_sky = |n: &DVec3| {
+        let gamma = n.z.clamp(-1.0, 1.0).acos();
+        2.0 / 3.0 * ((std::f64::consts::PI - gamma) * gamma.cos() + gamma.sin())
+    };
+    let mut table = Table::new(
+        "Error of irradiance",
+        &[
+            "map",
+            "texels",
+            "constant radiance: greatest error over π",
+            "by texels' middles",
+            "sky: greatest error over 2π/3",
+            "by texels' middles",
+        ],
+    );
+    for map in MAPS {
+        for budget in budgets {
+            let size = size(map, *budget);
+            let sky = |d: DVec3| d.z.max(0.0);
+            let held = |of: &(dyn Fn(DVec3) -> f64 + Sync)| {
+                MapImage::from_fn(map, size, |texel| {
+                    // At the rim of a disc, the texel's point next to the middle.
+                    let [lower, upper] = texel.bounds(size);
+                    let uv = glam::DVec2::splat(0.5).clamp(lower, upper);
+                    let inside = clerestory::maps::MapPoint { layer: texel.layer, uv };
+                    let d = map.texel_direction(size, texel).or_else(|| map.decode(inside));
+                    DVec3::splat(d.map_or(0.0, of))
+                })
+            };
+            let mut row = vec![
+                map.to_string().into(),
+                u64::from(size.element_product() * map.layers()).into(),
+            ];
+            let constant = |_: &DVec3| std::f64::consts::PI;
+            let lights: [(MapImage, &dyn Fn(&DVec3) -> f64, f64); 2] = [
+                (held(&|_| 1.0)?, &constant, std::f64::consts::PI),
+                (held(&sky)?, &of_sky, 2.0 * std::f64::consts::PI / 3.0),
+            ];
+            for (image, right, most) in &lights {
+                let source = IrradianceSource::new(image);
+                let parts: Vec<(DVec3, f64)> = map
+                    .texels(size)
+                    .filter_map(|texel| {
+                        let angle = map.texel_solid_angle(size, texel);
+                        let d = map.texel_direction(size, texel)?;
+                        Some((d, angle * f64::from(image.at(texel).x)))
+                    })
+                    .collect();
+                let mut worst = [0.0f64; 2];
+                for n in &normals {
+                    let exact = source.irradiance(*n).unwrap_or_default().x;
+                    let middles: f64 = parts.iter().map(|(d, light)| light * n.dot(*d).max(0.0)).sum();
+                    for (worst, found) in worst.iter_mut().zip([exact, middles]) {
+                        *worst = worst.max((found - right(n)).abs() / most);
+                    }
+                }
+                row.extend(worst.map(Into::into));
+            }
+            table.row(row);
+        }
+    }
+    table.note(format!(
+        "{count} random normals. Texels hold the light at their centres, which for the sky is an error of its own; constant radiance shows that of the integral alone. By middles each \
+         texel counts with its exact solid angle and one direction, as prefiltered maps on the device do."
+    ));
+    Ok(table)
 }
 
 /// The measure.
@@ -133,5 +209,5 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
         atomic::write(&context.folder.join("error.svg"), svg.as_bytes())?;
     }
-    Ok(vec![table])
+    Ok(vec![table, irradiance(context.smoke)?])
 }

@@ -1,11 +1,12 @@
-//! Glossy reflections of a map under glossiness that varies from pixel to pixel: boxes of a summed-area table and prefiltered levels against
-//! the lobe's own integral; what tables cost, and how exact their numbers are.
+//! Glossy reflections of a map under glossiness that varies from pixel to pixel: one and several boxes of a summed-area table and prefiltered
+//! levels against the lobe's own integral; what tables cost, and how exact their numbers are.
 //!
 //! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.2 and Fig. 7.6. Oracle: the sum over all texels in f64, and means of boxes in f64.
 
 use clerestory::film::png::{self, Rgb8};
 use clerestory::film::{Picture, ToneMap};
 use clerestory::gpu::{Gpu, compute_to_transfer, rw_compute_to_compute};
+use clerestory::maps::box_lobe::{Lobe, WeightedBox, box_lobe};
 use clerestory::maps::directional_map::DirectionalMap;
 use clerestory::maps::prefilter::{PrefilterGgx, ggx_lobe, ggx_solid_angle};
 use clerestory::maps::spherical_sat::{SatImage, SatNumbers, SatRange, SphericalSat, sat_half_width};
@@ -27,6 +28,10 @@ const SIZES: [u32; 4] = [64, 128, 256, 512];
 const LEVELS: u32 = 6;
 const LEAST_ALPHA: f64 = 0.02;
 const EYE: DVec3 = DVec3::new(1.0, 0.3, -0.35);
+/// Numbers of boxes that lobes are made of.
+const BOXES: [usize; 5] = [1, 2, 3, 4, 8];
+/// Lobes between the least roughness and the greatest, of which each pixel takes the nearest.
+const LOBES: usize = 65;
 /// Milliseconds of the document for a table of 512² texels.
 const STATED_MS: f64 = 3.3;
 
@@ -183,23 +188,135 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
         ],
     );
     let mut row = vec![shown(side, &pixels, &right)?];
-    for (name, seconds, values) in [
-        ("box of the summed-area table", fill, &by_boxes),
-        ("prefiltered levels", filter, &by_levels),
-    ] {
+    let several: Vec<(usize, Vec<Vec3>)> = BOXES
+        .into_iter()
+        .map(|count| Ok((count, by_lobes(&table, &pixels, count)?)))
+        .collect::<Result<_>>()?;
+    let mut line = |name: String, seconds: f64, values: &[Vec3]| {
         let [rms, mean] = errors(values, &right);
         found.row([name.into(), (1e3 * seconds).into(), rms.into(), mean.into()]);
-        row.push(shown(side, &pixels, values)?);
+    };
+    line("one box of the lobe's variance".into(), fill, &by_boxes);
+    for (count, values) in &several {
+        line(format!("best lobe of {count} boxes"), fill, values);
+        if [1, 4].contains(count) {
+            row.push(shown(side, &pixels, values)?);
+        }
     }
+    line("prefiltered levels".into(), filter, &by_levels);
+    row.push(shown(side, &pixels, &by_levels)?);
     std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
     png::write(context.folder.join("glossiness.png"), &sheet(&[row]))?;
     found.note(format!(
         "A mirror sphere whose roughness √α grows from left to right (α from {LEAST_ALPHA} to 1) in an octahedron map of {rows} × {rows} texels with a \
-         sun. Truth is the sum of the GGX lobe with n = v = r over all texels at each pixel; both look-ups stand for that lobe, and their error is that of \
-         the box and of interpolation between {LEVELS} levels. Boxes hold the solid angle over which an even mean has the lobe's variance; the border is half \
-         the map. Times are by wall clock, medians, with submission. Pictures beside this table, `glossiness.png`: truth, boxes, levels.",
+         sun. Truth is the sum of the GGX lobe with n = v = r over all texels at each pixel; all look-ups stand for that lobe, and their error is that of \
+         the boxes and of interpolation between {LEVELS} levels. One box holds the solid angle over which an even mean has the lobe's variance; several are \
+         the staircase nearest to the lobe, of {LOBES} lobes even in roughness the nearest. The border is half the map. Times are by wall clock, medians, with submission; \
+         all boxes need one table. Pictures beside this table, `glossiness.png`: truth, one box, four boxes, levels.",
     ));
     Ok(found)
+}
+
+/// The lobe of a number of all, even in roughness.
+fn alpha_of_lobe(number: usize) -> f64 {
+    (number as f64 / (LOBES - 1) as f64).powi(2).max(LEAST_ALPHA)
+}
+
+fn by_lobes(table: &SphericalSat, pixels: &[Pixel], count: usize) -> Result<Vec<Vec3>> {
+    let lobes: Vec<Vec<WeightedBox>> = (0..LOBES)
+        .map(|number| box_lobe(Lobe::Ggx { alpha: alpha_of_lobe(number) }, count))
+        .collect::<Result<_>>()?;
+    let query = |pixel: &Pixel| {
+        let number = (pixel.alpha.sqrt() * (LOBES - 1) as f64).round() as usize;
+        (pixel.direction.as_vec3(), number.min(LOBES - 1))
+    };
+    let queries: Vec<(Vec3, usize)> = pixels.iter().map(query).collect();
+    table.look_up_lobes(&queries, &lobes)
+}
+
+/// Error of lobes by number of boxes and glossiness; and what of it is the staircase alone, with the caps that boxes stand for.
+fn lobes(context: &Context<'_>) -> Result<Table> {
+    let (rows, count) = if context.smoke { (48, 40) } else { (TEXELS, 1500) };
+    let source = image(rows)?;
+    let size = source.size();
+    // As far as boxes may reach at all.
+    let sat = SatImage::new(&source, rows)?;
+    let held: Vec<(DVec3, DVec4)> = MAP
+        .texels(size)
+        .filter_map(|texel| {
+            let angle = MAP.texel_solid_angle(size, texel);
+            let value = (angle * source.at(texel).as_dvec3()).extend(angle);
+            Some((MAP.texel_direction(size, texel)?, value))
+        })
+        .collect();
+    let mut random = Random::new(23);
+    let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
+    let mut heads = vec!["lobe".to_owned(), "half of it within (degrees)".into()];
+    heads.extend(BOXES.iter().map(|count| format!("{count} boxes")));
+    heads.extend(BOXES.iter().map(|count| format!("{count} caps")));
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    let mut table = Table::new("RMS error of lobes of boxes over the mean", &heads);
+    let kinds = [0.03, 0.1, 0.2, 0.4, 0.7, 1.0].map(|alpha| (format!("GGX α = {alpha}"), Lobe::Ggx { alpha }));
+    let others = [10.0, 100.0].map(|exponent| (format!("Phong n = {exponent}"), Lobe::Phong { exponent }));
+    for (name, lobe) in kinds.into_iter().chain(others).take(if context.smoke { 2 } else { 8 }) {
+        // By t = 1 − cos: what lies within each box's cap.
+        let fits: Vec<Vec<WeightedBox>> = BOXES
+            .iter()
+            .map(|count| box_lobe(lobe, *count))
+            .collect::<Result<_>>()?;
+        let of = |d: &DVec3| -> Vec<Vec3> {
+            let mut sums = vec![DVec4::ZERO; 1 + fits.iter().map(Vec::len).sum::<usize>()];
+            for (other, value) in &held {
+                let t = 0.5 * (*d - *other).length_squared();
+                sums[0] += lobe.value(t) * *value;
+                let caps = fits.iter().flatten().map(|one| one.solid_angle / std::f64::consts::TAU);
+                for (sum, cap) in sums[1..].iter_mut().zip(caps) {
+                    *sum += if t < cap { *value } else { DVec4::ZERO };
+                }
+            }
+            let mean = |sum: DVec4| {
+                // A cap without a texel's middle is one of the texel at its own.
+                let held = source.nearest(*d).map_or(DVec3::ZERO, |value| value.as_dvec3());
+                if sum.w > 0.0 { sum.truncate() / sum.w } else { held }
+            };
+            let mut found = vec![mean(sums[0]).as_vec3()];
+            let boxes = fits.iter().map(|fit| sat.sat_lobe(MAP, *d, fit).unwrap_or_default().as_vec3());
+            found.extend(boxes);
+            let mut next = 1;
+            for fit in &fits {
+                let parts = fit.iter().zip(&sums[next..]).map(|(one, sum)| one.weight * mean(*sum));
+                found.push(parts.sum::<DVec3>().as_vec3());
+                next += fit.len();
+            }
+            found
+        };
+        let all: Vec<Vec<Vec3>> = directions.par_iter().map(of).collect();
+        let column = |at: usize| -> Vec<Vec3> { all.iter().map(|found| found[at]).collect() };
+        let right = column(0);
+        let mut row = vec![name.into(), half_angle(lobe).to_degrees().into()];
+        row.extend((1..=2 * BOXES.len()).map(|at| errors(&column(at), &right)[0].into()));
+        table.row(row);
+    }
+    table.note(format!(
+        "At {count} uniform directions in the same environment, on {rows} × {rows} texels; f64 throughout. Truth is the lobe's sum over all texels, each by its middle. \
+         Caps are round on the sphere and as large as the boxes: their error is that of the staircase alone, and what boxes have beyond it is that they are squares of \
+         the map. A border as wide as the map holds every box."
+    ));
+    Ok(table)
+}
+
+/// The angle from a lobe's middle within which half of it lies.
+fn half_angle(lobe: Lobe) -> f64 {
+    const STEPS: u32 = 100_000;
+    let at = |i: u32| (f64::from(i) / f64::from(STEPS)).powi(4);
+    let parts = |i: u32| (at(i + 1) - at(i)) * lobe.value(0.5 * (at(i) + at(i + 1)));
+    let whole: f64 = (0..STEPS).map(parts).sum();
+    let mut sum = 0.0;
+    let end = (0..STEPS).find(|i| {
+        sum += parts(*i);
+        sum >= 0.5 * whole
+    });
+    (1.0 - at(end.unwrap_or(STEPS))).acos()
 }
 
 fn numbers(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
@@ -273,5 +390,5 @@ fn numbers(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
-    Ok(vec![reflections(context, &gpu)?, numbers(context, &gpu)?])
+    Ok(vec![reflections(context, &gpu)?, lobes(context)?, numbers(context, &gpu)?])
 }

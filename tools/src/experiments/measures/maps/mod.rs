@@ -1,7 +1,10 @@
-//! Directional maps: how even they are, how well they hold a light field, and look-ups in them.
+//! Directional maps: how even they are, how well they hold a light field, which one to take, and look-ups in them.
 
+mod choice_plot;
+mod environments;
 mod heat;
 pub mod map_borders;
+pub mod map_choice;
 pub mod map_density;
 pub mod map_error;
 pub mod map_glossiness;
