@@ -1,10 +1,12 @@
 //! Rendering: exact coverage, depth, kept contents, refused mistakes, and barriers of what vertex and fragment shaders read. The rest of the
 //! raster floor has files of its own.
 
+mod cuts;
 mod directions;
 mod gbuffer;
 mod layers;
 mod oracle;
+mod splats;
 
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::{

@@ -1,9 +1,11 @@
 //! Directional maps: how even they are, how well they hold a light field, and look-ups in them.
 
 mod heat;
+mod live_maps;
 pub mod map_borders;
 pub mod map_density;
 pub mod map_error;
 pub mod map_glossiness;
 pub mod map_levels;
+pub mod map_rendering;
 mod sphere;
