@@ -4,11 +4,11 @@
 //! clip coordinates are homogeneous, with the norm |x| + |y| + |z| as the divisor, so that what is interpolated inside of an octant is
 //! right (the source's are divided already, and depth and attributes bend), and no more is emitted than there is.
 //!
-//! Guarantees. A cut is the same from both ends of an edge, and every octant's piece has the same corners on a plane as its neighbour's: there are no cracks
-//! but those of the rasterizer. Coordinates of a crossing lie between those of the edge's ends, so that a polygon's
-//! coordinates rise and fall once along its outline however they round, each plane cuts it at two places at most, and each cut of a
-//! polygon adds four corners at most to those of its two parts. Three cuts make of a triangle 7, 15 and at most
-//! [`SPLIT_CORNERS`] corners. In exact arithmetic and general position there are at most 7 polygons with 27 corners, or 13 triangles.
+//! Guarantees. A cut is the same from both ends of an edge, and every octant's piece has the same corners on a plane as its neighbour's:
+//! there are no cracks but those of the rasterizer. Coordinates of a crossing lie between those of the edge's ends, so that a polygon's
+//! coordinates rise and fall once along its outline however they round, each plane cuts it at two places at most, and its two parts have
+//! four corners more at most than the whole. Three cuts make of a triangle 7, 15 and at last [`SPLIT_CORNERS`] corners at most. In exact
+//! arithmetic and general position there are at most 7 polygons with 27 corners, or 13 triangles.
 //! Twin of `raster/octants.glsl`, in the same precision: the same counts.
 
 use glam::{Vec2, Vec3};
@@ -39,8 +39,8 @@ pub enum OctantCut {
     Mask,
     /// As [`OctantCut::Mask`], by a draw for each octant within the rectangle of pixels around it.
     MaskInRectangles,
-    /// OEM-4e: corners are mapped and joined by straight edges, and what lies over a seam is left out: right in the limit of small pieces. Each triangle
-    /// is drawn as `level`² pieces, with `level` from 1 to [`MAX_LEVEL`](super::tessellation::MAX_LEVEL).
+    /// OEM-4e: corners are mapped and joined by straight edges, and what lies over a seam is left out: right in the limit of small pieces.
+    /// Each triangle is drawn as `level`² pieces, with `level` from 1 to [`MAX_LEVEL`](super::tessellation::MAX_LEVEL).
     Unsplit {
         /// Pieces along an edge.
         level: u32,

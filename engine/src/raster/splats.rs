@@ -111,8 +111,8 @@ impl SplatMap {
         &self.texels
     }
 
-    /// Records passes that clear the map, splat `count` points of a buffer as they are seen from `origin` and, if wanted, fill holes. Points out of the range of rays and
-    /// those at the origin are left out.
+    /// Records passes that clear the map, splat `count` points of a buffer as they are seen from `origin` and, if wanted, fill holes. Points
+    /// out of the range of rays and those at the origin are left out.
     ///
     /// Barriers: the points must have been made visible to [`Access::COMPUTE`], and earlier uses of the texels by compute shaders and copies
     /// are waited for. After it texels are visible to compute shaders and copies.

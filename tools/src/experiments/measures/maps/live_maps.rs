@@ -8,7 +8,7 @@ use clerestory::maps::cube::CUBE_FACES;
 use clerestory::maps::octahedron::OctahedronLayout;
 use clerestory::maps::{MapPoint, Parametrization, Texel};
 use clerestory::raster::octants::Emitted;
-use clerestory::raster::splats::{SplatMap, surfels_of};
+use clerestory::raster::splats::{Splat, SplatMap, surfels_of};
 use clerestory::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Output, View};
 use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
@@ -23,7 +23,7 @@ pub const SPLATS_PER_TEXEL: u32 = 4;
 pub enum Way {
     /// By the rasterizer.
     Raster(Layering),
-    /// By points, with or without the fill of holes.
+    /// By points, with the fill of holes.
     Splats,
 }
 
@@ -174,7 +174,6 @@ pub struct Seen {
 /// Work of one filling.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Work {
-    pub seconds: f64,
     pub vertices: u64,
     pub primitives: u64,
     pub emitted_corners: u64,
@@ -260,14 +259,11 @@ impl LiveScene {
         let Way::Raster(layering) = variant.way else {
             let map = SplatMap::new(gpu, layout_of(variant.map), variant.size)?;
             let splats = map.splat(gpu, self.origin, &self.surfels(variant), true)?;
-            let number = |splat: &Option<_>| {
-                splat
-                    .as_ref()
-                    .map_or(u32::MAX, |s: &clerestory::raster::splats::Splat| s.number)
-            };
+            let number = |splat: &Option<Splat>| splat.map_or(u32::MAX, |splat| splat.number);
+            let distance = |splat: &Option<Splat>| splat.map_or(f32::INFINITY, |splat| splat.distance);
             return Ok(Filled {
                 triangles: splats.iter().map(number).collect(),
-                distances: splats.iter().map(|s| s.map_or(f32::INFINITY, |s| s.distance)).collect(),
+                distances: splats.iter().map(distance).collect(),
                 positions: vec![None; splats.len()],
             });
         };
@@ -316,24 +312,20 @@ impl LiveScene {
         let seconds = (0..repeats)
             .map(|_| Ok(once(false)?.seconds()))
             .collect::<Result<_>>()?;
-        let work = Work {
-            vertices: drawn.vertices,
-            primitives: drawn.primitives,
-            fragments: drawn.fragments,
-            emitted_corners: self.emitted_corners(variant, drawn.primitives),
-            ..Work::default()
-        };
         let points = u64::from(SPLATS_PER_TEXEL * variant.size.element_product());
-        let work = if variant.way == Way::Splats {
-            Work {
+        let work = match variant.way {
+            Way::Raster(_) => Work {
+                vertices: drawn.vertices,
+                primitives: drawn.primitives,
+                emitted_corners: self.emitted_corners(variant, drawn.primitives),
+                fragments: drawn.fragments,
+            },
+            Way::Splats => Work {
                 vertices: points,
                 primitives: points,
                 emitted_corners: points,
                 fragments: 0,
-                ..work
-            }
-        } else {
-            work
+            },
         };
         Ok((seconds, work))
     }

@@ -320,14 +320,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         ],
     );
     table.note(format!(
-        "About {0} × {0} texels in all: square 512², rectangle 724 × 362, cube 6 × 209², paraboloids 2 × 362² at full size, whose corners hold nothing. \
-         A pass draws depth and distances, which the rasterizer interpolates. Shadow errors: points spread evenly over all \
-         surfaces but those seen at a cosine below {LEAST_COSINE}; a point is lit when its distance d is at most the texel's and a bias of d (w tan θ + \
-         {ROUNDING_BIAS:e}), w being the mean width of the map's texels in radians, θ the angle to the normal; the truth is a ray. Wrong triangles: against \
-         the ray through the texel's centre; of points also where holes were filled. Attribute error: the angle between a texel and \
-         the interpolated position that it holds. {SPLATS_PER_TEXEL} points a texel are splatted, evenly over all surfaces. The document's figures are of other machines, scenes and pictures: \
-         their order counts.",
-        side
+        "About {side} × {side} texels in all: square 512², rectangle 724 × 362, cube 6 × 209², paraboloids 2 × 362² at full size, whose \
+         corners hold nothing. A pass draws depth and distances, which the rasterizer interpolates. Shadow errors: points spread evenly \
+         over all surfaces but those seen at a cosine below {LEAST_COSINE}; a point is lit when its distance d is at most the texel's and a \
+         bias of d (w tan θ + {ROUNDING_BIAS:e}), w being the mean width of the map's texels in radians, θ the angle to the normal; the truth \
+         is a ray. Wrong triangles: against the ray through the texel's centre; of points also where holes were filled. Attribute error: the \
+         angle between a texel and the interpolated position that it holds. {SPLATS_PER_TEXEL} points a texel are splatted, evenly over all \
+         surfaces. The document's figures are of other machines, scenes and pictures: their order counts."
     ));
     for scene in &SCENES[..scenes] {
         compare(&gpu, *scene, (side, repeats, points), &mut table)?;
