@@ -14,6 +14,8 @@ layout(constant_id = 7) const bool HAS_VERTEX_COLORS = true;
 layout(constant_id = 8) const bool HAS_SHADING_NORMALS = true;
 layout(constant_id = 9) const bool HAS_ALPHA = true;
 layout(constant_id = 10) const bool HAS_NORMAL_MAPS = true;
+layout(constant_id = 11) const bool INTERPOLATED = true;  // attributes by the rasterizer, not by rays
+layout(constant_id = 12) const bool MASKED = true;        // only in the octant of the view
 
 #include "maps/packed_direction.glsl"
 #include "raster/hit.glsl"
@@ -24,6 +26,7 @@ const uint RASTER_NORMAL_BITS = 16u;  // of each coordinate of a packed normal
 
 layout(location = 0) flat in uint raster_triangle;
 layout(location = 1) flat in uint raster_view;
+layout(location = 2) in vec2 raster_weights;
 
 layout(location = 0) out uint triangle_out;
 layout(location = 1) out uint object_out;
@@ -49,13 +52,21 @@ vec3 front_normal(SceneTriangle t) {
 void main() {
     SceneTriangle t = load_triangle(raster_triangle);
     RasterView view = raster_views[raster_view];
+    if (MASKED && !raster_is_in_octant(view, gl_FragCoord.xy)) {
+        discard;
+    }
     triangle_out = raster_triangle;
     material_out = t.material;
     if (WRITE_OBJECT) {
         object_out = texelFetch(raster_objects, int(raster_triangle)).x;
     }
     if (WRITE_DISTANCE || WRITE_POSITION || WRITE_NORMALS || WRITE_WEIGHTS || WRITE_TEXTURE_COORDINATES || HAS_ALPHA) {
-        RasterHit hit = raster_hit(view, t, gl_FragCoord.xy);
+        RasterHit hit;
+        if (INTERPOLATED) {
+            hit = raster_interpolated(view, t, raster_weights);
+        } else {
+            hit = raster_hit(view, t, gl_FragCoord.xy);
+        }
         vec3 w = hit.weights;
         uvec3 v = uvec3(0u);
         if (HAS_TEXTURES || HAS_VERTEX_COLORS || HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {

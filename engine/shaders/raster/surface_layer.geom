@@ -16,6 +16,7 @@ layout(location = 2) flat in uint there_in[];
 
 layout(location = 0) flat out uint raster_triangle;
 layout(location = 1) flat out uint raster_view;
+layout(location = 2) out vec2 raster_weights;
 
 bool all_outside(vec3 coordinate, vec3 w) {
     return all(greaterThan(coordinate, w)) || all(lessThan(coordinate, -w));
@@ -41,6 +42,7 @@ void main() {
             gl_Layer = number;
             raster_triangle = triangle_in[0];
             raster_view = push.first_view + number;
+            raster_weights = raster_corner_weights(uint(corner));
             EmitVertex();
         }
         EndPrimitive();

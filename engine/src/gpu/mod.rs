@@ -67,4 +67,4 @@ pub use rendering::{Area, ClearColor, ColorTarget, DepthTarget, Render, Targets}
 pub use submission::Submission;
 pub use surface::{Presented, Surface};
 pub use texels::TexelView;
-pub use timing::{PassTiming, Timings};
+pub use timing::{Drawn, PassTiming, Timings};

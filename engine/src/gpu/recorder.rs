@@ -41,7 +41,7 @@ pub struct Recorder {
     barriers: Vec<u32>,
     kept: Kept,
     tracker: Option<Tracker>,
-    /// The first pass whose invocations are counted.
+    /// The first pass whose work is counted.
     counted_from: Option<usize>,
 }
 
@@ -90,7 +90,7 @@ impl Gpu {
 }
 
 impl Recorder {
-    /// Counts the shader invocations of every compute pass from here on, where the device can.
+    /// Counts the shader invocations and primitives of every pass from here on, where the device can.
     pub fn count_invocations(&mut self) {
         if self.gpu.caps().pipeline_statistics {
             self.counted_from.get_or_insert(self.passes.len());

@@ -207,6 +207,28 @@ impl Render<'_, '_> {
     /// # Errors
     /// [`Error::Picture`] when it does not.
     pub fn set_area(&mut self, area: Area) -> Result<()> {
+        self.set_scissor(area)?;
+        let viewport = [vk::Viewport {
+            x: area.offset[0] as f32,
+            y: area.offset[1] as f32,
+            width: area.size[0] as f32,
+            height: area.size[1] as f32,
+            max_depth: 1.0,
+            ..Default::default()
+        }];
+        let command_buffer = self.pass.command_buffer;
+        let device = &self.pass.recorder.gpu.inner.device;
+        // SAFETY: the command buffer is recording.
+        unsafe { device.cmd_set_viewport(command_buffer, 0, &viewport) };
+        Ok(())
+    }
+
+    /// Nothing is drawn outside of this part of the targets from here on; what clip space spans stays as it is. It must lie in the part that is
+    /// rendered into.
+    ///
+    /// # Errors
+    /// [`Error::Picture`] when it does not.
+    pub fn set_scissor(&mut self, area: Area) -> Result<()> {
         let Area { offset, size } = self.area;
         let inside = |axis: usize| {
             area.offset[axis] >= offset[axis]
@@ -220,21 +242,9 @@ impl Render<'_, '_> {
                 cause: format!("draws go to {area:?} and the pass renders into {:?}", self.area),
             });
         }
-        let viewport = [vk::Viewport {
-            x: area.offset[0] as f32,
-            y: area.offset[1] as f32,
-            width: area.size[0] as f32,
-            height: area.size[1] as f32,
-            max_depth: 1.0,
-            ..Default::default()
-        }];
-        let command_buffer = self.pass.command_buffer;
         let device = &self.pass.recorder.gpu.inner.device;
         // SAFETY: the command buffer is recording.
-        unsafe {
-            device.cmd_set_viewport(command_buffer, 0, &viewport);
-            device.cmd_set_scissor(command_buffer, 0, &[area.rectangle()]);
-        }
+        unsafe { device.cmd_set_scissor(self.pass.command_buffer, 0, &[area.rectangle()]) };
         Ok(())
     }
 

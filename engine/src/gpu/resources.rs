@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use super::caps::Caps;
 use super::device::{Gpu, Inner};
 use super::recorder::MAX_PASSES;
 use crate::Result;
@@ -58,10 +59,22 @@ pub(super) struct FrameResources {
     pub command_buffer: vk::CommandBuffer,
     /// Two timestamps a pass; null without timestamp support.
     pub timestamps: vk::QueryPool,
-    /// One compute-invocation count a pass; null without support.
+    /// The counts of [`counted`] of each pass; null without support.
     pub statistics: vk::QueryPool,
     descriptor_pools: Vec<vk::DescriptorPool>,
     pool_in_use: usize,
+}
+
+/// Counts of draws, in the order in which queries give them.
+pub(super) const COUNTS_OF_DRAWS: usize = 3;
+
+/// What pipeline statistics count: draws where there are any, and compute shader invocations, which come last.
+fn counted(caps: &Caps) -> vk::QueryPipelineStatisticFlags {
+    let draws = vk::QueryPipelineStatisticFlags::VERTEX_SHADER_INVOCATIONS
+        | vk::QueryPipelineStatisticFlags::CLIPPING_INVOCATIONS
+        | vk::QueryPipelineStatisticFlags::FRAGMENT_SHADER_INVOCATIONS;
+    let compute = vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS;
+    if caps.graphics { draws | compute } else { compute }
 }
 
 impl FrameResources {
@@ -101,7 +114,7 @@ impl FrameResources {
         if inner.caps.pipeline_statistics {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::PIPELINE_STATISTICS)
-                .pipeline_statistics(vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS)
+                .pipeline_statistics(counted(&inner.caps))
                 .query_count(MAX_PASSES as u32);
             // SAFETY: the feature is enabled where it is offered.
             self.statistics =

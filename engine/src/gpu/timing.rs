@@ -16,6 +16,19 @@ pub struct PassTiming {
     pub barriers: u32,
     /// Compute shader invocations, when pipeline statistics were asked for.
     pub invocations: Option<u64>,
+    /// What was drawn, when pipeline statistics were asked for on a queue that draws.
+    pub drawn: Option<Drawn>,
+}
+
+/// Counts of draws, by the device's pipeline statistics: what they count of what a device leaves out or does twice is its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct Drawn {
+    /// Vertex shader invocations.
+    pub vertices: u64,
+    /// Primitives that reached clipping: as draws or geometry shaders emit them.
+    pub primitives: u64,
+    /// Fragment shader invocations.
+    pub fragments: u64,
 }
 
 /// All passes of a submission, in recording order.
@@ -80,6 +93,7 @@ mod tests {
             nanoseconds,
             barriers: 0,
             invocations: None,
+            drawn: None,
         };
         let passes = vec![
             pass("a", Some(3)),

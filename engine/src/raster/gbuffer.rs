@@ -1,7 +1,7 @@
 //! Pictures of the nearest surfaces: their triangles, distances, normals, whatever is asked for.
 
 use super::output::Output;
-use super::pipelines::{DEPTH, Layering, Pipeline, used_locations};
+use super::pipelines::{DEPTH, Layering, Pipeline, PipelineDesc, used_locations};
 use super::surfaces::{SurfaceFeatures, Surfaces};
 use super::view::View;
 use crate::gpu::ash::vk;
@@ -71,13 +71,36 @@ const ANY_USE: Access = Access::SHADER_READ
     .union(Access::COLOR_WRITE);
 
 impl GBuffer {
-    /// Allocates what is asked for, and makes the pipeline for these surfaces.
+    /// Allocates what is asked for, and makes the pipeline for these surfaces. Attributes are those at the point where a pixel's ray meets the
+    /// triangle; where the views have no such rays (paraboloids, cuts that are not exact), as by [`GBuffer::interpolated`].
     ///
     /// # Errors
     /// [`Error::MissingFeature`] for a way to several views that the device lacks, naming others; [`Error::Setting`] for a wrong number of
-    /// views; [`Error::LimitExceeded`] for a size; [`Error::OutOfMemory`].
+    /// views or pieces; [`Error::LimitExceeded`] for a size; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, desc: &GBufferDesc<'_>) -> Result<Self> {
-        let pipeline = Pipeline::new(gpu, desc.layering, desc.outputs, surfaces.features)?;
+        Self::make(gpu, surfaces, desc, !desc.layering.has_rays())
+    }
+
+    /// As [`GBuffer::new`], with all attributes as the rasterizer interpolates them between corners: cheaper, and off by the
+    /// rounding of vertices to parts of a pixel.
+    ///
+    /// # Errors
+    /// As [`GBuffer::new`].
+    pub fn interpolated(gpu: &Gpu, surfaces: &Surfaces<'_>, desc: &GBufferDesc<'_>) -> Result<Self> {
+        Self::make(gpu, surfaces, desc, true)
+    }
+
+    fn make(gpu: &Gpu, surfaces: &Surfaces<'_>, desc: &GBufferDesc<'_>, interpolates: bool) -> Result<Self> {
+        let pipeline = Pipeline::new(
+            gpu,
+            &PipelineDesc {
+                size: desc.size,
+                layering: desc.layering,
+                outputs: desc.outputs,
+                features: surfaces.features,
+                interpolates,
+            },
+        )?;
         let picture = |name, format, usage| Picture::new(gpu, desc, name, format, usage);
         let color =
             vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC;
@@ -137,13 +160,11 @@ impl GBuffer {
     /// barrier from [`Access::COLOR_WRITE`] or [`Access::DEPTH_WRITE`] and their layouts ([`GBuffer::barrier_to`]).
     ///
     /// # Errors
-    /// [`Error::Setting`] for another number of views than the layering takes, or surfaces with other features than those it was made for;
+    /// [`Error::Setting`] for another number of views than the layering takes or views of a layout that it cannot take, or surfaces with other
+    /// features than those it was made for; [`Error::LimitExceeded`] for more pieces of triangles than can be numbered;
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn record(&self, recorder: &mut Recorder, surfaces: &Surfaces<'_>, views: &[View]) -> Result<()> {
-        let wanted = self.layering.views();
-        if views.len() != wanted as usize {
-            return Err(Error::setting("views", views.len(), format!("is not {wanted}")));
-        }
+        self.layering.check_views(views)?;
         if surfaces.features != self.features {
             let cause = format!("is not {:?}, which the G-buffer was made for", self.features);
             return Err(Error::setting("surfaces", format!("{:?}", surfaces.features), cause));
@@ -156,12 +177,7 @@ impl GBuffer {
                 // Without objects no kernel reads it.
                 raster_objects: self.objects.as_ref().unwrap_or(surfaces.set.scene_triangles),
             };
-            let renderings = if let Layering::Passes(views) = self.layering {
-                views
-            } else {
-                1
-            };
-            for rendering in 0..renderings {
+            for rendering in 0..self.layering.renderings().unwrap_or(1) {
                 let colors: Vec<_> = self
                     .pictures
                     .iter()
@@ -177,7 +193,7 @@ impl GBuffer {
                     view_mask: self.layering.view_mask(),
                 };
                 pass.render(&targets, |render| {
-                    self.pipeline.draw(render, &raster, surfaces, rendering)
+                    self.pipeline.draw(render, &raster, surfaces, views, rendering)
                 })?;
             }
             Ok(())
@@ -302,12 +318,7 @@ impl Picture {
             usage,
             category: Category::Film,
         })?;
-        let parts = if let Layering::Passes(layers) = desc.layering {
-            layers
-        } else {
-            0
-        };
-        let layers = (0..parts)
+        let layers = (0..desc.layering.renderings().unwrap_or(0))
             .map(|layer| image.part(&ImagePart::layer(layer, 0)))
             .collect::<Result<_>>()?;
         Ok(Self { image, layers })

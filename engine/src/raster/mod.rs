@@ -1,23 +1,29 @@
 //! Floor 3: rasterization. Surfaces of a scene seen from a camera or, in all directions, from a point, by what is asked for of each pixel.
 //!
 //! A [`GBuffer`] draws the triangles of [`Surfaces`], pulled from the buffers that rays use, in one [`View`] or in several at once
-//! ([`Layering`]): six faces of a cube in six passes, by views or by layers, or the eight octants of an octahedron side by side. Sources:
+//! ([`Layering`]): six faces of a cube in six passes, by views or by layers, the eight octants of an octahedron side by side, in any of the
+//! ways of [`OctantCut`], or both halves of a dual paraboloid map. Sources:
 //! T. Saito and T. Takahashi, "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); T. Engelhardt, "Efficient Visibility for
 //! Realistic Rendering", 2013, §2.1 (both forms of visibility) and §7.2 (octahedra rendered live).
 //!
 //! Guarantee: what is seen at a pixel is what the ray through its centre meets, but where that centre lies within the rounding of vertices
 //! from an edge of a triangle, or where triangles are equally far within the rounding of depths; distances and weights are the ray caster's
-//! own. Deterministic, and equal bits in every way to several layers.
+//! own. Deterministic, and equal bits in every way to several layers of linear views. Cuts that are not exact ([`OctantCut::is_exact`]) and
+//! paraboloids guarantee nothing of this: they are here to be compared.
 
 mod gbuffer;
 mod octahedron;
+pub mod octants;
 mod output;
 mod pipelines;
+pub mod splats;
 mod surfaces;
+pub mod tessellation;
 mod view;
 
 pub use gbuffer::{GBuffer, GBufferDesc};
 pub use octahedron::OCTANTS;
+pub use octants::OctantCut;
 pub use output::Output;
 pub use pipelines::Layering;
 pub use surfaces::{ObjectTriangles, SurfaceFeatures, Surfaces};

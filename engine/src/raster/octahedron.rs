@@ -3,9 +3,10 @@
 //! Source: T. Engelhardt and C. Dachsbacher, "Octahedron Environment Maps", VMV 2008; T. Engelhardt, "Efficient Visibility for Realistic
 //! Rendering", 2013, §7.1 and §7.2. There triangles are split by a geometry shader. Here, with the signs s of an octant in place of absolute
 //! values, the map of a point p is a quotient of linear functions with the divisor W = s·p, the norm |x| + |y| + |z|: the rasterizer's own homogeneous
-//! coordinate, so that one matrix an octant and three clip distances s·p ≥ 0, component by component, render the map exactly.
+//! coordinate, so that one matrix an octant and three clip distances s·p ≥ 0, component by component, render the map exactly. The other ways
+//! of [`OctantCut`](super::OctantCut) take the same views.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::View;
 use crate::Result;
@@ -30,8 +31,27 @@ impl View {
             let rows = [0, 1, 3].map(|row| matrix.row(row).truncate());
             let mut view = Self::central(origin, rows, near, area)?;
             view.record.signs = signs.as_vec3().to_array();
+            view.layout = Some(layout);
             Ok(view)
         };
         (0..OCTANTS).map(octant).collect()
+    }
+
+    /// The pixels of a picture of that size which the octant lies in, for a view that fills it.
+    pub(super) fn octant_area(&self, size: [u32; 2]) -> Area {
+        let signs = self.octant().as_dvec3();
+        let corners = DVec3::AXES.map(|axis| {
+            let [x, y, _, w] = self.project(self.origin().as_dvec3() + signs * axis);
+            DVec2::new(x, y) / w
+        });
+        let pixels = DVec2::new(f64::from(size[0]), f64::from(size[1]));
+        let low = corners.into_iter().fold(DVec2::ONE, DVec2::min);
+        let high = corners.into_iter().fold(DVec2::NEG_ONE, DVec2::max);
+        let low = ((0.5 + 0.5 * low) * pixels).floor().max(DVec2::ZERO).as_uvec2();
+        let high = ((0.5 + 0.5 * high) * pixels).ceil().min(pixels).as_uvec2();
+        Area {
+            offset: low.to_array(),
+            size: (high - low).to_array(),
+        }
     }
 }

@@ -1,23 +1,28 @@
 //! The pipelines of surfaces, one for each way to several views.
 
 use super::octahedron::OCTANTS;
+use super::octants::OctantCut;
 use super::output::Output;
 use super::surfaces::{SurfaceFeatures, Surfaces};
+use super::tessellation::MAX_LEVEL;
+use super::view::View;
 use crate::gpu::ash::vk;
 use crate::gpu::interface::VertexShader;
 use crate::gpu::shaders::raster::{
-    surface_frag, surface_layer_geom, surface_layer_vert, surface_octant_vert, surface_vert, surface_view_vert,
-    surface_world_vert,
+    surface_frag, surface_halves_geom, surface_instance_vert, surface_layer_geom, surface_layer_vert,
+    surface_octant_vert, surface_outlines_geom, surface_paraboloid_vert, surface_split_geom, surface_unsplit_vert,
+    surface_vert, surface_view_vert, surface_world_vert,
 };
 use crate::gpu::shaders::sets::RasterSet;
 use crate::gpu::{Caps, GeometryStage, Gpu, GraphicsDesc, GraphicsPipeline, NoGeometry, Render};
 use crate::maps::cube::CUBE_FACES;
+use crate::maps::octahedron::OctahedronLayout;
 use crate::{Error, Result};
 
 /// Format of depths, see [`View`](super::View).
 pub(super) const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
-/// In how many views surfaces are drawn, and how they get there. All ways give the same bits.
+/// In how many views surfaces are drawn, and how they get there. All ways to the same linear views give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layering {
     /// One view into one picture.
@@ -31,9 +36,19 @@ pub enum Layering {
     Instances(u32),
     /// Up to six views with one origin, each into its own layer, to which a geometry shader takes each triangle that they can see.
     Geometry(u32),
-    /// The octants of an octahedron, all into one picture (`shaderClipDistance`).
-    Octants,
+    /// The octants of an octahedron, all into one picture.
+    Octants(OctantCut),
+    /// The two halves of a dual paraboloid map, each into its own layer by a draw of its own (`shaderClipDistance`). Corners are mapped and
+    /// joined by straight edges: right in the limit of small pieces (S. Brabec, T. Annen and H.-P. Seidel, "Shadow Mapping for Hemispherical and
+    /// Omnidirectional Light Sources", CGI 2002). Each triangle is drawn as `level`² pieces, as [`OctantCut::Unsplit`] does.
+    Paraboloids {
+        /// Pieces along an edge.
+        level: u32,
+    },
 }
+
+/// Halves of a dual paraboloid map.
+const PARABOLOIDS: u32 = 2;
 
 impl Layering {
     /// A way to so many layers that the device has.
@@ -54,14 +69,15 @@ impl Layering {
         match self {
             Self::One => 1,
             Self::Passes(views) | Self::Views(views) | Self::Instances(views) | Self::Geometry(views) => views,
-            Self::Octants => OCTANTS,
+            Self::Octants(_) => OCTANTS,
+            Self::Paraboloids { .. } => PARABOLOIDS,
         }
     }
 
     /// How many layers its pictures have.
     pub fn layers(self) -> u32 {
         match self {
-            Self::One | Self::Octants => 1,
+            Self::One | Self::Octants(_) => 1,
             other => other.views(),
         }
     }
@@ -72,6 +88,40 @@ impl Layering {
             Self::Views(views) => u32::MAX >> (u32::BITS - views),
             _ => 0,
         }
+    }
+
+    /// How often targets are rendered into, a layer each time; once into all of them otherwise.
+    pub(super) fn renderings(self) -> Option<u32> {
+        match self {
+            Self::Passes(views) => Some(views),
+            Self::Paraboloids { .. } => Some(PARABOLOIDS),
+            _ => None,
+        }
+    }
+
+    /// Whether a pixel's ray goes through what is drawn there.
+    pub(super) fn has_rays(self) -> bool {
+        match self {
+            Self::Octants(cut) => cut.is_exact(),
+            Self::Paraboloids { .. } => false,
+            _ => true,
+        }
+    }
+
+    /// Refuses views that it cannot draw in.
+    pub(super) fn check_views(self, views: &[View]) -> Result<()> {
+        let wanted = self.views();
+        if views.len() != wanted as usize {
+            return Err(Error::setting("views", views.len(), format!("is not {wanted}")));
+        }
+        let is_rectangular = |view: &View| view.layout == Some(OctahedronLayout::Rectangular);
+        if let Self::Octants(cut @ (OctantCut::Halves | OctantCut::Outlines)) = self
+            && !views.iter().all(is_rectangular)
+        {
+            let cause = "are not those of the rectangular layout, which the cut is for";
+            return Err(Error::setting("views", format!("{cut:?}"), cause));
+        }
+        Ok(())
     }
 
     fn check(self) -> Result<()> {
@@ -87,37 +137,64 @@ impl Layering {
                 format!("is not from 1 to {most}"),
             ));
         }
+        let (Self::Octants(OctantCut::Unsplit { level }) | Self::Paraboloids { level }) = self else {
+            return Ok(());
+        };
+        if level == 0 || level > MAX_LEVEL {
+            return Err(Error::setting("level", level, format!("is not from 1 to {MAX_LEVEL}")));
+        }
         Ok(())
     }
 }
+
+type Shaders<V, G = NoGeometry> = GraphicsPipeline<V, surface_frag::Shader, G>;
 
 /// The pipeline of a way to several views.
 #[derive(Debug)]
 pub(super) enum Pipeline {
     /// One view a draw.
-    Plain(GraphicsPipeline<surface_vert::Shader, surface_frag::Shader>),
-    Views(GraphicsPipeline<surface_view_vert::Shader, surface_frag::Shader>),
-    Instances(GraphicsPipeline<surface_layer_vert::Shader, surface_frag::Shader>, u32),
-    Geometry(GraphicsPipeline<surface_world_vert::Shader, surface_frag::Shader, surface_layer_geom::Shader>),
-    Octants(GraphicsPipeline<surface_octant_vert::Shader, surface_frag::Shader>),
+    Plain(Shaders<surface_vert::Shader>),
+    Views(Shaders<surface_view_vert::Shader>),
+    Instances(Shaders<surface_layer_vert::Shader>, u32),
+    Geometry(Shaders<surface_world_vert::Shader, surface_layer_geom::Shader>),
+    ClipDistances(Shaders<surface_octant_vert::Shader>),
+    Split(Shaders<surface_world_vert::Shader, surface_split_geom::Shader>),
+    Halves(Shaders<surface_world_vert::Shader, surface_halves_geom::Shader>),
+    Outlines(Shaders<surface_world_vert::Shader, surface_outlines_geom::Shader>),
+    Mask(Shaders<surface_instance_vert::Shader>),
+    /// The octants' rectangles.
+    MaskInRectangles(Shaders<surface_vert::Shader>, [u32; 2]),
+    Unsplit(Shaders<surface_unsplit_vert::Shader>, u32),
+    Paraboloids(Shaders<surface_paraboloid_vert::Shader>, u32),
 }
 
 impl Pipeline {
-    pub fn new(gpu: &Gpu, layering: Layering, outputs: &[Output], features: SurfaceFeatures) -> Result<Self> {
-        layering.check()?;
-        Ok(match layering {
-            Layering::One | Layering::Passes(_) => {
-                Self::Plain(make::<_, NoGeometry>(gpu, layering, outputs, features, ())?)
-            }
-            Layering::Views(_) => Self::Views(make::<_, NoGeometry>(gpu, layering, outputs, features, ())?),
-            Layering::Instances(views) => {
-                Self::Instances(make::<_, NoGeometry>(gpu, layering, outputs, features, ())?, views)
-            }
+    pub fn new(gpu: &Gpu, desc: &PipelineDesc<'_>) -> Result<Self> {
+        desc.layering.check()?;
+        Ok(match desc.layering {
+            Layering::One | Layering::Passes(_) => Self::Plain(make(gpu, desc, (), ())?),
+            Layering::Views(_) => Self::Views(make(gpu, desc, (), ())?),
+            Layering::Instances(views) => Self::Instances(make(gpu, desc, (), ())?, views),
             Layering::Geometry(views) => {
                 let geometry = surface_layer_geom::Spec { views: views as i32 };
-                Self::Geometry(make(gpu, layering, outputs, features, geometry)?)
+                Self::Geometry(make(gpu, desc, (), geometry)?)
             }
-            Layering::Octants => Self::Octants(make::<_, NoGeometry>(gpu, layering, outputs, features, ())?),
+            Layering::Octants(cut) => match cut {
+                OctantCut::ClipDistances => Self::ClipDistances(make(gpu, desc, (), ())?),
+                OctantCut::Split => Self::Split(make(gpu, desc, (), ())?),
+                OctantCut::Halves => Self::Halves(make(gpu, desc, (), ())?),
+                OctantCut::Outlines => Self::Outlines(make(gpu, desc, (), ())?),
+                OctantCut::Mask => Self::Mask(make(gpu, desc, (), ())?),
+                OctantCut::MaskInRectangles => Self::MaskInRectangles(make(gpu, desc, (), ())?, desc.size),
+                OctantCut::Unsplit { level } => {
+                    let vertex = surface_unsplit_vert::Spec { level: level as i32 };
+                    Self::Unsplit(make(gpu, desc, vertex, ())?, level)
+                }
+            },
+            Layering::Paraboloids { level } => {
+                let vertex = surface_paraboloid_vert::Spec { level: level as i32 };
+                Self::Paraboloids(make(gpu, desc, vertex, ())?, level)
+            }
         })
     }
 
@@ -127,17 +204,23 @@ impl Pipeline {
         render: &mut Render<'_, '_>,
         raster: &RasterSet<'_>,
         surfaces: &Surfaces<'_>,
+        views: &[View],
         first_view: u32,
     ) -> Result<()> {
         macro_rules! draw {
-            ($shader:ident, $pipeline:expr, $instances:expr) => {
+            ($shader:ident, $pipeline:expr, $pieces:expr, $instances:expr, $first_view:expr) => {
                 render.draw(
                     $pipeline,
                     &[raster, &surfaces.set],
-                    &$shader::Push { first_view },
-                    3 * surfaces.triangles,
+                    &$shader::Push {
+                        first_view: $first_view,
+                    },
+                    corners(surfaces.triangles, $pieces)?,
                     $instances,
                 )
+            };
+            ($shader:ident, $pipeline:expr, $instances:expr) => {
+                draw!($shader, $pipeline, 1, $instances, first_view)
             };
         }
         match self {
@@ -145,18 +228,58 @@ impl Pipeline {
             Self::Views(pipeline) => draw!(surface_view_vert, pipeline, 1),
             Self::Instances(pipeline, views) => draw!(surface_layer_vert, pipeline, *views),
             Self::Geometry(pipeline) => draw!(surface_world_vert, pipeline, 1),
-            Self::Octants(pipeline) => draw!(surface_octant_vert, pipeline, OCTANTS),
+            Self::ClipDistances(pipeline) => draw!(surface_octant_vert, pipeline, OCTANTS),
+            Self::Split(pipeline) => draw!(surface_world_vert, pipeline, 1),
+            Self::Halves(pipeline) => draw!(surface_world_vert, pipeline, 1),
+            Self::Outlines(pipeline) => draw!(surface_world_vert, pipeline, 1),
+            Self::Mask(pipeline) => draw!(surface_instance_vert, pipeline, OCTANTS),
+            Self::MaskInRectangles(pipeline, size) => (0..).zip(views).try_for_each(|(number, view)| {
+                render.set_scissor(view.octant_area(*size))?;
+                draw!(surface_vert, pipeline, 1, 1, first_view + number)
+            }),
+            Self::Unsplit(pipeline, level) => {
+                draw!(surface_unsplit_vert, pipeline, level * level, 1, first_view)
+            }
+            Self::Paraboloids(pipeline, level) => {
+                draw!(surface_paraboloid_vert, pipeline, level * level, 1, first_view)
+            }
         }
     }
 }
 
+/// Vertices of all pieces.
+fn corners(triangles: u32, pieces: u32) -> Result<u32> {
+    let corners = 3 * u64::from(triangles) * u64::from(pieces);
+    u32::try_from(corners).map_err(|_| Error::LimitExceeded {
+        name: "surfaces".into(),
+        value: corners,
+        limit_name: "vertices of a draw",
+        limit: u64::from(u32::MAX),
+    })
+}
+
+/// What a pipeline is made for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PipelineDesc<'a> {
+    pub size: [u32; 2],
+    pub layering: Layering,
+    pub outputs: &'a [Output],
+    pub features: SurfaceFeatures,
+    pub interpolates: bool,
+}
+
 fn make<V: VertexShader, G: GeometryStage>(
     gpu: &Gpu,
-    layering: Layering,
-    outputs: &[Output],
-    features: SurfaceFeatures,
+    desc: &PipelineDesc<'_>,
+    vertex: V::Spec,
     geometry: G::Spec,
-) -> Result<GraphicsPipeline<V, surface_frag::Shader, G>> {
+) -> Result<Shaders<V, G>> {
+    let &PipelineDesc {
+        layering,
+        outputs,
+        features,
+        ..
+    } = desc;
     let has = |output| outputs.contains(&output);
     let uvs = has(Output::TextureCoordinates);
     let has_normal_maps = features.normal_maps && has(Output::Normals);
@@ -173,6 +296,11 @@ fn make<V: VertexShader, G: GeometryStage>(
         has_shading_normals: features.shading_normals && has(Output::Normals),
         has_alpha: features.alpha,
         has_normal_maps,
+        interpolated: desc.interpolates,
+        masked: matches!(
+            layering,
+            Layering::Octants(OctantCut::Mask | OctantCut::MaskInRectangles)
+        ),
     };
     let format = |output: Output| {
         if has(output) {
@@ -184,6 +312,7 @@ fn make<V: VertexShader, G: GeometryStage>(
     let mut colors = Output::ALL.map(format).to_vec();
     colors.truncate(used_locations(outputs));
     gpu.graphics_pipeline(&GraphicsDesc {
+        vertex,
         geometry,
         fragment,
         colors: &colors,

@@ -13,6 +13,7 @@ use crate::accel::Ray;
 use crate::gpu::Area;
 use crate::gpu::shaders::types::RasterView;
 use crate::maps::cube::{CUBE_FACES, cube_axes};
+use crate::maps::octahedron::OctahedronLayout;
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::{Error, Result};
@@ -24,6 +25,8 @@ const NEAR: f32 = 1.0 / 16_384.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     pub(super) record: RasterView,
+    /// Of views of octants.
+    pub(super) layout: Option<OctahedronLayout>,
 }
 
 impl View {
@@ -66,6 +69,21 @@ impl View {
         Self::central(origin, cube_axes(face), near, area)
     }
 
+    /// What is seen from a point in one half of a dual paraboloid map ([`crate::maps::paraboloid`]), 1 for z < 0, for
+    /// [`Layering::Paraboloids`](super::Layering). Its rays are not those of [`View::ray`], which no linear map has.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a half that does not exist, or a place or near plane that is not finite.
+    pub fn of_paraboloid(origin: Vec3, half: u32, near: f32, area: Area) -> Result<Self> {
+        if half > 1 {
+            return Err(Error::setting("paraboloid", half, "is not below 2"));
+        }
+        let side = DVec3::new(0.0, 0.0, if half == 0 { 1.0 } else { -1.0 });
+        let mut view = Self::central(origin, [DVec3::X, DVec3::Y, side], near, area)?;
+        view.record.signs = side.as_vec3().to_array();
+        Ok(view)
+    }
+
     /// The near plane that [`View::of_camera`] takes from here: 2⁻¹⁴ of the distance to the farthest surface, metres.
     pub fn near_plane(origin: Vec3, surfaces: &Surfaces<'_>) -> f32 {
         surfaces.reach(origin) * NEAR
@@ -92,6 +110,7 @@ impl View {
         let scale = |axis: usize| 2.0 / f64::from(area.size[axis]);
         let offset = |axis: usize| (-1.0 - scale(axis) * f64::from(area.offset[axis])) as f32;
         Ok(Self {
+            layout: None,
             record: RasterView {
                 x: row(x, 0.0),
                 y: row(y, 0.0),
@@ -138,7 +157,7 @@ impl View {
         Vec3::from_array(self.record.origin)
     }
 
-    /// The signs of the octant that it shows; zeros for other views.
+    /// The signs of the octant that it shows, the third alone for halves of a paraboloid map; zeros for other views.
     pub fn octant(&self) -> Vec3 {
         Vec3::from_array(self.record.signs)
     }

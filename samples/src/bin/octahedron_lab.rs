@@ -21,7 +21,7 @@ use clerestory::gpu::{Area, Category, Gpu, GpuOptions};
 use clerestory::maps::cube::CUBE_FACES;
 use clerestory::maps::octahedron::OctahedronLayout;
 use clerestory::maps::{Parametrization, Texel};
-use clerestory::raster::{GBuffer, GBufferDesc, Layering, Output, View};
+use clerestory::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Output, View};
 use clerestory::scene::{self, Scene};
 use clerestory::srgb::srgb_from_linear;
 use clerestory::transport::GpuScene;
@@ -192,7 +192,7 @@ impl Live {
         let size = UVec2::new(rows * map.aspect(), rows);
         let layering = match layout {
             Layout::Cube => Layering::of_layers(gpu.caps(), CUBE_FACES),
-            _ => Layering::Octants,
+            _ => Layering::Octants(OctantCut::default()),
         };
         let desc = GBufferDesc {
             size: size.to_array(),

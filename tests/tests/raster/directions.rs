@@ -1,12 +1,11 @@
 //! Surfaces seen in all directions from a point: the faces of a cube in every way to six layers, and the octants of an octahedron.
 
-use clerestory::accel::NO_HIT;
-use clerestory::accel::RayIndex;
 use clerestory::accel::bvh2::Bvh2;
+use clerestory::accel::{NO_HIT, Ray, RayIndex};
 use clerestory::gpu::{Area, Gpu};
 use clerestory::maps::cube::{CUBE_FACES, cube_decode};
 use clerestory::maps::octahedron::{OctahedronLayout, octahedron_encode, octahedron_rectangular_encode};
-use clerestory::raster::{GBuffer, GBufferDesc, Layering, OCTANTS, Output, View};
+use clerestory::raster::{GBuffer, GBufferDesc, Layering, OCTANTS, OctantCut, Output, View};
 use clerestory::scene::Scene;
 use clerestory::transport::GpuScene;
 use clerestory_tests::random::Random;
@@ -23,7 +22,7 @@ const OUTPUTS: [Output; 3] = [Output::Triangle, Output::Object, Output::Distance
 
 /// A closed room with vertices on all axes about the place that it is seen from, things with vertices on axes, and triangles in planes through that
 /// place.
-fn axes() -> Scene {
+pub fn axes() -> Scene {
     let v = Vec3::new;
     let mut scene = looking(forward());
     let mut room = Vec::new();
@@ -46,7 +45,7 @@ fn axes() -> Scene {
 }
 
 /// Scenes, the place in the box around each that they are seen from, as a share of it, and whether that is in a closed room.
-fn scenes() -> [(&'static str, Scene, Vec3, bool); 8] {
+pub fn scenes() -> [(&'static str, Scene, Vec3, bool); 8] {
     let of = |address: &'static str, x, y, z, is_closed| (address, builtin(address), Vec3::new(x, y, z), is_closed);
     [
         ("axes", axes(), Vec3::splat(0.5), true),
@@ -61,17 +60,17 @@ fn scenes() -> [(&'static str, Scene, Vec3, bool); 8] {
 }
 
 /// The place in the box around a scene.
-fn place_in([lower, upper]: [Vec3; 2], share: Vec3) -> Vec3 {
+pub fn place_in([lower, upper]: [Vec3; 2], share: Vec3) -> Vec3 {
     lower + share * (upper - lower)
 }
 
-struct Prepared {
-    on_device: GpuScene,
-    corners: Vec<[Vec3; 3]>,
-    index: Bvh2,
+pub struct Prepared {
+    pub on_device: GpuScene,
+    pub corners: Vec<[Vec3; 3]>,
+    pub index: Bvh2,
 }
 
-fn prepare(gpu: &Gpu, scene: &Scene) -> Prepared {
+pub fn prepare(gpu: &Gpu, scene: &Scene) -> Prepared {
     let on_device = GpuScene::new(gpu, scene).unwrap();
     let corners = corners(&triangles(gpu, &on_device));
     let index = Bvh2::build(&corners, &Default::default()).unwrap();
@@ -142,6 +141,22 @@ fn cubes_are_the_same_in_every_way_and_as_rays_see_them() {
     });
 }
 
+/// The ray through the centre of each texel of an octahedron map, in the octant that it lies in.
+pub fn octahedron_rays(views: &[View], size: [u32; 2]) -> Vec<Ray> {
+    let places = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x as f32 + 0.5, y as f32 + 0.5]));
+    places
+        .map(|[x, y]| {
+            let mut rays = views.iter().map(|view| (view, view.ray(x, y)));
+            let is_inside = |(view, ray): &(&View, Ray)| {
+                (view.octant() * Vec3::from_array(ray.direction))
+                    .cmpge(Vec3::splat(-1e-6))
+                    .all()
+            };
+            rays.find(is_inside).expect("an octant").1
+        })
+        .collect()
+}
+
 #[test]
 fn octahedra_are_as_rays_see_them_and_have_no_holes() {
     with_gpu(|gpu| {
@@ -155,35 +170,34 @@ fn octahedra_are_as_rays_see_them_and_have_no_holes() {
                 (OctahedronLayout::Rectangular, [64, 32]),
                 (OctahedronLayout::Quadratic, [45, 45]),
             ] {
-                let what = format!("{address}, {layout:?} {size:?}");
                 let area = Area::whole(size);
                 let views = View::of_octants(origin, layout, near, area).unwrap();
-                let desc = GBufferDesc {
-                    size,
-                    layering: Layering::Octants,
-                    outputs: &OUTPUTS,
-                };
-                let gbuffer = GBuffer::new(gpu, &surfaces, &desc).unwrap();
-                draw(gpu, &gbuffer, &prepared.on_device, &views);
-                let seen: Vec<u32> = gbuffer.read(gpu, Output::Triangle).unwrap();
                 let mut oracle = Oracle::new(size, gpu.caps().sub_pixel_bits);
                 for view in &views {
                     oracle.add(view, area, &prepared.corners);
                 }
-                let rays: Vec<u32> = (0..size[1])
-                    .flat_map(|y| (0..size[0]).map(move |x| [x as f32 + 0.5, y as f32 + 0.5]))
-                    .map(|[x, y]| {
-                        let ray = views.iter().map(|view| (view, view.ray(x, y))).find(|(view, ray)| {
-                            // The octant whose ray lies in it.
-                            (view.octant() * Vec3::from_array(ray.direction))
-                                .cmpge(Vec3::splat(-1e-6))
-                                .all()
-                        });
-                        ray.map_or(NO_HIT, |(_, ray)| prepared.index.closest_hit(&ray).triangle)
-                    })
+                let rays: Vec<u32> = octahedron_rays(&views, size)
+                    .iter()
+                    .map(|ray| prepared.index.closest_hit(ray).triangle)
                     .collect();
-                compare(&what, &oracle, &seen, &rays);
-                assert!(!is_closed || !seen.contains(&NO_HIT), "{what}: a hole");
+                for cut in [
+                    OctantCut::ClipDistances,
+                    OctantCut::Split,
+                    OctantCut::Mask,
+                    OctantCut::MaskInRectangles,
+                ] {
+                    let what = format!("{address}, {layout:?} {size:?}, {cut:?}");
+                    let desc = GBufferDesc {
+                        size,
+                        layering: Layering::Octants(cut),
+                        outputs: &OUTPUTS,
+                    };
+                    let gbuffer = GBuffer::new(gpu, &surfaces, &desc).unwrap();
+                    draw(gpu, &gbuffer, &prepared.on_device, &views);
+                    let seen: Vec<u32> = gbuffer.read(gpu, Output::Triangle).unwrap();
+                    compare(&what, &oracle, &seen, &rays);
+                    assert!(!is_closed || !seen.contains(&NO_HIT), "{what}: a hole");
+                }
             }
         }
     });

@@ -5,8 +5,9 @@ use clerestory::accel::bvh2::Bvh2;
 use clerestory::accel::{Hit, NO_HIT, RayIndex};
 use clerestory::gpu::shaders::types::SceneTriangle;
 use clerestory::gpu::{Area, Category, Gpu, GpuOptions, Lesser, OptionalFeatures};
+use clerestory::maps::octahedron::OctahedronLayout;
 use clerestory::maps::packed_direction::unpack_octahedral;
-use clerestory::raster::{GBuffer, GBufferDesc, Layering, Output, View};
+use clerestory::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Output, View};
 use clerestory::scene::{AlphaMode, Camera, Filter, Image, Material, Mesh, Scene, Texture, Wrap};
 use clerestory::transport::GpuScene;
 use clerestory_hard_cases::scenes::orthographic;
@@ -439,7 +440,13 @@ fn mistakes_are_named() {
             layering,
             outputs: &[Output::Triangle],
         };
-        for layering in [Layering::Passes(0), Layering::Views(33), Layering::Geometry(7)] {
+        for layering in [
+            Layering::Passes(0),
+            Layering::Views(33),
+            Layering::Geometry(7),
+            Layering::Octants(OctantCut::Unsplit { level: 0 }),
+            Layering::Paraboloids { level: 65 },
+        ] {
             let refused = GBuffer::new(gpu, &surfaces, &desc(layering));
             assert!(matches!(refused, Err(Error::Setting { .. })), "{layering:?}");
         }
@@ -448,6 +455,10 @@ fn mistakes_are_named() {
         let mut recorder = gpu.recorder("mistakes").unwrap();
         let two = gbuffer.record(&mut recorder, &surfaces, &[view, view]);
         assert!(matches!(two, Err(Error::Setting { .. })), "{two:?}");
+        let views = View::of_octants(Vec3::ZERO, OctahedronLayout::Quadratic, 0.1, Area::whole([8, 8])).unwrap();
+        let halves = GBuffer::new(gpu, &surfaces, &desc(Layering::Octants(OctantCut::Halves))).unwrap();
+        let square = halves.record(&mut recorder, &surfaces, &views);
+        assert!(matches!(square, Err(Error::Setting { .. })), "{square:?}");
         let mut other = surfaces;
         other.features.alpha = true;
         let other = gbuffer.record(&mut recorder, &other, &[view]);
@@ -457,6 +468,7 @@ fn mistakes_are_named() {
             assert!(View::of_cube_face(origin, 0, near, Area::whole([8, 8])).is_err());
         }
         assert!(View::of_cube_face(Vec3::ZERO, 6, 1.0, Area::whole([8, 8])).is_err());
+        assert!(View::of_paraboloid(Vec3::ZERO, 2, 1.0, Area::whole([8, 8])).is_err());
     });
     // Devices that lack a way to several layers say so, and every device has one way.
     let gpu = gpu_with(&GpuOptions {
@@ -471,7 +483,9 @@ fn mistakes_are_named() {
         Layering::Views(6),
         Layering::Instances(6),
         Layering::Geometry(6),
-        Layering::Octants,
+        Layering::Octants(OctantCut::ClipDistances),
+        Layering::Octants(OctantCut::Split),
+        Layering::Paraboloids { level: 1 },
     ] {
         let desc = GBufferDesc {
             size: [8, 8],

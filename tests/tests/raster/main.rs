@@ -1,12 +1,14 @@
 //! Rendering: exact coverage, depth, kept contents, refused mistakes, and barriers of what vertex and fragment shaders read. The rest of the
 //! raster floor has files of its own.
 
+mod cuts;
 mod directions;
 mod gbuffer;
 mod layers;
 mod normal_maps;
 mod oracle;
 mod parallel;
+mod splats;
 
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::{

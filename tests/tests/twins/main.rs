@@ -10,6 +10,7 @@ mod maps;
 mod media;
 mod photons;
 mod random;
+mod raster;
 mod reflection;
 mod scattering;
 mod sums;

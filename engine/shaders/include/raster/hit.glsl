@@ -42,4 +42,20 @@ RasterHit raster_hit(RasterView view, SceneTriangle t, vec2 pixel) {
     return RasterHit(weights, found.t * length(direction));
 }
 
+// The same from weights that the rasterizer interpolated: exact as far as the projection is linear over the primitive.
+RasterHit raster_interpolated(RasterView view, SceneTriangle t, vec2 weights) {
+    vec3 w = vec3(1.0 - weights.x - weights.y, weights);
+    return RasterHit(w, length(t.a - view.origin + (w.y * (t.b - t.a) + w.z * (t.c - t.a))));
+}
+
+// Rounding of the three terms of a direction, none above 1.
+const float RASTER_DIRECTION_ROUNDING = 1.0 / 2097152.0;
+
+// Whether the direction of a pixel lies in the octant of a view, its border and what rounding leaves open of it included: every pixel lies
+// in one at least.
+bool raster_is_in_octant(RasterView view, vec2 pixel) {
+    vec3 direction = view.forward + raster_across(view, raster_place(view, pixel));
+    return all(greaterThanEqual(view.signs * direction, vec3(-RASTER_DIRECTION_ROUNDING)));
+}
+
 #endif

@@ -32,6 +32,9 @@ vec4 raster_project(RasterView view, vec3 p) {
     return vec4(raster_row(view.x, p), raster_row(view.y, p), raster_row(view.z, p), raster_row(view.w, p));
 }
 
+// Weights of a triangle's corners 1 and 2 at one of its corners.
+vec2 raster_corner_weights(uint corner) { return vec2(corner == 1u ? 1.0 : 0.0, corner == 2u ? 1.0 : 0.0); }
+
 // Corner of a triangle from the view's origin. Triangles that rays cannot meet, since a coordinate is NaN, infinite or out of range, are
 // nowhere.
 bool raster_corner(RasterView view, uint triangle, uint corner, out vec3 p) {

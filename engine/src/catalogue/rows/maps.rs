@@ -1,9 +1,11 @@
 //! Rows of the document on visibility and media about maps of directions (`DP-`, `OEM-`).
 
 use super::super::{Row, measured, part};
+use crate::techniques::Bias;
 
 const DENSITY: &str = "clerestory report map-density map-choice";
 const DENSITY_AND_ERROR: &str = "clerestory report map-density map-error map-choice";
+const RENDERING: &str = "clerestory report map-rendering";
 
 pub(super) const ROWS: &[Row] = &[
     measured(
@@ -73,6 +75,7 @@ pub(super) const ROWS: &[Row] = &[
             "Heidrich and Seidel 1998",
             "engine/src/maps/paraboloid.rs",
             &[
+                "tests/tests/raster/cuts.rs::paraboloids_come_nearer_with_smaller_pieces",
                 "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
                 "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
                 "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
@@ -162,6 +165,133 @@ pub(super) const ROWS: &[Row] = &[
                 "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
             ],
         ),
+    ),
+    measured(
+        RENDERING,
+        Row {
+            needs: &["geometryShader"],
+            ..part(
+                "OEM-4a",
+                "octahedron maps rendered live: exact split by a geometry shader",
+                "Engelhardt 2013, 7.2.1 and 7.3.2",
+                "engine/src/raster/octants.rs",
+                &[
+                    "tests/tests/raster/directions.rs::octahedra_are_as_rays_see_them_and_have_no_holes",
+                    "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
+                    "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+                    "engine/src/raster/octants.rs::triangles_in_general_position_give_thirteen_at_most",
+                    "engine/src/raster/octants.rs::triangles_on_a_lattice_give_no_more_than_shaders_may_emit",
+                    "engine/src/raster/octants.rs::pieces_cover_the_triangle_and_lie_in_their_octants",
+                    "engine/src/raster/octants.rs::cuts_are_the_same_from_both_ends",
+                    "tests/tests/twins/raster.rs::pieces_of_octants_agree_with_their_twins",
+                ],
+            )
+        },
+    ),
+    measured(
+        RENDERING,
+        Row {
+            needs: &["geometryShader"],
+            bias: Some(Bias::Biased("edges stay straight where their images bend")),
+            ..part(
+                "OEM-4b",
+                "octahedron maps rendered live: split along the equator alone",
+                "Engelhardt 2013, 7.2.1 and 7.3.2",
+                "engine/src/raster/octants.rs",
+                &[
+                    "tests/tests/raster/cuts.rs::halves_and_outlines_are_wrong_as_stated",
+                    "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+                    "tests/tests/raster/cuts.rs::the_split_emits_least",
+                ],
+            )
+        },
+    ),
+    measured(
+        RENDERING,
+        Row {
+            needs: &["geometryShader"],
+            bias: Some(Bias::Biased("what is interpolated inside of outlines")),
+            ..part(
+                "OEM-4c",
+                "octahedron maps rendered live: split outlines",
+                "Engelhardt 2013, 7.2.1 and 7.3.2",
+                "engine/src/raster/octants.rs",
+                &[
+                    "tests/tests/raster/cuts.rs::halves_and_outlines_are_wrong_as_stated",
+                    "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+                    "tests/tests/twins/raster.rs::outlines_agree_with_their_twins",
+                ],
+            )
+        },
+    ),
+    measured(
+        RENDERING,
+        Row {
+            ..part(
+                "OEM-4d",
+                "octahedron maps rendered live: mask of each octant",
+                "Engelhardt 2013, 7.2.1 and 7.3.2",
+                "engine/src/raster/pipelines.rs",
+                &[
+                    "tests/tests/raster/directions.rs::octahedra_are_as_rays_see_them_and_have_no_holes",
+                    "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
+                    "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+                ],
+            )
+        },
+    ),
+    measured(
+        RENDERING,
+        Row {
+            bias: Some(Bias::Consistent("straight edges, and gaps at seams, as long as pieces")),
+            ..part(
+                "OEM-4e",
+                "octahedron maps rendered live: unsplit pieces of triangles",
+                "Engelhardt 2013, 7.2.1 and 7.3.2",
+                "engine/src/raster/tessellation.rs",
+                &[
+                    "tests/tests/raster/cuts.rs::unsplit_maps_come_nearer_with_smaller_pieces",
+                    "engine/src/raster/tessellation.rs::pieces_fill_the_triangle_and_share_their_edges",
+                    "tests/tests/twins/raster.rs::pieces_of_triangles_agree_with_their_twins",
+                ],
+            )
+        },
+    ),
+    measured(
+        RENDERING,
+        Row {
+            bias: Some(Bias::Biased("holes and points as wide as texels")),
+            ..part(
+                "OEM-4f",
+                "octahedron maps of points: splats, pull and push",
+                "Engelhardt 2013, 7.4; Ritschel et al. 2008",
+                "engine/src/raster/splats.rs",
+                &[
+                    "tests/tests/raster/splats.rs::splats_and_their_fill_are_those_of_the_twin",
+                    "tests/tests/raster/splats.rs::rooms_of_splats_are_closed_and_as_far_as_rays_go",
+                    "engine/src/raster/splats.rs::surfels_share_the_area_evenly",
+                ],
+            )
+        },
+    ),
+    measured(
+        RENDERING,
+        Row {
+            needs: &["shaderClipDistance"],
+            ..part(
+                "OEM-4g",
+                "octahedron maps rendered live: linear octants with clip distances",
+                "Engelhardt and Dachsbacher 2008; linear octants are the engine's own",
+                "engine/src/raster/octahedron.rs",
+                &[
+                    "tests/tests/raster/directions.rs::octahedra_are_as_rays_see_them_and_have_no_holes",
+                    "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
+                    "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+                    "tests/tests/raster/directions.rs::views_project_as_the_maps_encode",
+                    "engine/src/maps/tests/printed.rs::matrices_of_octants_are_the_map",
+                ],
+            )
+        },
     ),
     measured(
         "clerestory report map-levels map-borders",

@@ -91,6 +91,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("map-glossiness", maps::map_glossiness::measure),
     on_host("map-levels", maps::map_levels::measure),
     on_host("map-quality", photon_maps::map_quality::measure),
+    on_device("map-rendering", maps::map_rendering::measure),
     on_host("merge-example", photon_maps::merge_example::measure),
     on_device("mitsuba", rendering::mitsuba::measure),
     on_host("multiple-scattering", surfaces::multiple_scattering::measure),

@@ -3,10 +3,12 @@
 mod choice_plot;
 mod environments;
 mod heat;
+mod live_maps;
 pub mod map_borders;
 pub mod map_choice;
 pub mod map_density;
 pub mod map_error;
 pub mod map_glossiness;
 pub mod map_levels;
+pub mod map_rendering;
 mod sphere;
