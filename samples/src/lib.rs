@@ -5,7 +5,9 @@ pub mod carousel;
 pub mod orbit;
 pub mod progressive;
 pub mod shaders;
+pub mod showroom;
 pub mod small_gltf;
+pub mod solids;
 pub mod window;
 
 use std::path::{Path, PathBuf};

@@ -12,6 +12,7 @@ mod photons;
 mod random;
 mod reflection;
 mod scattering;
+mod shadows;
 mod sums;
 mod tables;
 
