@@ -55,12 +55,6 @@ impl Subject {
         lower + share * (upper - lower)
     }
 
-    /// Length of the diagonal of the box around the scene.
-    pub fn size(&self) -> f32 {
-        let [lower, upper] = self.on_device.bounds();
-        (upper - lower).length()
-    }
-
     /// Places evenly over all surfaces.
     pub fn places(&self, seed: u64, count: usize) -> Vec<ShadowPlace> {
         let mut random = Random(seed);
