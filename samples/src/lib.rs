@@ -7,7 +7,9 @@ pub mod orbit;
 pub mod panels;
 pub mod progressive;
 pub mod shaders;
+pub mod showroom;
 pub mod small_gltf;
+pub mod solids;
 pub mod window;
 
 use std::path::{Path, PathBuf};

@@ -124,6 +124,14 @@ impl Options {
 /// [`Error::MissingFeature`] without a window system, what `make` and frames return, and what the validation layers said.
 pub fn show<S: Show>(options: Options, make: impl FnOnce(&Canvas<'_>) -> Result<S>) -> Result<()> {
     let scene = scene::load(&options.scene)?;
+    show_scene(options, scene, make)
+}
+
+/// As [`show`], of a scene that is there already.
+///
+/// # Errors
+/// As [`show`].
+pub fn show_scene<S: Show>(options: Options, scene: Scene, make: impl FnOnce(&Canvas<'_>) -> Result<S>) -> Result<()> {
     for note in &scene.notes {
         println!("note: {} at {}: {}", note.feature, note.at, note.instead);
     }

@@ -385,7 +385,14 @@ fn the_photon_viewer_refuses_what_it_cannot_show() {
 fn octahedron_lab(arguments: &[&str]) -> (image::RgbImage, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("new folder/picture.png");
-    let small = ["--size", "360x150", "--texels", "64", "--output", path.to_str().unwrap()];
+    let small = [
+        "--size",
+        "360x150",
+        "--texels",
+        "64",
+        "--output",
+        path.to_str().unwrap(),
+    ];
     let output = run(env!("CARGO_BIN_EXE_octahedron_lab"), &[&small[..], arguments].concat());
     (open(&path), said(&output))
 }
@@ -404,9 +411,15 @@ fn the_octahedron_lab_shows_map_density_and_error() {
             let [map, density, error] = PANELS.map(|across| mean(&picture, across, MIDDLE));
             // The map shows something; against rays there is no error but at silhouettes, and black stands for none.
             assert!(map.iter().sum::<f32>() > 60.0, "{layout}, {channel}: {map:?}");
-            assert!(error.iter().sum::<f32>() < 0.5 * map.iter().sum::<f32>(), "{layout}, {channel}: {error:?}");
+            assert!(
+                error.iter().sum::<f32>() < 0.5 * map.iter().sum::<f32>(),
+                "{layout}, {channel}: {error:?}"
+            );
             assert!(density.iter().sum::<f32>() > 250.0, "{layout}, {channel}: {density:?}");
-            assert!(text.contains(layout) && text.contains("another object than rays"), "{text}");
+            assert!(
+                text.contains(layout) && text.contains("another object than rays"),
+                "{text}"
+            );
             // Of some 4000 texels those next to edges may differ.
             let other: u32 = text
                 .split(" with another object")
@@ -461,6 +474,107 @@ fn the_octahedron_lab_has_a_window_too() {
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_octahedron_lab"))
             .args(arguments)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(said(&output).contains(expected), "{}", said(&output));
+    }
+}
+
+/// A frame of the reflection preview without a window, and what it said.
+fn reflection_preview(arguments: &[&str]) -> (image::RgbImage, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new folder/picture.png");
+    let small = ["--size", "96x72", "--map", "64", "--shadow", "128", "--samples", "1"];
+    let output = ["--output", path.to_str().unwrap()];
+    let output = run(
+        env!("CARGO_BIN_EXE_reflection_preview"),
+        &[&small[..], arguments, &output].concat(),
+    );
+    (open(&path), said(&output))
+}
+
+/// Pixels that differ by more than so many steps in a channel.
+fn differing(a: &image::RgbImage, b: &image::RgbImage, steps: u8) -> usize {
+    let pairs = a.pixels().zip(b.pixels());
+    let differs = |(a, b): &(&image::Rgb<u8>, &image::Rgb<u8>)| (0..3).any(|c| a[c].abs_diff(b[c]) > steps);
+    pairs.filter(differs).count()
+}
+
+#[test]
+fn the_reflection_preview_shows_its_room_and_a_body_that_moves() {
+    let (first, text) = reflection_preview(&["--shape", "sphere"]);
+    assert_eq!(first.dimensions(), (96, 72));
+    for expected in [
+        "raster: surfaces",
+        "shadow maps: distances",
+        "preview: shade live map",
+        "probe: filter",
+    ] {
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+    // The wall to the left is terracotta, that to the right teal.
+    let [left, right] = [[0.0, 0.12], [0.88, 1.0]].map(|across| mean(&first, across, [0.2, 0.5]));
+    assert!(left[0] > 1.5 * left[2] && left[0] > 30.0, "left {left:?}");
+    assert!(right[2] > 1.3 * right[0] && right[2] > 20.0, "right {right:?}");
+    // The same frame again is the same picture; later the body is elsewhere, and the room away from it and its shadow stays.
+    let (again, _) = reflection_preview(&["--shape", "sphere"]);
+    assert!(first == again);
+    let (later, _) = reflection_preview(&["--shape", "sphere", "--turn", "60", "--frames", "2"]);
+    let moved = differing(&first, &later, 8);
+    assert!((100..4000).contains(&moved), "{moved} pixels");
+    assert!((mean(&later, [0.0, 0.12], [0.2, 0.5])[0] - left[0]).abs() < 3.0);
+}
+
+#[test]
+fn the_reflection_previews_layouts_of_shadows_agree() {
+    let of = |shadows: &str| reflection_preview(&["--shape", "sphere", "--shadows", shadows]).0;
+    let [cube, octahedron, none] = ["cube", "octahedron", "none"].map(of);
+    let borders = differing(&cube, &octahedron, 16);
+    let shadows = differing(&octahedron, &none, 16);
+    assert!(borders < 96 * 72 / 20, "{borders} pixels");
+    assert!(shadows > 4 * borders && shadows > 200, "{shadows} pixels, {borders}");
+}
+
+#[test]
+fn the_reflection_preview_has_a_window_and_takes_any_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    // Without lights of its own the scene gets one.
+    let arguments = [
+        "builtin:cornell-box",
+        "--metal",
+        "mirror",
+        "--roughness",
+        "0.4",
+        "--map",
+        "64",
+    ];
+    let arguments = [&arguments[..], &["--size", "64x64", "--frames", "3"]].concat();
+    let output = windowed(env!("CARGO_BIN_EXE_reflection_preview"), &arguments, &path);
+    assert!(output.status.success(), "{}", said(&output));
+    let picture = open(&path);
+    assert_eq!(picture.dimensions(), (64, 64));
+    let [red, green] = [[0.04, 0.14], [0.86, 0.96]].map(|across| mean(&picture, across, [0.3, 0.7]));
+    assert!(red[0] > 1.5 * red[1] && green[1] > 1.2 * green[0], "{red:?} {green:?}");
+}
+
+#[test]
+fn the_reflection_preview_refuses_what_it_cannot_show() {
+    for (arguments, expected) in [
+        (&["--shape", "cone"][..], "cone"),
+        (&["--metal", "tin"], "tin"),
+        (&["--roughness", "2"], "from 0 to 1"),
+        (&["--shadows", "paraboloid"], "paraboloid"),
+        (&["--map", "100"], "power of two"),
+        (&["--samples", "0"], "from 1 to 8"),
+        (&["builtin:point-in-fog"], "participating media"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        let output = Command::new(env!("CARGO_BIN_EXE_reflection_preview"))
+            .args(arguments)
+            .args(["--size", "32x24", "--output", path.to_str().unwrap()])
             .output()
             .unwrap();
         assert_eq!(output.status.code(), Some(1), "{}", said(&output));

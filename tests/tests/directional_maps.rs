@@ -41,8 +41,7 @@ fn noise(map: Parametrization, rows: u32) -> MapImage {
     let size = size(map, rows);
     let mut random = Random(31);
     let count = size.element_product() * map.layers();
-    let texels =
-        (0..count).map(|_| Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)));
+    let texels = (0..count).map(|_| Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)));
     MapImage::new(map, size, texels.collect()).unwrap()
 }
 
@@ -166,7 +165,10 @@ fn look_ups_in_cubes_and_discs_are_their_twins() {
                 for (found, expected) in pair[1].texels().iter().zip(twin.texels()) {
                     // As in the maps with borders; where no direction is, both are black.
                     let off = (*found - *expected).abs().max_element();
-                    assert!(f64::from(off) < 16.0 * ROUNDING, "{map}, level {level}: {found} {expected}");
+                    assert!(
+                        f64::from(off) < 16.0 * ROUNDING,
+                        "{map}, level {level}: {found} {expected}"
+                    );
                 }
             }
             let mut queries: Vec<Vec4> = (0..600)
@@ -518,9 +520,8 @@ fn shadows_by_octahedron_and_cube_are_as_good() {
             DVec3::splat(f64::from(depth(d.as_vec3().normalize()).min(1e30)))
         })
         .unwrap();
-        let is_wrong = |((d, r), exact): &(&(Vec3, f32), &bool)| {
-            (depths.nearest(d.as_dvec3()).unwrap().x < *r) != **exact
-        };
+        let is_wrong =
+            |((d, r), exact): &(&(Vec3, f32), &bool)| (depths.nearest(d.as_dvec3()).unwrap().x < *r) != **exact;
         receivers.iter().zip(&exact).filter(is_wrong).count()
     };
     // 9216 and 9126 texels, and four times as many.
@@ -532,7 +533,10 @@ fn shadows_by_octahedron_and_cube_are_as_good() {
             let rows = (f64::from(square).powi(2) / 2.0).sqrt().round() as u32;
             wrong(Parametrization::OctahedronRectangular, rows)
         };
-        println!("{square}²: wrong {octahedron} square, {rectangular} rectangular, {cube} cube, of {}", receivers.len());
+        println!(
+            "{square}²: wrong {octahedron} square, {rectangular} rectangular, {cube} cube, of {}",
+            receivers.len()
+        );
         // Some thousand are wrong: counts that are even would differ by 3 % in one of some hundred cases.
         for other in [octahedron, rectangular] {
             let ratio = other as f64 / cube as f64;
@@ -574,7 +578,9 @@ fn maps_that_cannot_be_are_errors() {
         assert!(SphericalSat::new(gpu, &device, SatNumbers::Fixed, range).is_err());
         let cube = DirectionalMap::new(gpu, Parametrization::Cube, UVec2::splat(8), 2, 0).unwrap();
         let range = SatRange::of(&noise(Parametrization::Cube, 8), true);
-        assert!(SphericalSat::new(gpu, &cube, SatNumbers::Fixed, range).is_err() && PrefilterGgx::new(gpu, &cube).is_err());
+        assert!(
+            SphericalSat::new(gpu, &cube, SatNumbers::Fixed, range).is_err() && PrefilterGgx::new(gpu, &cube).is_err()
+        );
         assert!(sat_half_width(octahedron, DVec3::ZERO, 1.0).is_none());
     });
 }

@@ -6,6 +6,8 @@
 //! T. Saito and T. Takahashi, "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); T. Engelhardt, "Efficient Visibility for
 //! Realistic Rendering", 2013, §2.1 (both forms of visibility) and §7.2 (octahedra rendered live).
 //!
+//! [`OmniShadowMaps`] keep the distances that point lights see in all directions, and say which places their light reaches.
+//!
 //! Guarantee: what is seen at a pixel is what the ray through its centre meets, but where that centre lies within the rounding of vertices
 //! from an edge of a triangle, or where triangles are equally far within the rounding of depths; distances and weights are the ray caster's
 //! own. Deterministic, and equal bits in every way to several layers of linear views. Cuts that are not exact ([`OctantCut::is_exact`]) and
@@ -14,6 +16,7 @@
 mod gbuffer;
 mod octahedron;
 pub mod octants;
+mod omni_shadow;
 mod output;
 mod pipelines;
 pub mod splats;
@@ -24,6 +27,10 @@ mod view;
 pub use gbuffer::{GBuffer, GBufferDesc};
 pub use octahedron::OCTANTS;
 pub use octants::OctantCut;
+pub use omni_shadow::{
+    OmniShadowDesc, OmniShadowImage, OmniShadowMaps, ShadowLayout, ShadowPlace, ShadowReceiver, shadow_receiver,
+    shadow_texel_radius, shadow_threshold,
+};
 pub use output::Output;
 pub use pipelines::Layering;
 pub use surfaces::{ObjectTriangles, SurfaceFeatures, Surfaces};

@@ -66,6 +66,23 @@ impl Surfaces<'_> {
         (lower - from).abs().max((upper - from).abs()).length()
     }
 
+    /// The surfaces of the objects that come before that one; of all for one that is not among them.
+    pub fn before(self, object: u32) -> Self {
+        let place = self.objects.iter().position(|known| known.object == object);
+        let end = place.map_or(self.triangles, |place| self.objects[place].triangles.start);
+        Self {
+            triangles: end,
+            objects: &self.objects[..place.unwrap_or(self.objects.len())],
+            ..self
+        }
+    }
+
+    /// The triangles of an object; none of one that is not among them.
+    pub fn triangles_of(&self, object: u32) -> Range<u32> {
+        let found = self.objects.iter().find(|known| known.object == object);
+        found.map_or(0..0, |known| known.triangles.clone())
+    }
+
     /// The object of each triangle; `u32::MAX` without one.
     pub(super) fn object_of_triangles(&self) -> Vec<u32> {
         let mut objects = vec![u32::MAX; self.triangles as usize];

@@ -18,6 +18,7 @@ mod features;
 mod path;
 mod photon;
 pub mod photon_mapping;
+pub mod preview;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -447,7 +447,11 @@ impl Lab {
             Seen {
                 triangle: hit.triangle,
                 object: self.objects.get(hit.triangle as usize).copied().unwrap_or(NO_HIT),
-                distance: if hit.triangle == NO_HIT { f32::INFINITY } else { hit.t * length },
+                distance: if hit.triangle == NO_HIT {
+                    f32::INFINITY
+                } else {
+                    hit.t * length
+                },
             }
         };
         texels.zip(directions).map(cast).collect()

@@ -13,6 +13,7 @@ mod random;
 mod raster;
 mod reflection;
 mod scattering;
+mod shadows;
 mod sums;
 mod tables;
 

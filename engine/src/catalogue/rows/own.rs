@@ -1,6 +1,7 @@
 //! Rows of the engine's own (`CL-`): published methods outside of the documents.
 
 use super::super::{Row, measured, part, unbiased};
+use crate::techniques::Bias;
 
 pub(super) const ROWS: &[Row] = &[
     measured(
@@ -502,4 +503,48 @@ pub(super) const ROWS: &[Row] = &[
             ],
         ),
     ),
+    Row {
+        bias: Some(Bias::Biased(
+            "no interreflection beyond a probe, no parallax, round lobes, unshadowed directional lights",
+        )),
+        ..measured(
+            "clerestory report live-maps",
+            part(
+                "CL-PREVIEW",
+                "raster preview: deferred shading with shadow maps and light probes",
+                "Deering et al. 1988; Saito and Takahashi 1990; Kautz et al. 2000; Karis 2013",
+                "engine/src/techniques/preview/mod.rs",
+                &[
+                    "tests/tests/preview/light.rs::white_surfaces_vanish_in_a_white_furnace",
+                    "tests/tests/preview/light.rs::albedos_in_a_uniform_environment_are_the_path_tracers",
+                    "tests/tests/preview/light.rs::a_lambert_sphere_under_a_cosine_sky_has_the_closed_form",
+                    "tests/tests/preview/light.rs::a_mirror_sphere_shows_the_environment",
+                    "tests/tests/preview/light.rs::rough_reflections_are_close_to_the_path_tracers",
+                    "tests/tests/preview/light.rs::direct_light_is_the_path_tracers",
+                    "tests/tests/preview/moving.rs::moved_objects_are_as_if_made_there",
+                    "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
+                    "engine/src/techniques/preview/probe.rs::lobes_grow_from_level_to_level",
+                    "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
+                ],
+            ),
+        )
+    },
+    Row {
+        bias: Some(Bias::Biased("radiance at texel centres; parallax beside its place")),
+        ..measured(
+            "clerestory report live-maps",
+            part(
+                "CL-LIVE-MAP",
+                "live maps: light at a place drawn each frame as an octahedron, for reflections of objects that move",
+                "Blinn and Newell 1976; Greene 1986; Engelhardt and Dachsbacher 2008",
+                "engine/src/techniques/preview/live.rs",
+                &[
+                    "tests/tests/preview/live.rs::irradiance_in_a_closed_room_is_that_of_rays",
+                    "tests/tests/preview/live.rs::reflections_at_the_middle_are_those_of_rays",
+                    "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
+                    "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
+                ],
+            ),
+        )
+    },
 ];

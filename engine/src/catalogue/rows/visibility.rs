@@ -1,6 +1,7 @@
 //! Rows of the document on visibility and media (`BG-`). Tests that speak for several systems have a name of their own.
 
 use super::super::{Row, measured, part, unbiased};
+use crate::techniques::Bias;
 use crate::transport::PathSet;
 
 const SAMPLING: &[&str] = &[
@@ -89,6 +90,31 @@ pub(super) const ROWS: &[Row] = &[
             FREE_FLIGHT,
         )),
     ),
+    Row {
+        bias: Some(Bias::Biased(
+            "borders of shadows are those of texels; contact shadows begin half a texel late",
+        )),
+        ..measured(
+            "clerestory report shadow-maps",
+            part(
+                "BG-10",
+                "omnidirectional shadow maps of point lights, as cubes or octahedra",
+                "Williams 1978; Gerasimov 2004; Engelhardt and Dachsbacher 2008; Holbert 2011",
+                "engine/src/raster/omni_shadow.rs",
+                &[
+                    "engine/src/raster/omni_shadow/tests.rs::radii_are_those_of_texels",
+                    "engine/src/raster/omni_shadow/tests.rs::planes_do_not_shade_themselves",
+                    "tests/tests/preview/shadows.rs::maps_agree_with_rays_but_for_the_borders_of_shadows",
+                    "tests/tests/preview/shadows.rs::lights_close_to_surfaces_and_in_planes_of_geometry_are_wrong_at_borders_alone",
+                    "tests/tests/preview/shadows.rs::shadows_do_not_depend_on_the_scale",
+                    "tests/tests/preview/shadows.rs::look_ups_are_their_twins",
+                    "tests/tests/preview/shadows.rs::filters_keep_the_mean",
+                    "tests/tests/preview/shadows.rs::convex_rooms_have_no_shadows",
+                    "tests/tests/twins/shadows.rs::shadow_maps_agree_with_their_twins",
+                ],
+            ),
+        )
+    },
     measured(
         "clerestory index --peers",
         part(

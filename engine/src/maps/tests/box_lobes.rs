@@ -198,15 +198,20 @@ fn lobes_on_folds_and_edges_are_as_good_as_elsewhere() {
                 let d = map.texel_direction(small, texel).unwrap();
                 let off = (table.sat_lobe(map, d, &boxes).unwrap() - truth.at(texel).as_dvec3()).length_squared();
                 // Folds and edges lie on the planes of the axes.
-                let into = if d.abs().min_element() < 0.1 { &mut near } else { &mut far };
+                let into = if d.abs().min_element() < 0.1 {
+                    &mut near
+                } else {
+                    &mut far
+                };
                 into.push(off);
             }
             let rms = |all: &[f64]| (all.iter().sum::<f64>() / all.len() as f64).sqrt();
-            println!("{map}, α = {alpha}: {:.2e} near folds, {:.2e} elsewhere", rms(&near), rms(&far));
-            assert!(
-                rms(&near) < bound * rms(&far) && rms(&near) < 0.1,
-                "{map} {alpha}"
+            println!(
+                "{map}, α = {alpha}: {:.2e} near folds, {:.2e} elsewhere",
+                rms(&near),
+                rms(&far)
             );
+            assert!(rms(&near) < bound * rms(&far) && rms(&near) < 0.1, "{map} {alpha}");
         }
     }
 }
@@ -224,6 +229,10 @@ fn constant_radiance_is_constant_through_every_lobe() {
                 assert!(off < 1e-9, "{map} {lobe:?} {d}: {found}");
             }
         }
-        assert!(table.sat_lobe(map, DVec3::ZERO, &box_lobe(LOBES[0], 1).unwrap()).is_none());
+        assert!(
+            table
+                .sat_lobe(map, DVec3::ZERO, &box_lobe(LOBES[0], 1).unwrap())
+                .is_none()
+        );
     }
 }

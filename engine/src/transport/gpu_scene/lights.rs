@@ -180,7 +180,7 @@ fn is_sampleable([a, b, c]: [Vec3; 3]) -> bool {
     size >= LEAST.0 && size / scale / scale >= LEAST.1
 }
 
-pub(super) fn light_record(kind: &LightKind) -> SceneLight {
+pub(crate) fn light_record(kind: &LightKind) -> SceneLight {
     match *kind {
         LightKind::Point { position, intensity } => SceneLight {
             kind: LIGHT_POINT,

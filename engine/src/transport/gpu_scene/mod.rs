@@ -8,6 +8,7 @@ mod geometry;
 mod lights;
 mod materials;
 mod media;
+mod moving;
 mod punctual;
 mod textures;
 
@@ -18,6 +19,7 @@ use glam::{DVec3, Vec3};
 use self::bodies::Bodies;
 use self::geometry::{Geometry, visible_objects};
 use self::lights::Lights;
+pub(crate) use self::lights::light_record;
 use self::materials::{material_record, materials_by_use};
 use self::media::GpuMedia;
 use self::punctual::PunctualLights;

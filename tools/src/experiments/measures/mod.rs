@@ -10,6 +10,7 @@ mod media;
 mod photon_maps;
 mod photons;
 mod pictures;
+mod preview;
 mod rays;
 mod rendering;
 mod surfaces;
@@ -83,6 +84,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("kd-threads", kd::kd_threads::measure),
     on_device("kd-traversal", kd::kd_traversal::measure),
     on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
+    on_device("live-maps", preview::live_maps::measure),
     on_host("map-borders", maps::map_borders::measure),
     on_host("map-choice", maps::map_choice::measure),
     on_device("map-construction", photon_maps::map_construction::measure),
@@ -106,6 +108,7 @@ pub const MEASURES: &[Measure] = &[
     on_host("ray-offsets", rays::ray_offsets::measure),
     on_host("sample-sums", rendering::sample_sums::measure),
     on_device("scene-profile", rendering::scene_profile::measure),
+    on_device("shadow-maps", preview::shadow_maps::measure),
     on_host("shading-normals", surfaces::shading_normals::measure),
     on_host("sphere-tests", rays::sphere_tests::measure),
     on_host("tangents", surfaces::tangents::measure),

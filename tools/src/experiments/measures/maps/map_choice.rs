@@ -190,7 +190,12 @@ fn measured(context: &Context<'_>, environments: &[Environment]) -> Vec<Found> {
         .collect();
     let of_first = all.first().map_or_else(Vec::new, |first| first.curves.clone());
     for found in &mut all {
-        found.needs = found.curves.iter().zip(&of_first).map(|(curve, other)| need(curve, other)).collect();
+        found.needs = found
+            .curves
+            .iter()
+            .zip(&of_first)
+            .map(|(curve, other)| need(curve, other))
+            .collect();
     }
     all
 }

@@ -224,7 +224,14 @@ fn alpha_of_lobe(number: usize) -> f64 {
 
 fn by_lobes(table: &SphericalSat, pixels: &[Pixel], count: usize) -> Result<Vec<Vec3>> {
     let lobes: Vec<Vec<WeightedBox>> = (0..LOBES)
-        .map(|number| box_lobe(Lobe::Ggx { alpha: alpha_of_lobe(number) }, count))
+        .map(|number| {
+            box_lobe(
+                Lobe::Ggx {
+                    alpha: alpha_of_lobe(number),
+                },
+                count,
+            )
+        })
         .collect::<Result<_>>()?;
     let query = |pixel: &Pixel| {
         let number = (pixel.alpha.sqrt() * (LOBES - 1) as f64).round() as usize;
@@ -280,7 +287,9 @@ fn lobes(context: &Context<'_>) -> Result<Table> {
                 if sum.w > 0.0 { sum.truncate() / sum.w } else { held }
             };
             let mut found = vec![mean(sums[0]).as_vec3()];
-            let boxes = fits.iter().map(|fit| sat.sat_lobe(MAP, *d, fit).unwrap_or_default().as_vec3());
+            let boxes = fits
+                .iter()
+                .map(|fit| sat.sat_lobe(MAP, *d, fit).unwrap_or_default().as_vec3());
             found.extend(boxes);
             let mut next = 1;
             for fit in &fits {
@@ -390,5 +399,9 @@ fn numbers(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
-    Ok(vec![reflections(context, &gpu)?, lobes(context)?, numbers(context, &gpu)?])
+    Ok(vec![
+        reflections(context, &gpu)?,
+        lobes(context)?,
+        numbers(context, &gpu)?,
+    ])
 }

@@ -1,0 +1,472 @@
+//! Omnidirectional shadow maps: what is nearest to a point light in every direction, and which places its light does not reach.
+//!
+//! Sources: L. Williams, "Casting Curved Shadows on Curved Surfaces", SIGGRAPH 1978 (shadow maps); P. Gerasimov, "Omnidirectional Shadow
+//! Mapping", GPU Gems, 2004 (cube maps of distances); T. Engelhardt and C. Dachsbacher, "Octahedron Environment Maps", VMV 2008 (octahedra);
+//! W. Reeves, D. Salesin, R. Cook, "Rendering Antialiased Shadows with Depth Maps", SIGGRAPH 1987 (filtering of comparisons); D. Holbert,
+//! "Saying Goodbye to Shadow Acne", GDC 2011 (receivers moved along their normal); J. Isidoro, "Shadow Mapping: GPU-based Tips and
+//! Techniques", GDC 2006 (the receiver's plane). Maps hold Euclidean distances from the light, of texel centres, in metres.
+//!
+//! There is no bias in scene units. A receiver is moved off its surface, to the side of the light, by the width that half a texel's diagonal has
+//! at its distance ([`shadow_texel_radius`]), times one more than the width of the filter in texels, a little more for texels that change from one to
+//! the next. Along the direction of a texel's centre it
+//! is then in shadow of what is nearer than its own plane, or than its distance where that is nearer ([`shadow_threshold`]): a plane never
+//! shades itself, at any slope, and surfaces that fold towards the light do not shade each other within the move. What the caller adds is
+//! how far rounding takes the position off its plane ([`SurfacePoint::error`](crate::accel::offset::SurfacePoint)).
+//!
+//! Bias: the border of a shadow is that of texels, off by half of one on average, so that errors fall as one over the texels along a side;
+//! what lies within the move off a surface casts no shadow on it (contact shadows begin half a texel late); occluders nearer to the light than the near
+//! plane ([`View::near_plane`]) cast none. Filtered borders are as wide as the filter, whatever the light's size. Deterministic.
+//! GLSL: `raster/omni_shadow.glsl` and `raster/omni_shadow_set.glsl`; the twin of a look-up is [`OmniShadowImage::visibility`].
+
+use glam::{DVec2, DVec3, IVec2, UVec2, Vec3};
+
+use super::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
+use crate::gpu::ash::vk;
+use crate::gpu::shaders::constants::{SHADOW_CHANGE, SHADOW_CUBE, SHADOW_OCTAHEDRON, SHADOW_ROUNDING, SHADOW_SPAN_MAX};
+use crate::gpu::shaders::raster::omni_shadow_look_up as kernel;
+use crate::gpu::shaders::sets::OmniShadowSet;
+use crate::gpu::shaders::types::ShadowQuery;
+use crate::gpu::{Access, Area, Buffer, BufferBarrier, BufferDesc, Category, Gpu, Recorder, Timings};
+use crate::maps::cube::CUBE_FACES;
+use crate::maps::octahedron::OctahedronLayout;
+use crate::maps::topology::octahedron_wrap;
+use crate::maps::{MapPoint, Parametrization, Texel};
+use crate::{Error, Result};
+
+/// How directions lie in the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShadowLayout {
+    /// Six square faces.
+    Cube,
+    /// One square.
+    Octahedron,
+}
+
+impl ShadowLayout {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Cube, Self::Octahedron];
+
+    /// Its name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cube => "cube",
+            Self::Octahedron => "octahedron",
+        }
+    }
+
+    /// The map of directions.
+    pub const fn map(self) -> Parametrization {
+        match self {
+            Self::Cube => Parametrization::Cube,
+            Self::Octahedron => Parametrization::OctahedronQuadratic,
+        }
+    }
+
+    /// Layers of `side` × `side` texels.
+    pub const fn layers(self) -> u32 {
+        match self {
+            Self::Cube => CUBE_FACES,
+            Self::Octahedron => 1,
+        }
+    }
+
+    /// The even side with as many texels, nearly, as that.
+    pub fn side_for(self, texels: u64) -> u32 {
+        let side = (texels as f64 / f64::from(self.layers())).sqrt();
+        2 * ((0.5 * side).round() as u32).max(1)
+    }
+
+    /// The number by which kernels know it.
+    pub const fn kind(self) -> u32 {
+        match self {
+            Self::Cube => SHADOW_CUBE,
+            Self::Octahedron => SHADOW_OCTAHEDRON,
+        }
+    }
+}
+
+/// What [`OmniShadowMaps`] are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OmniShadowDesc {
+    /// How directions lie in each map.
+    pub layout: ShadowLayout,
+    /// Texels across and down of each layer.
+    pub side: u32,
+    /// Lights that have a map, at most.
+    pub maps: u32,
+}
+
+impl OmniShadowDesc {
+    /// Texels of one map.
+    pub fn texels(&self) -> u64 {
+        u64::from(self.layout.layers()) * u64::from(self.side) * u64::from(self.side)
+    }
+}
+
+/// A place on a surface, as light may reach it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShadowPlace {
+    /// Metres.
+    pub position: Vec3,
+    /// Geometric normal, of length 1, of either side.
+    pub normal: Vec3,
+    /// How far the position may be off its surface, metres: `|normal|·error` of a [`SurfacePoint`](crate::accel::offset::SurfacePoint).
+    pub slack: f32,
+}
+
+/// Shadow maps of point lights, all of one layout and size, in one buffer.
+#[derive(Debug)]
+pub struct OmniShadowMaps {
+    gpu: Gpu,
+    desc: OmniShadowDesc,
+    gbuffer: GBuffer,
+    distances: Buffer,
+}
+
+impl OmniShadowMaps {
+    /// Allocates the maps, and makes the pipeline that draws these surfaces. Nothing is in shadow before [`OmniShadowMaps::record`].
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for no texels or no maps; [`Error::LimitExceeded`] for more than a storage buffer or an image holds;
+    /// [`Error::MissingFeature`] for octahedra where clip distances are missing; [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, desc: OmniShadowDesc) -> Result<Self> {
+        if desc.side == 0 || desc.maps == 0 {
+            let value = format!("{} of side {}", desc.maps, desc.side);
+            return Err(Error::setting("shadow maps", value, "are none"));
+        }
+        let bytes = desc
+            .texels()
+            .saturating_mul(u64::from(desc.maps))
+            .saturating_mul(size_of::<f32>() as u64);
+        let limit = gpu.caps().max_storage_buffer_range;
+        if bytes > limit {
+            return Err(Error::LimitExceeded {
+                name: "shadow maps".into(),
+                value: bytes,
+                limit_name: "maxStorageBufferRange",
+                limit,
+            });
+        }
+        let gbuffer = GBuffer::new(
+            gpu,
+            surfaces,
+            &GBufferDesc {
+                size: [desc.side; 2],
+                layering: match desc.layout {
+                    ShadowLayout::Cube => Layering::of_layers(gpu.caps(), CUBE_FACES),
+                    ShadowLayout::Octahedron => Layering::Octants(OctantCut::default()),
+                },
+                outputs: &[Output::Distance],
+            },
+        )?;
+        let distances = gpu.buffer(&BufferDesc::storage("shadow maps", bytes, Category::Light))?;
+        let mut recorder = gpu.recorder("shadow maps")?;
+        recorder.pass("shadow maps: clear", |pass| {
+            pass.fill(distances.view(), f32::INFINITY.to_bits())
+        })?;
+        recorder.submit()?.wait()?;
+        Ok(Self {
+            gpu: gpu.clone(),
+            desc,
+            gbuffer,
+            distances,
+        })
+    }
+
+    /// What they are.
+    pub fn desc(&self) -> OmniShadowDesc {
+        self.desc
+    }
+
+    /// Bytes of the maps and of the pictures that they are drawn in.
+    pub fn bytes(&self) -> u64 {
+        self.gbuffer.bytes() + self.distances.bytes()
+    }
+
+    /// The set that `raster/omni_shadow_set.glsl` reads.
+    pub fn set(&self) -> OmniShadowSet<'_> {
+        OmniShadowSet {
+            shadow_distances: self.distances.view(),
+        }
+    }
+
+    /// Records two passes a light: the surfaces from there, and their distances into its map, in the order of `lights` (places in metres). Other maps stay as
+    /// they are. Earlier uses of the maps by compute shaders are waited for; afterwards they are visible to compute shaders.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for more lights than maps, places that are not finite, or surfaces with other features than those they were made
+    /// for; [`Error::MissingBarrier`] in debug builds.
+    pub fn record(&self, recorder: &mut Recorder, surfaces: &Surfaces<'_>, lights: &[Vec3]) -> Result<()> {
+        if lights.len() > self.desc.maps as usize {
+            let cause = format!("are more than the {} shadow maps", self.desc.maps);
+            return Err(Error::setting("lights", lights.len(), cause));
+        }
+        for (map, light) in (0u64..).zip(lights) {
+            self.gbuffer
+                .record(recorder, surfaces, &self.views(surfaces, *light)?)?;
+            let bytes = self.desc.texels() * size_of::<f32>() as u64;
+            let barrier = |from, to| BufferBarrier {
+                buffer: &self.distances,
+                from,
+                to,
+            };
+            recorder.pass("shadow maps: distances", |pass| {
+                let Some(image) = self.gbuffer.image(Output::Distance) else {
+                    return Ok(());
+                };
+                pass.barrier(&[barrier(Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
+                let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+                self.gbuffer.barrier_to(pass, Access::TRANSFER_READ, source);
+                pass.copy_image_to_buffer(image, self.distances.slice(map * bytes, bytes))?;
+                pass.barrier(&[barrier(Access::TRANSFER_WRITE, Access::COMPUTE_READ)]);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    fn views(&self, surfaces: &Surfaces<'_>, light: Vec3) -> Result<Vec<View>> {
+        let near = View::near_plane(light, surfaces);
+        let area = Area::whole([self.desc.side; 2]);
+        match self.desc.layout {
+            ShadowLayout::Cube => (0..CUBE_FACES)
+                .map(|face| View::of_cube_face(light, face, near, area))
+                .collect(),
+            ShadowLayout::Octahedron => View::of_octants(light, OctahedronLayout::Quadratic, near, area),
+        }
+    }
+
+    /// Shares of a light's light that reach places, by the device: the light's place and its map's number, and the filter's width in texels
+    /// (0 for none).
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a map that does not exist; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn look_up(&self, map: u32, light: Vec3, width: u32, places: &[ShadowPlace]) -> Result<Vec<f32>> {
+        Ok(self.look_up_timed(map, light, width, places)?.0)
+    }
+
+    /// As [`OmniShadowMaps::look_up`], with the times of the one pass.
+    ///
+    /// # Errors
+    /// As [`OmniShadowMaps::look_up`].
+    pub fn look_up_timed(
+        &self,
+        map: u32,
+        light: Vec3,
+        width: u32,
+        places: &[ShadowPlace],
+    ) -> Result<(Vec<f32>, Timings)> {
+        self.check(map)?;
+        if places.is_empty() {
+            return Ok(Default::default());
+        }
+        let pipeline = self.gpu.compute_pipeline::<kernel::Kernel>(&kernel::Spec {
+            shadow_kind: self.desc.layout.kind(),
+            shadow_width: width as i32,
+        })?;
+        let queries: Vec<_> = places
+            .iter()
+            .map(|place| ShadowQuery {
+                position: place.position.to_array(),
+                slack: place.slack,
+                normal: place.normal.to_array(),
+            })
+            .collect();
+        let queries = self.gpu.buffer_with("shadow queries", Category::Work, &queries)?;
+        let bytes = size_of::<f32>() as u64 * places.len() as u64;
+        let shares = self
+            .gpu
+            .buffer(&BufferDesc::storage("shadow shares", bytes, Category::Work))?;
+        let mut recorder = self.gpu.recorder("shadow maps")?;
+        recorder.pass("shadow maps: look-ups", |pass| {
+            let set = kernel::Set0 {
+                queries: queries.view(),
+                shares: shares.view(),
+            };
+            let count = places.len() as u32;
+            let push = kernel::Push {
+                light: light.to_array(),
+                count,
+                map,
+                side: self.desc.side as i32,
+            };
+            let groups = [pipeline.groups_for(count), 1, 1];
+            pass.dispatch(&pipeline, &[&set, &self.set()], &push, groups)
+        })?;
+        let timings = recorder.submit()?.wait()?;
+        Ok((self.gpu.read(shares.view(), places.len())?, timings))
+    }
+
+    /// A map on the host.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for one that does not exist; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn read(&self, map: u32) -> Result<OmniShadowImage> {
+        self.check(map)?;
+        let texels = self.desc.texels();
+        let bytes = texels * size_of::<f32>() as u64;
+        let distances = self
+            .gpu
+            .read(self.distances.slice(u64::from(map) * bytes, bytes), texels as usize)?;
+        Ok(OmniShadowImage {
+            layout: self.desc.layout,
+            side: self.desc.side,
+            distances,
+        })
+    }
+
+    fn check(&self, map: u32) -> Result<()> {
+        if map < self.desc.maps {
+            return Ok(());
+        }
+        Err(Error::setting(
+            "shadow map",
+            map,
+            format!("is not among {}", self.desc.maps),
+        ))
+    }
+}
+
+/// A shadow map on the host.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OmniShadowImage {
+    /// How directions lie in it.
+    pub layout: ShadowLayout,
+    /// Texels across and down of each layer.
+    pub side: u32,
+    /// Metres, layer by layer, row by row; infinite where there is nothing.
+    pub distances: Vec<f32>,
+}
+
+/// A place that light reaches or not, moved off its surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShadowReceiver {
+    /// From the light, moved, metres.
+    pub to: DVec3,
+    /// Of the place before it was moved, metres.
+    pub distance: f64,
+    /// Of the surface, to the side of the light.
+    pub normal: DVec3,
+    /// Of the light over the plane through the place, metres; not positive for one that it does not shine on.
+    pub height: f64,
+}
+
+/// Half the longer diagonal of a texel's image on the sphere about a direction, radians, in a map of `side` × `side` texels a layer.
+pub fn shadow_texel_radius(layout: ShadowLayout, d: DVec3, side: u32) -> f64 {
+    let map = layout.map();
+    let at = map.encode(d).unwrap_or(MapPoint {
+        layer: 0,
+        uv: DVec2::splat(0.5),
+    });
+    let [across, down] = map.derivatives(at);
+    0.5 * (across + down).length().max((across - down).length()) / f64::from(side)
+}
+
+/// How far the centres of texels that count may be from a direction, radians.
+fn shadow_span(layout: ShadowLayout, d: DVec3, side: u32, width: u32) -> f64 {
+    let texels = f64::from(width + 1) * (1.0 + f64::from(SHADOW_CHANGE) / f64::from(side));
+    (shadow_texel_radius(layout, d, side) * texels).min(SHADOW_SPAN_MAX.into())
+}
+
+/// The receiver at a position with a normal (unit, of either side) that may be off its plane by `slack`, for a filter `width` texels wide.
+pub fn shadow_receiver(
+    layout: ShadowLayout,
+    side: u32,
+    width: u32,
+    light: DVec3,
+    [position, normal]: [DVec3; 2],
+    slack: f64,
+) -> ShadowReceiver {
+    let to = position - light;
+    let normal = if normal.dot(to) > 0.0 { -normal } else { normal };
+    let distance = to.length();
+    let span = shadow_span(layout, to, side, width);
+    let to = to + normal * (distance * span.tan() + slack);
+    ShadowReceiver {
+        to,
+        distance,
+        normal,
+        height: -normal.dot(to),
+    }
+}
+
+/// What is nearer than this along a unit direction shades the receiver: its own plane, or its distance where that is nearer. Metres.
+pub fn shadow_threshold(r: &ShadowReceiver, direction: DVec3) -> f64 {
+    let fall = -r.normal.dot(direction);
+    let is_met = r.height > 0.0 && r.height < fall * r.distance;
+    let plane = if is_met { r.height / fall } else { r.distance };
+    plane * (1.0 - f64::from(SHADOW_ROUNDING))
+}
+
+impl OmniShadowImage {
+    /// Share of the light that reaches a place on a surface: the twin of `omni_shadow_visibility`.
+    pub fn visibility(&self, light: Vec3, width: u32, place: &ShadowPlace) -> f64 {
+        let surface = [place.position, place.normal].map(|v| v.as_dvec3());
+        let slack = f64::from(place.slack);
+        let r = shadow_receiver(self.layout, self.side, width, light.as_dvec3(), surface, slack);
+        let Some(at) = self.layout.map().encode(r.to) else {
+            return 1.0;
+        };
+        let at_texel = at.uv * f64::from(self.side);
+        if width == 0 {
+            let nearest = at_texel.as_ivec2().min(IVec2::splat(self.side as i32 - 1));
+            return self.tap(&r, at.layer, nearest);
+        }
+        let low = at_texel - 0.5 * f64::from(width);
+        let (first, part) = (low.floor(), low - low.floor());
+        let weight = |i: u32, part: f64| match i {
+            0 => 1.0 - part,
+            last if last == width => part,
+            _ => 1.0,
+        };
+        let all = (0..=width).flat_map(|y| (0..=width).map(move |x| UVec2::new(x, y)));
+        let sum: f64 = all
+            .map(|step| {
+                let share = weight(step.x, part.x) * weight(step.y, part.y);
+                share * self.tap(&r, at.layer, first.as_ivec2() + step.as_ivec2())
+            })
+            .sum();
+        sum / f64::from(width * width)
+    }
+
+    fn tap(&self, r: &ShadowReceiver, layer: u32, at: IVec2) -> f64 {
+        let (map, size) = (self.layout.map(), UVec2::splat(self.side));
+        let texel = self.wrap(layer, at);
+        let direction = map.texel_direction(size, texel).unwrap_or(DVec3::Z);
+        let index = (texel.layer * self.side + texel.y) * self.side + texel.x;
+        let seen = f64::from(self.distances[index as usize]);
+        if seen < shadow_threshold(r, direction) {
+            0.0
+        } else {
+            1.0
+        }
+    }
+
+    /// The texel that one beyond the edges repeats: of a cube the one that holds the direction of its centre.
+    fn wrap(&self, layer: u32, at: IVec2) -> Texel {
+        let side = self.side as i32;
+        let is_inside = at.min_element() >= 0 && at.max_element() < side;
+        let (layer, at) = match self.layout {
+            ShadowLayout::Octahedron => (0, octahedron_wrap(at, IVec2::splat(side))),
+            ShadowLayout::Cube if is_inside => (layer, at),
+            ShadowLayout::Cube => {
+                let uv = (2.0 * at.as_dvec2() + 1.0) / f64::from(side) - 1.0;
+                let (face, uv) = crate::maps::cube::cube_encode(crate::maps::cube::cube_decode(layer, uv));
+                let place = (0.5 * uv + 0.5) * f64::from(side);
+                (
+                    face,
+                    place.floor().as_ivec2().clamp(IVec2::ZERO, IVec2::splat(side - 1)),
+                )
+            }
+        };
+        let at = at.as_uvec2();
+        Texel {
+            layer,
+            x: at.x,
+            y: at.y,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,133 @@
+//! Lights of a preview and their shadow maps.
+
+use glam::Vec3;
+
+use crate::gpu::shaders::constants::PREVIEW_NO_SHADOW;
+use crate::gpu::shaders::types::SceneLight;
+use crate::gpu::{Access, Buffer, BufferBarrier, BufferDesc, Category, Gpu, Recorder};
+use crate::raster::{OmniShadowDesc, OmniShadowMaps, ShadowLayout, Surfaces};
+use crate::scene::LightKind;
+use crate::scene::check::light_is_sound;
+use crate::transport::gpu_scene::light_record;
+use crate::{Error, Result};
+
+/// Shadow maps of a preview.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PreviewShadows {
+    /// How directions lie in them.
+    pub layout: ShadowLayout,
+    /// Texels across and down of each layer.
+    pub side: u32,
+    /// Texels that the filter is wide; 0 for none.
+    pub width: u32,
+}
+
+impl Default for PreviewShadows {
+    fn default() -> Self {
+        Self {
+            layout: ShadowLayout::Octahedron,
+            side: 512,
+            width: 2,
+        }
+    }
+}
+
+/// Records of lights on the device, and shadow maps of those that have a place.
+#[derive(Debug)]
+pub struct PreviewLights {
+    most: u32,
+    count: u32,
+    records: Buffer,
+    shadows: Option<OmniShadowMaps>,
+    width: u32,
+}
+
+impl PreviewLights {
+    pub(super) fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, most: u32, shadows: Option<PreviewShadows>) -> Result<Self> {
+        let maps = |wanted: PreviewShadows| {
+            let desc = OmniShadowDesc {
+                layout: wanted.layout,
+                side: wanted.side,
+                maps: most,
+            };
+            OmniShadowMaps::new(gpu, surfaces, desc)
+        };
+        let bytes = u64::from(most.max(1)) * size_of::<SceneLight>() as u64;
+        Ok(Self {
+            most,
+            count: 0,
+            records: gpu.buffer(&BufferDesc::storage("preview lights", bytes, Category::Light))?,
+            shadows: shadows.filter(|_| most > 0).map(maps).transpose()?,
+            width: shadows.map_or(0, |wanted| wanted.width),
+        })
+    }
+
+    /// Number of lights.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The shadow maps, in the order of the lights that have a place.
+    pub fn shadows(&self) -> Option<&OmniShadowMaps> {
+        self.shadows.as_ref()
+    }
+
+    /// Texels that the shadows' filter is wide.
+    pub(super) fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// The records.
+    pub(super) fn records(&self) -> &Buffer {
+        &self.records
+    }
+
+    /// Records shadow maps and records of these lights. Afterwards all is visible to compute shaders.
+    pub(super) fn record(
+        &mut self,
+        recorder: &mut Recorder,
+        surfaces: &Surfaces<'_>,
+        lights: &[LightKind],
+    ) -> Result<()> {
+        let refuse = |value: usize, cause: String| Err(Error::setting("lights", value, cause));
+        if lights.len() > self.most as usize {
+            return refuse(lights.len(), format!("are more than the preview's {}", self.most));
+        }
+        if let Some(wrong) = lights.iter().position(|light| !light_is_sound(light)) {
+            return refuse(
+                wrong,
+                "holds a number that is not finite, a negative intensity or a direction of another length than 1"
+                    .into(),
+            );
+        }
+        let mut places: Vec<Vec3> = Vec::new();
+        let mut records = Vec::with_capacity(lights.len());
+        for light in lights {
+            let mut record = light_record(light);
+            record.spare = [PREVIEW_NO_SHADOW, 0];
+            if let (LightKind::Point { position, .. } | LightKind::Spot { position, .. }, Some(_)) =
+                (light, &self.shadows)
+            {
+                record.spare[0] = places.len() as u32;
+                places.push(*position);
+            }
+            records.push(record);
+        }
+        self.count = records.len() as u32;
+        recorder.pass("preview: lights", |pass| {
+            let barrier = |from, to| BufferBarrier {
+                buffer: &self.records,
+                from,
+                to,
+            };
+            pass.barrier(&[barrier(Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
+            pass.update(self.records.view(), &records)?;
+            pass.barrier(&[barrier(Access::TRANSFER_WRITE, Access::COMPUTE_READ)]);
+            Ok(())
+        })?;
+        match &self.shadows {
+            Some(shadows) => shadows.record(recorder, surfaces, &places),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Live maps: what is seen from a point in all directions, drawn anew each frame and kept as a light probe.
+//!
+//! Sources: N. Greene, "Environment Mapping and Other Applications of World Projections", IEEE CG&A 6(11), 1986 (maps of a scene from an object's
+//! middle); T. Engelhardt and C. Dachsbacher, "Octahedron Environment Maps", VMV 2008 (drawn live, one picture). The eight octants are drawn side
+//! by side, shaded as a camera's picture is, and filtered ([`LightProbe`]).
+//!
+//! Bias: radiance at texel centres stands for its mean over the texel; what light does among surfaces beyond direct light is in it as far as a
+//! probe that lights them says, which may be this one of the frame before. Seen from elsewhere than its point, a reflection shows what lies in the same
+//! *direction*: for a mirror at offset o the place it shows is off by |o|, an angle of up to asin(|o|/d) at distance d (parallax).
+
+use glam::Vec3;
+
+use super::probe::{LightProbe, LightProbeDesc};
+use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
+use super::{Preview, PreviewLights};
+use crate::gpu::{Area, Gpu, Recorder};
+use crate::maps::octahedron::OctahedronLayout;
+use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Surfaces, View};
+use crate::transport::GpuScene;
+use crate::{Error, Result};
+
+/// A light probe of a scene, drawn on the device.
+#[derive(Debug)]
+pub struct LiveProbe {
+    probe: LightProbe,
+    gbuffer: GBuffer,
+    shade: Shade,
+}
+
+impl LiveProbe {
+    /// Allocates a probe and what draws it; its surfaces are lit as those of the preview, and by probes where `has_probes` says so.
+    ///
+    /// # Errors
+    /// As [`LightProbe::new`]; [`Error::MissingFeature`] where clip distances are missing.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, preview: &Preview, desc: LightProbeDesc, has_probes: bool) -> Result<Self> {
+        Self::lit_by(gpu, scene, preview.lights(), desc, has_probes)
+    }
+
+    fn lit_by(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        lights: &PreviewLights,
+        desc: LightProbeDesc,
+        has_probes: bool,
+    ) -> Result<Self> {
+        let probe = LightProbe::new(gpu, desc)?;
+        let gbuffer = GBuffer::new(
+            gpu,
+            &scene.surfaces(),
+            &GBufferDesc {
+                size: [desc.side; 2],
+                layering: Layering::Octants(OctantCut::default()),
+                outputs: &OUTPUTS,
+            },
+        )?;
+        Ok(Self {
+            probe,
+            gbuffer,
+            shade: Shade::new(gpu, scene, lights, true, has_probes)?,
+        })
+    }
+
+    /// The probe.
+    pub fn probe(&self) -> &LightProbe {
+        &self.probe
+    }
+
+    /// Bytes of its maps and pictures.
+    pub fn bytes(&self) -> u64 {
+        self.probe.bytes() + self.gbuffer.bytes()
+    }
+
+    /// Records five passes: what of `surfaces` is seen from a place (metres), its shading by the preview's lights and by probes, levels and
+    /// borders, and the filter. Probes may be this one itself, as it was before. Afterwards it is visible to compute shaders.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a place that is not finite, or probes where it was made for none; [`Error::MissingBarrier`] in debug builds.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        scene: &GpuScene,
+        surfaces: &Surfaces<'_>,
+        preview: &Preview,
+        place: Vec3,
+        by: Option<&LightProbe>,
+    ) -> Result<()> {
+        if !place.is_finite() {
+            return Err(Error::setting("place", place, "is not finite"));
+        }
+        let near = View::near_plane(place, surfaces);
+        let area = Area::whole([self.probe.desc().side; 2]);
+        let views = View::of_octants(place, OctahedronLayout::Quadratic, near, area)?;
+        self.gbuffer.record(recorder, surfaces, &views)?;
+        recorder.pass("preview: shade live map", |pass| {
+            let map = self.probe.map();
+            let level = map.level(0)?;
+            let border = map.border();
+            let stride = self.probe.desc().side + 2 * border;
+            let target = Target {
+                buffer: map.texels(),
+                first: level.first + border * (stride + 1),
+                stride,
+            };
+            let part = PreviewPart {
+                triangles: 0..surfaces.triangles,
+                background: true,
+                probe: by,
+            };
+            let seen = Seen {
+                scene,
+                gbuffer: &self.gbuffer,
+                lights: preview.lights(),
+                eye: Eye::AllDirections(place),
+                target,
+            };
+            self.shade.record(pass, &seen, &[part])
+        })?;
+        self.probe.record(recorder)
+    }
+}

@@ -1,0 +1,245 @@
+//! Raster preview: a picture a frame, of surfaces from a G-buffer, lights with shadow maps, and light probes.
+//!
+//! Sources: M. Deering et al., "The Triangle Processor and Normal Vector Shader", SIGGRAPH 1988 (deferred shading); T. Saito and T. Takahashi,
+//! "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); those of [`OmniShadowMaps`](crate::raster::OmniShadowMaps) and of
+//! [`LightProbe`]. One compute pass shades what is seen: surfaces and their scattering functions are the path tracer's own.
+//!
+//! What it shows: emission; point, spot and directional lights, through shadow maps where they have a place; light of a [`LightProbe`] by two
+//! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact
+//! albedo. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them.
+//!
+//! Bias, all of it: surfaces that emit light nothing but through a live map; directional lights cast no shadows; a probe's light is neither
+//! occluded nor nearer than infinity, and interreflection is as much as a probe holds; microfacet reflections are filtered by a round lobe, without what
+//! the lobe's own Fresnel factors and masking do to its shape; nothing is seen through materials that transmit. Deterministic: the same bits for the same
+//! frame.
+
+mod lights;
+mod live;
+pub mod probe;
+mod shade;
+
+pub use lights::{PreviewLights, PreviewShadows};
+pub use live::LiveProbe;
+pub use probe::{LightProbe, LightProbeDesc};
+pub use shade::{PARTS_MAX, PreviewPart};
+
+use self::shade::{Eye, OUTPUTS, Seen, Shade, Target};
+use crate::film::Picture;
+use crate::gpu::shaders::techniques::preview::preview_display;
+use crate::gpu::{Area, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute};
+use crate::raster::{GBuffer, GBufferDesc, Layering, Surfaces, View};
+use crate::scene::camera_frame::CameraFrame;
+use crate::scene::{Camera, LightKind};
+use crate::transport::GpuScene;
+use crate::{Error, Result};
+
+/// What a [`Preview`] is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PreviewDesc {
+    /// Pixels across and down.
+    pub size: [u32; 2],
+    /// Samples along each side of a pixel, 1 to 8; their mean is shown.
+    pub samples: u32,
+    /// Lights at most, up to 1024.
+    pub lights: u32,
+    /// Shadow maps of lights that have a place; `None` for none.
+    pub shadows: Option<PreviewShadows>,
+    /// Whether surfaces are lit by probes.
+    pub has_probes: bool,
+}
+
+/// Samples along a side of a pixel at most.
+const SAMPLES_MAX: u32 = 8;
+/// Lights at most: their records go into the command buffer.
+const LIGHTS_MAX: u32 = 1024;
+
+/// A picture of a scene, and what draws it.
+#[derive(Debug)]
+pub struct Preview {
+    gpu: Gpu,
+    desc: PreviewDesc,
+    gbuffer: GBuffer,
+    lights: PreviewLights,
+    shade: Shade,
+    display: ComputePipeline<preview_display::Kernel>,
+    /// Of samples, row by row.
+    radiance: Buffer,
+}
+
+impl Preview {
+    /// Allocates a picture, and makes the pipelines for a scene.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for numbers out of range; [`Error::Unsupported`] for a scene with participating media; [`Error::LimitExceeded`] for
+    /// sizes; [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, scene: &GpuScene, desc: PreviewDesc) -> Result<Self> {
+        if !(1..=SAMPLES_MAX).contains(&desc.samples) {
+            let cause = format!("is not from 1 to {SAMPLES_MAX}");
+            return Err(Error::setting("samples", desc.samples, cause));
+        }
+        if desc.lights > LIGHTS_MAX {
+            let cause = format!("are more than {LIGHTS_MAX}");
+            return Err(Error::setting("lights", desc.lights, cause));
+        }
+        if scene.profile().media.any() {
+            return Err(Error::Unsupported {
+                technique: "preview".into(),
+                reasons: vec!["the scene has participating media, which a preview of surfaces does not show".into()],
+            });
+        }
+        let surfaces = scene.surfaces();
+        let size = desc.size.map(|side| side.saturating_mul(desc.samples));
+        let gbuffer = GBuffer::new(
+            gpu,
+            &surfaces,
+            &GBufferDesc {
+                size,
+                layering: Layering::One,
+                outputs: &OUTPUTS,
+            },
+        )?;
+        let bytes = u64::from(size[0]) * u64::from(size[1]) * size_of::<[f32; 3]>() as u64;
+        let limit = gpu.caps().max_storage_buffer_range;
+        if bytes > limit {
+            return Err(Error::LimitExceeded {
+                name: "preview: samples".into(),
+                value: bytes,
+                limit_name: "maxStorageBufferRange",
+                limit,
+            });
+        }
+        let lights = PreviewLights::new(gpu, &surfaces, desc.lights, desc.shadows)?;
+        Ok(Self {
+            gpu: gpu.clone(),
+            desc,
+            gbuffer,
+            shade: Shade::new(gpu, scene, &lights, false, desc.has_probes)?,
+            lights,
+            display: gpu.compute_pipeline(&())?,
+            radiance: gpu.buffer(&BufferDesc::storage("preview radiance", bytes, Category::Film))?,
+        })
+    }
+
+    /// What it is.
+    pub fn desc(&self) -> PreviewDesc {
+        self.desc
+    }
+
+    /// The lights and their shadow maps.
+    pub fn lights(&self) -> &PreviewLights {
+        &self.lights
+    }
+
+    /// Records the lights that pictures are lit by from here on: their records, and shadow maps of `surfaces` from those that have a place. To be recorded
+    /// anew when lights or surfaces have moved.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for more lights than there is room for, or one that holds wrong numbers; [`Error::MissingBarrier`] in debug builds.
+    pub fn record_lights(
+        &mut self,
+        recorder: &mut Recorder,
+        surfaces: &Surfaces<'_>,
+        lights: &[LightKind],
+    ) -> Result<()> {
+        self.lights.record(recorder, surfaces, lights)
+    }
+
+    /// Records two passes: what a camera sees of `surfaces`, and its shading part by part. Pixels of triangles that belong to no part stay as
+    /// they were.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a camera that cannot be used, too many parts, or probes where the preview was made for none;
+    /// [`Error::MissingBarrier`] in debug builds.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        scene: &GpuScene,
+        surfaces: &Surfaces<'_>,
+        camera: &Camera,
+        parts: &[PreviewPart<'_>],
+    ) -> Result<()> {
+        let size = self.gbuffer.size();
+        let view = View::of_camera(camera, surfaces, Area::whole(size))?;
+        let frame = CameraFrame::new(camera, size)?;
+        self.gbuffer.record(recorder, surfaces, &[view])?;
+        recorder.pass("preview: shade", |pass| {
+            let seen = Seen {
+                scene,
+                gbuffer: &self.gbuffer,
+                lights: &self.lights,
+                eye: Eye::Camera(&frame),
+                target: Target {
+                    buffer: &self.radiance,
+                    first: 0,
+                    stride: size[0],
+                },
+            };
+            self.shade.record(pass, &seen, parts)
+        })
+    }
+
+    /// Records the way to the screen: four bytes a pixel, rows from the top, exposed by `exposure` stops, clipped and sRGB-encoded, blue first
+    /// where `bgra` says so. Earlier uses of the target by compute shaders and copies must have ended.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when the target is too small; [`Error::MissingBarrier`] in debug builds.
+    pub fn record_display(&self, recorder: &mut Recorder, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        let [width, height] = self.desc.size;
+        let bytes = 4 * u64::from(width) * u64::from(height);
+        if target.bytes() < bytes {
+            let cause = format!("has {} bytes; the picture needs {bytes}", target.bytes());
+            return Err(Error::setting("target", target.name(), cause));
+        }
+        recorder.pass("preview: display", |pass| {
+            let set = preview_display::Set0 {
+                radiance: self.radiance.view(),
+                display_pixels: target.view(),
+            };
+            let push = preview_display::Push {
+                width,
+                height,
+                samples: self.desc.samples,
+                scale: exposure.exp2(),
+                bgra: bgra.into(),
+            };
+            let groups = [self.display.groups_for(width * height), 1, 1];
+            pass.dispatch(&self.display, &[&set], &push, groups)?;
+            pass.barrier(&[rw_compute_to_compute(target)]);
+            Ok(())
+        })
+    }
+
+    /// The picture as it is: mean radiance of each pixel's samples. Its last recording must have been submitted.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn picture(&self) -> Result<Picture> {
+        let [width, height] = self.desc.size;
+        let samples = self.desc.samples;
+        let across = (width * samples) as usize;
+        let all: Vec<[f32; 3]> = self
+            .gpu
+            .read(self.radiance.view(), across * (height * samples) as usize)?;
+        let mut values = Vec::with_capacity(3 * width as usize * height as usize);
+        for y in (0..height * samples).step_by(samples as usize) {
+            for x in 0..width {
+                let mut sum = glam::DVec3::ZERO;
+                for row in y..y + samples {
+                    let first = row as usize * across + (x * samples) as usize;
+                    let of_row = all[first..first + samples as usize].iter();
+                    sum += of_row
+                        .map(|v| glam::Vec3::from_array(*v).as_dvec3())
+                        .sum::<glam::DVec3>();
+                }
+                values.extend((sum / f64::from(samples * samples)).as_vec3().to_array());
+            }
+        }
+        Picture::from_radiance(width, height, values)
+    }
+
+    /// Bytes of its pictures and of the shadow maps.
+    pub fn bytes(&self) -> u64 {
+        let shadows = self.lights.shadows().map_or(0, crate::raster::OmniShadowMaps::bytes);
+        self.gbuffer.bytes() + self.radiance.bytes() + shadows
+    }
+}

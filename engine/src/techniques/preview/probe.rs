@@ -1,0 +1,315 @@
+//! Light probes: all light that arrives at a point, kept as what reflections of every width see of it.
+//!
+//! Sources: J. Blinn and M. Newell, "Texture and Reflection in Computer Generated Images", CACM 1976 (reflection mapping); G. Miller and
+//! R. Hoffman, "Illumination and Reflection Maps", SIGGRAPH course notes, 1984 (diffuse irradiance in a map); J. Kautz et al., "A Unified Approach to Prefiltered
+//! Environment Maps", EGWR 2000; B. Karis, "Real Shading in Unreal Engine 4", SIGGRAPH course notes, 2013 (the integral split into filtered
+//! light and albedo).
+//!
+//! A probe is a square octahedron map in the world's axes. Its look-ups are in levels: the first is the map itself, for mirrors; the last, of 16²
+//! texels, is filtered by the GGX lobe of width α = 1, which with n = v = r is the cosine, so that it is irradiance over π; those between are of
+//! smaller α, each level half as wide. Levels finer than the finest filtered one are plain means by solid angle, and count as the lobe of their texels' solid angle.
+//! A width between two levels' is the mixture of both whose lobe has its variance ([`probe_part`]).
+//!
+//! Bias: that of [`prefilter`](crate::maps::prefilter) (round lobes), of mixtures of two lobes for those between, of bilinear look-ups in 16² texels
+//! (irradiance), and of light that is taken to come from infinity. A mean over all directions is kept to the rounding of f32. Deterministic.
+
+use glam::{DMat3, UVec2};
+
+use crate::gpu::shaders::constants::PROBE_LEVELS_MAX;
+use crate::gpu::{
+    Access, BufferBarrier, Gpu, Pass, Recorder, compute_to_transfer, rw_compute_to_compute, transfer_to_compute,
+};
+use crate::maps::directional_map::DirectionalMap;
+use crate::maps::prefilter::{PrefilterGgx, ggx_solid_angle};
+use crate::maps::resample::{Reconstruction, ResampleSettings, resample};
+use crate::maps::{MapImage, Parametrization};
+use crate::scene::Environment;
+use crate::{Error, Result};
+
+/// Texels along a side of the last level, whose lobe has α = 1.
+pub const LAST_SIDE: u32 = 16;
+/// Least texels along a side of the level that lobes are summed over.
+const LEAST_SOURCE: u32 = 32;
+
+/// What a [`LightProbe`] is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LightProbeDesc {
+    /// Texels along a side: a power of two from 32 to 2048.
+    pub side: u32,
+    /// Texels along a side of the finest level that is filtered by a lobe: a power of two from 16 to 128. The work grows with its fourth
+    /// power.
+    pub finest: u32,
+}
+
+impl Default for LightProbeDesc {
+    fn default() -> Self {
+        Self { side: 128, finest: 64 }
+    }
+}
+
+impl LightProbeDesc {
+    fn check(self) -> Result<()> {
+        let is_one_of = |value: u32, low: u32, high: u32| value.is_power_of_two() && (low..=high).contains(&value);
+        let most = LAST_SIDE << (PROBE_LEVELS_MAX - 1);
+        if !is_one_of(self.side, 2 * LAST_SIDE, most) {
+            let cause = format!("is not a power of two from {} to {most}", 2 * LAST_SIDE);
+            return Err(Error::setting("probe side", self.side, cause));
+        }
+        if !is_one_of(self.finest, LAST_SIDE, 128) {
+            return Err(Error::setting(
+                "finest filtered level",
+                self.finest,
+                "is not a power of two from 16 to 128",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Number of levels.
+    pub fn levels(self) -> u32 {
+        (self.side / LAST_SIDE).ilog2() + 1
+    }
+
+    fn is_filtered(self, level: u32) -> bool {
+        level > 0 && self.side >> level <= self.finest
+    }
+
+    /// The lobe's width α of each level.
+    pub fn alphas(self) -> Vec<f32> {
+        let alpha = |level: u32| {
+            let side = f64::from(self.side >> level);
+            if level == 0 {
+                0.0
+            } else if self.is_filtered(level) {
+                // 1, 0.35, 0.125, 0.044: lobes stay wider than the texels of their level.
+                (f64::from(LAST_SIDE) / side).powf(1.5)
+            } else {
+                alpha_of_solid_angle(4.0 * std::f64::consts::PI / (side * side))
+            }
+        };
+        (0..self.levels()).map(|level| alpha(level) as f32).collect()
+    }
+}
+
+/// The width whose lobe holds a solid angle, sr; [`ggx_solid_angle`] grows with it.
+fn alpha_of_solid_angle(solid_angle: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..f32::MANTISSA_DIGITS {
+        let middle = 0.5 * (low + high);
+        if ggx_solid_angle(middle) < solid_angle {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Between two levels of lobe widths a < b: the share of the second in the mixture whose lobe has the variance of width `alpha`.
+pub fn probe_part(alpha: f64, a: f64, b: f64) -> f64 {
+    ((alpha * alpha - a * a) / (b * b - a * a)).clamp(0.0, 1.0)
+}
+
+/// The level of detail of a look-up for a lobe of width `alpha`, between the levels' own widths.
+pub fn probe_level(alphas: &[f32], alpha: f64) -> f64 {
+    let last = alphas.len().saturating_sub(1);
+    if last == 0 {
+        return 0.0;
+    }
+    let below = alphas[1..last].iter().take_while(|a| alpha >= f64::from(**a)).count();
+    let [a, b] = [alphas[below], alphas[below + 1]].map(f64::from);
+    below as f64 + probe_part(alpha, a, b)
+}
+
+/// Light at a point, on the device.
+#[derive(Debug)]
+pub struct LightProbe {
+    desc: LightProbeDesc,
+    alphas: Vec<f32>,
+    /// The map and its means.
+    map: DirectionalMap,
+    /// What is looked up.
+    filtered: DirectionalMap,
+    filter: PrefilterGgx,
+}
+
+impl LightProbe {
+    /// A probe without light.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for sizes out of range; [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, desc: LightProbeDesc) -> Result<Self> {
+        desc.check()?;
+        let map = || {
+            DirectionalMap::new(
+                gpu,
+                Parametrization::OctahedronQuadratic,
+                UVec2::splat(desc.side),
+                desc.levels(),
+                1,
+            )
+        };
+        let map_of_light = map()?;
+        Ok(Self {
+            desc,
+            alphas: desc.alphas(),
+            filter: PrefilterGgx::new(gpu, &map_of_light)?,
+            map: map_of_light,
+            filtered: map()?,
+        })
+    }
+
+    /// A probe of a distant environment.
+    ///
+    /// # Errors
+    /// As [`LightProbe::new`]; [`Error::DeviceLost`].
+    pub fn of_environment(gpu: &Gpu, desc: LightProbeDesc, environment: &Environment) -> Result<Self> {
+        let probe = Self::new(gpu, desc)?;
+        let size = UVec2::new(environment.width, environment.height);
+        let texels = environment.radiance.iter().map(|texel| *texel * environment.strength);
+        let source = MapImage::new(Parametrization::LatLong, size, texels.collect())?;
+        let from_world = DMat3::from_quat(environment.rotation.as_dquat().inverse());
+        let image = resample(
+            &source,
+            Parametrization::OctahedronQuadratic,
+            UVec2::splat(desc.side),
+            Parametrization::LatLong.world_axes() * from_world,
+            &ResampleSettings {
+                reconstruction: Reconstruction::Bilinear,
+                ..ResampleSettings::default()
+            },
+        )?;
+        probe.map.upload(0, &image)?;
+        probe.fill(gpu)?;
+        Ok(probe)
+    }
+
+    /// What it is.
+    pub fn desc(&self) -> LightProbeDesc {
+        self.desc
+    }
+
+    /// The map and its means by solid angle. What is put into level 0 counts after [`LightProbe::record`] or [`LightProbe::fill`].
+    pub fn map(&self) -> &DirectionalMap {
+        &self.map
+    }
+
+    /// The levels that are looked up, filtered by the lobes of [`LightProbe::alphas`].
+    pub fn filtered(&self) -> &DirectionalMap {
+        &self.filtered
+    }
+
+    /// The lobe's width of each level.
+    pub fn alphas(&self) -> &[f32] {
+        &self.alphas
+    }
+
+    /// Bytes of both maps.
+    pub fn bytes(&self) -> u64 {
+        self.map.texels().bytes() + self.filtered.texels().bytes()
+    }
+
+    /// Records three passes: levels and borders of the map, the copy of those that are looked up as they are, and the filtering of the others.
+    ///
+    /// Barriers: texels of the map's level 0 must have been made visible to [`Access::COMPUTE`], and earlier uses must have ended. After it what
+    /// is looked up is visible to compute shaders.
+    ///
+    /// # Errors
+    /// As [`Pass::dispatch`].
+    pub fn record(&self, recorder: &mut Recorder) -> Result<()> {
+        recorder.pass("probe: levels and borders", |pass| self.map.record_levels(pass))?;
+        recorder.pass("probe: copy", |pass| self.record_copy(pass))?;
+        recorder.pass("probe: filter", |pass| {
+            for level in (0..self.desc.levels()).filter(|level| self.desc.is_filtered(*level)) {
+                let source = (self.desc.side / (self.desc.side >> level).max(LEAST_SOURCE)).ilog2();
+                let alpha = self.alphas[level as usize];
+                self.filter
+                    .record(pass, (&self.map, source), (&self.filtered, level), alpha)?;
+                pass.barrier(&[rw_compute_to_compute(self.filtered.texels())]);
+                self.filtered.record_border(pass, level)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Both maps have the same levels in the same places.
+    fn record_copy(&self, pass: &mut Pass<'_>) -> Result<()> {
+        let first_filtered = (0..self.desc.levels()).find(|level| self.desc.is_filtered(*level));
+        let texels = match first_filtered {
+            Some(level) => u64::from(self.map.level(level)?.first),
+            None => self.map.texels().bytes() / size_of::<[f32; 3]>() as u64,
+        };
+        let bytes = texels * size_of::<[f32; 3]>() as u64;
+        let (from, to) = (self.map.texels(), self.filtered.texels());
+        pass.barrier(&[compute_to_transfer(from), compute_to_transfer(to)]);
+        pass.copy(from.slice(0, bytes), to.slice(0, bytes))?;
+        pass.barrier(&[
+            transfer_to_compute(to),
+            BufferBarrier {
+                buffer: from,
+                from: Access::TRANSFER_READ,
+                to: Access::COMPUTE,
+            },
+        ]);
+        Ok(())
+    }
+
+    /// As [`LightProbe::record`], after what was uploaded to the map, and waits.
+    ///
+    /// # Errors
+    /// As [`LightProbe::record`]; [`Error::DeviceLost`].
+    pub fn fill(&self, gpu: &Gpu) -> Result<()> {
+        let mut recorder = gpu.recorder("probe")?;
+        self.record(&mut recorder)?;
+        recorder.submit()?.wait()?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lobes_grow_from_level_to_level() {
+        for (side, finest) in [(32, 16), (128, 64), (256, 64), (512, 128), (2048, 128)] {
+            let desc = LightProbeDesc { side, finest };
+            let alphas = desc.alphas();
+            assert_eq!(alphas.len() as u32, desc.levels());
+            assert!(
+                alphas.windows(2).all(|pair| pair[0] < pair[1]),
+                "{side}, {finest}: {alphas:?}"
+            );
+            assert_eq!((alphas[0], alphas.last().copied()), (0.0, Some(1.0)));
+        }
+        for desc in [(16, 16), (100, 64), (4096, 64), (128, 8), (128, 256)] {
+            let (side, finest) = desc;
+            assert!(LightProbeDesc { side, finest }.check().is_err(), "{desc:?}");
+        }
+    }
+
+    #[test]
+    fn levels_of_lobes_are_those_of_their_widths() {
+        let alphas = LightProbeDesc { side: 256, finest: 64 }.alphas();
+        for (level, alpha) in alphas.iter().enumerate() {
+            assert!((probe_level(&alphas, f64::from(*alpha)) - level as f64).abs() < 1e-12);
+        }
+        let mut last = -1.0;
+        for i in 0..=100 {
+            let level = probe_level(&alphas, f64::from(i) * 0.01);
+            assert!(level > last, "{i}: {level}");
+            last = level;
+        }
+        // Variances of narrow lobes go with the square of their width, and mix linearly.
+        let t = probe_part(0.3, 0.2, 0.4);
+        assert!(((1.0 - t) * 0.2f64.powi(2) + t * 0.4f64.powi(2) - 0.3f64.powi(2)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn solid_angles_give_their_widths_back() {
+        for alpha in [0.004, 0.05, 0.4, 0.9] {
+            let found = alpha_of_solid_angle(ggx_solid_angle(alpha));
+            assert!((found - alpha).abs() < 1e-6, "{alpha}: {found}");
+        }
+    }
+}

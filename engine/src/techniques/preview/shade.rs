@@ -1,0 +1,227 @@
+//! The kernel that shades a G-buffer, for cameras and for maps of directions.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::lights::PreviewLights;
+use super::probe::LightProbe;
+use crate::gpu::ash::vk;
+use crate::gpu::interface::SampledView;
+use crate::gpu::shaders::constants::PROBE_LEVELS_MAX;
+use crate::gpu::shaders::techniques::preview::preview_shade as kernel;
+use crate::gpu::shaders::types::PreviewFrame;
+use crate::gpu::{
+    Access, Buffer, BufferBarrier, BufferDesc, Category, ComputePipeline, Gpu, Pass, Sampler, SamplerDesc,
+};
+use crate::maps::directional_map::DirectionalMap;
+use crate::raster::{GBuffer, Output};
+use crate::scene::camera_frame::CameraFrame;
+use crate::transport::GpuScene;
+use crate::transport::path_tracer::pipelines::surface_spec;
+use crate::{Error, Result};
+
+/// What of a G-buffer the kernel reads.
+pub(super) const OUTPUTS: [Output; 2] = [Output::Triangle, Output::Weights];
+
+/// Parts that one picture may be shaded in, each by a probe of its own.
+pub const PARTS_MAX: usize = 64;
+
+/// Which of the triangles that are seen are shaded by which probe.
+#[derive(Debug, Clone)]
+pub struct PreviewPart<'a> {
+    /// Numbers of triangles, as in [`ObjectTriangles`](crate::raster::ObjectTriangles).
+    pub triangles: Range<u32>,
+    /// Pixels without surfaces are filled, too: with the scene's environment, or black.
+    pub background: bool,
+    /// Where light from all sides comes from; `None` for no such light.
+    pub probe: Option<&'a LightProbe>,
+}
+
+/// From where a picture is seen.
+pub(super) enum Eye<'a> {
+    Camera(&'a CameraFrame),
+    AllDirections(Vec3),
+}
+
+/// Where radiance goes.
+pub(super) struct Target<'a> {
+    pub buffer: &'a Buffer,
+    pub first: u32,
+    pub stride: u32,
+}
+
+/// What is shaded, seen from where, to where.
+pub(super) struct Seen<'a> {
+    pub scene: &'a GpuScene,
+    pub gbuffer: &'a GBuffer,
+    pub lights: &'a PreviewLights,
+    pub eye: Eye<'a>,
+    pub target: Target<'a>,
+}
+
+/// The kernel, specialized to a scene and to how it is seen.
+#[derive(Debug)]
+pub(super) struct Shade {
+    pipeline: ComputePipeline<kernel::Kernel>,
+    frames: Buffer,
+    sampler: Sampler,
+    /// Bound where a part has no probe, or the kernel knows of none.
+    dark: DirectionalMap,
+    has_probe: bool,
+    /// Bound where there are no shadow maps.
+    no_shadows: Buffer,
+}
+
+impl Shade {
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        lights: &PreviewLights,
+        all_directions: bool,
+        has_probe: bool,
+    ) -> Result<Self> {
+        let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
+        let shadows = lights.shadows();
+        let dark = DirectionalMap::new(
+            gpu,
+            crate::maps::Parametrization::OctahedronQuadratic,
+            glam::UVec2::splat(2),
+            1,
+            1,
+        )?;
+        let constants = dark.constants();
+        let spec = surface_spec!(kernel, scene, {
+            has_multiple_scattering: bsdf.multiple_scattering,
+            separable_masking: false,
+            has_environment: profile.has_environment(),
+            has_area_lights: scene.has_area_lights(),
+            has_punctual_lights: true,
+            sees_all_directions: all_directions,
+            has_probe,
+            has_shadows: shadows.is_some(),
+            shadow_kind: shadows.map_or(0, |maps| maps.desc().layout.kind()),
+            shadow_width: lights.width() as i32,
+            directional_kind: constants.kind,
+            directional_border: constants.border,
+            ..Default::default()
+        });
+        let bytes = (PARTS_MAX * size_of::<PreviewFrame>()) as u64;
+        Ok(Self {
+            pipeline: gpu.compute_pipeline(&spec)?,
+            frames: gpu.buffer(&BufferDesc::storage("preview frames", bytes, Category::Work))?,
+            sampler: gpu.sampler(&SamplerDesc {
+                name: "preview texels",
+                filter: vk::Filter::NEAREST,
+                address: vk::SamplerAddressMode::CLAMP_TO_EDGE,
+            })?,
+            dark,
+            has_probe,
+            no_shadows: gpu.buffer_with("no shadows", Category::Light, &[f32::INFINITY])?,
+        })
+    }
+
+    /// Records the shading of a G-buffer that was just drawn. Earlier uses of the target by compute shaders are waited for; afterwards it is
+    /// visible to them.
+    pub fn record(&self, pass: &mut Pass<'_>, seen: &Seen<'_>, parts: &[PreviewPart<'_>]) -> Result<()> {
+        let Seen {
+            scene,
+            gbuffer,
+            lights,
+            target,
+            ..
+        } = seen;
+        if parts.len() > PARTS_MAX {
+            let cause = format!("are more than {PARTS_MAX}");
+            return Err(Error::setting("parts", parts.len(), cause));
+        }
+        if !self.has_probe && parts.iter().any(|part| part.probe.is_some()) {
+            return Err(Error::setting(
+                "probe",
+                "given",
+                "is none that the preview was made for",
+            ));
+        }
+        let frames: Vec<_> = parts.iter().map(|part| frame(seen, part)).collect();
+        let barrier = |buffer, from, to| BufferBarrier { buffer, from, to };
+        pass.barrier(&[barrier(&self.frames, Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
+        pass.update(self.frames.view(), &frames)?;
+        pass.barrier(&[
+            barrier(&self.frames, Access::TRANSFER_WRITE, Access::COMPUTE_READ),
+            barrier(target.buffer, Access::COMPUTE, Access::COMPUTE),
+        ]);
+        gbuffer.barrier_to(pass, Access::COMPUTE_READ, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
+        let (Some(triangles), Some(weights)) = (gbuffer.image(Output::Triangle), gbuffer.image(Output::Weights)) else {
+            return Ok(());
+        };
+        let view = |image| SampledView {
+            image,
+            sampler: &self.sampler,
+        };
+        let mut shadows = crate::gpu::shaders::sets::OmniShadowSet {
+            shadow_distances: self.no_shadows.view(),
+        };
+        if let Some(maps) = lights.shadows() {
+            shadows = maps.set();
+        }
+        let [width, height] = gbuffer.size();
+        for (frame, part) in (0..).zip(parts) {
+            let set = kernel::Set0 {
+                seen_triangles: view(triangles),
+                seen_weights: view(weights),
+                frames: self.frames.view(),
+                lights: lights.records().view(),
+                radiance: target.buffer.view(),
+            };
+            let map = part.probe.map_or(&self.dark, LightProbe::filtered);
+            let groups = [self.pipeline.groups_for(width * height), 1, 1];
+            let sets: [&dyn crate::gpu::interface::BindingSet<'_>; 4] =
+                [&set, &map.set(), &scene.scene_set(), &shadows];
+            pass.dispatch(&self.pipeline, &sets, &kernel::Push { frame }, groups)?;
+            pass.barrier(&[barrier(target.buffer, Access::COMPUTE, Access::COMPUTE)]);
+        }
+        Ok(())
+    }
+}
+
+fn frame(seen: &Seen<'_>, part: &PreviewPart<'_>) -> PreviewFrame {
+    let Seen {
+        scene,
+        gbuffer,
+        lights,
+        eye,
+        target,
+    } = seen;
+    let [lower, upper] = scene.bounds().map(|corner| corner.to_array());
+    let mut alphas = [0.0; PROBE_LEVELS_MAX as usize];
+    let known = part.probe.map_or(&[][..], LightProbe::alphas);
+    alphas[..known.len()].copy_from_slice(known);
+    let scaled = |axis: [f32; 3], by: f32| (Vec3::from_array(axis) * by).to_array();
+    let mut frame = PreviewFrame {
+        width: gbuffer.size()[0],
+        height: gbuffer.size()[1],
+        light_count: lights.count(),
+        lower,
+        upper,
+        first_triangle: part.triangles.start,
+        end_triangle: part.triangles.end,
+        first_pixel: target.first,
+        stride: target.stride,
+        has_background: part.background.into(),
+        shadow_side: lights.shadows().map_or(0, |maps| maps.desc().side as i32),
+        probe_levels: known.len() as u32,
+        probe_alphas: alphas,
+        ..PreviewFrame::default()
+    };
+    match eye {
+        Eye::Camera(camera) => {
+            frame.origin = camera.origin;
+            frame.right = scaled(camera.right, camera.half_width);
+            frame.down = scaled(camera.up, -camera.half_height);
+            frame.forward = camera.forward;
+            frame.is_parallel = camera.orthographic.into();
+        }
+        Eye::AllDirections(origin) => frame.origin = origin.to_array(),
+    }
+    frame
+}

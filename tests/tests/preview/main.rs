@@ -1,0 +1,7 @@
+//! Raster preview: shadow maps against shadow rays, light probes against closed forms and rays, moved objects.
+
+mod light;
+mod live;
+mod moving;
+mod shadows;
+mod subject;

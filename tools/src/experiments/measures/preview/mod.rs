@@ -1,0 +1,4 @@
+//! Directional maps in a raster preview: shadows of point lights, and light of maps that are drawn live.
+
+pub mod live_maps;
+pub mod shadow_maps;
