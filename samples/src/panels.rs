@@ -22,7 +22,13 @@ pub const SEQUENTIAL: Scale = &[
     [253, 231, 37],
 ];
 /// Blue below the middle, white in it, red above.
-pub const DIVERGING: Scale = &[[33, 102, 172], [146, 197, 222], [247, 247, 247], [244, 165, 130], [178, 24, 43]];
+pub const DIVERGING: Scale = &[
+    [33, 102, 172],
+    [146, 197, 222],
+    [247, 247, 247],
+    [244, 165, 130],
+    [178, 24, 43],
+];
 /// Black, then from dark red to white: for errors, of which there should be none.
 pub const ERRORS: Scale = &[[0, 0, 0], [90, 0, 60], [200, 30, 30], [250, 160, 30], [255, 255, 220]];
 

@@ -385,7 +385,14 @@ fn the_photon_viewer_refuses_what_it_cannot_show() {
 fn octahedron_lab(arguments: &[&str]) -> (image::RgbImage, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("new folder/picture.png");
-    let small = ["--size", "360x150", "--texels", "64", "--output", path.to_str().unwrap()];
+    let small = [
+        "--size",
+        "360x150",
+        "--texels",
+        "64",
+        "--output",
+        path.to_str().unwrap(),
+    ];
     let output = run(env!("CARGO_BIN_EXE_octahedron_lab"), &[&small[..], arguments].concat());
     (open(&path), said(&output))
 }
@@ -404,9 +411,15 @@ fn the_octahedron_lab_shows_map_density_and_error() {
             let [map, density, error] = PANELS.map(|across| mean(&picture, across, MIDDLE));
             // The map shows something; against rays there is no error but at silhouettes, and black stands for none.
             assert!(map.iter().sum::<f32>() > 60.0, "{layout}, {channel}: {map:?}");
-            assert!(error.iter().sum::<f32>() < 0.5 * map.iter().sum::<f32>(), "{layout}, {channel}: {error:?}");
+            assert!(
+                error.iter().sum::<f32>() < 0.5 * map.iter().sum::<f32>(),
+                "{layout}, {channel}: {error:?}"
+            );
             assert!(density.iter().sum::<f32>() > 250.0, "{layout}, {channel}: {density:?}");
-            assert!(text.contains(layout) && text.contains("another object than rays"), "{text}");
+            assert!(
+                text.contains(layout) && text.contains("another object than rays"),
+                "{text}"
+            );
             // Of some 4000 texels those next to edges may differ.
             let other: u32 = text
                 .split(" with another object")

@@ -215,7 +215,11 @@ fn every_format_leads_to_every_other() -> Tested {
                 let output = succeed(&[text(&file), text(&written), "--to", to, "--size", "24", "--json"])?;
                 let said: Value = serde_json::from_slice(&output.stdout)?;
                 assert_eq!(said["after"]["map"], to);
-                let picture = if out == "hdr" { hdr::read(&written)? } else { exr::read(&written)? };
+                let picture = if out == "hdr" {
+                    hdr::read(&written)?
+                } else {
+                    exr::read(&written)?
+                };
                 let extent = UVec2::new(picture.width(), picture.height());
                 let texels: Vec<Vec3> = picture.main_layer()?.pixels().map(Vec3::from_array).collect();
                 images.push((from, out, MapImage::from_strip(map, extent, 0, &texels)?));
@@ -227,7 +231,11 @@ fn every_format_leads_to_every_other() -> Tested {
             assert!(!exact || image == first, "{to}, {from} to {out}");
             for (found, expected) in image.texels().iter().zip(first.texels()) {
                 // Eight bits of the greatest component, once for a file that is read and once for one that is written.
-                let allowed = if exact { 0.0 } else { 2.0 / 256.0 * 2.0 * expected.max_element() };
+                let allowed = if exact {
+                    0.0
+                } else {
+                    2.0 / 256.0 * 2.0 * expected.max_element()
+                };
                 let off = (*found - *expected).abs().max_element();
                 assert!(off <= allowed, "{to}, {from} to {out}: {found} {expected}");
             }
@@ -242,10 +250,20 @@ fn a_pipe_holds_nothing_but_the_table() -> Tested {
     let folder = tempfile::tempdir()?;
     let at = |name: &str| folder.path().join(name);
     write_sky(&at("sky.exr"))?;
-    let output = succeed(&[text(&at("sky.exr")), text(&at("out.exr")), "--to", "cube", "--samples", "32"])?;
+    let output = succeed(&[
+        text(&at("sky.exr")),
+        text(&at("out.exr")),
+        "--to",
+        "cube",
+        "--samples",
+        "32",
+    ])?;
     assert_eq!(String::from_utf8(output.stderr)?, "");
     let said = String::from_utf8(output.stdout)?;
-    assert!(said.lines().count() == 4 && !said.contains('\u{1b}') && !said.contains('%'), "{said}");
+    assert!(
+        said.lines().count() == 4 && !said.contains('\u{1b}') && !said.contains('%'),
+        "{said}"
+    );
     Ok(())
 }
 

@@ -100,7 +100,10 @@ fn normal_maps_lead_shading_normals() {
                     scale.into(),
                 );
                 // The packing's bound, 6.6·10⁻⁵, and some roundings.
-                assert!((*found - expected).length() < 8e-5, "pixel {pixel}, texel {texel}: {found} {expected}");
+                assert!(
+                    (*found - expected).length() < 8e-5,
+                    "pixel {pixel}, texel {texel}: {found} {expected}"
+                );
                 seen.insert(found.to_array().map(f64::to_bits));
             }
             assert_eq!(seen.len(), if scale == 0.0 { 1 } else { 4 }, "{scale}");

@@ -134,7 +134,9 @@ fn a_parallel_view_is_alone_what_it_is_in_layers() {
         // From below the roofs the highest ones are behind the eye.
         assert_ne!(both[0][..PIXELS], both[0][PIXELS..]);
         let greatest = |layer: usize| {
-            let all = both[1][layer * PIXELS..][..PIXELS].iter().map(|bits| f32::from_bits(*bits));
+            let all = both[1][layer * PIXELS..][..PIXELS]
+                .iter()
+                .map(|bits| f32::from_bits(*bits));
             all.filter(|distance| distance.is_finite()).fold(0.0, f32::max)
         };
         assert!((greatest(0) - greatest(1) - 1.1 * (upper.y - lower.y)).abs() < 1e-3 * greatest(0));

@@ -198,7 +198,9 @@ fn levels_borders_and_words_agree_with_their_twins() {
         for (case, result) in table.iter().zip(twin_maps(gpu, 7, &table, &[])) {
             let [x, y, face, n] = [case.0[0], case.0[1], case.0[2], case.0[3]];
             let size = UVec2::splat(n as u32);
-            let expected = Parametrization::Cube.wrap(size, face.to_bits(), x as i32, y as i32).unwrap();
+            let expected = Parametrization::Cube
+                .wrap(size, face.to_bits(), x as i32, y as i32)
+                .unwrap();
             let found = result.0[..3].iter().map(|v| *v as u32).collect::<Vec<_>>();
             assert_eq!(found, [expected.layer, expected.x, expected.y], "({x}, {y}) of {n}");
         }

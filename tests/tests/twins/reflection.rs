@@ -1,9 +1,9 @@
 //! Fresnel factors, GGX, Phong's lobe and shading normals.
 
+use clerestory::scene::normal_map::mapped_normal;
 use clerestory::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_f0, fresnel_schlick};
 use clerestory::transport::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
 use clerestory::transport::phong::{phong_eval, phong_pdf, phong_sample};
-use clerestory::scene::normal_map::mapped_normal;
 use clerestory::transport::shading_normal::{adapt_shading_normal, sides_agree};
 use clerestory_tests::twin::{Results, Tolerance, U, compare, trigonometric_error};
 use clerestory_tests::with_gpu;

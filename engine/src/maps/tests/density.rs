@@ -77,7 +77,10 @@ fn ratios_along_great_circles_are_those_of_the_figures() {
         // Through the middles of faces and edges the cube is never off by a factor of two.
         let cube = of(Parametrization::Cube);
         near(cube, 6.0 / PI * d.abs().max_element().powi(3), 12);
-        assert!((0.675..1.910).contains(&cube) && cube < 2.0 && 1.0 / cube < 1.482, "{degrees}: {cube}");
+        assert!(
+            (0.675..1.910).contains(&cube) && cube < 2.0 && 1.0 / cube < 1.482,
+            "{degrees}: {cube}"
+        );
         // From the middle of a disc to its rim, by ρ = tan of half the angle.
         let rho = d.x.abs() / (1.0 + d.z.abs());
         near(of(Parametrization::DualParaboloid), 2.0 / (1.0 + rho * rho).powi(2), 12);

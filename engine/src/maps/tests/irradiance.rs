@@ -8,7 +8,9 @@ use std::f64::consts::PI;
 
 /// Maps of the whole sphere.
 fn whole() -> impl Iterator<Item = Parametrization> {
-    Parametrization::ALL.into_iter().filter(|map| *map != Parametrization::Nusselt)
+    Parametrization::ALL
+        .into_iter()
+        .filter(|map| *map != Parametrization::Nusselt)
 }
 
 fn image(map: Parametrization, rows: u32, radiance: impl Fn(DVec3) -> f64 + Sync) -> MapImage {

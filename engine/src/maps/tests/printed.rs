@@ -10,12 +10,18 @@ use std::f64::consts::PI;
 #[test]
 fn a_longitude_of_a_quotient_folds_half_turns() {
     let printed = |d: DVec3| DVec2::new((d.y / d.x).atan(), d.z.acos());
-    for d in super::directions(10, 500).into_iter().filter(|d| d.x != 0.0 && d.y != 0.0) {
+    for d in super::directions(10, 500)
+        .into_iter()
+        .filter(|d| d.x != 0.0 && d.y != 0.0)
+    {
         let behind = DVec3::new(-d.x, -d.y, d.z);
         assert_eq!(printed(d), printed(behind), "{d}");
         let [here, there] = [d, behind].map(lat_long_encode);
         assert!(((here.x - there.x).abs() - 0.5).abs() < 1e-14, "{d}: {here} {there}");
-        assert!((0.0..=1.0).contains(&here.y) && (printed(d).y - PI * here.y).abs() < 1e-7, "{d}");
+        assert!(
+            (0.0..=1.0).contains(&here.y) && (printed(d).y - PI * here.y).abs() < 1e-7,
+            "{d}"
+        );
     }
     // The seam is in longitude: on both sides of the half plane y = 0, x > 0 the columns are the last and the first.
     let [above, below] = [1e-9, -1e-9].map(|y| lat_long_encode(DVec3::new(1.0, y, 0.2).normalize()));

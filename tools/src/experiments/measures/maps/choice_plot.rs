@@ -82,7 +82,9 @@ fn onto(svg: &mut String, bars: &[Bars<'_>], panels: &[Panel<'_>], subjects: &[S
         let first = &subjects[0].curves[at];
         let over = |curve: &Vec<(f64, f64)>| {
             let pairs = curve.iter().zip(first);
-            pairs.map(|((texels, error), (_, other))| (*texels, error / other)).collect()
+            pairs
+                .map(|((texels, error), (_, other))| (*texels, error / other))
+                .collect()
         };
         let curves: Vec<Vec<(f64, f64)>> = subjects.iter().map(|subject| over(&subject.curves[at])).collect();
         let title = format!("{}: error over that of the {}", panel.title, subjects[0].name);
@@ -145,12 +147,22 @@ fn panel_of_bars(area: &Area<'_>, bars: &Bars<'_>) -> Drawn {
     for (index, [from, to]) in bars.spans.iter().enumerate() {
         let (color, y) = (COLORS[index % COLORS.len()], count - index as f64 - 0.5);
         let ends = [(from.clamp(0.0, bars.top), y - BAR), (to.clamp(0.0, bars.top), y + BAR)];
-        chart.draw_series([Rectangle::new(ends, color.filled())]).map_err(failed)?;
+        chart
+            .draw_series([Rectangle::new(ends, color.filled())])
+            .map_err(failed)?;
         let shown = if *to > bars.top {
-            let more = if to.is_finite() { format!("{to:.1} ▸") } else { "∞ ▸".into() };
+            let more = if to.is_finite() {
+                format!("{to:.1} ▸")
+            } else {
+                "∞ ▸".into()
+            };
             Text::new(more, (0.98 * bars.top, y), text(LABEL, HPos::Right).color(&WHITE))
         } else {
-            let value = if *from > 0.0 { format!("{from:.2} – {to:.2}") } else { label(*to) };
+            let value = if *from > 0.0 {
+                format!("{from:.2} – {to:.2}")
+            } else {
+                label(*to)
+            };
             // Beside the bar, or in it where there is no room.
             if *to > 0.7 * bars.top && *from < 0.3 * bars.top {
                 Text::new(value, (to - 0.01 * bars.top, y), text(LABEL, HPos::Right).color(&WHITE))
@@ -170,14 +182,22 @@ fn panel_of_bars(area: &Area<'_>, bars: &Bars<'_>) -> Drawn {
 }
 
 fn label(value: f64) -> String {
-    if value == 0.0 { "0".into() } else { format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').into() }
+    if value == 0.0 {
+        "0".into()
+    } else {
+        format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').into()
+    }
 }
 
 fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (least, most) = values
         .filter(|value| *value > 0.0 && value.is_finite())
         .fold((f64::INFINITY, 0.0f64), |(a, b), value| (a.min(value), b.max(value)));
-    if most > 0.0 { (least / MARGIN, most * MARGIN) } else { (0.5, 2.0) }
+    if most > 0.0 {
+        (least / MARGIN, most * MARGIN)
+    } else {
+        (0.5, 2.0)
+    }
 }
 
 /// Curves on logarithmic axes, of which those beyond the frame are cut off.

@@ -51,7 +51,11 @@ fn size(map: Parametrization, texels: u64) -> UVec2 {
 
 /// Greatest errors of irradiance for random normals: by the function and by texels of one direction each.
 fn irradiance(smoke: bool) -> Result<Table> {
-    let (budgets, count): (&[u64], u32) = if smoke { (&[256], 5) } else { (&[256, 1024, 4096, 16384], 100) };
+    let (budgets, count): (&[u64], u32) = if smoke {
+        (&[256], 5)
+    } else {
+        (&[256, 1024, 4096, 16384], 100)
+    };
     let mut random = Random::new(13);
     let normals: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
     // ∫ over the half spaces about z and about the normal.
