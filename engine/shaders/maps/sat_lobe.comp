@@ -25,10 +25,13 @@ void main() {
         return;
     }
     LobeQuery query = queries[i];
-    vec2 uv = directional_encode(query.direction);
+    vec3 x;
+    vec3 y;
+    orthonormal_basis(query.direction, x, y);
     vec3 sum = vec3(0.0);
     for (uint j = 0u; j < query.box_count; ++j) {
         LobeBox box = boxes[query.first_box + j];
+        vec2 uv = directional_encode(box.direction.x * x + box.direction.y * y + box.direction.z * query.direction);
         sum += box.weight * sat_mean(uv, sat_half_width(uv, box.solid_angle));
     }
     values[i] = sum;

@@ -6,19 +6,21 @@
 //! own integral, exact on a grid of caps by dynamic programming (R. Bellman, "On the Approximation of Curves by Line Segments Using
 //! Dynamic Programming", CACM 4(6), 1961). Weights are positive and sum to 1: constant radiance stays constant, and none is negative.
 //!
-//! Bias: boxes are squares of the map where caps are discs of the sphere, as dense as the map is in the lobe's middle, and a square that
-//! reaches over a fold bends with it. Steps alone converge as 1/n; squares for discs do not converge. GLSL: `maps/box_lobe.glsl`; twin of the
-//! device's look-up: [`SatImage::sat_lobe`].
+//! Bias: boxes are squares of the map where caps are discs of the sphere, as dense as the map is in their middles, and a square that
+//! reaches over a fold bends with it. Steps alone converge as 1/n; large squares for discs do not converge, so that [`box_lobe`] gains little
+//! by more than some four. [`ring_lobe`] divides the steps into rings of sectors, each a small box with a middle of its own: it follows the
+//! sphere where the map is sheared. GLSL: `maps/box_lobe.glsl`; twin of the device's look-up: [`SatImage::sat_lobe`].
 
+use super::Parametrization;
 use super::directional_map::answer_of;
 use super::spherical_sat::{SatImage, SphericalSat, sat_half_width};
-use super::{MapPoint, Parametrization};
 use crate::gpu::Pass;
 use crate::gpu::shaders::maps::sat_lobe;
-use crate::gpu::shaders::types::LobeBox;
+use crate::gpu::shaders::types::{LobeBox, LobeQuery};
+use crate::scene::normal_map::orthonormal_basis;
 use crate::{Error, Result};
 use glam::{DVec3, UVec2, Vec3};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// A lobe of light that is reflected, round about the mirror direction: what is seen through it is the mean radiance by it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,50 +70,97 @@ impl Lobe {
 /// One of the boxes that stand for a lobe.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedBox {
-    /// What it holds about the lobe's middle, sr.
+    /// Its middle in the lobe's frame, whose z is the lobe's direction and whose x and y are those of
+    /// [`orthonormal_basis`].
+    pub direction: DVec3,
+    /// What it holds, sr.
     pub solid_angle: f64,
     /// Its mean's share of the whole.
     pub weight: f64,
 }
 
-/// Boxes of a lobe at most.
-pub const MAX_BOXES: usize = 16;
+/// Steps of a lobe at most.
+pub const MAX_STEPS: usize = 16;
+/// Boxes that the innermost step of a lobe of rings is made of, and each other one.
+pub const RING_BOXES: [usize; 2] = [4, 8];
 /// Caps among which thresholds are chosen, even in ln(1 + t/width).
 const CAPS: usize = 384;
 /// Steps of integration from one cap to the next.
 const STEPS: usize = 8;
 
-/// The lobe's boxes, from the smallest to the largest.
-///
-/// # Errors
-/// [`Error::Setting`] for a lobe out of range, or for a number of boxes that is not in 1 to [`MAX_BOXES`].
-pub fn box_lobe(lobe: Lobe, count: usize) -> Result<Vec<WeightedBox>> {
+/// A step of a staircase: from one cap to a larger one the lobe is as high.
+#[derive(Debug, Clone, Copy)]
+struct Stair {
+    /// Solid angles of the caps, sr.
+    from: f64,
+    to: f64,
+    height: f64,
+}
+
+/// The nearest staircase of a lobe, of integral 1.
+fn staircase(lobe: Lobe, steps: usize) -> Result<Vec<Stair>> {
     lobe.check()?;
-    if !(1..=MAX_BOXES).contains(&count) {
-        return Err(Error::setting("boxes", count, format!("are not 1 to {MAX_BOXES}")));
+    if !(1..=MAX_STEPS).contains(&steps) {
+        return Err(Error::setting("steps", steps, format!("are not 1 to {MAX_STEPS}")));
     }
     let caps = Caps::of(lobe);
-    let thresholds = caps.thresholds(count);
+    let thresholds = caps.thresholds(steps);
     let end = *thresholds.last().unwrap_or(&CAPS);
     // What the staircase leaves out goes evenly over all of it: the best there is with the lobe's own integral.
     let lift = (1.0 - caps.held[end]) / caps.angles[end];
-    let heights: Vec<f64> = thresholds
-        .iter()
-        .scan(0, |from, to| {
-            let height = caps.mean(*from, *to) + lift;
-            *from = *to;
-            Some(height)
-        })
-        .collect();
-    let next = heights.iter().skip(1).chain([&0.0]);
-    let boxes = thresholds.iter().zip(&heights).zip(next);
-    Ok(boxes
-        .map(|((cap, height), next)| WeightedBox {
-            solid_angle: caps.angles[*cap],
-            // Means of a falling lobe fall, but for their rounding where it is even.
-            weight: (height - next).max(0.0) * caps.angles[*cap],
-        })
-        .collect())
+    let begins = [0].into_iter().chain(thresholds.iter().copied());
+    let stairs = begins.zip(&thresholds).map(|(from, to)| Stair {
+        from: caps.angles[from],
+        to: caps.angles[*to],
+        height: caps.mean(from, *to) + lift,
+    });
+    Ok(stairs.collect())
+}
+
+/// A lobe of as many boxes as steps, all about its middle, from the smallest to the largest.
+///
+/// # Errors
+/// [`Error::Setting`] for a lobe out of range, or for a number of steps that is not in 1 to [`MAX_STEPS`].
+pub fn box_lobe(lobe: Lobe, steps: usize) -> Result<Vec<WeightedBox>> {
+    let stairs = staircase(lobe, steps)?;
+    let next = stairs.iter().skip(1).map(|stair| stair.height).chain([0.0]);
+    let boxes = stairs.iter().zip(next).map(|(stair, next)| WeightedBox {
+        direction: DVec3::Z,
+        solid_angle: stair.to,
+        // Means of a falling lobe fall, but for their rounding where it is even.
+        weight: (stair.height - next).max(0.0) * stair.to,
+    });
+    Ok(boxes.collect())
+}
+
+/// A lobe whose steps are divided into sectors, each of them a box at its centroid: [`RING_BOXES`] of each step.
+///
+/// # Errors
+/// As [`box_lobe`].
+pub fn ring_lobe(lobe: Lobe, steps: usize) -> Result<Vec<WeightedBox>> {
+    let mut boxes = Vec::new();
+    for (ring, stair) in staircase(lobe, steps)?.into_iter().enumerate() {
+        let count = RING_BOXES[ring.min(1)];
+        let sectors = count as f64;
+        // In the chart of equal areas whose radius is √s a ring is one of the plane: the centroid of its sector.
+        let (inner, outer) = (stair.from.sqrt(), stair.to.sqrt());
+        let middle = 2.0 / 3.0 * (outer.powi(3) - inner.powi(3)) / (stair.to - stair.from);
+        let half = PI / sectors;
+        let radius = middle * half.sin() / half;
+        let cos = 1.0 - radius * radius / TAU;
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        // Rings are turned by half a sector, one against the next.
+        let turn = if ring % 2 == 0 { half } else { 0.0 };
+        for sector in 0..count {
+            let (y, x) = (2.0 * half * sector as f64 + turn).sin_cos();
+            boxes.push(WeightedBox {
+                direction: DVec3::new(sin * x, sin * y, cos),
+                solid_angle: (stair.to - stair.from) / sectors,
+                weight: stair.height * (stair.to - stair.from) / sectors,
+            });
+        }
+    }
+    Ok(boxes)
 }
 
 /// A lobe by growing caps about its middle.
@@ -213,12 +262,14 @@ pub fn sat_border(map: Parametrization, size: UVec2, boxes: &[WeightedBox]) -> R
 }
 
 impl SatImage {
-    /// Twin of `maps/sat_lobe.comp`: the mean by a lobe's boxes about a direction; `None` for one that the map does not hold.
+    /// Twin of `maps/sat_lobe.comp`: the mean by a lobe's boxes about a unit direction; `None` where the map holds none.
     pub fn sat_lobe(&self, map: Parametrization, direction: DVec3, boxes: &[WeightedBox]) -> Option<DVec3> {
-        let at: MapPoint = map.encode(direction)?;
+        let d = direction.try_normalize()?;
+        let (x, y) = orthonormal_basis(d);
         let of = |one: &WeightedBox| -> Option<DVec3> {
-            let half = sat_half_width(map, direction, one.solid_angle)?;
-            Some(one.weight * self.sat_mean(at.uv, half))
+            let middle = one.direction.x * x + one.direction.y * y + one.direction.z * d;
+            let half = sat_half_width(map, middle, one.solid_angle)?;
+            Some(one.weight * self.sat_mean(map.encode(middle)?.uv, half))
         };
         boxes.iter().map(of).sum()
     }
@@ -235,6 +286,7 @@ impl SphericalSat {
         for lobe in lobes {
             ranges.push((boxes.len() as u32, lobe.len() as u32));
             boxes.extend(lobe.iter().map(|one| LobeBox {
+                direction: one.direction.as_vec3().to_array(),
                 solid_angle: one.solid_angle as f32,
                 weight: one.weight as f32,
             }));
@@ -243,7 +295,7 @@ impl SphericalSat {
         for (direction, lobe) in queries {
             let none = || Error::setting("lobe", lobe, format!("is not among {}", lobes.len()));
             let (first_box, box_count) = *ranges.get(*lobe).ok_or_else(none)?;
-            asked.push(crate::gpu::shaders::types::LobeQuery {
+            asked.push(LobeQuery {
                 direction: direction.to_array(),
                 first_box,
                 box_count,

@@ -15,37 +15,37 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clerestory::accel::bvh2::Bvh2;
-use clerestory::accel::{NO_HIT, Ray, RayIndex};
+use clerestory::accel::{NO_HIT, RayIndex};
 use clerestory::gpu::shaders::types::SceneTriangle;
-use clerestory::gpu::{Area, Category, Gpu, GpuOptions};
-use clerestory::maps::cube::CUBE_FACES;
-use clerestory::maps::octahedron::OctahedronLayout;
-use clerestory::maps::{Parametrization, Texel};
-use clerestory::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Output, View};
+use clerestory::gpu::{Category, Gpu, GpuOptions};
+use clerestory::maps::Texel;
+use clerestory::raster::View;
 use clerestory::scene::{self, Scene};
 use clerestory::srgb::srgb_from_linear;
 use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
 use clerestory_samples::arguments::Arguments;
 use clerestory_samples::lettering;
+use clerestory_samples::live_map::{Layout, Live, Seen};
 use clerestory_samples::orbit::Orbit;
 use clerestory_samples::panels::{DIVERGING, ERRORS, SEQUENTIAL, Scale, Sheet, color};
 use clerestory_samples::window::{self, Show, Shown};
-use glam::{DVec3, UVec2, Vec3};
+use glam::{DVec3, Vec3};
 use winit::keyboard::{Key, NamedKey};
 
-const SCENE: &str = "builtin:divider-room";
+const SCENE: &str = "builtin:box-room";
 /// Texels of the map are about this squared, unless told otherwise.
 const TEXELS: u32 = 256;
 /// Degrees that the point goes on each frame, unless told otherwise.
 const TURN: f64 = 2.0;
+/// Where on its way the point begins, rad: on no plane of symmetry.
+const START: f64 = 0.6;
 /// Size of a picture without a window.
 const SIZE: [u32; 2] = [1200, 480];
 /// How far the point goes from the middle of the scene, as a share of its extent, and where it is in height.
 const ORBIT: DVec3 = DVec3::new(0.22, 0.08, 0.22);
 /// Of surfaces without a material.
 const GREY: Vec3 = Vec3::splat(0.5);
-const OUTPUTS: [Output; 3] = [Output::Triangle, Output::Object, Output::Distance];
 /// The least relative error that is shown, as a power of ten.
 const LEAST_ERROR: f64 = -7.0;
 
@@ -98,14 +98,6 @@ fn one_of<const N: usize>(given: &Arguments, option: &str, names: [&str; N]) -> 
     names.iter().position(|known| *known == name).ok_or_else(unknown)
 }
 
-/// Which map is rendered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Layout {
-    Square,
-    Rectangle,
-    Cube,
-}
-
 /// What of the surfaces is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Channel {
@@ -119,35 +111,6 @@ struct Choice {
     layout: Layout,
     channel: Channel,
     against_cube: bool,
-}
-
-impl Layout {
-    const ALL: [Self; 3] = [Self::Square, Self::Rectangle, Self::Cube];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Square => "square",
-            Self::Rectangle => "rectangle",
-            Self::Cube => "cube",
-        }
-    }
-
-    fn map(self) -> Parametrization {
-        match self {
-            Self::Square => Parametrization::OctahedronQuadratic,
-            Self::Rectangle => Parametrization::OctahedronRectangular,
-            Self::Cube => Parametrization::Cube,
-        }
-    }
-
-    /// Columns and rows of layers in a picture, and where each layer is.
-    fn faces(self) -> ([u32; 2], &'static [[u32; 2]]) {
-        match self {
-            // A cross: +x −x +y −y +z −z.
-            Self::Cube => ([4, 3], &[[2, 1], [0, 1], [1, 0], [1, 2], [1, 1], [3, 1]]),
-            _ => ([1, 1], &[[0, 0]]),
-        }
-    }
 }
 
 impl Channel {
@@ -166,99 +129,6 @@ impl Channel {
 fn after<T: Copy + PartialEq>(all: &[T], one: T) -> T {
     let at = all.iter().position(|other| *other == one).unwrap_or(0);
     all[(at + 1) % all.len()]
-}
-
-/// What is seen through a texel.
-#[derive(Debug, Clone, Copy)]
-struct Seen {
-    triangle: u32,
-    object: u32,
-    distance: f32,
-}
-
-/// A map that is rendered live.
-struct Live {
-    layout: Layout,
-    size: UVec2,
-    gbuffer: GBuffer,
-}
-
-impl Live {
-    /// About `texels` squared texels.
-    fn new(gpu: &Gpu, scene: &GpuScene, layout: Layout, texels: u32) -> Result<Self> {
-        let map = layout.map();
-        let rows = f64::from(texels) / f64::from(map.layers() * map.aspect()).sqrt();
-        let rows = rows.round() as u32;
-        let size = UVec2::new(rows * map.aspect(), rows);
-        let layering = match layout {
-            Layout::Cube => Layering::of_layers(gpu.caps(), CUBE_FACES),
-            _ => Layering::Octants(OctantCut::default()),
-        };
-        let desc = GBufferDesc {
-            size: size.to_array(),
-            layering,
-            outputs: &OUTPUTS,
-        };
-        Ok(Self {
-            layout,
-            size,
-            gbuffer: GBuffer::new(gpu, &scene.surfaces(), &desc)?,
-        })
-    }
-
-    fn views(&self, scene: &GpuScene, origin: Vec3) -> Result<Vec<View>> {
-        let near = View::near_plane(origin, &scene.surfaces());
-        let area = Area::whole(self.size.to_array());
-        match self.layout {
-            Layout::Square => View::of_octants(origin, OctahedronLayout::Quadratic, near, area),
-            Layout::Rectangle => View::of_octants(origin, OctahedronLayout::Rectangular, near, area),
-            Layout::Cube => (0..CUBE_FACES)
-                .map(|face| View::of_cube_face(origin, face, near, area))
-                .collect(),
-        }
-    }
-
-    fn render(&self, gpu: &Gpu, scene: &GpuScene, views: &[View]) -> Result<Vec<Seen>> {
-        let mut recorder = gpu.recorder("octahedron lab")?;
-        self.gbuffer.record(&mut recorder, &scene.surfaces(), views)?;
-        recorder.submit()?.wait()?;
-        let triangles: Vec<u32> = self.gbuffer.read(gpu, Output::Triangle)?;
-        let objects: Vec<u32> = self.gbuffer.read(gpu, Output::Object)?;
-        let distances: Vec<f32> = self.gbuffer.read(gpu, Output::Distance)?;
-        let all = triangles.into_iter().zip(objects).zip(distances);
-        Ok(all
-            .map(|((triangle, object), distance)| Seen {
-                triangle,
-                object,
-                distance,
-            })
-            .collect())
-    }
-
-    /// The ray through the middle of a texel, the same that the rasterizer's pixel has.
-    fn ray(&self, views: &[View], texel: Texel, direction: DVec3) -> Ray {
-        let view = match self.layout {
-            Layout::Cube => texel.layer,
-            _ => (0..3).map(|axis| u32::from(direction[axis] < 0.0) << axis).sum(),
-        };
-        views[view as usize].ray(texel.x as f32 + 0.5, texel.y as f32 + 0.5)
-    }
-
-    /// Where a texel is in a list of all.
-    fn index(&self, texel: Texel) -> usize {
-        ((texel.layer * self.size.y + texel.y) * self.size.x + texel.x) as usize
-    }
-
-    /// The texel that a direction belongs to.
-    fn at(&self, direction: DVec3) -> Option<Texel> {
-        let at = self.layout.map().encode(direction)?;
-        let p = (at.uv * self.size.as_dvec2()).as_uvec2().min(self.size - 1);
-        Some(Texel {
-            layer: at.layer,
-            x: p.x,
-            y: p.y,
-        })
-    }
 }
 
 /// What the last frame was like.
@@ -330,7 +200,7 @@ impl Lab {
             bgra,
             choice,
             texels,
-            angle: 0.0,
+            angle: START,
             turn,
             held: false,
             facts: Facts::default(),
@@ -345,17 +215,20 @@ impl Lab {
         lower + share.as_vec3() * (upper - lower)
     }
 
-    /// Radiance of a surface lit from where it is seen, between 0 and 1.
+    /// Radiance of a surface lit from where it is seen and from one side, between 0 and 1.
     fn shade(&self, seen: Seen, direction: DVec3) -> Vec3 {
         const AMBIENT: f32 = 0.25;
+        const SIDE: f32 = 0.4;
+        const TOWARDS: Vec3 = Vec3::new(0.36, 0.8, 0.48);
         let Some(t) = self.triangles.get(seen.triangle as usize) else {
             return Vec3::ZERO;
         };
         let [a, b, c] = [t.a, t.b, t.c].map(Vec3::from_array);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let facing = normal.dot(direction.as_vec3()).abs();
+        let side = normal.dot(TOWARDS).abs();
         let albedo = self.albedos.get(seen.object as usize).copied();
-        albedo.unwrap_or(GREY) * (AMBIENT + (1.0 - AMBIENT) * facing)
+        albedo.unwrap_or(GREY) * (AMBIENT + SIDE * side + (1.0 - AMBIENT - SIDE) * facing)
     }
 
     fn shown(&self, seen: Seen, direction: DVec3, reach: f64) -> [u8; 3] {

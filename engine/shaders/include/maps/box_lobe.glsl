@@ -4,9 +4,10 @@
 
 #include "maps/directional_map.glsl"
 #include "maps/spherical_sat.glsl"
+#include "scene/normal_map.glsl"
 
-// A square about the lobe's direction.
 struct LobeBox {
+    vec3 direction;     // of its middle, in the frame about the lobe
     float solid_angle;  // sr
     float weight;       // of its mean
 };

@@ -55,7 +55,7 @@ fn squared_error(lobe: Lobe, boxes: &[WeightedBox]) -> f64 {
 #[test]
 fn weights_share_the_lobe() {
     for lobe in LOBES {
-        for count in 1..=MAX_BOXES {
+        for count in 1..=MAX_STEPS {
             let boxes = box_lobe(lobe, count).unwrap();
             let sum: f64 = boxes.iter().map(|one| one.weight).sum();
             assert!(boxes.len() == count && (sum - 1.0).abs() < 1e-12, "{lobe:?}: {sum}");
@@ -64,6 +64,22 @@ fn weights_share_the_lobe() {
                 boxes.is_sorted_by(|a, b| a.solid_angle < b.solid_angle) && boxes[count - 1].solid_angle <= TAU + 1e-9,
                 "{lobe:?}: {boxes:?}"
             );
+            // Rings divide the same staircase: as much within each of its steps.
+            let rings = ring_lobe(lobe, count).unwrap();
+            let sum: f64 = rings.iter().map(|one| one.weight).sum();
+            let whole: f64 = rings.iter().map(|one| one.solid_angle).sum();
+            assert!(rings.len() == RING_BOXES[0] + (count - 1) * RING_BOXES[1] && (sum - 1.0).abs() < 1e-12);
+            assert!((whole / boxes[count - 1].solid_angle - 1.0).abs() < 1e-12);
+            let middle: DVec3 = rings.iter().map(|one| one.weight * one.direction).sum();
+            assert!(
+                middle.truncate().length() < 1e-12 && middle.z > 0.0,
+                "{lobe:?}: {middle}"
+            );
+            assert!(
+                rings
+                    .iter()
+                    .all(|one| (one.direction.length() - 1.0).abs() < 1e-12 && one.weight >= 0.0)
+            );
         }
     }
     for (lobe, count) in [
@@ -71,7 +87,7 @@ fn weights_share_the_lobe() {
         (Lobe::Ggx { alpha: f64::NAN }, 1),
         (Lobe::Phong { exponent: -1.0 }, 1),
         (LOBES[0], 0),
-        (LOBES[0], MAX_BOXES + 1),
+        (LOBES[0], MAX_STEPS + 1),
     ] {
         assert!(box_lobe(lobe, count).is_err(), "{lobe:?} {count}");
     }
@@ -186,8 +202,9 @@ fn lobes_on_folds_and_edges_are_as_good_as_elsewhere() {
             light(map.texel_direction(size(map, 64), texel).unwrap())
         })
         .unwrap();
-        for alpha in [0.1, 0.3] {
-            let boxes = box_lobe(Lobe::Ggx { alpha }, 4).unwrap();
+        for (alpha, rings) in [(0.1, false), (0.3, false), (0.1, true), (0.3, true)] {
+            let lobe = Lobe::Ggx { alpha };
+            let boxes = if rings { ring_lobe(lobe, 4) } else { box_lobe(lobe, 4) }.unwrap();
             let border = sat_border(map, image.size(), &boxes).unwrap();
             let table = SatImage::new(&image, border).unwrap();
             // The lobe's own mean at texels of a small map.
@@ -207,11 +224,45 @@ fn lobes_on_folds_and_edges_are_as_good_as_elsewhere() {
             }
             let rms = |all: &[f64]| (all.iter().sum::<f64>() / all.len() as f64).sqrt();
             println!(
-                "{map}, α = {alpha}: {:.2e} near folds, {:.2e} elsewhere",
+                "{map}, α = {alpha}, rings {rings}: {:.2e} near folds, {:.2e} elsewhere",
                 rms(&near),
                 rms(&far)
             );
             assert!(rms(&near) < bound * rms(&far) && rms(&near) < 0.1, "{map} {alpha}");
+        }
+    }
+}
+
+/// Under a sun, of which large boxes show the squares: rings are nearer to the lobe than as many steps about one middle.
+#[test]
+fn rings_follow_the_lobe() {
+    let sun = DVec3::new(0.5, 0.7, 0.51).normalize();
+    for map in [Parametrization::OctahedronQuadratic, Parametrization::EqualArea] {
+        let image = MapImage::from_fn(map, size(map, 96), |texel| {
+            let d = map.texel_direction(size(map, 96), texel).unwrap();
+            DVec3::splat(1.0 + 100.0 * (300.0 * (d.dot(sun) - 1.0)).exp())
+        })
+        .unwrap();
+        let table = SatImage::new(&image, 96).unwrap();
+        for alpha in [0.05, 0.1] {
+            let lobe = Lobe::Ggx { alpha };
+            let truth = prefilter_ggx(&image, size(map, 16), alpha).unwrap();
+            let rms = |boxes: &[WeightedBox]| {
+                let off = |texel: Texel| {
+                    let d = map.texel_direction(size(map, 16), texel).unwrap();
+                    (table.sat_lobe(map, d, boxes).unwrap().x - f64::from(truth.at(texel).x)).powi(2)
+                };
+                let all: f64 = map.texels(size(map, 16)).map(off).sum();
+                (all / 256.0).sqrt()
+            };
+            let one = rms(&box_lobe(lobe, 1).unwrap());
+            let nested = rms(&box_lobe(lobe, 4).unwrap());
+            let rings = [1, 2, 4].map(|steps| rms(&ring_lobe(lobe, steps).unwrap()));
+            println!("{map}, α = {alpha}: one box {one:.3}, four {nested:.3}, rings {rings:.3?}");
+            assert!(
+                nested < one && rings[2] < 0.6 * nested && rings[2] < rings[1],
+                "{map} {alpha}"
+            );
         }
     }
 }

@@ -39,6 +39,8 @@ const MAPS: [Parametrization; 12] = [
 const TURNS: u32 = 6;
 /// Rows of the maps of which densities are taken.
 const DENSITY_ROWS: u32 = 256;
+/// Least ratio of solid angles of maps without poles.
+const FINEST: f64 = 0.1;
 /// Maps whose need of texels differs by less than this factor are as good as each other.
 const ALIKE: f64 = 1.1;
 
@@ -276,14 +278,19 @@ fn verdict(all: &[Found], environments: &[Environment]) -> Vec<String> {
     }
     let (least, names) = best(all, whole, Found::need);
     lines.push(format!(
-        "Verdict, all together: {} need least ({least:.2} of the cube's texels, within {:.0} % of each other).",
+        "Verdict, all together: least by {} ({least:.2} of the cube's texels; all that are within {:.0} % of it).",
         names.join(", "),
         100.0 * (ALIKE - 1.0),
     ));
-    let (least, names) = best(all, |found| whole(found) && found.is_one_rectangle(), Found::need);
+    let one_rectangle = |found: &Found| whole(found) && found.is_one_rectangle();
+    let (least, names) = best(all, one_rectangle, Found::need);
+    let even = |found: &Found| one_rectangle(found) && found.density.min_ratio > FINEST;
+    let (of_even, without_poles) = best(all, even, Found::need);
     lines.push(format!(
-        "Verdict, one rectangle for an atlas, a summed-area table or a border of its own: {} ({least:.2}).",
+        "Verdict, one rectangle for an atlas, a summed-area table or a border of its own: {} ({least:.2}); where no texel may be finer than \
+         {FINEST} of the mean, as at poles, for what is rendered into it or blurred in it: {} ({of_even:.2}).",
         names.join(", "),
+        without_poles.join(", "),
     ));
     let even = all
         .iter()

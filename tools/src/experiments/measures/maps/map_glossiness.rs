@@ -6,7 +6,7 @@
 use clerestory::film::png::{self, Rgb8};
 use clerestory::film::{Picture, ToneMap};
 use clerestory::gpu::{Gpu, compute_to_transfer, rw_compute_to_compute};
-use clerestory::maps::box_lobe::{Lobe, WeightedBox, box_lobe};
+use clerestory::maps::box_lobe::{Lobe, RING_BOXES, WeightedBox, box_lobe, ring_lobe};
 use clerestory::maps::directional_map::DirectionalMap;
 use clerestory::maps::prefilter::{PrefilterGgx, ggx_lobe, ggx_solid_angle};
 use clerestory::maps::spherical_sat::{SatImage, SatNumbers, SatRange, SphericalSat, sat_half_width};
@@ -28,8 +28,10 @@ const SIZES: [u32; 4] = [64, 128, 256, 512];
 const LEVELS: u32 = 6;
 const LEAST_ALPHA: f64 = 0.02;
 const EYE: DVec3 = DVec3::new(1.0, 0.3, -0.35);
-/// Numbers of boxes that lobes are made of.
-const BOXES: [usize; 5] = [1, 2, 3, 4, 8];
+/// Steps of lobes whose boxes are about one middle.
+const NESTED: [usize; 4] = [1, 2, 4, 8];
+/// Steps of lobes of rings.
+const RINGS: [usize; 4] = [1, 2, 3, 4];
 /// Lobes between the least roughness and the greatest, of which each pixel takes the nearest.
 const LOBES: usize = 65;
 /// Milliseconds of the document for a table of 512² texels.
@@ -188,18 +190,17 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
         ],
     );
     let mut row = vec![shown(side, &pixels, &right)?];
-    let several: Vec<(usize, Vec<Vec3>)> = BOXES
-        .into_iter()
-        .map(|count| Ok((count, by_lobes(&table, &pixels, count)?)))
+    let several: Vec<(Fit, Vec<Vec3>)> = fits()
+        .map(|fit| Ok((fit, by_lobes(&table, &pixels, fit)?)))
         .collect::<Result<_>>()?;
     let mut line = |name: String, seconds: f64, values: &[Vec3]| {
         let [rms, mean] = errors(values, &right);
         found.row([name.into(), (1e3 * seconds).into(), rms.into(), mean.into()]);
     };
     line("one box of the lobe's variance".into(), fill, &by_boxes);
-    for (count, values) in &several {
-        line(format!("best lobe of {count} boxes"), fill, values);
-        if [1, 4].contains(count) {
+    for (fit, values) in &several {
+        line(fit.name(), fill, values);
+        if [SHOWN_NESTED, SHOWN_RINGS].contains(fit) {
             row.push(shown(side, &pixels, values)?);
         }
     }
@@ -212,7 +213,7 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
          sun. Truth is the sum of the GGX lobe with n = v = r over all texels at each pixel; all look-ups stand for that lobe, and their error is that of \
          the boxes and of interpolation between {LEVELS} levels. One box holds the solid angle over which an even mean has the lobe's variance; several are \
          the staircase nearest to the lobe, of {LOBES} lobes even in roughness the nearest. The border is half the map. Times are by wall clock, medians, with submission; \
-         all boxes need one table. Pictures beside this table, `glossiness.png`: truth, one box, four boxes, levels.",
+         all boxes need one table. Pictures beside this table, `glossiness.png`: truth, four boxes about one middle, four steps in rings, levels.",
     ));
     Ok(found)
 }
@@ -222,15 +223,48 @@ fn alpha_of_lobe(number: usize) -> f64 {
     (number as f64 / (LOBES - 1) as f64).powi(2).max(LEAST_ALPHA)
 }
 
-fn by_lobes(table: &SphericalSat, pixels: &[Pixel], count: usize) -> Result<Vec<Vec3>> {
+/// How a lobe is made of boxes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fit {
+    /// So many about one middle.
+    Nested(usize),
+    /// So many steps, divided.
+    Rings(usize),
+}
+
+const SHOWN_NESTED: Fit = Fit::Nested(4);
+const SHOWN_RINGS: Fit = Fit::Rings(4);
+
+fn fits() -> impl Iterator<Item = Fit> {
+    NESTED
+        .into_iter()
+        .map(Fit::Nested)
+        .chain(RINGS.into_iter().map(Fit::Rings))
+}
+
+impl Fit {
+    fn boxes(self, lobe: Lobe) -> Result<Vec<WeightedBox>> {
+        match self {
+            Self::Nested(steps) => box_lobe(lobe, steps),
+            Self::Rings(steps) => ring_lobe(lobe, steps),
+        }
+    }
+
+    fn name(self) -> String {
+        match self {
+            Self::Nested(1) => "1 box".into(),
+            Self::Nested(steps) => format!("{steps} boxes"),
+            Self::Rings(steps) => format!("{} boxes in rings", RING_BOXES[0] + (steps - 1) * RING_BOXES[1]),
+        }
+    }
+}
+
+fn by_lobes(table: &SphericalSat, pixels: &[Pixel], fit: Fit) -> Result<Vec<Vec3>> {
     let lobes: Vec<Vec<WeightedBox>> = (0..LOBES)
         .map(|number| {
-            box_lobe(
-                Lobe::Ggx {
-                    alpha: alpha_of_lobe(number),
-                },
-                count,
-            )
+            fit.boxes(Lobe::Ggx {
+                alpha: alpha_of_lobe(number),
+            })
         })
         .collect::<Result<_>>()?;
     let query = |pixel: &Pixel| {
@@ -259,24 +293,32 @@ fn lobes(context: &Context<'_>) -> Result<Table> {
     let mut random = Random::new(23);
     let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
     let mut heads = vec!["lobe".to_owned(), "half of it within (degrees)".into()];
-    heads.extend(BOXES.iter().map(|count| format!("{count} boxes")));
-    heads.extend(BOXES.iter().map(|count| format!("{count} caps")));
+    heads.extend(fits().map(Fit::name));
+    heads.extend(
+        NESTED
+            .iter()
+            .map(|steps| format!("caps of {}", Fit::Nested(*steps).name())),
+    );
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     let mut table = Table::new("RMS error of lobes of boxes over the mean", &heads);
     let kinds = [0.03, 0.1, 0.2, 0.4, 0.7, 1.0].map(|alpha| (format!("GGX α = {alpha}"), Lobe::Ggx { alpha }));
     let others = [10.0, 100.0].map(|exponent| (format!("Phong n = {exponent}"), Lobe::Phong { exponent }));
     for (name, lobe) in kinds.into_iter().chain(others).take(if context.smoke { 2 } else { 8 }) {
         // By t = 1 − cos: what lies within each box's cap.
-        let fits: Vec<Vec<WeightedBox>> = BOXES
+        let nested: Vec<Vec<WeightedBox>> = NESTED
             .iter()
             .map(|count| box_lobe(lobe, *count))
             .collect::<Result<_>>()?;
+        let all_boxes: Vec<Vec<WeightedBox>> = fits().map(|fit| fit.boxes(lobe)).collect::<Result<_>>()?;
         let of = |d: &DVec3| -> Vec<Vec3> {
-            let mut sums = vec![DVec4::ZERO; 1 + fits.iter().map(Vec::len).sum::<usize>()];
+            let mut sums = vec![DVec4::ZERO; 1 + nested.iter().map(Vec::len).sum::<usize>()];
             for (other, value) in &held {
                 let t = 0.5 * (*d - *other).length_squared();
                 sums[0] += lobe.value(t) * *value;
-                let caps = fits.iter().flatten().map(|one| one.solid_angle / std::f64::consts::TAU);
+                let caps = nested
+                    .iter()
+                    .flatten()
+                    .map(|one| one.solid_angle / std::f64::consts::TAU);
                 for (sum, cap) in sums[1..].iter_mut().zip(caps) {
                     *sum += if t < cap { *value } else { DVec4::ZERO };
                 }
@@ -287,12 +329,12 @@ fn lobes(context: &Context<'_>) -> Result<Table> {
                 if sum.w > 0.0 { sum.truncate() / sum.w } else { held }
             };
             let mut found = vec![mean(sums[0]).as_vec3()];
-            let boxes = fits
+            let boxes = all_boxes
                 .iter()
                 .map(|fit| sat.sat_lobe(MAP, *d, fit).unwrap_or_default().as_vec3());
             found.extend(boxes);
             let mut next = 1;
-            for fit in &fits {
+            for fit in &nested {
                 let parts = fit.iter().zip(&sums[next..]).map(|(one, sum)| one.weight * mean(*sum));
                 found.push(parts.sum::<DVec3>().as_vec3());
                 next += fit.len();
@@ -303,7 +345,7 @@ fn lobes(context: &Context<'_>) -> Result<Table> {
         let column = |at: usize| -> Vec<Vec3> { all.iter().map(|found| found[at]).collect() };
         let right = column(0);
         let mut row = vec![name.into(), half_angle(lobe).to_degrees().into()];
-        row.extend((1..=2 * BOXES.len()).map(|at| errors(&column(at), &right)[0].into()));
+        row.extend((1..=all_boxes.len() + NESTED.len()).map(|at| errors(&column(at), &right)[0].into()));
         table.row(row);
     }
     table.note(format!(
