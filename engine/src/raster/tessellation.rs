@@ -11,7 +11,7 @@ pub fn tessellation_weights(level: u32, piece: u32, corner: u32) -> [u32; 3] {
     let row = piece.isqrt();
     let along = piece - row * row;
     let column = along / 2;
-    let (down, right) = if along % 2 == 0 {
+    let (down, right) = if along.is_multiple_of(2) {
         (row + corner.min(1), column + u32::from(corner == 2))
     } else {
         (row + u32::from(corner == 1), column + corner.min(1))
