@@ -180,10 +180,13 @@ pub struct Work {
     pub fragments: u64,
 }
 
+/// Records the filling of a map.
+type Record<'a> = Box<dyn Fn(&mut Recorder) -> Result<()> + 'a>;
+
 /// A map that is ready to be filled again and again.
 pub struct Filling<'a> {
     gpu: Gpu,
-    record: Box<dyn Fn(&mut Recorder) -> Result<()> + 'a>,
+    record: Record<'a>,
 }
 
 impl Filling<'_> {
@@ -308,7 +311,7 @@ impl LiveScene {
     pub fn filling(&self, gpu: &Gpu, variant: &Variant) -> Result<(Filling<'_>, Work)> {
         let surfaces = self.on_device.surfaces();
         let points = SPLATS_PER_TEXEL * variant.size.element_product();
-        let record: Box<dyn Fn(&mut Recorder) -> Result<()>> = match variant.way {
+        let record: Record<'_> = match variant.way {
             Way::Raster(layering) => {
                 let gbuffer = self.gbuffer(gpu, variant, layering, &[Output::Distance])?;
                 let views = self.views(variant)?;

@@ -376,7 +376,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
          bias of d (w tan θ + {ROUNDING_BIAS:e}), w being the mean width of the map's texels in radians, θ the angle to the normal; the truth \
          is a ray. Wrong triangles: against the ray through the texel's centre; of points also where holes were filled. Attribute error: the \
          angle between a texel and the interpolated position that it holds. {SPLATS_PER_TEXEL} points a texel are splatted, evenly over all \
-         surfaces. The document's figures are of other machines, scenes and pictures: their order counts."
+         surfaces. The cost of masks goes with their fragments and that of geometry shaders with \
+         triangles, so that few large triangles favour the split and many small ones the mask. The document's figures are of other \
+         machines, scenes and pictures: their order counts."
     ));
     for scene in &SCENES[..scenes] {
         compare(&gpu, *scene, (side, repeats, points), &mut table)?;
