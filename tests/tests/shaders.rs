@@ -56,9 +56,10 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("transport/path_extend_media_alpha.comp", "SampledBuffer"),
     ("transport/path_shadow_media.comp", "SampledBuffer"),
     ("transport/path_shadow_media_alpha.comp", "SampledBuffer"),
-    ("raster/splat_points.comp", "MemberOffset"),
-    ("raster/splat_pull.comp", "MemberOffset"),
-    ("raster/splat_push.comp", "MemberOffset"),
+    ("raster/splat_points.comp", "SpecConstantOp"),
+    // Two numbers right behind one, of three words in all.
+    ("raster/splat_pull.comp", "MemberOverlap"),
+    ("raster/splat_push.comp", "MemberOverlap"),
     ("raster/surface.frag", "SampledBuffer"),
     ("raster/surface_halves.geom", "SampledBuffer"),
     ("raster/surface_instance.vert", "SampledBuffer"),

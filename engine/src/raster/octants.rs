@@ -260,6 +260,18 @@ mod tests {
             found[0] <= 8 && found[1] <= SPLIT_CORNERS && found[2] <= 15,
             "{found:?}"
         );
+        // About the middle, but for rounding: one plane meets six octants there, and rounding adds slivers.
+        let mut random = Random(22);
+        let central = (0..200_000).map(|_| {
+            let [a, b] = [0; 2].map(|_| random.vector());
+            split([a, b, -random.unit() * (a + b)])
+        });
+        let found = most(central);
+        println!("split of triangles about the middle: {found:?}");
+        assert!(
+            found[0] <= 8 && found[1] <= SPLIT_CORNERS && found[2] <= 15,
+            "{found:?}"
+        );
         for (cut, bounds) in [
             (OctantCut::Halves, [2, HALVES_CORNERS, 3]),
             (OctantCut::Outlines, [2, OUTLINES_CORNERS, 11]),

@@ -3,7 +3,7 @@
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::{Hit, Ray, RayIndex};
 use clerestory::gpu::shaders::types::{SceneTriangle, Surfel};
-use clerestory::gpu::{Area, Buffer, Category, Gpu, Recorder, Timings};
+use clerestory::gpu::{Area, Category, Gpu, Recorder, Timings};
 use clerestory::maps::cube::CUBE_FACES;
 use clerestory::maps::octahedron::OctahedronLayout;
 use clerestory::maps::{MapPoint, Parametrization, Texel};
@@ -180,6 +180,31 @@ pub struct Work {
     pub fragments: u64,
 }
 
+/// Records the filling of a map.
+type Record<'a> = Box<dyn Fn(&mut Recorder) -> Result<()> + 'a>;
+
+/// A map that is ready to be filled again and again.
+pub struct Filling<'a> {
+    gpu: Gpu,
+    record: Record<'a>,
+}
+
+impl Filling<'_> {
+    fn run(&self, counts: bool) -> Result<Timings> {
+        let mut recorder = self.gpu.recorder("live map")?;
+        if counts {
+            recorder.count_invocations();
+        }
+        (self.record)(&mut recorder)?;
+        recorder.submit()?.wait()
+    }
+
+    /// Seconds of the device for one filling.
+    pub fn seconds(&self) -> Result<f64> {
+        Ok(self.run(false)?.seconds())
+    }
+}
+
 impl LiveScene {
     /// Loads a scene; `share` is the place in the box around it.
     pub fn load(gpu: &Gpu, address: &str, share: Vec3) -> Result<Self> {
@@ -282,10 +307,11 @@ impl LiveScene {
         })
     }
 
-    /// Fills a map of distances, as shadows want it, so often after once to warm up and to count: seconds of each, and the work.
-    pub fn work(&self, gpu: &Gpu, variant: &Variant, repeats: usize) -> Result<(Vec<f64>, Work)> {
+    /// Makes ready to fill a map of distances, as shadows want it, and fills it once to count and to warm up.
+    pub fn filling(&self, gpu: &Gpu, variant: &Variant) -> Result<(Filling<'_>, Work)> {
         let surfaces = self.on_device.surfaces();
-        let mut run: Box<dyn FnMut(&mut Recorder) -> Result<()>> = match variant.way {
+        let points = SPLATS_PER_TEXEL * variant.size.element_product();
+        let record: Record<'_> = match variant.way {
             Way::Raster(layering) => {
                 let gbuffer = self.gbuffer(gpu, variant, layering, &[Output::Distance])?;
                 let views = self.views(variant)?;
@@ -293,26 +319,18 @@ impl LiveScene {
             }
             Way::Splats => {
                 let map = SplatMap::new(gpu, layout_of(variant.map), variant.size)?;
-                let points = self.surfels(variant);
-                let buffer: Buffer = gpu.buffer_with("surfels", Category::Geometry, &points)?;
-                let (origin, count) = (self.origin, points.len() as u32);
-                Box::new(move |recorder| map.record(recorder, origin, &buffer, count, true))
+                let buffer = gpu.buffer_with("surfels", Category::Geometry, &self.surfels(variant))?;
+                let origin = self.origin;
+                Box::new(move |recorder| map.record(recorder, origin, &buffer, points, true))
             }
         };
-        let mut once = |counts: bool| -> Result<Timings> {
-            let mut recorder = gpu.recorder("live map")?;
-            if counts {
-                recorder.count_invocations();
-            }
-            run(&mut recorder)?;
-            recorder.submit()?.wait()
+        let filling = Filling {
+            gpu: gpu.clone(),
+            record,
         };
-        let counted = once(true)?;
+        let counted = filling.run(true)?;
         let drawn = counted.passes[0].drawn.unwrap_or_default();
-        let seconds = (0..repeats)
-            .map(|_| Ok(once(false)?.seconds()))
-            .collect::<Result<_>>()?;
-        let points = u64::from(SPLATS_PER_TEXEL * variant.size.element_product());
+        let points = u64::from(points);
         let work = match variant.way {
             Way::Raster(_) => Work {
                 vertices: drawn.vertices,
@@ -327,7 +345,7 @@ impl LiveScene {
                 fragments: 0,
             },
         };
-        Ok((seconds, work))
+        Ok((filling, work))
     }
 
     /// Corners that reach the rasterizer: of strips by the cuts' twins, of triangles three each.
