@@ -4,7 +4,7 @@ use clerestory::scene::{Camera, Filter, Image, LightKind, Material, Mesh, Scene,
 use glam::{DVec3, Vec2, Vec3};
 
 /// Half of the room's extent, and its height, metres.
-const HALF: Vec3 = Vec3::new(4.0, 3.2, 4.0);
+const HALF: Vec3 = Vec3::new(4.0, 3.8, 4.0);
 
 fn quad(name: &str, material: u32, [a, b, c, d]: [Vec3; 4], repeat: Vec2) -> Mesh {
     Mesh {
@@ -137,23 +137,23 @@ pub fn showroom() -> Scene {
     scene.add_light(
         "warm lamp",
         LightKind::Point {
-            position: v(-1.6, 2.8, 0.9),
-            intensity: v(13.0, 10.2, 7.0),
+            position: v(-1.7, 2.3, 1.2),
+            intensity: v(11.0, 8.4, 5.6),
         },
     );
     scene.add_light(
         "cool lamp",
         LightKind::Point {
-            position: v(2.1, 2.5, -0.6),
-            intensity: v(4.0, 5.4, 8.0),
+            position: v(1.9, 2.2, -1.2),
+            intensity: v(3.6, 5.0, 7.6),
         },
     );
     scene.cameras.push(Camera::look_at(
         "main",
-        DVec3::new(0.4, 1.75, 3.7),
-        DVec3::new(0.0, 1.05, -0.6),
+        DVec3::new(0.9, 1.8, 3.5),
+        DVec3::new(-0.1, 1.45, -0.6),
         DVec3::Y,
-        62f32.to_radians(),
+        60f32.to_radians(),
     ));
     scene.defaults.aspect = Some(4.0 / 3.0);
     scene

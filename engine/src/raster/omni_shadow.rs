@@ -6,31 +6,32 @@
 //! "Saying Goodbye to Shadow Acne", GDC 2011 (receivers moved along their normal); J. Isidoro, "Shadow Mapping: GPU-based Tips and
 //! Techniques", GDC 2006 (the receiver's plane). Maps hold Euclidean distances from the light, of texel centres, in metres.
 //!
-//! There is no bias in scene units. A receiver is moved off its surface, to the side of the light, by the width that half a texel's diagonal has
-//! at its distance ([`shadow_texel_radius`]), times one more than the width of the filter in texels, a little more for texels that change from one to
-//! the next. Along the direction of a texel's centre it
-//! is then in shadow of what is nearer than its own plane, or than its distance where that is nearer ([`shadow_threshold`]): a plane never
-//! shades itself, at any slope, and surfaces that fold towards the light do not shade each other within the move. What the caller adds is
-//! how far rounding takes the position off its plane ([`SurfacePoint::error`](crate::accel::offset::SurfacePoint)).
+//! There is no bias in scene units. Along the direction of a texel's centre a place is in shadow of what is nearer than the place's own plane, or than
+//! the place where that is nearer ([`shadow_threshold`]): a plane never shades itself, at any slope, with any filter. So that surfaces which fold
+//! towards the light do not shade each other, the plane is moved to the light's side by a texel's diagonal at that distance
+//! ([`shadow_texel_radius`]), times one more than the filter is wide in texels, but by no more than an eighth of the light's height over it; what the
+//! caller adds is how far rounding takes the position off its plane ([`SurfacePoint::error`](crate::accel::offset::SurfacePoint)). The map is looked up
+//! for the place half a diagonal off its surface, where a texel more often holds what is in front of the surface than the surface itself.
 //!
 //! Bias: the border of a shadow is that of texels, off by half of one on average, so that errors fall as one over the texels along a side;
-//! what lies within the move off a surface casts no shadow on it (contact shadows begin half a texel late); occluders nearer to the light than the near
+//! what lies within the move off a surface casts no shadow on it (contact shadows begin a texel late); folds whose other side light grazes stay darker
+//! within a texel; occluders nearer to the light than the near
 //! plane ([`View::near_plane`]) cast none. Filtered borders are as wide as the filter, whatever the light's size. Deterministic.
 //! GLSL: `raster/omni_shadow.glsl` and `raster/omni_shadow_set.glsl`; the twin of a look-up is [`OmniShadowImage::visibility`].
 
-use glam::{DVec2, DVec3, IVec2, UVec2, Vec3};
+use glam::{DVec3, IVec2, UVec2, Vec3};
 
 use super::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{SHADOW_CHANGE, SHADOW_CUBE, SHADOW_OCTAHEDRON, SHADOW_ROUNDING, SHADOW_SPAN_MAX};
+use crate::gpu::shaders::constants::{SHADOW_CUBE, SHADOW_FOLD, SHADOW_MOVE_MAX, SHADOW_OCTAHEDRON, SHADOW_ROUNDING};
 use crate::gpu::shaders::raster::omni_shadow_look_up as kernel;
 use crate::gpu::shaders::sets::OmniShadowSet;
 use crate::gpu::shaders::types::ShadowQuery;
 use crate::gpu::{Access, Area, Buffer, BufferBarrier, BufferDesc, Category, Gpu, Recorder, Timings};
-use crate::maps::cube::CUBE_FACES;
+use crate::maps::cube::{CUBE_FACES, cube_decode, cube_encode};
 use crate::maps::octahedron::OctahedronLayout;
 use crate::maps::topology::octahedron_wrap;
-use crate::maps::{MapPoint, Parametrization, Texel};
+use crate::maps::{Parametrization, Texel};
 use crate::{Error, Result};
 
 /// How directions lie in the map.
@@ -338,34 +339,24 @@ pub struct OmniShadowImage {
     pub distances: Vec<f32>,
 }
 
-/// A place that light reaches or not, moved off its surface.
+/// A place that light reaches or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowReceiver {
-    /// From the light, moved, metres.
+    /// From the light to where it is looked up, metres.
     pub to: DVec3,
-    /// Of the place before it was moved, metres.
+    /// From the light, metres.
     pub distance: f64,
     /// Of the surface, to the side of the light.
     pub normal: DVec3,
-    /// Of the light over the plane through the place, metres; not positive for one that it does not shine on.
+    /// Of the light over the surface's plane, which is moved towards the light, metres.
     pub height: f64,
 }
 
-/// Half the longer diagonal of a texel's image on the sphere about a direction, radians, in a map of `side` × `side` texels a layer.
+/// Half the diagonal of a square as large as the texel about a direction, radians, in a map of `side` × `side` texels a layer.
 pub fn shadow_texel_radius(layout: ShadowLayout, d: DVec3, side: u32) -> f64 {
     let map = layout.map();
-    let at = map.encode(d).unwrap_or(MapPoint {
-        layer: 0,
-        uv: DVec2::splat(0.5),
-    });
-    let [across, down] = map.derivatives(at);
-    0.5 * (across + down).length().max((across - down).length()) / f64::from(side)
-}
-
-/// How far the centres of texels that count may be from a direction, radians.
-fn shadow_span(layout: ShadowLayout, d: DVec3, side: u32, width: u32) -> f64 {
-    let texels = f64::from(width + 1) * (1.0 + f64::from(SHADOW_CHANGE) / f64::from(side));
-    (shadow_texel_radius(layout, d, side) * texels).min(SHADOW_SPAN_MAX.into())
+    let density = map.encode(d).map_or(0.0, |at| map.solid_angle_density(at.uv));
+    (0.5 * density).sqrt() / f64::from(side)
 }
 
 /// The receiver at a position with a normal (unit, of either side) that may be off its plane by `slack`, for a filter `width` texels wide.
@@ -380,20 +371,21 @@ pub fn shadow_receiver(
     let to = position - light;
     let normal = if normal.dot(to) > 0.0 { -normal } else { normal };
     let distance = to.length();
-    let span = shadow_span(layout, to, side, width);
-    let to = to + normal * (distance * span.tan() + slack);
+    let half_texel = distance * shadow_texel_radius(layout, to, side);
+    let moved = f64::from(SHADOW_FOLD) * half_texel * f64::from(width + 1) + slack;
+    let height = -normal.dot(to);
     ShadowReceiver {
-        to,
+        to: to + half_texel * normal,
         distance,
         normal,
-        height: -normal.dot(to),
+        height: height - moved.min(f64::from(SHADOW_MOVE_MAX) * height),
     }
 }
 
-/// What is nearer than this along a unit direction shades the receiver: its own plane, or its distance where that is nearer. Metres.
+/// What is nearer than this along a unit direction shades the receiver: its moved plane, or its distance where that is nearer. Metres.
 pub fn shadow_threshold(r: &ShadowReceiver, direction: DVec3) -> f64 {
     let fall = -r.normal.dot(direction);
-    let is_met = r.height > 0.0 && r.height < fall * r.distance;
+    let is_met = r.height < fall * r.distance;
     let plane = if is_met { r.height / fall } else { r.distance };
     plane * (1.0 - f64::from(SHADOW_ROUNDING))
 }
@@ -451,7 +443,7 @@ impl OmniShadowImage {
             ShadowLayout::Cube if is_inside => (layer, at),
             ShadowLayout::Cube => {
                 let uv = (2.0 * at.as_dvec2() + 1.0) / f64::from(side) - 1.0;
-                let (face, uv) = crate::maps::cube::cube_encode(crate::maps::cube::cube_decode(layer, uv));
+                let (face, uv) = cube_encode(cube_decode(layer, uv));
                 let place = (0.5 * uv + 0.5) * f64::from(side);
                 (
                     face,

@@ -292,7 +292,7 @@ impl Stage {
         )?;
         let probe = |side, finest| LiveProbe::new(gpu, scene, &preview, LightProbeDesc { side, finest }, true);
         let walls = [probe(WALLS, 32)?, probe(WALLS, 32)?];
-        let around = probe(self.settings.map, 64)?;
+        let around = probe(self.settings.map, 128)?;
         let surfaces = scene.surfaces();
         let bare = surfaces.before(self.body.object);
         let mut recorder = gpu.recorder("light among the walls")?;

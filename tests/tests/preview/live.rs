@@ -91,7 +91,7 @@ fn live(gpu: &Gpu, subject: &Subject, desc: LightProbeDesc, place: Vec3) -> Live
     live
 }
 
-const DESC: LightProbeDesc = LightProbeDesc { side: 128, finest: 64 };
+const DESC: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
 
 /// In whatever direction a surface looks, the probe's last level is its irradiance over π: the rays' mean by the cosine.
 #[test]
@@ -125,8 +125,8 @@ fn irradiance_in_a_closed_room_is_that_of_rays() {
             worst = worst.max(((value.as_dvec3() - mean) / mean).abs().max_element());
         }
         println!("irradiance: {worst:.2e}");
-        // Bilinear look-ups in 16² texels, 0.12 apart, of a function whose curvature is up to three times its size where a bright face rises over
-        // the horizon: 3 · 0.12²/8; and faces' edges in 32² texels.
+        // Bilinear look-ups between centres up to 0.27 apart, of a function whose curvature is about its size: 0.27²/8; and faces' edges in 32²
+        // texels.
         assert!(worst < 0.012, "{worst}");
     });
 }
@@ -140,7 +140,7 @@ fn reflections_at_the_middle_are_those_of_rays() {
         let place = Vec3::new(0.2, -0.3, 0.1);
         let mut last = f64::INFINITY;
         for side in [64, 128, 256] {
-            let live = live(gpu, &subject, LightProbeDesc { side, finest: 16 }, place);
+            let live = live(gpu, &subject, LightProbeDesc { side, finest: 32 }, place);
             let mut random = Random(5);
             let queries: Vec<Vec4> = (0..4000).map(|_| random.direction().extend(0.0)).collect();
             let found = live.probe().filtered().look_up(&queries).unwrap();
@@ -180,7 +180,7 @@ fn deviations_beside_the_middle_are_parallax() {
         let live = live(
             gpu,
             &subject,
-            LightProbeDesc { side: 256, finest: 16 },
+            LightProbeDesc { side: 256, finest: 32 },
             middle.as_vec3(),
         );
         let mut random = Random(6);

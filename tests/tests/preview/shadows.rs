@@ -74,7 +74,7 @@ fn maps_agree_with_rays_but_for_the_borders_of_shadows() {
             let truth: Vec<bool> = places.iter().map(|place| subject.is_lit(light, place)).collect();
             let lit = truth.iter().filter(|lit| **lit).count() as f64 / truth.len() as f64;
             let mut lines = [Vec::new(), Vec::new()];
-            for cube_side in [16u64, 32, 64, 128, 256] {
+            for cube_side in [64u64, 128, 256, 512] {
                 let errors = ShadowLayout::ALL.map(|layout| {
                     let side = layout.side_for(6 * cube_side * cube_side);
                     error(gpu, &subject, layout, side, light, (&places, &truth))
@@ -83,14 +83,17 @@ fn maps_agree_with_rays_but_for_the_borders_of_shadows() {
                 for (line, error) in lines.iter_mut().zip(errors) {
                     line.push(((cube_side as f64).ln(), error.ln()));
                 }
-                if cube_side >= 64 {
-                    ratios.push(errors[1] / errors[0]);
-                }
+                ratios.push(errors[1] / errors[0]);
             }
             for (layout, line) in ShadowLayout::ALL.iter().zip(&lines) {
-                let slope = slope(line);
-                println!("{address}, {}: slope {slope:.3}", layout.name());
-                assert!((-1.25..-0.8).contains(&slope), "{address}, {}: {slope}", layout.name());
+                let (whole, last) = (slope(line), slope(&line[line.len() - 2..]));
+                println!(
+                    "{address}, {}: slope {whole:.3}, of the last two {last:.3}",
+                    layout.name()
+                );
+                // Coarse maps have texels as wide as some shadows, of which no border is left.
+                assert!((-1.2..-0.6).contains(&whole), "{address}, {}: {whole}", layout.name());
+                assert!((-1.3..-0.75).contains(&last), "{address}, {}: {last}", layout.name());
             }
         }
         println!("octahedron over cube: {ratios:.2?}");
@@ -290,7 +293,7 @@ fn look_ups_are_their_twins() {
     });
 }
 
-/// Filters blur borders and keep the light that passes.
+/// Filters blur borders: what they change of the mean is little beside the share of places that they blur.
 #[test]
 fn filters_keep_the_mean() {
     with_gpu(|gpu| {
@@ -299,13 +302,17 @@ fn filters_keep_the_mean() {
         let places = subject.places(4, PLACES);
         for layout in ShadowLayout::ALL {
             let maps = maps(gpu, &subject, layout, layout.side_for(6 * 128 * 128), light);
-            let mean = |width| {
-                let shares = maps.look_up(0, light, width, &places).unwrap();
-                shares.iter().map(|share| f64::from(*share)).sum::<f64>() / places.len() as f64
-            };
-            let (plain, filtered) = (mean(0), mean(2));
-            println!("{}: {plain} {filtered}", layout.name());
-            assert!((filtered - plain).abs() < 0.02, "{}: {plain} {filtered}", layout.name());
+            let look_up = |width| maps.look_up(0, light, width, &places).unwrap();
+            let mean = |shares: &[f32]| shares.iter().map(|share| f64::from(*share)).sum::<f64>() / PLACES as f64;
+            let (plain, filtered) = (look_up(0), look_up(2));
+            let blurred = filtered.iter().filter(|share| **share > 0.0 && **share < 1.0).count() as f64 / PLACES as f64;
+            let change = mean(&filtered) - mean(&plain);
+            println!("{}: {change:.4} of {blurred:.4}", layout.name());
+            assert!(
+                blurred > 0.02 && change.abs() < 0.25 * blurred,
+                "{}: {change}",
+                layout.name()
+            );
         }
     });
 }
@@ -324,8 +331,8 @@ fn convex_rooms_have_no_shadows() {
                     let shares = maps.look_up(0, light, width, &places).unwrap();
                     let dark: f64 = shares.iter().map(|share| 1.0 - f64::from(*share)).sum();
                     println!("{} {share} {width}: {dark}", layout.name());
-                    // Folds that rise towards the light by more than their own width.
-                    assert!(dark <= 1e-3 * places.len() as f64, "{} {width}: {dark}", layout.name());
+                    // Folds whose other side light grazes: of the room's area a strip of a texel has a share of some hundredths.
+                    assert!(dark <= 5e-3 * places.len() as f64, "{} {width}: {dark}", layout.name());
                 }
             }
         }

@@ -31,7 +31,6 @@ fn shadow_maps_agree_with_their_twins() {
             join(&[&bits([layout.kind(), side]), &direction(r).to_array()])
         });
         let results = twin_shadows(gpu, 0, &table, &[]);
-        // Folds, where the image of a texel jumps, are in the cases, and so are directions on them: there the sides of both agree, since signs do.
         let worst = compare("texels", &table, &results, ulps(16.0, 4.0, 0.0), 2..5, |x| {
             let (layout, side) = layout_of(x);
             vec![shadow_texel_radius(layout, v3(x, 2), side)]

@@ -14,17 +14,17 @@ const uint SHADOW_OCTAHEDRON = 1u;
 // Relative rounding of distances, of either side: differences, squares, a root.
 const float SHADOW_ROUNDING = 16.0 / 16777216.0;
 
-// The image of a texel changes by less than this share over the texels along a side while one goes to the next texel.
-const float SHADOW_CHANGE = 4.0;
-// Filters are taken to span this much at most, radians.
-const float SHADOW_SPAN_MAX = 0.75;
+// How far folds towards the light keep from shading themselves, in half diagonals of the filter.
+const float SHADOW_FOLD = 2.0;
+// The most that a receiver's plane is moved, as a share of the light's height over its plane.
+const float SHADOW_MOVE_MAX = 0.125;
 
-// A place that light reaches or not, moved off its surface.
+// A place that light reaches or not.
 struct ShadowReceiver {
-    vec3 to;         // from the light, moved
-    float distance;  // of the place before it was moved
+    vec3 to;         // from the light to where it is looked up
+    float distance;  // from the light
     vec3 normal;     // of the surface, to the side of the light
-    float height;    // of the light over the plane through the place; not positive for one that it does not shine on
+    float height;    // of the light over the surface's plane, which is moved towards the light
 };
 
 struct ShadowTexel {
@@ -32,31 +32,12 @@ struct ShadowTexel {
     ivec2 at;
 };
 
-// Half the longer diagonal of a texel's image on the sphere, radians, in a map of side x side texels a layer.
+// Half the diagonal of a square as large as the texel about a direction, radians, in a map of side x side texels a layer.
 float shadow_texel_radius(uint kind, vec3 d, int side) {
-    vec3 p;
-    vec3 across;
-    vec3 down;
-    if (kind == SHADOW_CUBE) {
-        // Any face's axes do: the largest component is the face's normal.
-        vec3 a = abs(d);
-        a = a.z >= a.x && a.z >= a.y ? a : a.y >= a.x ? a.zxy : a.yzx;
-        p = vec3(a.xy / a.z, 1.0);
-        across = vec3(1.0, 0.0, 0.0);
-        down = vec3(0.0, 1.0, 0.0);
-    } else {
-        vec2 s = octahedron_signs(d.xy);
-        p = d / (abs(d.x) + abs(d.y) + abs(d.z));
-        across = d.z < 0.0 ? vec3(0.0, -s.x * s.y, -s.x) : vec3(1.0, 0.0, -s.x);
-        down = d.z < 0.0 ? vec3(-s.x * s.y, 0.0, -s.y) : vec3(0.0, 1.0, -s.y);
-    }
-    float squared = dot(p, p);
-    vec3 one = across + down;
-    vec3 other = across - down;
-    one -= p * (dot(p, one) / squared);
-    other -= p * (dot(p, other) / squared);
+    uint face;
+    float density = kind == SHADOW_CUBE ? cube_density(cube_encode(d, face)) : octahedron_density(octahedron_encode(d));
     // A texel is 2 / side wide in the map's coordinates.
-    return sqrt(max(dot(one, one), dot(other, other)) / squared) / float(side);
+    return sqrt(2.0 * density) / float(side);
 }
 
 // `width`: texels that the filter is wide, 0 for none. `slack`: by how much the position may be off its plane, metres.
@@ -65,19 +46,18 @@ ShadowReceiver shadow_receiver(uint kind, int side, int width, vec3 light, vec3 
     r.to = position - light;
     r.normal = dot(normal, r.to) > 0.0 ? -normal : normal;
     r.distance = length(r.to);
-    // Centres of texels that count are no farther away than this.
-    float span = shadow_texel_radius(kind, r.to, side) * float(width + 1) * (1.0 + SHADOW_CHANGE / float(side));
-    r.to += r.normal * (r.distance * tan(min(span, SHADOW_SPAN_MAX)) + slack);
-    r.height = -dot(r.normal, r.to);
+    float half_texel = r.distance * shadow_texel_radius(kind, r.to, side);
+    float height = -dot(r.normal, r.to);
+    r.height = height - min(SHADOW_FOLD * half_texel * float(width + 1) + slack, SHADOW_MOVE_MAX * height);
+    // Off the surface, so that the texel is more often one of what is in front of it than of itself.
+    r.to += half_texel * r.normal;
     return r;
 }
 
-// What is nearer than this along a unit direction shades the receiver: its own plane, or its distance where that is nearer.
+// What is nearer than this along a unit direction shades the receiver: its moved plane, or its distance where that is nearer.
 float shadow_threshold(ShadowReceiver r, vec3 direction) {
     float fall = -dot(r.normal, direction);
-    // The plane is met within the distance.
-    bool is_met = r.height > 0.0 && r.height < fall * r.distance;
-    return (is_met ? r.height / fall : r.distance) * (1.0 - SHADOW_ROUNDING);
+    return (r.height < fall * r.distance ? r.height / fall : r.distance) * (1.0 - SHADOW_ROUNDING);
 }
 
 // The texel that is so far from a layer's corner, or the one that it repeats beyond the edges.

@@ -5,12 +5,12 @@
 //! Environment Maps", EGWR 2000; B. Karis, "Real Shading in Unreal Engine 4", SIGGRAPH course notes, 2013 (the integral split into filtered
 //! light and albedo).
 //!
-//! A probe is a square octahedron map in the world's axes. Its look-ups are in levels: the first is the map itself, for mirrors; the last, of 16²
+//! A probe is a square octahedron map in the world's axes. Its look-ups are in levels: the first is the map itself, for mirrors; the last, of 32²
 //! texels, is filtered by the GGX lobe of width α = 1, which with n = v = r is the cosine, so that it is irradiance over π; those between are of
 //! smaller α, each level half as wide. Levels finer than the finest filtered one are plain means by solid angle, and count as the lobe of their texels' solid angle.
 //! A width between two levels' is the mixture of both whose lobe has its variance ([`probe_part`]).
 //!
-//! Bias: that of [`prefilter`](crate::maps::prefilter) (round lobes), of mixtures of two lobes for those between, of bilinear look-ups in 16² texels
+//! Bias: that of [`prefilter`](crate::maps::prefilter) (round lobes), of mixtures of two lobes for those between, of bilinear look-ups in 32² texels
 //! (irradiance), and of light that is taken to come from infinity. A mean over all directions is kept to the rounding of f32. Deterministic.
 
 use glam::{DMat3, UVec2};
@@ -27,23 +27,25 @@ use crate::scene::Environment;
 use crate::{Error, Result};
 
 /// Texels along a side of the last level, whose lobe has α = 1.
-pub const LAST_SIDE: u32 = 16;
+pub const LAST_SIDE: u32 = 32;
 /// Least texels along a side of the level that lobes are summed over.
 const LEAST_SOURCE: u32 = 32;
+/// Greatest texels along a side of a level that is filtered.
+const FINEST_MAX: u32 = 256;
 
 /// What a [`LightProbe`] is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LightProbeDesc {
-    /// Texels along a side: a power of two from 32 to 2048.
+    /// Texels along a side: a power of two from 64 to 4096.
     pub side: u32,
-    /// Texels along a side of the finest level that is filtered by a lobe: a power of two from 16 to 128. The work grows with its fourth
+    /// Texels along a side of the finest level that is filtered by a lobe: a power of two from 32 to 256. The work grows with its fourth
     /// power.
     pub finest: u32,
 }
 
 impl Default for LightProbeDesc {
     fn default() -> Self {
-        Self { side: 128, finest: 64 }
+        Self { side: 256, finest: 128 }
     }
 }
 
@@ -55,12 +57,9 @@ impl LightProbeDesc {
             let cause = format!("is not a power of two from {} to {most}", 2 * LAST_SIDE);
             return Err(Error::setting("probe side", self.side, cause));
         }
-        if !is_one_of(self.finest, LAST_SIDE, 128) {
-            return Err(Error::setting(
-                "finest filtered level",
-                self.finest,
-                "is not a power of two from 16 to 128",
-            ));
+        if !is_one_of(self.finest, LAST_SIDE, FINEST_MAX) {
+            let cause = format!("is not a power of two from {LAST_SIDE} to {FINEST_MAX}");
+            return Err(Error::setting("finest filtered level", self.finest, cause));
         }
         Ok(())
     }
@@ -81,7 +80,7 @@ impl LightProbeDesc {
             if level == 0 {
                 0.0
             } else if self.is_filtered(level) {
-                // 1, 0.35, 0.125, 0.044: lobes stay wider than the texels of their level.
+                // 1, 0.35, 0.125, 0.044: lobes stay wider than the texels of half as fine a level.
                 (f64::from(LAST_SIDE) / side).powf(1.5)
             } else {
                 alpha_of_solid_angle(4.0 * std::f64::consts::PI / (side * side))
@@ -221,7 +220,7 @@ impl LightProbe {
         recorder.pass("probe: copy", |pass| self.record_copy(pass))?;
         recorder.pass("probe: filter", |pass| {
             for level in (0..self.desc.levels()).filter(|level| self.desc.is_filtered(*level)) {
-                let source = (self.desc.side / (self.desc.side >> level).max(LEAST_SOURCE)).ilog2();
+                let source = (self.desc.side / (self.desc.side >> (level + 1)).max(LEAST_SOURCE)).ilog2();
                 let alpha = self.alphas[level as usize];
                 self.filter
                     .record(pass, (&self.map, source), (&self.filtered, level), alpha)?;
@@ -272,7 +271,7 @@ mod tests {
 
     #[test]
     fn lobes_grow_from_level_to_level() {
-        for (side, finest) in [(32, 16), (128, 64), (256, 64), (512, 128), (2048, 128)] {
+        for (side, finest) in [(64, 32), (128, 64), (256, 64), (512, 128), (4096, 256)] {
             let desc = LightProbeDesc { side, finest };
             let alphas = desc.alphas();
             assert_eq!(alphas.len() as u32, desc.levels());
@@ -282,7 +281,7 @@ mod tests {
             );
             assert_eq!((alphas[0], alphas.last().copied()), (0.0, Some(1.0)));
         }
-        for desc in [(16, 16), (100, 64), (4096, 64), (128, 8), (128, 256)] {
+        for desc in [(32, 32), (100, 64), (8192, 64), (128, 16), (128, 512)] {
             let (side, finest) = desc;
             assert!(LightProbeDesc { side, finest }.check().is_err(), "{desc:?}");
         }
@@ -290,7 +289,7 @@ mod tests {
 
     #[test]
     fn levels_of_lobes_are_those_of_their_widths() {
-        let alphas = LightProbeDesc { side: 256, finest: 64 }.alphas();
+        let alphas = LightProbeDesc { side: 512, finest: 128 }.alphas();
         for (level, alpha) in alphas.iter().enumerate() {
             assert!((probe_level(&alphas, f64::from(*alpha)) - level as f64).abs() < 1e-12);
         }

@@ -93,11 +93,10 @@ fn irradiance(smoke: bool) -> Result<Table> {
                 u64::from(size.element_product() * map.layers()).into(),
             ];
             let constant = |_: &DVec3| std::f64::consts::PI;
-            let lights: [(MapImage, &dyn Fn(&DVec3) -> f64, f64); 2] = [
-                (held(&|_| 1.0)?, &constant, std::f64::consts::PI),
-                (held(&sky)?, &of_sky, 2.0 * std::f64::consts::PI / 3.0),
-            ];
-            for (image, right, most) in &lights {
+            let exact: [&dyn Fn(&DVec3) -> f64; 2] = [&constant, &of_sky];
+            let most = [std::f64::consts::PI, 2.0 * std::f64::consts::PI / 3.0];
+            let images = [held(&|_| 1.0)?, held(&sky)?];
+            for ((image, right), most) in images.iter().zip(exact).zip(most) {
                 let source = IrradianceSource::new(image);
                 let parts: Vec<(DVec3, f64)> = map
                     .texels(size)

@@ -187,7 +187,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let stage = Stage::new(&gpu, address, *share)?;
         let finest = LightProbeDesc {
             side: reference,
-            finest: 16,
+            finest: 32,
         };
         let (right, _) = stage.draw(finest, 0)?;
         let mirror = right.probe().map().read(0)?;
@@ -200,7 +200,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         for side in sides {
             let desc = LightProbeDesc {
                 side: *side,
-                finest: 64,
+                finest: 128,
             };
             let (live, times) = stage.draw(desc, repeats)?;
             let probe = live.probe();
