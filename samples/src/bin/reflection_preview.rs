@@ -24,7 +24,7 @@ use clerestory::{Error, Result};
 use clerestory_samples::arguments::Arguments;
 use clerestory_samples::orbit::Orbit;
 use clerestory_samples::showroom::showroom;
-use clerestory_samples::window::{self, Canvas, Show, Shown};
+use clerestory_samples::window::{self, Show, Shown};
 use clerestory_samples::{check_messages, save_png, solids};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use winit::keyboard::{Key, NamedKey};
