@@ -3,6 +3,8 @@
 //! [`all`] lists the engine's own. Each says what it needs of a device, which scenes it can model (and refuses the others with the
 //! reason), which light paths its picture contains, and whether and how it is biased.
 //!
+//! [`preview`] is none of them: it draws one picture a frame into command buffers that its caller records, with nothing to add up.
+//!
 //! # How to add one
 //!
 //! 1. A type with settings, pipelines, working memory and a [`GpuFilm`](crate::film::GpuFilm), made from a [`Gpu`], a [`GpuScene`] and a

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::gpu::Gpu;
-use clerestory::{Result, scene};
+use clerestory::{Error, Result, scene};
 use clerestory_tools::experiments::measures::{self, Context};
 use clerestory_tools::experiments::render_sweep::{self, Places};
 use clerestory_tools::experiments::sweep::Sweep;
@@ -103,6 +103,9 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         return list();
     }
     let found = wanted(arguments)?;
+    for (experiment, _) in &found {
+        refuse_scenes(arguments, experiment)?;
+    }
     let bar = Bar::start()?;
     // Opened for the first experiment that needs it, and kept: kernels compile once.
     let mut gpu = None;
@@ -159,6 +162,18 @@ fn wanted(arguments: &Arguments) -> Result<Vec<(Experiment, Option<Block<'static
     }
     let found = arguments.experiments.iter();
     found.map(|name| Ok((experiments::find(name)?, None))).collect()
+}
+
+/// Scenes for a measure that has its own.
+fn refuse_scenes(arguments: &Arguments, experiment: &Experiment) -> Result<()> {
+    if let Kind::Measure(name) = experiment.kind()?
+        && !arguments.scenes.is_empty()
+        && !measures::find(name)?.takes_scenes
+    {
+        let cause = "has scenes of its own, or none: leave out --scene";
+        return Err(Error::setting("experiment", &experiment.name, cause));
+    }
+    Ok(())
 }
 
 fn list() -> Outcome<ExitCode> {

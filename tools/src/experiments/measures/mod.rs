@@ -44,6 +44,8 @@ pub struct Measure {
     pub name: &'static str,
     /// Whether it opens the device.
     pub needs_device: bool,
+    /// Whether it measures scenes that it is told ([`Context::scenes`]).
+    pub takes_scenes: bool,
     /// Takes the measure. Errors and counts are deterministic; times are not.
     pub run: fn(&Context<'_>) -> Result<Vec<Table>>,
 }
@@ -52,6 +54,7 @@ const fn on_host(name: &'static str, run: fn(&Context<'_>) -> Result<Vec<Table>>
     Measure {
         name,
         needs_device: false,
+        takes_scenes: false,
         run,
     }
 }
@@ -60,7 +63,15 @@ const fn on_device(name: &'static str, run: fn(&Context<'_>) -> Result<Vec<Table
     Measure {
         name,
         needs_device: true,
+        takes_scenes: false,
         run,
+    }
+}
+
+impl Measure {
+    const fn of_any_scenes(mut self) -> Self {
+        self.takes_scenes = true;
+        self
     }
 }
 
@@ -76,15 +87,15 @@ pub const MEASURES: &[Measure] = &[
     on_host("coupled-reflection", surfaces::coupled_reflection::measure),
     on_device("device-model", device::device_model::measure),
     on_host("free-flight", media::free_flight::measure),
-    on_device("kd-caches", kd::kd_caches::measure),
-    on_device("kd-heuristics", kd::kd_heuristics::measure),
-    on_device("kd-or-bvh", kd::kd_or_bvh::measure),
+    on_device("kd-caches", kd::kd_caches::measure).of_any_scenes(),
+    on_device("kd-heuristics", kd::kd_heuristics::measure).of_any_scenes(),
+    on_device("kd-or-bvh", kd::kd_or_bvh::measure).of_any_scenes(),
     on_host("kd-probability", kd::kd_probability::measure),
-    on_device("kd-rays", kd::kd_rays::measure),
-    on_device("kd-threads", kd::kd_threads::measure),
-    on_device("kd-traversal", kd::kd_traversal::measure),
+    on_device("kd-rays", kd::kd_rays::measure).of_any_scenes(),
+    on_device("kd-threads", kd::kd_threads::measure).of_any_scenes(),
+    on_device("kd-traversal", kd::kd_traversal::measure).of_any_scenes(),
     on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
-    on_device("live-maps", preview::live_maps::measure),
+    on_device("live-maps", preview::live_maps::measure).of_any_scenes(),
     on_host("map-borders", maps::map_borders::measure),
     on_host("map-choice", maps::map_choice::measure),
     on_device("map-construction", photon_maps::map_construction::measure),
@@ -108,7 +119,7 @@ pub const MEASURES: &[Measure] = &[
     on_host("ray-offsets", rays::ray_offsets::measure),
     on_host("sample-sums", rendering::sample_sums::measure),
     on_device("scene-profile", rendering::scene_profile::measure),
-    on_device("shadow-maps", preview::shadow_maps::measure),
+    on_device("shadow-maps", preview::shadow_maps::measure).of_any_scenes(),
     on_host("shading-normals", surfaces::shading_normals::measure),
     on_host("sphere-tests", rays::sphere_tests::measure),
     on_host("tangents", surfaces::tangents::measure),
