@@ -10,12 +10,7 @@ fn quad(name: &str, material: u32, [a, b, c, d]: [Vec3; 4], repeat: Vec2) -> Mes
     Mesh {
         name: name.into(),
         positions: vec![a, b, c, d],
-        uv0: vec![
-            Vec2::ZERO,
-            Vec2::new(repeat.x, 0.0),
-            repeat,
-            Vec2::new(0.0, repeat.y),
-        ],
+        uv0: vec![Vec2::ZERO, Vec2::new(repeat.x, 0.0), repeat, Vec2::new(0.0, repeat.y)],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         material: Some(material),
         ..Mesh::default()
@@ -50,10 +45,7 @@ fn block(material: u32, low: Vec3, high: Vec3) -> Mesh {
     Mesh {
         name: "block".into(),
         positions: (0..8).map(corner).collect(),
-        triangles: faces
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect(),
+        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
         material: Some(material),
         ..Mesh::default()
     }
@@ -65,7 +57,9 @@ fn squares(scene: &mut Scene, name: &str, dark: [u8; 3], bright: [u8; 3]) -> Tex
         name: name.into(),
         width: 2,
         height: 2,
-        texels: [dark, bright, bright, dark].map(|[r, g, b]| [r, g, b, u8::MAX]).to_vec(),
+        texels: [dark, bright, bright, dark]
+            .map(|[r, g, b]| [r, g, b, u8::MAX])
+            .to_vec(),
     });
     Texture {
         image,
@@ -135,11 +129,7 @@ pub fn showroom() -> Scene {
     for (side, depth) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
         let foot = v(2.7 * side, 0.0, 2.6 * depth);
         scene.place(column(marble, foot, 0.28, y));
-        scene.place(block(
-            marble,
-            foot - v(0.4, 0.0, 0.4),
-            foot + v(0.4, 0.22, 0.4),
-        ));
+        scene.place(block(marble, foot - v(0.4, 0.0, 0.4), foot + v(0.4, 0.22, 0.4)));
     }
     scene.place(block(blue, v(-0.5, 0.0, -3.4), v(0.6, 1.3, -2.7)));
     scene.place(block(red, v(1.1, 0.0, -3.2), v(1.8, 0.7, -2.5)));

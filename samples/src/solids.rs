@@ -14,7 +14,10 @@ fn closed_grid(name: &str, cells: [u32; 2], at: impl Fn(f64, f64) -> [DVec3; 2])
     };
     for i in 0..along {
         for j in 0..around {
-            let [place, normal] = at(TAU * f64::from(i) / f64::from(along), TAU * f64::from(j) / f64::from(around));
+            let [place, normal] = at(
+                TAU * f64::from(i) / f64::from(along),
+                TAU * f64::from(j) / f64::from(around),
+            );
             mesh.positions.push(place.as_vec3());
             mesh.normals.push(normal.normalize_or_zero().as_vec3());
         }
@@ -95,7 +98,10 @@ mod tests {
     /// Volume by the divergence theorem: positive where triangles are seen from outside counter-clockwise.
     fn volume(mesh: &Mesh) -> f64 {
         let at = |i: u32| mesh.positions[i as usize].as_dvec3();
-        let parts = mesh.triangles.iter().map(|[a, b, c]| at(*a).dot(at(*b).cross(at(*c))) / 6.0);
+        let parts = mesh
+            .triangles
+            .iter()
+            .map(|[a, b, c]| at(*a).dot(at(*b).cross(at(*c))) / 6.0);
         parts.sum()
     }
 

@@ -441,7 +441,15 @@ fn the_reflection_preview_has_a_window_and_takes_any_scene() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.png");
     // Without lights of its own the scene gets one.
-    let arguments = ["builtin:cornell-box", "--metal", "mirror", "--roughness", "0.4", "--map", "64"];
+    let arguments = [
+        "builtin:cornell-box",
+        "--metal",
+        "mirror",
+        "--roughness",
+        "0.4",
+        "--map",
+        "64",
+    ];
     let arguments = [&arguments[..], &["--size", "64x64", "--frames", "3"]].concat();
     let output = windowed(env!("CARGO_BIN_EXE_reflection_preview"), &arguments, &path);
     assert!(output.status.success(), "{}", said(&output));

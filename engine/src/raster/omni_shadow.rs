@@ -23,9 +23,7 @@ use glam::{DVec3, IVec2, UVec2, Vec3};
 
 use super::{GBuffer, GBufferDesc, Layering, Output, Surfaces, View};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{
-    SHADOW_CUBE, SHADOW_FOLD, SHADOW_MOVE_MAX, SHADOW_OCTAHEDRON, SHADOW_ROUNDING,
-};
+use crate::gpu::shaders::constants::{SHADOW_CUBE, SHADOW_FOLD, SHADOW_MOVE_MAX, SHADOW_OCTAHEDRON, SHADOW_ROUNDING};
 use crate::gpu::shaders::raster::omni_shadow_look_up as kernel;
 use crate::gpu::shaders::sets::OmniShadowSet;
 use crate::gpu::shaders::types::ShadowQuery;
@@ -205,7 +203,8 @@ impl OmniShadowMaps {
             return Err(Error::setting("lights", lights.len(), cause));
         }
         for (map, light) in (0u64..).zip(lights) {
-            self.gbuffer.record(recorder, surfaces, &self.views(surfaces, *light)?)?;
+            self.gbuffer
+                .record(recorder, surfaces, &self.views(surfaces, *light)?)?;
             let bytes = self.desc.texels() * size_of::<f32>() as u64;
             let barrier = |from, to| BufferBarrier {
                 buffer: &self.distances,
@@ -428,7 +427,11 @@ impl OmniShadowImage {
         let direction = map.texel_direction(size, texel).unwrap_or(DVec3::Z);
         let index = (texel.layer * self.side + texel.y) * self.side + texel.x;
         let seen = f64::from(self.distances[index as usize]);
-        if seen < shadow_threshold(r, direction) { 0.0 } else { 1.0 }
+        if seen < shadow_threshold(r, direction) {
+            0.0
+        } else {
+            1.0
+        }
     }
 
     /// The texel that one beyond the edges repeats: of a cube the one that holds the direction of its centre.

@@ -18,15 +18,13 @@ use std::time::Instant;
 use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu, GpuOptions, Recorder};
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{self, LightKind, Material, Mesh, Scene, SceneProfile, metals};
-use clerestory::techniques::preview::{
-    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows,
-};
+use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows};
 use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
 use clerestory_samples::arguments::Arguments;
 use clerestory_samples::orbit::Orbit;
 use clerestory_samples::showroom::showroom;
-use clerestory_samples::window::{self, Canvas, Show, Shown};
+use clerestory_samples::window::{self, Show, Shown};
 use clerestory_samples::{check_messages, save_png, solids};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use winit::keyboard::{Key, NamedKey};
@@ -354,8 +352,12 @@ impl Show for Stage {
         };
         if self.frames > 0 && !self.held {
             self.angle = (self.angle + self.settings.turn) % (4.0 * std::f64::consts::TAU);
-            self.on_device
-                .move_object(&self.gpu, &self.scene, self.body.object as usize, self.body.at(self.angle))?;
+            self.on_device.move_object(
+                &self.gpu,
+                &self.scene,
+                self.body.object as usize,
+                self.body.at(self.angle),
+            )?;
         }
         let mut recorder = self.gpu.recorder("frame")?;
         self.record(&mut view, orbit, &mut recorder)?;

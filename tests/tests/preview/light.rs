@@ -4,9 +4,7 @@ use clerestory::film::Picture;
 use clerestory::gpu::Gpu;
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{Camera, Environment, LightKind, Material, Scene};
-use clerestory::techniques::preview::{
-    LightProbe, LightProbeDesc, Preview, PreviewDesc, PreviewPart, PreviewShadows,
-};
+use clerestory::techniques::preview::{LightProbe, LightProbeDesc, Preview, PreviewDesc, PreviewPart, PreviewShadows};
 use clerestory::transport::GpuScene;
 use clerestory_hard_cases::scenes::{cuboid, floor};
 use clerestory_tests::render::{builtin, independent, paths, render};
@@ -17,10 +15,7 @@ use std::f64::consts::PI;
 use crate::subject::sphere;
 
 const SIZE: [u32; 2] = [48, 48];
-const PROBE: LightProbeDesc = LightProbeDesc {
-    side: 256,
-    finest: 128,
-};
+const PROBE: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
 
 /// A scene's picture by its first camera and its own lights, lit by a probe of its environment if it has one.
 pub fn picture(gpu: &Gpu, scene: &Scene, samples: u32, shadows: Option<PreviewShadows>) -> Picture {

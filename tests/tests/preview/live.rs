@@ -91,10 +91,7 @@ fn live(gpu: &Gpu, subject: &Subject, desc: LightProbeDesc, place: Vec3) -> Live
     live
 }
 
-const DESC: LightProbeDesc = LightProbeDesc {
-    side: 256,
-    finest: 128,
-};
+const DESC: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
 
 /// In whatever direction a surface looks, the probe's last level is its irradiance over π: the rays' mean by the cosine.
 #[test]
@@ -180,7 +177,12 @@ fn deviations_beside_the_middle_are_parallax() {
         let (scene, colors) = room();
         let subject = Subject::new(gpu, &scene);
         let middle = DVec3::new(0.2, -0.3, 0.1);
-        let live = live(gpu, &subject, LightProbeDesc { side: 256, finest: 32 }, middle.as_vec3());
+        let live = live(
+            gpu,
+            &subject,
+            LightProbeDesc { side: 256, finest: 32 },
+            middle.as_vec3(),
+        );
         let mut random = Random(6);
         for radius in [0.05, 0.2, 0.5] {
             let mut queries = Vec::new();

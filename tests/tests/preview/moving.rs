@@ -154,11 +154,11 @@ fn mistakes_are_refused() {
     with_gpu(|gpu| {
         let (whole, moving) = scene(placed(0.0));
         let on_device = GpuScene::new(gpu, &whole).unwrap();
-        let refused = |object: usize, place: DAffine3, words: &str| match on_device.move_object(gpu, &whole, object, place)
-        {
-            Err(Error::Setting { cause, .. }) => assert!(cause.contains(words), "{cause}"),
-            other => panic!("{words}: {other:?}"),
-        };
+        let refused =
+            |object: usize, place: DAffine3, words: &str| match on_device.move_object(gpu, &whole, object, place) {
+                Err(Error::Setting { cause, .. }) => assert!(cause.contains(words), "{cause}"),
+                other => panic!("{words}: {other:?}"),
+            };
         let moving = moving as usize;
         refused(99, placed(0.0), "does not exist");
         refused(0, placed(0.0), "emits light");
@@ -199,7 +199,11 @@ fn mistakes_are_refused() {
         };
         let many = vec![part.clone(); PARTS_MAX + 1];
         let camera = &whole.cameras[0];
-        assert!(preview.record(&mut recorder, &on_device, &surfaces, camera, &many).is_err());
+        assert!(
+            preview
+                .record(&mut recorder, &on_device, &surfaces, camera, &many)
+                .is_err()
+        );
         let probeless = Preview::new(
             gpu,
             &on_device,
@@ -262,8 +266,7 @@ fn passes_are_those_that_are_needed() {
         };
         let bare = "preview: lights, raster: surfaces, preview: shade";
         let shadows = DESC.shadows;
-        let shadowed =
-            "preview: lights, raster: surfaces, shadow maps: distances, raster: surfaces, preview: shade";
+        let shadowed = "preview: lights, raster: surfaces, shadow maps: distances, raster: surfaces, preview: shade";
         let (plain, bytes) = names(None, &[point]);
         assert_eq!(plain, bare);
         // Depth, triangle, two weights and radiance of each sample.

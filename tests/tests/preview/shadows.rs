@@ -116,7 +116,11 @@ fn is_at_border(subject: &Subject, light: Vec3, place: &ShadowPlace, span: f64, 
         let plane = if fall > 0.0 { height / fall } else { f64::INFINITY };
         let seen = subject.seen(light, direction.as_vec3());
         for moved in [0.0, 2.0 * span * to.length()] {
-            let low = if fall > 0.0 { (height - moved) / fall } else { f64::INFINITY };
+            let low = if fall > 0.0 {
+                (height - moved) / fall
+            } else {
+                f64::INFINITY
+            };
             found[usize::from(seen >= low.min(plane).min(to.length()) * (1.0 - 1e-5))] = true;
         }
     }
@@ -273,7 +277,11 @@ fn look_ups_are_their_twins() {
                 }
                 // The comparisons are those of f32 against f64: different where a distance is within rounding of the threshold.
                 println!("{} width {width}: {differing} differ", layout.name());
-                assert!(differing <= places.len() / 500, "{} {width}: {differing}", layout.name());
+                assert!(
+                    differing <= places.len() / 500,
+                    "{} {width}: {differing}",
+                    layout.name()
+                );
                 let partly = found.iter().filter(|share| **share > 0.0 && **share < 1.0).count();
                 assert_eq!(partly == 0, width == 0, "{} {width}: {partly}", layout.name());
             }

@@ -469,7 +469,9 @@ pub(super) const ROWS: &[Row] = &[
         ),
     ),
     Row {
-        bias: Some(Bias::Biased("no interreflection beyond a probe, no parallax, round lobes, unshadowed directional lights")),
+        bias: Some(Bias::Biased(
+            "no interreflection beyond a probe, no parallax, round lobes, unshadowed directional lights",
+        )),
         ..measured(
             "clerestory report live-maps",
             part(

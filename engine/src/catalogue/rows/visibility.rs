@@ -91,7 +91,9 @@ pub(super) const ROWS: &[Row] = &[
         )),
     ),
     Row {
-        bias: Some(Bias::Biased("borders of shadows are those of texels; contact shadows begin a texel late")),
+        bias: Some(Bias::Biased(
+            "borders of shadows are those of texels; contact shadows begin a texel late",
+        )),
         ..measured(
             "clerestory report shadow-maps",
             part(

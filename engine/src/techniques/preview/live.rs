@@ -32,13 +32,7 @@ impl LiveProbe {
     ///
     /// # Errors
     /// As [`LightProbe::new`]; [`Error::MissingFeature`] where clip distances are missing.
-    pub fn new(
-        gpu: &Gpu,
-        scene: &GpuScene,
-        preview: &Preview,
-        desc: LightProbeDesc,
-        has_probes: bool,
-    ) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, preview: &Preview, desc: LightProbeDesc, has_probes: bool) -> Result<Self> {
         Self::lit_by(gpu, scene, preview.lights(), desc, has_probes)
     }
 

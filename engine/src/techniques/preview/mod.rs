@@ -26,9 +26,7 @@ pub use shade::{PARTS_MAX, PreviewPart};
 use self::shade::{Eye, OUTPUTS, Seen, Shade, Target};
 use crate::film::Picture;
 use crate::gpu::shaders::techniques::preview::preview_display;
-use crate::gpu::{
-    Area, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute,
-};
+use crate::gpu::{Area, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute};
 use crate::raster::{GBuffer, GBufferDesc, Layering, Surfaces, View};
 use crate::scene::camera_frame::CameraFrame;
 use crate::scene::{Camera, LightKind};
@@ -229,7 +227,9 @@ impl Preview {
                 for row in y..y + samples {
                     let first = row as usize * across + (x * samples) as usize;
                     let of_row = all[first..first + samples as usize].iter();
-                    sum += of_row.map(|v| glam::Vec3::from_array(*v).as_dvec3()).sum::<glam::DVec3>();
+                    sum += of_row
+                        .map(|v| glam::Vec3::from_array(*v).as_dvec3())
+                        .sum::<glam::DVec3>();
                 }
                 values.extend((sum / f64::from(samples * samples)).as_vec3().to_array());
             }

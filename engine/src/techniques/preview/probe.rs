@@ -45,10 +45,7 @@ pub struct LightProbeDesc {
 
 impl Default for LightProbeDesc {
     fn default() -> Self {
-        Self {
-            side: 256,
-            finest: 128,
-        }
+        Self { side: 256, finest: 128 }
     }
 }
 
@@ -292,11 +289,7 @@ mod tests {
 
     #[test]
     fn levels_of_lobes_are_those_of_their_widths() {
-        let alphas = LightProbeDesc {
-            side: 512,
-            finest: 128,
-        }
-        .alphas();
+        let alphas = LightProbeDesc { side: 512, finest: 128 }.alphas();
         for (level, alpha) in alphas.iter().enumerate() {
             assert!((probe_level(&alphas, f64::from(*alpha)) - level as f64).abs() < 1e-12);
         }

@@ -136,12 +136,13 @@ impl Shade {
             return Err(Error::setting("parts", parts.len(), cause));
         }
         if !self.has_probe && parts.iter().any(|part| part.probe.is_some()) {
-            return Err(Error::setting("probe", "given", "is none that the preview was made for"));
+            return Err(Error::setting(
+                "probe",
+                "given",
+                "is none that the preview was made for",
+            ));
         }
-        let frames: Vec<_> = parts
-            .iter()
-            .map(|part| frame(seen, part))
-            .collect();
+        let frames: Vec<_> = parts.iter().map(|part| frame(seen, part)).collect();
         let barrier = |buffer, from, to| BufferBarrier { buffer, from, to };
         pass.barrier(&[barrier(&self.frames, Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
         pass.update(self.frames.view(), &frames)?;
@@ -149,11 +150,7 @@ impl Shade {
             barrier(&self.frames, Access::TRANSFER_WRITE, Access::COMPUTE_READ),
             barrier(target.buffer, Access::COMPUTE, Access::COMPUTE),
         ]);
-        gbuffer.barrier_to(
-            pass,
-            Access::COMPUTE_READ,
-            vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
-        );
+        gbuffer.barrier_to(pass, Access::COMPUTE_READ, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
         let (Some(triangles), Some(weights)) = (gbuffer.image(Output::Triangle), gbuffer.image(Output::Weights)) else {
             return Ok(());
         };

@@ -2,8 +2,8 @@
 
 use glam::{DAffine3, Vec3};
 
-use super::geometry::{Geometry, corners_of, instances_in_order};
 use super::GpuScene;
+use super::geometry::{Geometry, corners_of, instances_in_order};
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::gpu::{Gpu, TexelView};
 use crate::scene::{Instance, Scene};

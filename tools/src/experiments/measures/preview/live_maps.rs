@@ -195,10 +195,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         while image.size().x > summed {
             image = image.coarser()?;
         }
-        let truths: Vec<Vec<DVec3>> = ALPHAS
-            .iter()
-            .map(|alpha| truth(&image, &directions, *alpha))
-            .collect();
+        let truths: Vec<Vec<DVec3>> = ALPHAS.iter().map(|alpha| truth(&image, &directions, *alpha)).collect();
         let sharp: Vec<DVec3> = directions.iter().filter_map(|d| mirror.look_up(*d)).collect();
         for side in sides {
             let desc = LightProbeDesc {

@@ -157,7 +157,9 @@ fn run(gpu: &Gpu, subject: &Subject, layout: ShadowLayout, side: u32, repeats: u
     let count = subject.places.len() as f64;
     let off = |shares: &[f32]| {
         let pairs = shares.iter().zip(&subject.lit);
-        let sum: f64 = pairs.map(|(share, lit)| (f64::from(*share) - f64::from(u8::from(*lit))).abs()).sum();
+        let sum: f64 = pairs
+            .map(|(share, lit)| (f64::from(*share) - f64::from(u8::from(*lit))).abs())
+            .sum();
         sum / count
     };
     Ok(Found {
@@ -188,7 +190,11 @@ fn rate(line: &[Found]) -> f64 {
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
-    let (sides, repeats) = if context.smoke { (&SIDES[..2], 1) } else { (&SIDES[..], REPEATS) };
+    let (sides, repeats) = if context.smoke {
+        (&SIDES[..2], 1)
+    } else {
+        (&SIDES[..], REPEATS)
+    };
     let own: Vec<(String, Vec3)> = if context.scenes.is_empty() {
         let count = if context.smoke { 1 } else { SCENES.len() };
         SCENES[..count]
