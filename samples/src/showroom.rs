@@ -156,5 +156,6 @@ pub fn showroom() -> Scene {
         60f32.to_radians(),
     ));
     scene.defaults.aspect = Some(4.0 / 3.0);
+    scene.defaults.exposure = -0.4;
     scene
 }

@@ -215,7 +215,8 @@ fn mistakes_in_an_experiment_are_named() -> Tested {
 
 #[test]
 fn scenes_for_a_measure_with_its_own_are_refused() -> Tested {
-    let experiment = "title = \"tiny\"\nabout = \"What a test looks at.\"\nsystems = [\"BG-2\"]\nmeasure = \"phase-functions\"\n";
+    let experiment =
+        "title = \"tiny\"\nabout = \"What a test looks at.\"\nsystems = [\"BG-2\"]\nmeasure = \"phase-functions\"\n";
     let output = Bench::new()?.run(experiment, &["--scene", "builtin:cornell-box"])?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!output.status.success() && said.contains("leave out --scene"), "{said}");

@@ -30,7 +30,7 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 use winit::keyboard::{Key, NamedKey};
 
 /// Radius of the body as a share of the scene's least side, unless told otherwise.
-const RADIUS: f64 = 0.17;
+const RADIUS: f64 = 0.2;
 /// Radius of its way, as a share of the scene's lesser side on the ground.
 const WAY: f64 = 0.13;
 /// Degrees of its way a frame, unless told otherwise.

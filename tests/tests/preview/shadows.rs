@@ -86,14 +86,10 @@ fn maps_agree_with_rays_but_for_the_borders_of_shadows() {
                 ratios.push(errors[1] / errors[0]);
             }
             for (layout, line) in ShadowLayout::ALL.iter().zip(&lines) {
-                let (whole, last) = (slope(line), slope(&line[line.len() - 2..]));
-                println!(
-                    "{address}, {}: slope {whole:.3}, of the last two {last:.3}",
-                    layout.name()
-                );
+                let slope = slope(line);
+                println!("{address}, {}: slope {slope:.3}", layout.name());
                 // Coarse maps have texels as wide as some shadows, of which no border is left.
-                assert!((-1.2..-0.6).contains(&whole), "{address}, {}: {whole}", layout.name());
-                assert!((-1.3..-0.75).contains(&last), "{address}, {}: {last}", layout.name());
+                assert!((-1.2..-0.75).contains(&slope), "{address}, {}: {slope}", layout.name());
             }
         }
         println!("octahedron over cube: {ratios:.2?}");
@@ -293,7 +289,7 @@ fn look_ups_are_their_twins() {
     });
 }
 
-/// Filters blur borders: what they change of the mean is little beside the share of places that they blur.
+/// Filters blur borders, and lose contact as their width moves planes: they let more light through, by less than a third of what they blur.
 #[test]
 fn filters_keep_the_mean() {
     with_gpu(|gpu| {
@@ -309,7 +305,7 @@ fn filters_keep_the_mean() {
             let change = mean(&filtered) - mean(&plain);
             println!("{}: {change:.4} of {blurred:.4}", layout.name());
             assert!(
-                blurred > 0.02 && change.abs() < 0.25 * blurred,
+                blurred > 0.02 && (0.0..blurred / 3.0).contains(&change),
                 "{}: {change}",
                 layout.name()
             );

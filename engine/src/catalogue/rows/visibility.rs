@@ -92,7 +92,7 @@ pub(super) const ROWS: &[Row] = &[
     ),
     Row {
         bias: Some(Bias::Biased(
-            "borders of shadows are those of texels; contact shadows begin half a texel late",
+            "borders of shadows are those of texels; contact shadows begin a texel late",
         )),
         ..measured(
             "clerestory report shadow-maps",
