@@ -5,9 +5,9 @@
 //!
 //! The irradiance of a texel that is wholly above the horizon is its radiance times n · ∫ ω dω, with the integral over the texel's own solid
 //! angle, which is found once for all normals. It is summed over a grid of rectangles on the texel, each by its exact solid angle and the
-//! direction of its middle: off by a twelfth of their solid angle, relatively, times a half to three halves of their shear. Texels on the horizon are taken by a finer grid, weighted by
-//! the map's density and scaled to the texel's solid angle.
-//! Texels are constant each, as they are stored. Deterministic; sums of f64 in the order of texels. On the device: a map filtered with α = 1 by
+//! direction of its middle: off by a twelfth of their solid angle, relatively, times a half to three halves of their shear
+//! (which has no bound at the rims of the sphere map, which cost up to 3·10⁻⁴ of the irradiance, and of Nusselt's, up to 3·10⁻³). Texels on
+//! the horizon are taken by a finer grid, weighted by the map's density and scaled to the texel's solid angle. Texels are constant each, as they are stored. Deterministic; sums of f64 in the order of texels. On the device: a map filtered with α = 1 by
 //! [`PrefilterGgx`](super::prefilter::PrefilterGgx), times π, where texels have one direction each.
 
 use super::{MapImage, MapPoint, Parametrization, Texel};

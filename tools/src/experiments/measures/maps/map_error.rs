@@ -49,6 +49,9 @@ fn size(map: Parametrization, texels: u64) -> UVec2 {
     UVec2::new(height * map.aspect(), height)
 }
 
+/// A map, the irradiance under what it holds by the normal, and the most that this is.
+type Light<'a> = (MapImage, &'a dyn Fn(&DVec3) -> f64, f64);
+
 /// Greatest errors of irradiance for random normals: by the function and by texels of one direction each.
 fn irradiance(smoke: bool) -> Result<Table> {
     let (budgets, count): (&[u64], u32) = if smoke {
@@ -93,10 +96,11 @@ fn irradiance(smoke: bool) -> Result<Table> {
                 u64::from(size.element_product() * map.layers()).into(),
             ];
             let constant = |_: &DVec3| std::f64::consts::PI;
-            let exact: [&dyn Fn(&DVec3) -> f64; 2] = [&constant, &of_sky];
-            let most = [std::f64::consts::PI, 2.0 * std::f64::consts::PI / 3.0];
-            let images = [held(&|_| 1.0)?, held(&sky)?];
-            for ((image, right), most) in images.iter().zip(exact).zip(most) {
+            let lights: [Light<'_>; 2] = [
+                (held(&|_| 1.0)?, &constant, std::f64::consts::PI),
+                (held(&sky)?, &of_sky, 2.0 * std::f64::consts::PI / 3.0),
+            ];
+            for (image, right, most) in &lights {
                 let source = IrradianceSource::new(image);
                 let parts: Vec<(DVec3, f64)> = map
                     .texels(size)
