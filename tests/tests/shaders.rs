@@ -56,6 +56,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("transport/path_extend_media_alpha.comp", "SampledBuffer"),
     ("transport/path_shadow_media.comp", "SampledBuffer"),
     ("transport/path_shadow_media_alpha.comp", "SampledBuffer"),
+    ("techniques/preview/preview_shade.comp", "SampledBuffer"),
     ("raster/splat_points.comp", "SpecConstantOp"),
     // Two numbers right behind one, of three words in all.
     ("raster/splat_pull.comp", "MemberOverlap"),
@@ -81,6 +82,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("cube_probe.comp", "InvalidId"),
     // Comparisons of specialization constants.
     ("twin_random.comp", "SpecConstantOp"),
+    ("raster/omni_shadow_look_up.comp", "SpecConstantOp"),
     ("maps/directional_border.comp", "SpecConstantOp"),
     ("maps/directional_coarser.comp", "SpecConstantOp"),
     ("maps/directional_look_up.comp", "SpecConstantOp"),

@@ -40,7 +40,7 @@ const SPIN: f64 = 3.0;
 /// Bounces of light from wall to wall.
 const BOUNCES: usize = 3;
 /// Texels along a side of the map that lights the walls.
-const WALLS: u32 = 64;
+const WALLS: u32 = 128;
 /// Size of pictures without a window.
 const SIZE: [u32; 2] = [640, 480];
 
@@ -291,7 +291,7 @@ impl Stage {
             },
         )?;
         let probe = |side, finest| LiveProbe::new(gpu, scene, &preview, LightProbeDesc { side, finest }, true);
-        let walls = [probe(WALLS, 32)?, probe(WALLS, 32)?];
+        let walls = [probe(WALLS, 64)?, probe(WALLS, 64)?];
         let around = probe(self.settings.map, 128)?;
         let surfaces = scene.surfaces();
         let bare = surfaces.before(self.body.object);

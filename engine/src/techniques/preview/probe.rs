@@ -36,7 +36,7 @@ const FINEST_MAX: u32 = 256;
 /// What a [`LightProbe`] is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LightProbeDesc {
-    /// Texels along a side: a power of two from 64 to 4096.
+    /// Texels along a side: a power of two from 64 to 4096. With 64 there is no level between mirrors and irradiance.
     pub side: u32,
     /// Texels along a side of the finest level that is filtered by a lobe: a power of two from 32 to 256. The work grows with its fourth
     /// power.

@@ -26,7 +26,7 @@ const SCENES: [(&str, Vec3); 4] = [
     ("builtin:cathedral?source=point", Vec3::new(0.5, 0.25, 0.55)),
     ("builtin:divider-room", Vec3::new(0.3, 0.5, 0.4)),
 ];
-const SIDES: [u32; 4] = [64, 128, 256, 512];
+const SIDES: [u32; 3] = [128, 256, 512];
 const REFERENCE: u32 = 1024;
 /// Means of the reference that lobes are summed over, texels along a side: lobes are many times wider.
 const SUMMED: u32 = 256;
@@ -145,7 +145,7 @@ fn error(values: &[Vec3], truth: &[DVec3]) -> f64 {
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
     let (sides, reference, summed) = if context.smoke {
-        (&SIDES[..1], 128, 64)
+        (&SIDES[..1], 256, 64)
     } else {
         (&SIDES[..], REFERENCE, SUMMED)
     };
