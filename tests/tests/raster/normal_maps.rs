@@ -8,7 +8,7 @@ use clerestory::scene::{Filter, Image, Material, Scene, Texture, Wrap};
 use clerestory::transport::GpuScene;
 use clerestory_tests::render::{camera_down, floor};
 use clerestory_tests::with_gpu;
-use glam::{DVec3, DVec4, Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use crate::gbuffer::{draw, looking};
 
@@ -95,7 +95,7 @@ fn normal_maps_lead_shading_normals() {
                 let rgb = TEXELS[texel].map(|byte| f64::from(byte) / 255.0);
                 let expected = mapped_normal(
                     normal().as_dvec3(),
-                    DVec4::from(tangent(handedness).as_dvec4()),
+                    tangent(handedness).as_dvec4(),
                     DVec3::new(rgb[0], rgb[1], rgb[2]),
                     scale.into(),
                 );
