@@ -23,6 +23,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("accel/lbvh_refit_triangles.comp", "MemberOffset"),
     // Vectors of three numbers one behind the other.
     ("accel/lbvh_boxes.comp", "ArrayStride"),
+    ("techniques/preview/preview_display.comp", "ArrayStride"),
     // Texel buffers.
     ("twin_texture.comp", "SampledBuffer"),
     ("scene/records.comp", "SampledBuffer"),

@@ -15,7 +15,7 @@
 //!
 //! Bias: the border of a shadow is that of texels, off by half of one on average, so that errors fall as one over the texels along a side;
 //! what lies within the move off a surface casts no shadow on it (contact shadows begin a texel late); folds whose other side light grazes stay darker
-//! within a texel; occluders nearer to the light than the near
+//! within a texel; far sides of walls thinner than the move count as lit, where they are asked for (who shades sees that light comes from behind); occluders nearer to the light than the near
 //! plane ([`View::near_plane`]) cast none. Filtered borders are as wide as the filter, whatever the light's size. Deterministic.
 //! GLSL: `raster/omni_shadow.glsl` and `raster/omni_shadow_set.glsl`; the twin of a look-up is [`OmniShadowImage::visibility`].
 

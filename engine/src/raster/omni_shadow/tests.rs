@@ -27,14 +27,14 @@ fn planes_do_not_shade_themselves() {
         for width in [0, 1, 3] {
             for _ in 0..4000 {
                 let side = random.choose(&[8, 64, 1024]);
-                let normal = random.direction().as_dvec3();
+                let normal = random.direction().as_dvec3().normalize();
                 let light = 10f64.powf(3.0 * f64::from(random.signed())) * random.direction().as_dvec3();
                 // Down to grazing: the light is close above the plane now and then.
                 let along = normal.any_orthonormal_vector() * 10f64.powf(2.0 * f64::from(random.signed()));
                 let height = light.length() * random.choose(&[1e-3, 0.3, 1.0]);
                 let position = light + along - height * normal;
                 let r = shadow_receiver(layout, side, width, light, [position, normal], 0.0);
-                let direction = random.direction().as_dvec3();
+                let direction = random.direction().as_dvec3().normalize();
                 let fall = -normal.dot(direction);
                 let seen = if fall > 0.0 { height / fall } else { f64::INFINITY };
                 let threshold = shadow_threshold(&r, direction);
