@@ -5,6 +5,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "maps/directional_map.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -17,7 +18,7 @@ layout(set = 0, binding = 0, scalar) restrict buffer Texels { vec3 texels[]; };
 layout(set = 0, binding = 1, scalar) restrict readonly buffer Angles { float angles[]; };
 
 void main() {
-    int i = int(gl_GlobalInvocationID.x);
+    int i = int(invocation_index());
     if (i >= push.coarse.size.x * push.coarse.size.y * push.layers) {
         return;
     }

@@ -5,6 +5,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "maps/directional_map_set.glsl"
 
 layout(push_constant, scalar) uniform Push { uint count; } push;
@@ -14,7 +15,7 @@ layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { vec4 que
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer Values { vec3 values[]; };
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_index();
     if (i < push.count) {
         vec4 query = queries[i];
         values[i] = directional_look_up(query.xyz, query.w);

@@ -5,6 +5,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "raster/omni_shadow_set.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -24,7 +25,7 @@ layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { ShadowQu
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer Shares { float shares[]; };
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_index();
     if (i < push.count) {
         ShadowQuery q = queries[i];
         shares[i] = omni_shadow_visibility(push.map, push.side, push.light, q.position, q.normal, q.slack);

@@ -14,6 +14,9 @@ use crate::{Error, Result};
 /// Live pipelines by shader and specialization, so that equal ones are made once.
 pub(super) type PipelineTable = BTreeMap<(&'static str, Vec<(u32, u32)>), Weak<PipelineInner>>;
 
+/// Workgroups along an axis that every device dispatches.
+const ROW_GROUPS: u32 = 65_535;
+
 /// A compute pipeline of the shader `K`. Cloning shares it.
 pub struct ComputePipeline<K> {
     pub(super) inner: Arc<PipelineInner>,
@@ -100,6 +103,13 @@ impl<K> ComputePipeline<K> {
     /// Workgroups along x that cover `count` invocations.
     pub fn groups_for(&self, count: u32) -> u32 {
         count.div_ceil(self.inner.local_size[0])
+    }
+
+    /// Workgroups in rows that cover `count` invocations, for kernels that number theirs by `invocation_index`: as many a row as every device can.
+    pub fn groups_over(&self, count: u32) -> [u32; 3] {
+        let all = self.groups_for(count);
+        let rows = all.div_ceil(ROW_GROUPS).max(1);
+        [all.div_ceil(rows), rows, 1]
     }
 
     /// What it was made of.

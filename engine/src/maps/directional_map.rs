@@ -315,7 +315,7 @@ impl DirectionalMap {
                 coarse,
                 layers: layers.cast_signed(),
             };
-            pass.dispatch(&self.coarser, &[&set], &push, [self.coarser.groups_for(count), 1, 1])?;
+            pass.dispatch(&self.coarser, &[&set], &push, self.coarser.groups_over(count))?;
             pass.barrier(&[rw_compute_to_compute(&self.texels)]);
         }
         for level in 0..self.levels() {
@@ -379,7 +379,7 @@ impl DirectionalMap {
                 queries: queries.view(),
                 values: values.view(),
             };
-            let groups = [pipeline.groups_for(count), 1, 1];
+            let groups = pipeline.groups_over(count);
             pass.dispatch(
                 &pipeline,
                 &[&set, &self.set()],

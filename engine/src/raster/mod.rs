@@ -28,9 +28,10 @@ pub use gbuffer::{GBuffer, GBufferDesc};
 pub use octahedron::OCTANTS;
 pub use octants::OctantCut;
 pub use omni_shadow::{
-    OmniShadowDesc, OmniShadowImage, OmniShadowMaps, ShadowLayout, ShadowPlace, ShadowReceiver, shadow_receiver,
-    shadow_texel_radius, shadow_threshold,
+    OmniShadowDesc, OmniShadowImage, OmniShadowMaps, SHADOW_MAPS_MAX, SHADOW_WIDTH_MAX, ShadowLayout, ShadowPlace,
+    ShadowReceiver, shadow_receiver, shadow_texel_radius, shadow_threshold,
 };
+pub(crate) use omni_shadow::{check_width, filter_iterations};
 pub use output::Output;
 pub use pipelines::Layering;
 pub use surfaces::{ObjectTriangles, SurfaceFeatures, Surfaces};

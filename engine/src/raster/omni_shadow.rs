@@ -6,18 +6,31 @@
 //! "Saying Goodbye to Shadow Acne", GDC 2011 (receivers moved along their normal); J. Isidoro, "Shadow Mapping: GPU-based Tips and
 //! Techniques", GDC 2006 (the receiver's plane). Maps hold Euclidean distances from the light, of texel centres, in metres.
 //!
-//! There is no bias in scene units. Along the direction of a texel's centre a place is in shadow of what is nearer than the place's own plane, or than
-//! the place where that is nearer ([`shadow_threshold`]): a plane never shades itself, at any slope, with any filter. So that surfaces which fold
-//! towards the light do not shade each other, the plane is moved to the light's side by a texel's diagonal at that distance
-//! ([`shadow_texel_radius`]), times one more than the filter is wide in texels, but by no more than an eighth of the light's height over it; what the
-//! caller adds is how far rounding takes the position off its plane ([`SurfacePoint::error`](crate::accel::offset::SurfacePoint)). The map is looked up
-//! for the place half a diagonal off its surface, where a texel more often holds what is in front of the surface than the surface itself.
+//! No constant has a unit of length. A place is compared with texels so:
 //!
-//! Bias: the border of a shadow is that of texels, off by half of one on average, so that errors fall as one over the texels along a side;
-//! what lies within the move off a surface casts no shadow on it (contact shadows begin a texel late); folds whose other side light grazes stay darker
-//! within a texel; far sides of walls thinner than the move count as lit, where they are asked for (who shades sees that light comes from behind); occluders nearer to the light than the near
-//! plane ([`View::near_plane`]) cast none. Filtered borders are as wide as the filter, whatever the light's size. Deterministic.
-//! GLSL: `raster/omni_shadow.glsl` and `raster/omni_shadow_set.glsl`; the twin of a look-up is [`OmniShadowImage::visibility`].
+//! 1. *Threshold.* Along the direction of a texel's centre a place is in shadow of what is nearer than the place's own plane there, or than the
+//!    place itself where that is nearer ([`shadow_threshold`]): a plane never shades itself, at any slope, with any filter.
+//! 2. *Move of the plane.* So that surfaces which fold towards the light do not shade each other, the plane is moved to the light's side by a
+//!    texel's diagonal at that distance ([`shadow_texel_radius`]) times one more than the filter's width in texels, by an eighth of the light's
+//!    height over it at most; and, whatever that height, by how far rounding may take the position off its plane ([`ShadowPlace::slack`]). Where the
+//!    light is no higher than that nothing shades the place: on which side of the plane it is nobody knows.
+//! 3. *Move of the look-up.* The map is looked up for the place half a diagonal off its surface, where a texel more often holds what is in front of
+//!    the surface than the surface itself.
+//!
+//! Filters are percentage-closer filtering (PCF): shares of a square of texels that are not nearer than the threshold, `width` texels wide about the
+//! place, with the texels at its rim weighted by how much of them it covers.
+//!
+//! # Bias
+//!
+//! - The border of a shadow is that of texels, off by half of one on average: errors fall as one over the texels along a side.
+//! - What lies within the move of the plane off a surface casts no shadow on it: contact shadows begin `width + 1` texel diagonals late.
+//! - Folds whose other side light grazes stay darker within a texel.
+//! - Far sides of walls thinner than the move count as lit where they are asked for; who shades sees that light comes from behind.
+//! - What is nearer to the light than the near plane ([`View::near_plane`]) casts no shadow.
+//! - Filtered borders are as wide as the filter, whatever the light's size.
+//! - All that is drawn is opaque: partial alpha and glass cast full shadows.
+//!
+//! Deterministic. GLSL: `raster/omni_shadow.glsl` and `raster/omni_shadow_set.glsl`; the twin of a look-up is [`OmniShadowImage::visibility`].
 
 use glam::{DVec3, IVec2, UVec2, Vec3};
 
@@ -93,7 +106,7 @@ pub struct OmniShadowDesc {
     pub layout: ShadowLayout,
     /// Texels across and down of each layer.
     pub side: u32,
-    /// Lights that have a map, at most.
+    /// Lights that have a map, at most; [`SHADOW_MAPS_MAX`] at most.
     pub maps: u32,
 }
 
@@ -102,6 +115,30 @@ impl OmniShadowDesc {
     pub fn texels(&self) -> u64 {
         u64::from(self.layout.layers()) * u64::from(self.side) * u64::from(self.side)
     }
+}
+
+/// Width of a filter at most, texels: wider ones blur more than what they are wrong by, and cost its square.
+pub const SHADOW_WIDTH_MAX: u32 = 8;
+/// Maps at most: two passes each take half of those that a command buffer times.
+pub const SHADOW_MAPS_MAX: u32 = 256;
+
+/// Refuses filters that are wider than [`SHADOW_WIDTH_MAX`] or than a map: what lies beyond the edges is known for one side's length.
+pub(crate) fn check_width(width: u32, side: u32) -> Result<()> {
+    let most = SHADOW_WIDTH_MAX.min(side);
+    if width <= most {
+        return Ok(());
+    }
+    Err(Error::setting(
+        "shadow width",
+        width,
+        format!("is more than {most} texels"),
+    ))
+}
+
+/// Iterations of the loops over a filter's texels, for one light.
+pub(crate) fn filter_iterations(width: u32) -> u64 {
+    let count = u64::from(width) + 1;
+    if width == 0 { 0 } else { count * (count + 1) }
 }
 
 /// A place on a surface, as light may reach it.
@@ -128,12 +165,16 @@ impl OmniShadowMaps {
     /// Allocates the maps, and makes the pipeline that draws these surfaces. Nothing is in shadow before [`OmniShadowMaps::record`].
     ///
     /// # Errors
-    /// [`Error::Setting`] for no texels or no maps; [`Error::LimitExceeded`] for more than a storage buffer or an image holds;
+    /// [`Error::Setting`] for no texels, or maps other than 1 to [`SHADOW_MAPS_MAX`] in number; [`Error::LimitExceeded`] for more than a storage buffer or an image holds;
     /// [`Error::MissingFeature`] for octahedra where clip distances are missing; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, desc: OmniShadowDesc) -> Result<Self> {
         if desc.side == 0 || desc.maps == 0 {
             let value = format!("{} of side {}", desc.maps, desc.side);
             return Err(Error::setting("shadow maps", value, "are none"));
+        }
+        if desc.maps > SHADOW_MAPS_MAX {
+            let cause = format!("are more than {SHADOW_MAPS_MAX}, of which each takes two passes");
+            return Err(Error::setting("shadow maps", desc.maps, cause));
         }
         let bytes = desc
             .texels()
@@ -238,10 +279,10 @@ impl OmniShadowMaps {
     }
 
     /// Shares of a light's light that reach places, by the device: the light's place and its map's number, and the filter's width in texels
-    /// (0 for none).
+    /// (0 for none, [`SHADOW_WIDTH_MAX`] and the map's side at most).
     ///
     /// # Errors
-    /// [`Error::Setting`] for a map that does not exist; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Setting`] for a map that does not exist or a filter that is too wide; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn look_up(&self, map: u32, light: Vec3, width: u32, places: &[ShadowPlace]) -> Result<Vec<f32>> {
         Ok(self.look_up_timed(map, light, width, places)?.0)
     }
@@ -258,6 +299,7 @@ impl OmniShadowMaps {
         places: &[ShadowPlace],
     ) -> Result<(Vec<f32>, Timings)> {
         self.check(map)?;
+        check_width(width, self.desc.side)?;
         if places.is_empty() {
             return Ok(Default::default());
         }
@@ -291,7 +333,7 @@ impl OmniShadowMaps {
                 map,
                 side: self.desc.side as i32,
             };
-            let groups = [pipeline.groups_for(count), 1, 1];
+            let groups = pipeline.groups_over(count);
             pass.dispatch(&pipeline, &[&set, &self.set()], &push, groups)
         })?;
         let timings = recorder.submit()?.wait()?;
@@ -348,7 +390,7 @@ pub struct ShadowReceiver {
     pub distance: f64,
     /// Of the surface, to the side of the light.
     pub normal: DVec3,
-    /// Of the light over the surface's plane, which is moved towards the light, metres.
+    /// Of the light over the surface's plane, which is moved towards the light, metres; 0 where the light may be in the plane.
     pub height: f64,
 }
 
@@ -372,18 +414,23 @@ pub fn shadow_receiver(
     let normal = if normal.dot(to) > 0.0 { -normal } else { normal };
     let distance = to.length();
     let half_texel = distance * shadow_texel_radius(layout, to, side);
-    let moved = f64::from(SHADOW_FOLD) * half_texel * f64::from(width + 1) + slack;
     let height = -normal.dot(to);
+    let fold = f64::from(SHADOW_FOLD) * half_texel * (f64::from(width) + 1.0);
+    let fold = fold.min(f64::from(SHADOW_MOVE_MAX) * height);
     ShadowReceiver {
         to: to + half_texel * normal,
         distance,
         normal,
-        height: height - moved.min(f64::from(SHADOW_MOVE_MAX) * height),
+        height: (height - fold - slack).max(0.0),
     }
 }
 
-/// What is nearer than this along a unit direction shades the receiver: its moved plane, or its distance where that is nearer. Metres.
+/// What is nearer than this along a unit direction shades the receiver: its moved plane, or its distance where that is nearer, metres; 0 where the
+/// light may be in the plane.
 pub fn shadow_threshold(r: &ShadowReceiver, direction: DVec3) -> f64 {
+    if r.height <= 0.0 {
+        return 0.0;
+    }
     let fall = -r.normal.dot(direction);
     let is_met = r.height < fall * r.distance;
     let plane = if is_met { r.height / fall } else { r.distance };
@@ -391,8 +438,10 @@ pub fn shadow_threshold(r: &ShadowReceiver, direction: DVec3) -> f64 {
 }
 
 impl OmniShadowImage {
-    /// Share of the light that reaches a place on a surface: the twin of `omni_shadow_visibility`.
+    /// Share of the light that reaches a place on a surface: the twin of `omni_shadow_visibility`. The filter's width, texels, is
+    /// [`SHADOW_WIDTH_MAX`] and the map's side at most; greater counts as that.
     pub fn visibility(&self, light: Vec3, width: u32, place: &ShadowPlace) -> f64 {
+        let width = width.min(SHADOW_WIDTH_MAX).min(self.side);
         let surface = [place.position, place.normal].map(|v| v.as_dvec3());
         let slack = f64::from(place.slack);
         let r = shadow_receiver(self.layout, self.side, width, light.as_dvec3(), surface, slack);

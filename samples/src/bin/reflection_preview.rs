@@ -1,14 +1,15 @@
 //! A polished body that turns and wanders through a room and reflects it, drawn by rasterization alone.
 //!
-//! `reflection_preview [SCENE] [--shape sphere|ring|knot] [--metal mirror|gold|silver|copper|aluminium] [--roughness NUMBER] [--radius METRES]
-//! [--turn DEGREES] [--map TEXELS] [--shadows cube|octahedron|none] [--shadow TEXELS] [--samples N] [--output FILE] [--camera NAME]
+//! `reflection_preview [SCENE] [--shape sphere|ring|knot] [--metal mirror|NAME] [--roughness NUMBER] [--radius METRES] [--turn DEGREES]
+//! [--map TEXELS] [--shadows cube|octahedron|none] [--shadow TEXELS] [--samples N] [--output FILE] [--camera NAME]
 //! [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--screenshot FILE]`
 //!
 //! Each frame the body goes on by `--turn` degrees of its way. Lights without area cast shadows by omnidirectional shadow maps (`--shadow` texels
 //! along a side); the scene without the body is drawn in all directions from the body's middle, into an octahedron map of `--map` texels a side, and
 //! the body shows that map, filtered by how rough it is. What walls throw on one another is a second such map, drawn three times at the start, each lit by the one before.
-//! `--samples` squared samples make a pixel. Space holds the body. With `--output` there is no window: the last of `--frames` frames is
-//! written, and how long its parts took. Without a scene it is a room with two lamps. Otherwise as the viewer.
+//! `--samples` squared samples make a pixel. Metals are gold, silver, copper, aluminium, iron, chromium, titanium, nickel and cobalt. Space holds the
+//! body. With `--output` there is no window: the last of `--frames` frames is written, and how long its parts took. Without a scene it is a room with two
+//! lamps. Otherwise as the viewer.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -129,11 +130,15 @@ impl Settings {
                 ));
             }
         };
+        let radius = given.value("--radius")?;
+        if let Some(wrong) = radius.filter(|radius: &f64| !(*radius > 0.0 && radius.is_finite())) {
+            return Err(Error::setting("--radius", wrong, "is no length above 0"));
+        }
         Ok(Self {
             shape: given.text("--shape").unwrap_or("knot").into(),
             metal: given.text("--metal").unwrap_or("gold").into(),
             roughness: given.value("--roughness")?.unwrap_or(0.0),
-            radius: given.value("--radius")?,
+            radius,
             turn: given.value("--turn")?.unwrap_or(TURN).to_radians(),
             map: given.value("--map")?.unwrap_or(256),
             shadows: layout.map(|layout| PreviewShadows {
@@ -229,6 +234,20 @@ fn with_body(mut scene: Scene, settings: &Settings) -> Result<(Scene, Body)> {
     Ok((scene, body))
 }
 
+/// The error of a setting with the name of the option that gives it.
+fn by_option(mut error: Error) -> Error {
+    if let Error::Setting { name, .. } | Error::LimitExceeded { name, .. } = &mut error {
+        let option = match name.as_str() {
+            "probe side" | "directional map: texels" => "--map",
+            "shadow maps" | "shadow width" => "--shadow",
+            "samples" | "preview: samples" => "--samples",
+            _ => return error,
+        };
+        *name = option.into();
+    }
+    error
+}
+
 /// All that is drawn.
 struct Stage {
     gpu: Gpu,
@@ -289,10 +308,11 @@ impl Stage {
                 shadows: self.settings.shadows,
                 has_probes: true,
             },
-        )?;
+        )
+        .map_err(by_option)?;
         let probe = |side, finest| LiveProbe::new(gpu, scene, &preview, LightProbeDesc { side, finest }, true);
         let walls = [probe(WALLS, 64)?, probe(WALLS, 64)?];
-        let around = probe(self.settings.map, 128)?;
+        let around = probe(self.settings.map, 128).map_err(by_option)?;
         let surfaces = scene.surfaces();
         let bare = surfaces.before(self.body.object);
         let mut recorder = gpu.recorder("light among the walls")?;
@@ -377,7 +397,11 @@ impl Show for Stage {
 
     fn title(&mut self) -> String {
         let whole: f64 = self.times.values().sum();
-        format!("{:.1} frames/s", 1e3 / whole)
+        if whole > 0.0 {
+            format!("GPU {whole:.1} ms a frame")
+        } else {
+            "no timestamps".into()
+        }
     }
 
     fn key(&mut self, key: &Key) {

@@ -1,8 +1,11 @@
 //! Live maps: irradiance in a closed room against rays, reflections at the map's middle against rays, and parallax beside it.
 
-use clerestory::gpu::Gpu;
-use clerestory::scene::{Material, Mesh, Scene};
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc};
+use clerestory::Error;
+use clerestory::gpu::{BufferDesc, Category, Gpu};
+use clerestory::raster::ShadowLayout;
+use clerestory::scene::{Camera, Material, Mesh, Scene};
+use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows};
+use clerestory::transport::GpuScene;
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
 use glam::{DVec3, Vec3, Vec4};
@@ -58,6 +61,17 @@ fn face(from: DVec3, direction: DVec3) -> (usize, f64) {
         }
     }
     (found, nearest)
+}
+
+/// Whether another face begins within the texels that a look-up in a map of that side takes: they are no wider than 4.3 / side either way.
+fn is_at_edge(from: DVec3, direction: DVec3, side: u32) -> bool {
+    let reach = 2.0 * 4.3 / f64::from(side);
+    let (x, y) = direction.any_orthonormal_pair();
+    (0..16).any(|i| {
+        let (sine, cosine) = (f64::from(i) * std::f64::consts::TAU / 16.0).sin_cos();
+        let near = (direction + reach * (cosine * x + sine * y)).normalize();
+        face(from, near).0 != face(from, direction).0
+    })
 }
 
 fn live(gpu: &Gpu, subject: &Subject, desc: LightProbeDesc, place: Vec3) -> LiveProbe {
@@ -152,15 +166,10 @@ fn reflections_at_the_middle_are_those_of_rays() {
                     continue;
                 }
                 wrong += 1;
-                // Somewhere within the texels that were looked up another face begins: they are no wider than 4.3 / side either way.
-                let reach = 2.0 * 4.3 / f64::from(side);
-                let (x, y) = d.any_orthonormal_pair();
-                let is_at_edge = (0..16).any(|i| {
-                    let (sine, cosine) = (f64::from(i) * std::f64::consts::TAU / 16.0).sin_cos();
-                    let near = (d + reach * (cosine * x + sine * y)).normalize();
-                    face(place.as_dvec3(), near).0 != face(place.as_dvec3(), d).0
-                });
-                assert!(is_at_edge, "{side}: {d} {value} instead of {exact}");
+                assert!(
+                    is_at_edge(place.as_dvec3(), d, side),
+                    "{side}: {d} {value} instead of {exact}"
+                );
             }
             let share = f64::from(wrong) / queries.len() as f64;
             println!("{side}: {share:.4} of directions at edges");
@@ -198,13 +207,25 @@ fn deviations_beside_the_middle_are_parallax() {
                 }
                 let (seen, distance) = face(from, ray);
                 let to = (from + distance * ray - middle).normalize();
-                let reach = (from + distance * ray - middle).length();
-                // What is off is an angle of less than that under which the offset is seen.
-                assert!(to.angle_between(ray) <= (radius / reach).min(1.0).asin() + 1e-12);
                 queries.extend([to, ray].map(|d| d.as_vec3().extend(0.0)));
                 exact.push(colors[seen]);
             }
             let found = live.probe().filtered().look_up(&queries).unwrap();
+            // What is shown is what a ray from the middle meets in the mirrored direction.
+            let mut inside = 0;
+            for (query, value) in queries.iter().zip(&found).skip(1).step_by(2) {
+                let ray = query.truncate().as_dvec3();
+                if is_at_edge(middle, ray, 256) {
+                    continue;
+                }
+                inside += 1;
+                let from_middle = colors[face(middle, ray).0];
+                assert!(
+                    (*value - from_middle).abs().max_element() < 1e-5,
+                    "{ray}: {value} instead of {from_middle}"
+                );
+            }
+            assert!(10 * inside > 8 * exact.len(), "{radius}: {inside} of {}", exact.len());
             let mut differing = [0u32; 2];
             for (pair, exact) in found.as_chunks::<2>().0.iter().zip(&exact) {
                 for (count, value) in differing.iter_mut().zip(pair) {
@@ -217,5 +238,100 @@ fn deviations_beside_the_middle_are_parallax() {
             assert!(corrected < 0.05, "{radius}: {corrected}");
             assert!(plain > corrected, "{radius}: {plain}");
         }
+    });
+}
+
+/// A probe is drawn with the shadow maps and the scene's features that it was made for.
+#[test]
+fn other_previews_and_scenes_are_refused() {
+    with_gpu(|gpu| {
+        let (scene, _) = room();
+        let subject = Subject::new(gpu, &scene);
+        let scene = &subject.on_device;
+        let preview = |on_device: &GpuScene, shadows: Option<(ShadowLayout, u32)>| {
+            let desc = PreviewDesc {
+                size: [8, 8],
+                samples: 1,
+                lights: 1,
+                shadows: shadows.map(|(layout, width)| PreviewShadows {
+                    layout,
+                    side: 16,
+                    width,
+                }),
+                has_probes: false,
+            };
+            Preview::new(gpu, on_device, desc).unwrap()
+        };
+        let made_for = preview(scene, Some((ShadowLayout::Cube, 1)));
+        let desc = LightProbeDesc { side: 64, finest: 32 };
+        let live = LiveProbe::new(gpu, scene, &made_for, desc, false).unwrap();
+        let record = |scene: &GpuScene, preview: &Preview| {
+            let mut recorder = gpu.recorder("others").unwrap();
+            live.record(&mut recorder, scene, &scene.surfaces(), preview, Vec3::ZERO, None)
+        };
+        record(scene, &made_for).unwrap();
+        record(scene, &preview(scene, Some((ShadowLayout::Cube, 1)))).unwrap();
+        for other in [None, Some((ShadowLayout::Octahedron, 1)), Some((ShadowLayout::Cube, 2))] {
+            let refused = record(scene, &preview(scene, other));
+            assert!(matches!(refused, Err(Error::Setting { .. })), "{other:?}: {refused:?}");
+        }
+        // Of the same shapes, but without surfaces that emit light.
+        let (mut dark, _) = room();
+        for material in &mut dark.materials {
+            material.emission = Vec3::ZERO;
+        }
+        let dark = GpuScene::new(gpu, &dark).unwrap();
+        let refused = record(&dark, &preview(&dark, Some((ShadowLayout::Cube, 1))));
+        assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
+        let part = PreviewPart {
+            triangles: 0..12,
+            background: true,
+            probe: None,
+        };
+        let camera = Camera::look_at("main", DVec3::ZERO, DVec3::X, DVec3::Y, 1.0);
+        let mut recorder = gpu.recorder("others").unwrap();
+        let refused = made_for.record(&mut recorder, &dark, &dark.surfaces(), &camera, &[part]);
+        assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
+    });
+}
+
+/// More samples and pixels than one row of workgroups has invocations, down to the last.
+#[test]
+fn large_pictures_take_several_rows_of_workgroups() {
+    with_gpu(|gpu| {
+        let (scene, colors) = room();
+        let scene = GpuScene::new(gpu, &scene).unwrap();
+        let size = [2048, 2050];
+        assert!(size[0] * size[1] > 65_535 * 64);
+        let desc = PreviewDesc {
+            size,
+            samples: 1,
+            lights: 0,
+            shadows: None,
+            has_probes: false,
+        };
+        let preview = Preview::new(gpu, &scene, desc).unwrap();
+        let camera = Camera::look_at("main", DVec3::ZERO, DVec3::X, DVec3::Y, 0.5);
+        let part = PreviewPart {
+            triangles: 0..12,
+            background: true,
+            probe: None,
+        };
+        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+        let shown = gpu
+            .buffer(&BufferDesc::storage("shown", bytes, Category::Film))
+            .unwrap();
+        let mut recorder = gpu.recorder("large").unwrap();
+        preview
+            .record(&mut recorder, &scene, &scene.surfaces(), &camera, &[part])
+            .unwrap();
+        preview.record_display(&mut recorder, &shown, 0.0, false).unwrap();
+        recorder.submit().unwrap().wait().unwrap();
+        let pixels = (size[0] * size[1]) as usize;
+        let shown: Vec<u32> = gpu.read(shown.view(), pixels).unwrap();
+        assert!(shown.iter().all(|pixel| *pixel == shown[0]) && shown[0] & 0xFF == 0xFF);
+        let picture = preview.picture().unwrap();
+        let layer = picture.main_layer().unwrap();
+        assert!(layer.pixels().all(|pixel| pixel == colors[0].to_array()));
     });
 }

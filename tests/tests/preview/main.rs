@@ -3,5 +3,6 @@
 mod light;
 mod live;
 mod moving;
+mod penumbra;
 mod shadows;
 mod subject;

@@ -2,7 +2,7 @@
 
 use clerestory::Error;
 use clerestory::gpu::Gpu;
-use clerestory::raster::ShadowLayout;
+use clerestory::raster::{SHADOW_MAPS_MAX, SHADOW_WIDTH_MAX, ShadowLayout};
 use clerestory::scene::{Camera, LightKind, Material, Scene};
 use clerestory::techniques::preview::{
     LightProbe, LightProbeDesc, LiveProbe, PARTS_MAX, Preview, PreviewDesc, PreviewPart, PreviewShadows,
@@ -176,8 +176,29 @@ fn mistakes_are_refused() {
             PreviewDesc { samples: 9, ..DESC },
             PreviewDesc { lights: 4096, ..DESC },
             PreviewDesc { size: [0, 4], ..DESC },
+            PreviewDesc {
+                lights: SHADOW_MAPS_MAX + 1,
+                ..DESC
+            },
         ] {
             assert!(Preview::new(gpu, &on_device, wrong).is_err(), "{wrong:?}");
+        }
+        // Filters wider than is known of or than the map.
+        for (side, width) in [(64, SHADOW_WIDTH_MAX + 1), (2, 3), (64, u32::MAX)] {
+            let shadows = PreviewShadows {
+                layout: ShadowLayout::Cube,
+                side,
+                width,
+            };
+            let wrong = PreviewDesc {
+                shadows: Some(shadows),
+                ..DESC
+            };
+            let refused = Preview::new(gpu, &on_device, wrong).map(|_| ());
+            assert!(
+                matches!(&refused, Err(Error::Setting { name, .. }) if name == "shadow width"),
+                "{wrong:?}: {refused:?}"
+            );
         }
         let mut preview = Preview::new(gpu, &on_device, DESC).unwrap();
         let surfaces = on_device.surfaces();

@@ -1,15 +1,21 @@
 //! Omnidirectional shadow maps: against shadow rays at places on surfaces, by layout and by size; at every scale; lights near surfaces and in
 //! the planes of geometry; the twin; filters.
 
+use clerestory::Error;
 use clerestory::accel::offset::{scene_reach, surface_point};
 use clerestory::gpu::Gpu;
-use clerestory::raster::{OmniShadowDesc, OmniShadowMaps, ShadowLayout, ShadowPlace, shadow_texel_radius};
+use clerestory::gpu::shaders::constants::{SHADOW_FOLD, SHADOW_MOVE_MAX};
+use clerestory::maps::Texel;
+use clerestory::raster::{
+    OmniShadowDesc, OmniShadowImage, OmniShadowMaps, SHADOW_MAPS_MAX, SHADOW_WIDTH_MAX, ShadowLayout, ShadowPlace,
+    shadow_receiver, shadow_texel_radius, shadow_threshold,
+};
 use clerestory::scene::Scene;
 use clerestory_hard_cases::scenes::{cuboid, floor, transform};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::builtin;
 use clerestory_tests::with_gpu;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, UVec2, Vec3};
 
 use crate::subject::{Subject, place};
 
@@ -61,6 +67,23 @@ fn slope(points: &[(f64, f64)]) -> f64 {
     xy / xx
 }
 
+/// Texels along a side of a cube's faces.
+const SIDES: [u64; 4] = [64, 128, 256, 512];
+
+/// Whether what shades a place is so close to its plane that a map of either layout, with as many texels as a cube of that side, moves the plane beyond.
+fn is_contact(subject: &Subject, light: Vec3, place: &ShadowPlace, cube_side: u64) -> bool {
+    let to = (place.position - light).as_dvec3();
+    let fold = |layout: ShadowLayout| {
+        let side = layout.side_for(6 * cube_side * cube_side);
+        f64::from(SHADOW_FOLD) * shadow_texel_radius(layout, to, side) * to.length()
+    };
+    let height = to.dot(place.normal.as_dvec3()).abs();
+    let move_most = ShadowLayout::ALL.map(fold).into_iter().fold(0.0, f64::max);
+    let moved = move_most.min(f64::from(SHADOW_MOVE_MAX) * height);
+    let blocker = subject.height_of_blocker(light, place);
+    blocker.is_some_and(|blocker| f64::from(blocker) <= moved)
+}
+
 /// The document's expectation: cube and octahedron are as good at as many texels, within a fifth of the mean of both over the scenes; and the
 /// width of wrong borders is that of texels.
 #[test]
@@ -70,16 +93,26 @@ fn maps_agree_with_rays_but_for_the_borders_of_shadows() {
         for (address, share) in scenes() {
             let subject = Subject::new(gpu, &builtin(address));
             let light = subject.at(share);
-            let places = subject.places(3, PLACES);
+            // What is shaded from within the coarsest map's move of planes is lit by it, as its bias says, and no border: the ceiling behind a lamp.
+            let mut places = subject.places(3, PLACES);
+            places.retain(|place| !is_contact(&subject, light, place, SIDES[0]));
+            println!("{address}: {} of {PLACES} in contact", PLACES - places.len());
             let truth: Vec<bool> = places.iter().map(|place| subject.is_lit(light, place)).collect();
             let lit = truth.iter().filter(|lit| **lit).count() as f64 / truth.len() as f64;
             let mut lines = [Vec::new(), Vec::new()];
-            for cube_side in [64u64, 128, 256, 512] {
+            for cube_side in SIDES {
                 let errors = ShadowLayout::ALL.map(|layout| {
                     let side = layout.side_for(6 * cube_side * cube_side);
                     error(gpu, &subject, layout, side, light, (&places, &truth))
                 });
                 println!("{address}: lit {lit:.3}, cube side {cube_side}: {errors:?}");
+                // Borders in all directions: the layouts differ by their texels alone.
+                let ratio = errors[1] / errors[0];
+                let is_random = address.starts_with("builtin:triangle-soup") && cube_side >= 256;
+                assert!(
+                    !is_random || (0.8..1.2).contains(&ratio),
+                    "{address}, {cube_side}: {ratio}"
+                );
                 for (line, error) in lines.iter_mut().zip(errors) {
                     line.push(((cube_side as f64).ln(), error.ln()));
                 }
@@ -99,54 +132,95 @@ fn maps_agree_with_rays_but_for_the_borders_of_shadows() {
     });
 }
 
-/// Directions about a place, as seen from the light, within a map's texel: lit as the light sees them, if both answers occur.
-fn is_at_border(subject: &Subject, light: Vec3, place: &ShadowPlace, span: f64, random: &mut Random) -> bool {
+/// What surrounds a place, as seen from the light within a span, radians: whether a comparison with the place's plane, or with it moved as far as the
+/// map's bias says, gives both answers.
+struct Border {
+    exact: bool,
+    moved: bool,
+}
+
+fn border(
+    subject: &Subject,
+    (layout, side): (ShadowLayout, u32),
+    light: Vec3,
+    place: &ShadowPlace,
+    random: &mut Random,
+) -> Border {
     let to = (place.position - light).as_dvec3();
-    let normal = if place.normal.as_dvec3().dot(to) > 0.0 {
-        -place.normal.as_dvec3()
-    } else {
-        place.normal.as_dvec3()
-    };
-    let mut found = [false; 2];
-    // The receiver's plane is that of the place, and that of the place moved by what the bias may move it.
+    let normal = place.normal.as_dvec3();
+    let normal = if normal.dot(to) > 0.0 { -normal } else { normal };
+    let (distance, height) = (to.length(), -normal.dot(to));
+    let radius = shadow_texel_radius(layout, to, side);
+    let fold = f64::from(SHADOW_FOLD) * radius * distance;
+    let moved = fold.min(f64::from(SHADOW_MOVE_MAX) * height) + f64::from(place.slack);
+    let mut found = [[false; 2]; 2];
+    // A texel's diagonal: half of it to the texel's centre, half by which the look-up is moved.
+    let span = 2.0 * radius;
     for _ in 0..96 {
         let aside = to.cross(random.direction().as_dvec3()).normalize_or_zero();
         let direction = (to.normalize() + (span * f64::from(random.unit().sqrt())).tan() * aside).normalize();
         let fall = -normal.dot(direction);
-        let height = -normal.dot(to);
-        let plane = if fall > 0.0 { height / fall } else { f64::INFINITY };
         let seen = subject.seen(light, direction.as_vec3());
-        for moved in [0.0, 2.0 * span * to.length()] {
-            let low = if fall > 0.0 {
-                (height - moved) / fall
-            } else {
-                f64::INFINITY
-            };
-            found[usize::from(seen >= low.min(plane).min(to.length()) * (1.0 - 1e-5))] = true;
+        for (answers, height) in found.iter_mut().zip([height, (height - moved).max(0.0)]) {
+            let plane = if fall > 0.0 { height / fall } else { f64::INFINITY };
+            answers[usize::from(seen >= plane.min(distance) * (1.0 - 1e-5))] = true;
         }
     }
-    found[0] && found[1]
+    let [exact, moved] = found;
+    Border {
+        exact: exact == [true; 2],
+        // With either plane: what is between the two is lost by the move.
+        moved: exact != moved || moved == [true; 2],
+    }
 }
 
-/// Whatever is wrong is at a border: the light sees both within the span of the place's texel.
-fn check_borders(gpu: &Gpu, what: &str, subject: &Subject, light: Vec3, places: &[ShadowPlace]) {
+/// The nearest texel's answer with planes moved by three times the fold: a map that leaks light.
+fn leaking(map: &OmniShadowImage, light: Vec3, place: &ShadowPlace) -> bool {
+    let surface = [place.position, place.normal].map(|v| v.as_dvec3());
+    let mut r = shadow_receiver(map.layout, map.side, 0, light.as_dvec3(), surface, place.slack.into());
+    let to = surface[0] - light.as_dvec3();
+    let height = -r.normal.dot(to);
+    let fold = f64::from(SHADOW_FOLD) * r.distance * shadow_texel_radius(map.layout, to, map.side);
+    r.height = (height - (3.0 * fold).min(f64::from(SHADOW_MOVE_MAX) * height) - f64::from(place.slack)).max(0.0);
+    let at = map.layout.map().encode(r.to).unwrap();
+    let texel = (at.uv * f64::from(map.side)).as_uvec2().min(UVec2::splat(map.side - 1));
+    let texel = Texel {
+        layer: at.layer,
+        x: texel.x,
+        y: texel.y,
+    };
+    let direction = map.layout.map().texel_direction(UVec2::splat(map.side), texel).unwrap();
+    let index = (texel.layer * map.side + texel.y) * map.side + texel.x;
+    f64::from(map.distances[index as usize]) >= shadow_threshold(&r, direction)
+}
+
+/// Whatever is wrong is at a border: the light sees both within the span of the place's texel. And not much of what is at borders is wrong. A map
+/// that leaks light fails the first.
+fn check_borders(gpu: &Gpu, what: &str, subject: &Subject, light: Vec3, places: &[ShadowPlace]) -> [usize; 2] {
     let side = 128;
+    let mut leaks = [0; 2];
     for layout in ShadowLayout::ALL {
         let maps = maps(gpu, subject, layout, side, light);
         let found = maps.look_up(0, light, 0, places).unwrap();
+        let twin = maps.read(0).unwrap();
         let mut random = Random(17);
-        let (mut wrong, mut unexplained) = (0, 0);
+        let (mut wrong, mut unexplained, mut near) = (0, 0, 0);
+        let mut control = [0, 0];
         for (place, share) in places.iter().zip(&found) {
-            if (*share > 0.5) == subject.is_lit(light, place) {
-                continue;
+            let lit = subject.is_lit(light, place);
+            let at = border(subject, (layout, side), light, place, &mut random);
+            near += usize::from(at.exact);
+            if (*share > 0.5) != lit {
+                wrong += 1;
+                unexplained += usize::from(!at.moved);
             }
-            wrong += 1;
-            let d = (place.position - light).as_dvec3();
-            let span = 2.0 * shadow_texel_radius(layout, d, side);
-            unexplained += usize::from(!is_at_border(subject, light, place, span, &mut random));
+            if leaking(&twin, light, place) != lit {
+                control[0] += 1;
+                control[1] += usize::from(!at.moved);
+            }
         }
         println!(
-            "{what}, {}: {wrong} of {} wrong, {unexplained} of them not at borders",
+            "{what}, {}: {wrong} of {} wrong, {unexplained} of them not at borders, near which {near} are; with three times the fold {control:?}",
             layout.name(),
             places.len()
         );
@@ -156,8 +230,13 @@ fn check_borders(gpu: &Gpu, what: &str, subject: &Subject, light: Vec3, places: 
             "{what}, {}: {unexplained} of {wrong}",
             layout.name()
         );
-        assert!(wrong < places.len() / 10, "{what}, {}: {wrong}", layout.name());
+        // Within a texel's diagonal of a border either way, 2.8 texels: wrong by half a texel on average, and where the look-up is moved over it.
+        assert!(2 * wrong <= near, "{what}, {}: {wrong} of {near}", layout.name());
+        for (sum, count) in leaks.iter_mut().zip(control) {
+            *sum += count;
+        }
     }
+    leaks
 }
 
 /// A floor with blocks.
@@ -182,7 +261,12 @@ fn lights_close_to_surfaces_and_in_planes_of_geometry_are_wrong_at_borders_alone
     with_gpu(|gpu| {
         let subject = Subject::new(gpu, &blocks());
         let places = subject.places(5, 6000);
-        check_borders(gpu, "in the air", &subject, Vec3::new(0.0, 0.3, 0.0), &places);
+        let [wrong, unexplained] = check_borders(gpu, "in the air", &subject, Vec3::new(0.0, 0.3, 0.0), &places);
+        // The same check tells a map that leaks light.
+        assert!(
+            unexplained > wrong / 50,
+            "three times the fold: {unexplained} of {wrong}"
+        );
         check_borders(gpu, "a thousandth above", &subject, Vec3::new(0.0, 1e-3, 0.0), &places);
         check_borders(
             gpu,
@@ -350,6 +434,10 @@ fn mistakes_are_refused() {
             OmniShadowDesc { side: 0, ..desc },
             OmniShadowDesc { maps: 0, ..desc },
             OmniShadowDesc { side: 1 << 15, ..desc },
+            OmniShadowDesc {
+                maps: SHADOW_MAPS_MAX + 1,
+                ..desc
+            },
         ] {
             assert!(OmniShadowMaps::new(gpu, &surfaces, wrong).is_err(), "{wrong:?}");
         }
@@ -364,5 +452,35 @@ fn mistakes_are_refused() {
         let shares = maps.look_up(0, Vec3::Y, 0, &places).unwrap();
         assert!(shares.iter().all(|share| *share == 1.0));
         assert!(maps.look_up(0, Vec3::Y, 0, &[]).unwrap().is_empty());
+        // Filters that reach farther than a side beyond the edges, or than is known of.
+        for width in [SHADOW_WIDTH_MAX + 1, u32::MAX] {
+            let refused = maps.look_up(0, Vec3::Y, width, &places);
+            assert!(
+                matches!(&refused, Err(Error::Setting { name, .. }) if name == "shadow width"),
+                "{width}: {refused:?}"
+            );
+        }
+        let shares = maps.look_up(0, Vec3::Y, SHADOW_WIDTH_MAX, &places).unwrap();
+        // Weights are parts of texels, rounded.
+        assert!(shares.iter().all(|share| (*share - 1.0).abs() < 1e-6));
+        let least = OmniShadowMaps::new(gpu, &surfaces, OmniShadowDesc { side: 2, ..desc }).unwrap();
+        assert!(least.look_up(0, Vec3::Y, 3, &places).is_err());
+    });
+}
+
+/// More places than one row of workgroups has invocations: each has the answer that it has among few.
+#[test]
+fn many_places_take_several_rows_of_workgroups() {
+    with_gpu(|gpu| {
+        let subject = Subject::new(gpu, &blocks());
+        let light = Vec3::new(0.0, 0.3, 0.0);
+        let maps = maps(gpu, &subject, ShadowLayout::Octahedron, 64, light);
+        let few = subject.places(11, 1000);
+        let expected = maps.look_up(0, light, 1, &few).unwrap();
+        assert!(expected.contains(&0.0) && expected.contains(&1.0));
+        let many: Vec<_> = few.iter().copied().cycle().take(65_535 * 64 + 100).collect();
+        let found = maps.look_up(0, light, 1, &many).unwrap();
+        assert_eq!(found.len(), many.len());
+        assert!(found.iter().zip(expected.iter().cycle()).all(|(a, b)| a == b));
     });
 }

@@ -2,7 +2,7 @@
 
 use clerestory::accel::bvh2::Bvh2;
 use clerestory::accel::offset::{offset_ray_origin, scene_reach, surface_point};
-use clerestory::accel::{Ray, RayIndex};
+use clerestory::accel::{NO_HIT, Ray, RayIndex};
 use clerestory::gpu::Gpu;
 use clerestory::raster::ShadowPlace;
 use clerestory::scene::{Material, Mesh, Scene};
@@ -93,6 +93,20 @@ impl Subject {
             direction: (light - start).to_array(),
             t_max: 1.0,
         })
+    }
+
+    /// How far off a place's plane the first thing is that is between it and a light, metres; `None` for nothing.
+    pub fn height_of_blocker(&self, light: Vec3, place: &ShadowPlace) -> Option<f32> {
+        let along = light - place.position;
+        let error = Vec3::splat(place.slack / place.normal.abs().element_sum());
+        let start = offset_ray_origin(place.position, error, place.normal, along);
+        let hit = self.index.closest_hit(&Ray {
+            origin: start.to_array(),
+            t_min: 0.0,
+            direction: (light - start).to_array(),
+            t_max: 1.0,
+        });
+        (hit.triangle != NO_HIT).then(|| hit.t * place.normal.dot(along).abs())
     }
 
     /// Distance of what a light sees first in a direction; infinite for nothing.

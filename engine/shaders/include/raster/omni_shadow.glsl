@@ -16,7 +16,7 @@ const float SHADOW_ROUNDING = 16.0 / 16777216.0;
 
 // How far folds towards the light keep from shading themselves, in half diagonals of the filter.
 const float SHADOW_FOLD = 2.0;
-// The most that a receiver's plane is moved, as a share of the light's height over its plane.
+// The most that a receiver's plane is moved for folds, as a share of the light's height over its plane.
 const float SHADOW_MOVE_MAX = 0.125;
 
 // A place that light reaches or not.
@@ -24,7 +24,7 @@ struct ShadowReceiver {
     vec3 to;         // from the light to where it is looked up
     float distance;  // from the light
     vec3 normal;     // of the surface, to the side of the light
-    float height;    // of the light over the surface's plane, which is moved towards the light
+    float height;    // of the light over the surface's plane, which is moved towards the light; 0 where the light may be in the plane
 };
 
 struct ShadowTexel {
@@ -48,15 +48,20 @@ ShadowReceiver shadow_receiver(uint kind, int side, int width, vec3 light, vec3 
     r.distance = length(r.to);
     float half_texel = r.distance * shadow_texel_radius(kind, r.to, side);
     float height = -dot(r.normal, r.to);
-    r.height = height - min(SHADOW_FOLD * half_texel * float(width + 1) + slack, SHADOW_MOVE_MAX * height);
+    float fold = min(SHADOW_FOLD * half_texel * float(width + 1), SHADOW_MOVE_MAX * height);
+    r.height = max(height - fold - slack, 0.0);
     // Off the surface, so that the texel is more often one of what is in front of it than of itself.
     r.to += half_texel * r.normal;
     return r;
 }
 
-// What is nearer than this along a unit direction shades the receiver: its moved plane, or its distance where that is nearer.
+// What is nearer than this along a unit direction shades the receiver: its moved plane, or its distance where that is nearer. Nothing is
+// where the light may be in the plane, of which no side is known.
 float shadow_threshold(ShadowReceiver r, vec3 direction) {
     float fall = -dot(r.normal, direction);
+    if (!(r.height > 0.0)) {
+        return 0.0;
+    }
     return (r.height < fall * r.distance ? r.height / fall : r.distance) * (1.0 - SHADOW_ROUNDING);
 }
 

@@ -5,6 +5,7 @@
 
 layout(local_size_x = 64) in;
 
+#include "invocation.glsl"
 #include "srgb.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -19,7 +20,7 @@ layout(set = 0, binding = 0, scalar) restrict readonly buffer Radiance { vec3 ra
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer DisplayPixels { uint display_pixels[]; };
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_index();
     if (i >= push.width * push.height) {
         return;
     }

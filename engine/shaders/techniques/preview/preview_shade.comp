@@ -15,6 +15,7 @@ layout(constant_id = 140) const bool SEES_ALL_DIRECTIONS = false;
 layout(constant_id = 141) const bool HAS_PROBE = true;
 layout(constant_id = 142) const bool HAS_SHADOWS = true;
 
+#include "invocation.glsl"
 #include "raster/omni_shadow_set.glsl"
 #include "scene/bindings.glsl"
 #include "techniques/preview/frame.glsl"
@@ -102,7 +103,7 @@ vec3 preview_surface(uint triangle, vec2 weights, vec3 origin, vec3 direction) {
 
 void main() {
     PreviewFrame frame = frames[push.frame];
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_index();
     if (i >= frame.width * frame.height) {
         return;
     }

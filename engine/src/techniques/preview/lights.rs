@@ -2,14 +2,19 @@
 
 use glam::Vec3;
 
-use crate::gpu::shaders::constants::PREVIEW_NO_SHADOW;
+use crate::gpu::shaders::constants::{PREVIEW_NO_SHADOW, PROBE_LEVELS_MAX};
 use crate::gpu::shaders::types::SceneLight;
-use crate::gpu::{Access, Buffer, BufferBarrier, BufferDesc, Category, Gpu, Recorder};
-use crate::raster::{OmniShadowDesc, OmniShadowMaps, ShadowLayout, Surfaces};
+use crate::gpu::{Access, Buffer, BufferBarrier, BufferDesc, Category, DeviceKind, Gpu, Recorder, SOFTWARE_LOOP_CAP};
+use crate::raster::{
+    OmniShadowDesc, OmniShadowMaps, SHADOW_MAPS_MAX, ShadowLayout, Surfaces, check_width, filter_iterations,
+};
 use crate::scene::LightKind;
 use crate::scene::check::light_is_sound;
 use crate::transport::gpu_scene::light_record;
 use crate::{Error, Result};
+
+/// Iterations of the loops over a probe's levels: two look-ups.
+const PROBE_ITERATIONS: u64 = 2 * PROBE_LEVELS_MAX as u64;
 
 /// Shadow maps of a preview.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,7 +23,7 @@ pub struct PreviewShadows {
     pub layout: ShadowLayout,
     /// Texels across and down of each layer.
     pub side: u32,
-    /// Texels that the filter is wide; 0 for none.
+    /// Texels that the filter is wide; 0 for none, [`SHADOW_WIDTH_MAX`](crate::raster::SHADOW_WIDTH_MAX) and `side` at most.
     pub width: u32,
 }
 
@@ -29,6 +34,27 @@ impl Default for PreviewShadows {
             side: 512,
             width: 2,
         }
+    }
+}
+
+impl PreviewShadows {
+    /// Refuses filters that no look-up takes, and more lights than passes or the software driver's loops allow.
+    fn check(&self, gpu: &Gpu, lights: u32) -> Result<()> {
+        check_width(self.width, self.side)?;
+        if lights > SHADOW_MAPS_MAX {
+            let cause = format!("are more than the {SHADOW_MAPS_MAX} that may have shadow maps");
+            return Err(Error::setting("lights", lights, cause));
+        }
+        // All loops of an invocation count together.
+        let iterations = u64::from(lights) * (1 + filter_iterations(self.width)) + PROBE_ITERATIONS;
+        if gpu.caps().kind == DeviceKind::Cpu && iterations > u64::from(SOFTWARE_LOOP_CAP) {
+            let width = self.width;
+            let cause = format!(
+                "with a shadow width of {width} take more iterations than the {SOFTWARE_LOOP_CAP} after which software devices end loops"
+            );
+            return Err(Error::setting("lights", lights, cause));
+        }
+        Ok(())
     }
 }
 
@@ -44,6 +70,9 @@ pub struct PreviewLights {
 
 impl PreviewLights {
     pub(super) fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, most: u32, shadows: Option<PreviewShadows>) -> Result<Self> {
+        if let Some(wanted) = shadows {
+            wanted.check(gpu, most)?;
+        }
         let maps = |wanted: PreviewShadows| {
             let desc = OmniShadowDesc {
                 layout: wanted.layout,

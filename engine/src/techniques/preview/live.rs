@@ -74,7 +74,8 @@ impl LiveProbe {
     /// borders, and the filter. Probes may be this one itself, as it was before. Afterwards it is visible to compute shaders.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a place that is not finite, or probes where it was made for none; [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::Setting`] for a place that is not finite, a preview with other shadow maps or a scene with other features than those that it was made
+    /// for, or probes where it was made for none; [`Error::MissingBarrier`] in debug builds.
     pub fn record(
         &self,
         recorder: &mut Recorder,

@@ -8,10 +8,16 @@
 //! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact
 //! albedo. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them.
 //!
-//! Bias, all of it: surfaces that emit light nothing but through a live map; directional lights cast no shadows; a probe's light is neither
-//! occluded nor nearer than infinity, and interreflection is as much as a probe holds; microfacet reflections are filtered by a round lobe, without what
-//! the lobe's own Fresnel factors and masking do to its shape; nothing is seen through materials that transmit. Deterministic: the same bits for the same
-//! frame.
+//! Bias, all of it:
+//!
+//! - Emitting surfaces light others only through a live map.
+//! - Directional lights cast no shadows; shadows of the others have the bias of [`OmniShadowMaps`](crate::raster::OmniShadowMaps).
+//! - A probe's light is neither occluded nor nearer than infinity, and interreflection is as much as a probe holds.
+//! - Microfacet reflections are filtered by a round lobe, without what the lobe's own Fresnel factors and masking do to its shape.
+//! - Nothing is seen through materials that transmit, and glass casts full shadows.
+//! - Partial alpha is drawn opaque, in the picture, in shadow maps and in live maps.
+//!
+//! Deterministic: the same bits for the same frame.
 
 mod lights;
 mod live;
@@ -40,7 +46,7 @@ pub struct PreviewDesc {
     pub size: [u32; 2],
     /// Samples along each side of a pixel, 1 to 8; their mean is shown.
     pub samples: u32,
-    /// Lights at most, up to 1024.
+    /// Lights at most, up to 1024; with shadow maps up to [`SHADOW_MAPS_MAX`](crate::raster::SHADOW_MAPS_MAX).
     pub lights: u32,
     /// Shadow maps of lights that have a place; `None` for none.
     pub shadows: Option<PreviewShadows>,
@@ -70,7 +76,8 @@ impl Preview {
     /// Allocates a picture, and makes the pipelines for a scene.
     ///
     /// # Errors
-    /// [`Error::Setting`] for numbers out of range; [`Error::Unsupported`] for a scene with participating media; [`Error::LimitExceeded`] for
+    /// [`Error::Setting`] for numbers out of range, which for software devices those of lights times texels of the shadows' filter are, too, where
+    /// loops would end early; [`Error::Unsupported`] for a scene with participating media; [`Error::LimitExceeded`] for
     /// sizes; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, scene: &GpuScene, desc: PreviewDesc) -> Result<Self> {
         if !(1..=SAMPLES_MAX).contains(&desc.samples) {
@@ -148,7 +155,8 @@ impl Preview {
     /// they were.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a camera that cannot be used, too many parts, or probes where the preview was made for none;
+    /// [`Error::Setting`] for a camera that cannot be used, too many parts, a scene with other features than that which the preview was made for, or
+    /// probes where it was made for none;
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn record(
         &self,
@@ -202,7 +210,7 @@ impl Preview {
                 scale: exposure.exp2(),
                 bgra: bgra.into(),
             };
-            let groups = [self.display.groups_for(width * height), 1, 1];
+            let groups = self.display.groups_over(width * height);
             pass.dispatch(&self.display, &[&set], &push, groups)?;
             pass.barrier(&[rw_compute_to_compute(target)]);
             Ok(())

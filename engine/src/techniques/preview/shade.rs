@@ -64,11 +64,12 @@ pub(super) struct Seen<'a> {
 #[derive(Debug)]
 pub(super) struct Shade {
     pipeline: ComputePipeline<kernel::Kernel>,
+    /// What scene and shadow maps it was made for.
+    spec: kernel::Spec,
     frames: Buffer,
     sampler: Sampler,
     /// Bound where a part has no probe, or the kernel knows of none.
     dark: DirectionalMap,
-    has_probe: bool,
     /// Bound where there are no shadow maps.
     no_shadows: Buffer,
 }
@@ -81,8 +82,6 @@ impl Shade {
         all_directions: bool,
         has_probe: bool,
     ) -> Result<Self> {
-        let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
-        let shadows = lights.shadows();
         let dark = DirectionalMap::new(
             gpu,
             crate::maps::Parametrization::OctahedronQuadratic,
@@ -90,25 +89,11 @@ impl Shade {
             1,
             1,
         )?;
-        let constants = dark.constants();
-        let spec = surface_spec!(kernel, scene, {
-            has_multiple_scattering: bsdf.multiple_scattering,
-            separable_masking: false,
-            has_environment: profile.has_environment(),
-            has_area_lights: scene.has_area_lights(),
-            has_punctual_lights: true,
-            sees_all_directions: all_directions,
-            has_probe,
-            has_shadows: shadows.is_some(),
-            shadow_kind: shadows.map_or(0, |maps| maps.desc().layout.kind()),
-            shadow_width: lights.width() as i32,
-            directional_kind: constants.kind,
-            directional_border: constants.border,
-            ..Default::default()
-        });
+        let spec = spec(scene, lights, &dark, all_directions, has_probe);
         let bytes = (PARTS_MAX * size_of::<PreviewFrame>()) as u64;
         Ok(Self {
             pipeline: gpu.compute_pipeline(&spec)?,
+            spec,
             frames: gpu.buffer(&BufferDesc::storage("preview frames", bytes, Category::Work))?,
             sampler: gpu.sampler(&SamplerDesc {
                 name: "preview texels",
@@ -116,7 +101,6 @@ impl Shade {
                 address: vk::SamplerAddressMode::CLAMP_TO_EDGE,
             })?,
             dark,
-            has_probe,
             no_shadows: gpu.buffer_with("no shadows", Category::Light, &[f32::INFINITY])?,
         })
     }
@@ -135,11 +119,25 @@ impl Shade {
             let cause = format!("are more than {PARTS_MAX}");
             return Err(Error::setting("parts", parts.len(), cause));
         }
-        if !self.has_probe && parts.iter().any(|part| part.probe.is_some()) {
+        if !self.spec.has_probe && parts.iter().any(|part| part.probe.is_some()) {
             return Err(Error::setting(
                 "probe",
                 "given",
                 "is none that the preview was made for",
+            ));
+        }
+        let found = spec(
+            scene,
+            lights,
+            &self.dark,
+            self.spec.sees_all_directions,
+            self.spec.has_probe,
+        );
+        if found != self.spec {
+            return Err(Error::setting(
+                "scene or preview",
+                "given",
+                "has other features or other shadow maps than that which the kernel was made for",
             ));
         }
         let frames: Vec<_> = parts.iter().map(|part| frame(seen, part)).collect();
@@ -174,7 +172,7 @@ impl Shade {
                 radiance: target.buffer.view(),
             };
             let map = part.probe.map_or(&self.dark, LightProbe::filtered);
-            let groups = [self.pipeline.groups_for(width * height), 1, 1];
+            let groups = self.pipeline.groups_over(width * height);
             let sets: [&dyn crate::gpu::interface::BindingSet<'_>; 4] =
                 [&set, &map.set(), &scene.scene_set(), &shadows];
             pass.dispatch(&self.pipeline, &sets, &kernel::Push { frame }, groups)?;
@@ -182,6 +180,34 @@ impl Shade {
         }
         Ok(())
     }
+}
+
+/// What the kernel is specialized to.
+fn spec(
+    scene: &GpuScene,
+    lights: &PreviewLights,
+    dark: &DirectionalMap,
+    all_directions: bool,
+    has_probe: bool,
+) -> kernel::Spec {
+    let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
+    let shadows = lights.shadows();
+    let constants = dark.constants();
+    surface_spec!(kernel, scene, {
+        has_multiple_scattering: bsdf.multiple_scattering,
+        separable_masking: false,
+        has_environment: profile.has_environment(),
+        has_area_lights: scene.has_area_lights(),
+        has_punctual_lights: true,
+        sees_all_directions: all_directions,
+        has_probe,
+        has_shadows: shadows.is_some(),
+        shadow_kind: shadows.map_or(0, |maps| maps.desc().layout.kind()),
+        shadow_width: lights.width() as i32,
+        directional_kind: constants.kind,
+        directional_border: constants.border,
+        ..Default::default()
+    })
 }
 
 fn frame(seen: &Seen<'_>, part: &PreviewPart<'_>) -> PreviewFrame {
