@@ -84,9 +84,7 @@ impl Live {
     /// The G-buffer's.
     pub fn new(gpu: &Gpu, scene: &GpuScene, layout: Layout, texels: u32) -> Result<Self> {
         let map = layout.map();
-        let rows = f64::from(texels) / f64::from(map.layers() * map.aspect()).sqrt();
-        let rows = rows.round() as u32;
-        let size = UVec2::new(rows * map.aspect(), rows);
+        let size = map.size_for(f64::from(texels).powi(2));
         let layering = match layout {
             Layout::Cube => Layering::of_layers(gpu.caps(), CUBE_FACES),
             _ => Layering::Octants(OctantCut::default()),

@@ -15,7 +15,7 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 layout(set = 0, binding = 0, scalar) restrict buffer Texels { vec3 texels[]; };
-layout(set = 0, binding = 1, scalar) restrict readonly buffer Angles { float angles[]; };
+layout(set = 0, binding = 1, scalar) restrict readonly buffer SolidAngles { float solid_angles[]; };
 
 void main() {
     int i = int(invocation_index());
@@ -28,7 +28,7 @@ void main() {
     float whole = 0.0;
     for (int child = 0; child < 4; ++child) {
         ivec2 q = 2 * p + ivec2(child & 1, child >> 1);
-        float angle = angles[directional_angle(push.fine, ivec2(q.x, q.y % push.fine.size.y))];
+        float angle = solid_angles[directional_angle(push.fine, ivec2(q.x, q.y % push.fine.size.y))];
         sum += angle * texels[directional_texel(push.fine, q)];
         whole += angle;
     }

@@ -13,7 +13,7 @@
 
 use super::Parametrization;
 use super::directional_map::answer_of;
-use super::spherical_sat::{SatImage, SphericalSat, sat_half_width};
+use super::spherical_sat::{SatImage, SphericalSat, half_width_at};
 use crate::gpu::Pass;
 use crate::gpu::shaders::maps::sat_lobe;
 use crate::gpu::shaders::types::{LobeBox, LobeQuery};
@@ -252,7 +252,7 @@ pub fn sat_border(map: Parametrization, size: UVec2, boxes: &[WeightedBox]) -> R
     let mut most = 0.0f64;
     for (x, y) in (0..=PLACES).flat_map(|y| (0..=PLACES).map(move |x| (x, y))) {
         let uv = UVec2::new(x, y).as_dvec2() / f64::from(PLACES);
-        let reach = rows * 0.5 * (f64::from(map.aspect()) * largest / map.solid_angle_density(uv)).sqrt();
+        let reach = rows * half_width_at(map, size, uv, largest);
         let inside = (uv.min(1.0 - uv) * size.as_dvec2()).min_element();
         most = most.max(reach - inside);
     }
@@ -268,8 +268,9 @@ impl SatImage {
         let (x, y) = orthonormal_basis(d);
         let of = |one: &WeightedBox| -> Option<DVec3> {
             let middle = one.direction.x * x + one.direction.y * y + one.direction.z * d;
-            let half = sat_half_width(map, middle, one.solid_angle)?;
-            Some(one.weight * self.sat_mean(map.encode(middle)?.uv, half))
+            let uv = map.encode(middle)?.uv;
+            let half = half_width_at(map, self.size, uv, one.solid_angle);
+            Some(one.weight * self.sat_mean(uv, half))
         };
         boxes.iter().map(of).sum()
     }

@@ -32,11 +32,11 @@ pub struct DirectionalMap {
     map: Parametrization,
     border: u32,
     levels: Vec<MapLevel>,
-    greatest_angle: f64,
+    greatest_solid_angle: f64,
     /// The levels on the device.
     table: Buffer,
     texels: Buffer,
-    angles: Buffer,
+    solid_angles: Buffer,
     coarser: ComputePipeline<directional_coarser::Kernel>,
     borders: ComputePipeline<directional_border::Kernel>,
 }
@@ -119,19 +119,19 @@ impl DirectionalMap {
                 limit,
             });
         }
-        let (mut all, mut angles) = (Vec::new(), Vec::new());
+        let (mut all, mut solid_angles) = (Vec::new(), Vec::new());
         let mut first = 0;
         for level in 0..levels {
             let size = size >> level;
             all.push(MapLevel {
                 first,
-                first_angle: angles.len() as u32,
+                first_angle: solid_angles.len() as u32,
                 size: size.as_ivec2().to_array(),
             });
             let of = MapImage::from_fn(map, size, |texel| DVec3::splat(map.texel_solid_angle(size, texel)))?;
             // Layers are alike.
             let layer = size.element_product() as usize;
-            angles.extend(of.texels()[..layer].iter().map(|angle| angle.x));
+            solid_angles.extend(of.texels()[..layer].iter().map(|angle| angle.x));
             first += (size + 2 * border).element_product() * map.layers();
         }
         let bytes = u64::from(first) * size_of::<[f32; 3]>() as u64;
@@ -144,12 +144,12 @@ impl DirectionalMap {
             map,
             border,
             levels: all.clone(),
-            greatest_angle: angles[..size.element_product() as usize]
+            greatest_solid_angle: solid_angles[..size.element_product() as usize]
                 .iter()
                 .fold(0.0, |most, angle| most.max(f64::from(*angle))),
             table: gpu.buffer_with("directional map: levels", Category::Light, &all)?,
             texels: gpu.buffer(&BufferDesc::storage("directional map: texels", bytes, Category::Light))?,
-            angles: gpu.buffer_with("directional map: solid angles", Category::Light, &angles)?,
+            solid_angles: gpu.buffer_with("directional map: solid angles", Category::Light, &solid_angles)?,
             coarser: gpu.compute_pipeline(&directional_coarser::Spec {
                 directional_kind: constants.kind,
                 directional_border: constants.border,
@@ -220,8 +220,8 @@ impl DirectionalMap {
     }
 
     /// Solid angle of the map's texels at level 0 at most, sr.
-    pub(super) fn greatest_angle(&self) -> f64 {
-        self.greatest_angle
+    pub(super) fn greatest_solid_angle(&self) -> f64 {
+        self.greatest_solid_angle
     }
 
     /// The set that `maps/directional_map_set.glsl` reads.
@@ -229,7 +229,7 @@ impl DirectionalMap {
         DirectionalMapSet {
             map_levels: self.table.view(),
             map_texels: self.texels.view(),
-            map_angles: self.angles.view(),
+            map_angles: self.solid_angles.view(),
         }
     }
 
@@ -306,7 +306,7 @@ impl DirectionalMap {
             let (fine, coarse) = (pair[0], pair[1]);
             let set = directional_coarser::Set0 {
                 texels: self.texels.view(),
-                angles: self.angles.view(),
+                solid_angles: self.solid_angles.view(),
             };
             let layers = self.map.layers();
             let count = (coarse.size[0] * coarse.size[1]).cast_unsigned() * layers;

@@ -25,6 +25,11 @@ pub fn lat_long_density(uv: DVec2) -> f64 {
     2.0 * PI * PI * (PI * uv.y).sin()
 }
 
+/// The mean density of the row of texels at a pole, where it falls to 0, of a map of so many rows, sr.
+pub fn lat_long_pole_density(rows: f64) -> f64 {
+    4.0 * PI * rows * (0.5 * PI / rows).sin().powi(2)
+}
+
 /// Derivatives of the direction by the two coordinates.
 pub(super) fn derivatives(uv: DVec2) -> [DVec3; 2] {
     let (sin_phi, cos_phi) = (TAU * uv.x).sin_cos();

@@ -136,6 +136,13 @@ impl Parametrization {
         }
     }
 
+    /// Texels of a layer, square ones, of the map that has next to `texels` in all, those that hold no direction counted.
+    pub fn size_for(self, texels: f64) -> UVec2 {
+        let rows = (texels / f64::from(self.layers() * self.aspect())).sqrt();
+        let rows = rows.round().max(1.0) as u32;
+        UVec2::new(rows * self.aspect(), rows)
+    }
+
     /// Whether layers hold directions on their inscribed disc alone.
     pub fn is_disc(self) -> bool {
         matches!(self, Self::Sphere | Self::DualParaboloid | Self::Nusselt)

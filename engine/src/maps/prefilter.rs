@@ -59,6 +59,23 @@ fn check(alpha: f64) -> Result<()> {
     }
 }
 
+/// What sums over a map take of each texel: its direction, and radiance times solid angle with the solid angle (sr) behind it.
+pub fn weighted_texels(map: &MapImage) -> Vec<(DVec3, DVec4)> {
+    let (kind, size) = (map.map(), map.size());
+    let of = |texel| {
+        let solid_angle = kind.texel_solid_angle(size, texel);
+        let value = solid_angle * map.at(texel).as_dvec3();
+        Some((kind.texel_direction(size, texel)?, value.extend(solid_angle)))
+    };
+    kind.texels(size).filter_map(of).collect()
+}
+
+/// The mean radiance by the lobe about the unit direction `r`, over all of the [`weighted_texels`] of a map.
+pub fn ggx_mean(texels: &[(DVec3, DVec4)], r: DVec3, alpha: f64) -> DVec3 {
+    let sum: DVec4 = texels.iter().map(|(d, value)| ggx_lobe(r, *d, alpha) * *value).sum();
+    sum.truncate() / sum.w
+}
+
 /// Twin of [`PrefilterGgx`]: a map of the same kind, of `size`.
 ///
 /// # Errors
@@ -66,20 +83,10 @@ fn check(alpha: f64) -> Result<()> {
 pub fn prefilter_ggx(source: &MapImage, size: UVec2, alpha: f64) -> Result<MapImage> {
     check(alpha)?;
     let map = source.map();
-    let held: Vec<(DVec3, DVec4)> = map
-        .texels(source.size())
-        .filter_map(|texel| {
-            let angle = map.texel_solid_angle(source.size(), texel);
-            let value = angle * source.at(texel).as_dvec3();
-            Some((map.texel_direction(source.size(), texel)?, value.extend(angle)))
-        })
-        .collect();
+    let texels = weighted_texels(source);
     MapImage::from_fn(map, size, |texel| {
-        let Some(r) = map.texel_direction(size, texel) else {
-            return DVec3::ZERO;
-        };
-        let sum: DVec4 = held.iter().map(|(d, value)| ggx_lobe(r, *d, alpha) * *value).sum();
-        sum.truncate() / sum.w
+        let direction = map.texel_direction(size, texel);
+        direction.map_or(DVec3::ZERO, |r| ggx_mean(&texels, r, alpha))
     })
 }
 
@@ -108,7 +115,7 @@ impl PrefilterGgx {
         Ok(Self { constants, pipeline })
     }
 
-    /// Records the filtering of level `from` of `source` into level `to` of `target`, by roughness α = roughness²; the border is left to
+    /// Records the filtering of level `from` of `source` into level `to` of `target`, by a lobe of width α (the square of the material's roughness); the border is left to
     /// [`DirectionalMap::record_border`].
     ///
     /// Barriers: the source's texels must have been made visible to [`Access::COMPUTE`](crate::gpu::Access::COMPUTE), and earlier uses of

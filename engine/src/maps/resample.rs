@@ -46,7 +46,7 @@ pub const MAX_SAMPLES: u32 = 64;
 /// Texels of a map that are finer than the mean one by more than this, in solid angle, are taken as so fine: those at poles have no bound.
 const FINEST: f64 = 1.0 / 64.0;
 
-/// Converts a map. `turn` takes directions of the target's axes to those of the source: the identity where both are the same, or from
+/// Converts a map. `to_source` takes directions of the target's axes to those of the source: the identity where both are the same, or from
 /// [`Parametrization::world_axes`]. Texels without directions are black, and so is what the source does not hold.
 ///
 /// # Errors
@@ -55,10 +55,10 @@ pub fn resample(
     source: &MapImage,
     to: Parametrization,
     size: UVec2,
-    turn: DMat3,
+    to_source: DMat3,
     settings: &ResampleSettings,
 ) -> Result<MapImage> {
-    let conversion = Conversion::new(source, to, size, turn, settings)?;
+    let conversion = Conversion::new(source, to, size, to_source, settings)?;
     MapImage::from_fn(to, size, |texel| conversion.texel(texel))
 }
 
@@ -70,11 +70,11 @@ pub fn resample_watched(
     source: &MapImage,
     to: Parametrization,
     size: UVec2,
-    turn: DMat3,
+    to_source: DMat3,
     settings: &ResampleSettings,
     go_on: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Option<MapImage>> {
-    let conversion = Conversion::new(source, to, size, turn, settings)?;
+    let conversion = Conversion::new(source, to, size, to_source, settings)?;
     let rows = to.layers() * size.y;
     let mut texels = Vec::with_capacity((rows * size.x) as usize);
     for row in 0..rows {
@@ -94,7 +94,7 @@ struct Conversion<'a> {
     source: &'a MapImage,
     to: Parametrization,
     size: UVec2,
-    turn: DMat3,
+    to_source: DMat3,
     settings: &'a ResampleSettings,
 }
 
@@ -103,7 +103,7 @@ impl<'a> Conversion<'a> {
         source: &'a MapImage,
         to: Parametrization,
         size: UVec2,
-        turn: DMat3,
+        to_source: DMat3,
         settings: &'a ResampleSettings,
     ) -> Result<Self> {
         to.check_size(size)?;
@@ -116,7 +116,7 @@ impl<'a> Conversion<'a> {
             source,
             to,
             size,
-            turn,
+            to_source,
             settings,
         })
     }
@@ -124,14 +124,14 @@ impl<'a> Conversion<'a> {
     /// Of the source, in a direction of the target's axes.
     fn value(&self, d: DVec3) -> Option<DVec3> {
         match self.settings.reconstruction {
-            Reconstruction::Box => self.source.nearest(self.turn * d).map(|v| v.as_dvec3()),
-            Reconstruction::Bilinear => self.source.look_up(self.turn * d),
+            Reconstruction::Box => self.source.nearest(self.to_source * d).map(|v| v.as_dvec3()),
+            Reconstruction::Bilinear => self.source.look_up(self.to_source * d),
         }
     }
 
     fn texel(&self, texel: Texel) -> DVec3 {
         let Self { to, size, .. } = *self;
-        let steps = steps(self.source, to, size, texel, self.turn, self.settings.samples);
+        let steps = steps(self.source, to, size, texel, self.to_source, self.settings.samples);
         let [lower, upper] = texel.bounds(size);
         let step = (upper - lower) / f64::from(steps);
         let (mut sum, mut whole) = (DVec3::ZERO, 0.0);
@@ -157,7 +157,7 @@ impl<'a> Conversion<'a> {
 
 /// Rectangles along a side of a target's texel: the samples times a power of two, so that maps of which one refines the other meet edge to
 /// edge.
-fn steps(source: &MapImage, to: Parametrization, size: UVec2, texel: Texel, turn: DMat3, samples: u32) -> u32 {
+fn steps(source: &MapImage, to: Parametrization, size: UVec2, texel: Texel, to_source: DMat3, samples: u32) -> u32 {
     let texels = source.size().as_dvec2().element_product();
     let mean = source.map().solid_angle() / (texels * f64::from(source.map().layers()) * source.map().coverage());
     let [lower, upper] = texel.bounds(size);
@@ -171,7 +171,7 @@ fn steps(source: &MapImage, to: Parametrization, size: UVec2, texel: Texel, turn
     let fine = places
         .into_iter()
         .filter_map(|uv| to.decode(MapPoint { layer: texel.layer, uv }))
-        .filter_map(|d| source.map().encode(turn * d))
+        .filter_map(|d| source.map().encode(to_source * d))
         .map(|at| source.map().solid_angle_density(at.uv) / texels)
         .fold(f64::INFINITY, f64::min)
         .clamp(FINEST * mean, mean);

@@ -18,6 +18,7 @@
 //! `maps/spherical_sat.glsl`. Table: four channels of eight bytes a texel of the bordered map.
 
 use super::directional_map::{DirectionalMap, answer};
+use super::lat_long::lat_long_pole_density;
 use super::{MapImage, Parametrization};
 use crate::gpu::shaders::constants::{SAT_FIXED, SAT_FLOAT, SAT_TWO_FLOAT};
 use crate::gpu::shaders::maps::{sat_columns, sat_look_up, sat_rows};
@@ -57,7 +58,7 @@ impl SatNumbers {
 pub struct SatRange {
     /// Taken from radiance before it is summed, and added to means.
     pub offset: Vec3,
-    /// |radiance − offset| at most, above 0: sums of integers overflow beyond.
+    /// |radiance − offset| at most, above 0: sums of integers overflow beyond. Texels of integers are no finer than 2⁻¹²⁰, whatever it is.
     pub deviation: f32,
 }
 
@@ -76,14 +77,26 @@ impl SatRange {
     }
 }
 
-/// Half the side, over the map's height, of the box about a direction that holds a solid angle (sr) where the map is as dense as there.
-pub fn sat_half_width(map: Parametrization, direction: DVec3, solid_angle: f64) -> Option<f64> {
-    let at = map.encode(direction)?;
-    Some(0.5 * (f64::from(map.aspect()) * solid_angle / map.solid_angle_density(at.uv)).sqrt())
+/// Half the side, over the map's height, of the box about a direction that holds a solid angle (sr) where a map of that many texels is as dense
+/// as there, and at the poles of the latitude–longitude map as the row of texels there: finite everywhere.
+pub fn sat_half_width(map: Parametrization, size: UVec2, direction: DVec3, solid_angle: f64) -> Option<f64> {
+    Some(half_width_at(map, size, map.encode(direction)?.uv, solid_angle))
+}
+
+/// Twin of `sat_half_width` of `maps/box_lobe.glsl`: of [`sat_half_width`] at a place in \[0, 1\]².
+pub(super) fn half_width_at(map: Parametrization, size: UVec2, uv: DVec2, solid_angle: f64) -> f64 {
+    let least = match map {
+        Parametrization::LatLong => lat_long_pole_density(size.y.into()),
+        _ => 0.0,
+    };
+    let density = map.solid_angle_density(uv).max(least);
+    0.5 * (f64::from(map.aspect()) * solid_angle / density).sqrt()
 }
 
 /// Bits of sums of integers, of which one more is the sign.
 const FIXED_BITS: f64 = 62.0;
+/// Largest scale of integers as a power of two: it and what it multiplies stay within f32.
+const MAX_SCALE: f64 = 120.0;
 /// Longest line of a table: a line is a loop of some steps a texel, and software drivers end loops after 65,535.
 const MAX_LINE: u32 = 4096;
 
@@ -130,9 +143,10 @@ impl SphericalSat {
         }
         let per_angle = f64::from(size.element_product()) / (4.0 * PI);
         // The largest sums that there can be.
-        let weight = per_angle * map.greatest_angle();
+        let weight = per_angle * map.greatest_solid_angle();
         let count = f64::from(tile.element_product());
-        let scale = |largest: f64| (FIXED_BITS - (largest * weight * count).log2()).floor().exp2() as f32;
+        let bits = |largest: f64| (FIXED_BITS - (largest * weight * count).log2()).floor();
+        let scale = |largest: f64| bits(largest).min(MAX_SCALE).exp2() as f32;
         let color = scale(range.deviation.into());
         let shape = SatShape {
             size: level.size,
@@ -250,7 +264,7 @@ impl SphericalSat {
 /// Twin of [`SphericalSat`] in f64.
 #[derive(Debug, Clone)]
 pub struct SatImage {
-    size: UVec2,
+    pub(super) size: UVec2,
     border: u32,
     /// Radiance × solid angle, and solid angle.
     sums: Vec<DVec4>,

@@ -4,21 +4,35 @@ use super::{MapImage, Parametrization, Texel};
 use crate::{Error, Result};
 use glam::{UVec2, Vec3};
 
+impl Parametrization {
+    /// Refuses borders that layers of a size cannot have: of discs, over the poles of a latitude–longitude map of odd width, and wider than the
+    /// map.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] with the cause.
+    pub fn check_border(self, size: UVec2, border: u32) -> Result<()> {
+        let cause = if border > size.min_element() {
+            "is wider than the map"
+        } else if border > 0 && self.is_disc() {
+            "has no texels to repeat: discs have no edges in common"
+        } else if border > 0 && self == Self::LatLong && !size.x.is_multiple_of(2) {
+            "leads over the pole of a map of odd width"
+        } else {
+            return Ok(());
+        };
+        Err(Error::setting("border", border, cause))
+    }
+}
+
 impl MapImage {
     /// The map as a picture: its extent, and its texels row by row. A border repeats the texels that the map has beyond each edge
     /// ([`Parametrization::wrap`]); beyond the corners of a cube's face, where three faces meet, it is the mean of the two next to it.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a border of a map without one (discs, a latitude–longitude map of odd width) or one wider than the map.
+    /// As [`Parametrization::check_border`].
     pub fn to_strip(&self, border: u32) -> Result<(UVec2, Vec<Vec3>)> {
         let (map, size) = (self.map(), self.size());
-        let wrong = |cause: &str| Error::setting("border", border, cause);
-        if border > size.min_element() {
-            return Err(wrong("is wider than the map"));
-        }
-        if border > 0 && map.is_disc() {
-            return Err(wrong("has no texels to repeat: discs have no edges in common"));
-        }
+        map.check_border(size, border)?;
         let tile = size + 2 * border;
         let extent = UVec2::new(tile.x * map.layers(), tile.y);
         let mut texels = Vec::with_capacity(extent.x as usize * extent.y as usize);
@@ -26,7 +40,7 @@ impl MapImage {
             for x in 0..extent.x {
                 let at = UVec2::new(x % tile.x, y).as_ivec2() - border as i32;
                 let held = self.beyond(x / tile.x, at.x, at.y);
-                texels.push(held.ok_or_else(|| wrong("leads over the pole of a map of odd width"))?);
+                texels.push(held.ok_or_else(|| Error::setting("border", border, "has no texels to repeat"))?);
             }
         }
         Ok((extent, texels))

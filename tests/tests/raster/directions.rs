@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::gbuffer::{corners, draw, forward, hits, looking, place, triangles};
 use crate::layers::clipped_primitives_change_views;
-use crate::oracle::{Oracle, compare};
+use crate::oracle::{Oracle, Tally, compare};
 
 const FACE: [u32; 2] = [32, 32];
 const OUTPUTS: [Output; 3] = [Output::Triangle, Output::Object, Output::Distance];
@@ -87,6 +87,15 @@ fn bits(gpu: &Gpu, gbuffer: &GBuffer) -> Vec<Vec<u32>> {
         .iter()
         .map(|output| gbuffer.read(gpu, *output).unwrap())
         .collect()
+}
+
+/// Of a map's pixels at most one in so many may leave more than one answer open: else the comparison tells little.
+const OPEN: usize = 8;
+/// Of pixels at least one in so many shows something.
+const LEAST_COVERED: usize = 8;
+
+fn assert_tells(what: &str, tally: &Tally) {
+    assert!(tally.open < tally.pixels / OPEN, "{what}: {tally:?}");
 }
 
 #[test]
@@ -195,7 +204,9 @@ fn octahedra_are_as_rays_see_them_and_have_no_holes() {
                     let gbuffer = GBuffer::new(gpu, &surfaces, &desc).unwrap();
                     draw(gpu, &gbuffer, &prepared.on_device, &views);
                     let seen: Vec<u32> = gbuffer.read(gpu, Output::Triangle).unwrap();
-                    compare(&what, &oracle, &seen, &rays);
+                    let tally = compare(&what, &oracle, &seen, &rays);
+                    assert_tells(&what, &tally);
+                    assert!(tally.covered > tally.pixels / LEAST_COVERED, "{what}: {tally:?}");
                     assert!(!is_closed || !seen.contains(&NO_HIT), "{what}: a hole");
                 }
             }

@@ -12,11 +12,13 @@ struct LobeBox {
     float weight;       // of its mean
 };
 
-// Half the side, over the map's height, of a box that holds a solid angle where the map is as dense as at a place.
+// Half the side, over the map's height, of a box that holds a solid angle where the map is as dense as at a place, and at poles as the row of
+// texels there.
 float sat_half_width(vec2 uv, float solid_angle) {
     bool is_wide = DIRECTIONAL_KIND == DIRECTIONAL_LAT_LONG || DIRECTIONAL_KIND == DIRECTIONAL_OCTAHEDRON_RECTANGULAR;
     float aspect = is_wide ? 2.0 : 1.0;
-    return 0.5 * sqrt(aspect * solid_angle / directional_density(uv));
+    float least = DIRECTIONAL_KIND == DIRECTIONAL_LAT_LONG ? lat_long_pole_density(float(sat_shape.size.y)) : 0.0;
+    return 0.5 * sqrt(aspect * solid_angle / max(directional_density(uv), least));
 }
 
 #endif

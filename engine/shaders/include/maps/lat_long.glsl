@@ -19,4 +19,10 @@ vec3 lat_long_decode(vec2 uv) {
 // Solid angle over area.
 float lat_long_density(vec2 uv) { return 2.0 * PI * PI * turn_vector(0.5 * uv.y).y; }
 
+// The mean density of the row of texels at a pole, where it falls to 0.
+float lat_long_pole_density(float rows) {
+    float sine = turn_vector(0.25 / rows).y;
+    return 4.0 * PI * rows * sine * sine;
+}
+
 #endif

@@ -122,7 +122,7 @@ fn lobes_have_the_width_that_is_said() {
     );
     // The box about a direction holds the solid angle.
     for map in MAPS {
-        let half = sat_half_width(map, DVec3::new(0.2, 0.3, 0.9), 0.01).unwrap();
+        let half = sat_half_width(map, UVec2::new(64 * map.aspect(), 64), DVec3::new(0.2, 0.3, 0.9), 0.01).unwrap();
         let at = map.encode(DVec3::new(0.2, 0.3, 0.9)).unwrap();
         let reach = half * DVec2::new(1.0 / f64::from(map.aspect()), 1.0);
         let held = map.rectangle_solid_angle(at.uv - reach, at.uv + reach);

@@ -190,3 +190,26 @@ fn look_ups_are_continuous_over_seams() {
         }
     }
 }
+
+/// Borders that are refused are those that have texels without any to repeat.
+#[test]
+fn borders_are_refused_where_nothing_repeats() {
+    for map in Parametrization::ALL {
+        for (width, height) in [(8, 8), (7, 7), (16, 8), (9, 4)] {
+            let size = UVec2::new(width, height);
+            if map.check_size(size).is_err() {
+                continue;
+            }
+            for border in 0..=9 {
+                let corners = [-(border as i32), height as i32 + border as i32 - 1];
+                // In a middle column, where the cube too has neighbours.
+                let repeats = corners.iter().all(|y| map.wrap(size, 0, 2, *y).is_some());
+                let is_legal = map.check_border(size, border).is_ok();
+                let narrow = border <= width.min(height);
+                assert_eq!(is_legal, narrow && (border == 0 || repeats), "{map} {size} {border}");
+                let image = MapImage::from_fn(map, size, |_| DVec3::ONE).unwrap();
+                assert_eq!(image.to_strip(border).is_ok(), is_legal, "{map} {size} {border}");
+            }
+        }
+    }
+}

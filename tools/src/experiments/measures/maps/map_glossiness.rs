@@ -162,7 +162,8 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
     let table = SphericalSat::new(gpu, &device, SatNumbers::Fixed, SatRange::of(&source, true))?;
     table.fill(&device)?;
     let box_query = |pixel: &Pixel| {
-        let half = sat_half_width(MAP, pixel.direction, ggx_solid_angle(pixel.alpha)).unwrap_or_default();
+        let half =
+            sat_half_width(MAP, source.size(), pixel.direction, ggx_solid_angle(pixel.alpha)).unwrap_or_default();
         pixel.direction.as_vec3().extend(half as f32)
     };
     let boxes: Vec<Vec4> = pixels.iter().map(box_query).collect();
