@@ -345,6 +345,44 @@ fn what_cannot_be_is_refused() -> Tested {
             2,
             "wider",
         ),
+        // Hours of conversion, were they not refused before it.
+        (
+            [
+                &[text(&sky), text(&out), "--to", "octahedron", "--size", "4096"][..],
+                &["--samples", "64", "--border", "4097"],
+            ]
+            .concat(),
+            2,
+            "wider",
+        ),
+        (
+            [
+                &[text(&sky), text(&out), "--to", "nusselt", "--size", "4096"][..],
+                &["--samples", "64", "--border", "1"],
+            ]
+            .concat(),
+            2,
+            "disc",
+        ),
+        (
+            vec![text(&sky), text(&out), "--to", "cube", "--size", "8192"],
+            2,
+            "--size 8192",
+        ),
+        (
+            vec![
+                text(&sky),
+                text(&out),
+                "--to",
+                "octahedron",
+                "--size",
+                "8192",
+                "--border",
+                "8192",
+            ],
+            2,
+            "--size 8192",
+        ),
         (vec![text(&sky), "out.png", "--to", "cube"], 2, ".exr or .hdr"),
         (vec!["missing.exr", text(&out), "--to", "cube"], 1, "missing.exr"),
         (vec![text(&broken), text(&out), "--to", "octahedron"], 1, "NaN"),

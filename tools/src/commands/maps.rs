@@ -102,9 +102,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             Filter::Bilinear => Reconstruction::Bilinear,
         },
     };
+    check_output(to, size, arguments.border)?;
     // Axes are orthonormal: the transpose leads back to the world.
-    let turn = from.world_axes() * to.world_axes().transpose();
-    let Some(converted) = convert(&source, to, size, turn, &settings)? else {
+    let to_source = from.world_axes() * to.world_axes().transpose();
+    let Some(converted) = convert(&source, to, size, to_source, &settings)? else {
         output::note(&format!("stopped; {} was not written", arguments.output.display()));
         return Ok(Code::Interrupted.into());
     };
@@ -127,7 +128,7 @@ fn convert(
     source: &MapImage,
     to: Parametrization,
     size: UVec2,
-    turn: DMat3,
+    to_source: DMat3,
     settings: &ResampleSettings,
 ) -> Outcome<Option<MapImage>> {
     let bar = output::bar(STEPS);
@@ -135,7 +136,7 @@ fn convert(
     tracing::info!("converting {} to {to}", source.map());
     bar.set_message(format!("{} to {to}", source.map()));
     bar.enable_steady_tick(output::TICK);
-    let converted = resample_watched(source, to, size, turn, settings, &mut |share| {
+    let converted = resample_watched(source, to, size, to_source, settings, &mut |share| {
         bar.set_position((share * STEPS as f64) as u64);
         !stop.wished()
     });
@@ -163,10 +164,27 @@ fn source(arguments: &Arguments, picture: &Picture) -> Outcome<MapImage> {
 
 /// The size of a layer that comes next to as many texels with directions as a map has; of even height, so that the lat-long map has borders.
 fn size_like(source: &MapImage, to: Parametrization) -> UVec2 {
-    let texels = source.texels().len() as f64 * source.map().coverage();
-    let rows = (texels / (f64::from(to.layers() * to.aspect()) * to.coverage())).sqrt();
-    let rows = 2 * ((0.5 * rows).round() as u32).max(1);
-    UVec2::new(rows * to.aspect(), rows)
+    let texels = source.texels().len() as f64 * source.map().coverage() / to.coverage();
+    2 * to.size_for(0.25 * texels)
+}
+
+/// Bytes of the texels of an output at most: a conversion holds them several times.
+const MAX_BYTES: u64 = 1 << 31;
+
+/// Refuses outputs that could not be written, before the conversion.
+fn check_output(to: Parametrization, size: UVec2, border: u32) -> Outcome<()> {
+    to.check_size(size)?;
+    to.check_border(size, border)?;
+    let tile = size.as_u64vec2() + 2 * u64::from(border);
+    let texels = tile.element_product() * u64::from(to.layers());
+    if texels > MAX_BYTES / size_of::<Vec3>() as u64 {
+        return Err(Failure::usage(format!(
+            "--size {}: the map's {texels} texels would take more than {} GiB",
+            size.y,
+            MAX_BYTES >> 30
+        )));
+    }
+    Ok(())
 }
 
 fn write(path: &Path, picture: &Picture) -> Result<()> {

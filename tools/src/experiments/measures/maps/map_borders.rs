@@ -121,7 +121,7 @@ fn lost(image: &MapImage, before: DVec3) -> f64 {
     ((image.integral() - before) / before).abs().max_element()
 }
 
-fn energy(field_of: impl Fn(Parametrization) -> Result<MapImage>) -> Result<Table> {
+fn energy(context: &Context<'_>, field_of: impl Fn(Parametrization) -> Result<MapImage>) -> Result<Table> {
     let mut table = Table::new(
         "Energy through levels",
         &[
@@ -132,12 +132,17 @@ fn energy(field_of: impl Fn(Parametrization) -> Result<MapImage>) -> Result<Tabl
             "change by means by solid angle",
         ],
     );
-    for map in [
+    let maps = [
         Parametrization::OctahedronQuadratic,
         Parametrization::OctahedronRectangular,
         Parametrization::EqualArea,
         Parametrization::LatLong,
-    ] {
+    ];
+    for (done, map) in maps.into_iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(&format!("levels of {map}"), done, maps.len());
         let first = field_of(map)?;
         let before = first.integral();
         let (mut plain, mut weighted) = (first.clone(), first);
@@ -197,5 +202,5 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         .map(|texel| map.texel_solid_angle(size, texel) * (first.at(texel).as_dvec3() - mean).length_squared())
         .sum();
     let deviation = (squares / (3.0 * map.solid_angle())).sqrt();
-    Ok(vec![seams(context, &chain, deviation)?, energy(field_of)?])
+    Ok(vec![seams(context, &chain, deviation)?, energy(context, field_of)?])
 }

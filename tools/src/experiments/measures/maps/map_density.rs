@@ -54,7 +54,7 @@ const AXIS: (u32, f64) = (4, 45.0);
 /// Where plots end: the ratio and the shear.
 const TOPS: [f64; 2] = [2.7, 5.0];
 
-fn statistics(size: u32) -> Table {
+fn statistics(context: &Context<'_>, size: u32) -> Table {
     let mut table = Table::new(
         "Density of maps against uniform sampling",
         &[
@@ -73,7 +73,11 @@ fn statistics(size: u32) -> Table {
             "error of Σ solid angles (sr)",
         ],
     );
-    for (map, [min, max, rms, shear]) in STATED {
+    for (done, (map, [min, max, rms, shear])) in STATED.into_iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(&map.to_string(), done, STATED.len());
         let size = UVec2::new(size * map.aspect(), size);
         let found = map.density_statistics(size);
         table.row([
@@ -231,7 +235,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     plots(context.folder)?;
     let maps = STATED.map(|(map, _)| map);
     png::write(context.folder.join("density.png"), &heat::strip(&maps, side))?;
-    let mut first = statistics(size);
+    let mut first = statistics(context, size);
     let names: Vec<String> = maps.iter().map(ToString::to_string).collect();
     first.note(format!(
         "Pictures beside this table: `density.png`, from left to right {}, above on the sphere, below on the map, red too coarse and blue too fine, \

@@ -44,17 +44,15 @@ fn radiance(field: &[(f64, DVec3)], d: DVec3) -> f64 {
 
 /// The size of a layer that comes closest to a number of texels in all, of even height.
 fn size(map: Parametrization, texels: u64) -> UVec2 {
-    let rows = (texels as f64 / f64::from(map.layers() * map.aspect())).sqrt();
-    let height = (2.0 * (0.5 * rows).round().max(1.0)) as u32;
-    UVec2::new(height * map.aspect(), height)
+    2 * map.size_for(0.25 * texels as f64)
 }
 
 /// A map, the irradiance under what it holds by the normal, and the most that this is.
 type Light<'a> = (MapImage, &'a dyn Fn(&DVec3) -> f64, f64);
 
 /// Greatest errors of irradiance for random normals: by the function and by texels of one direction each.
-fn irradiance(smoke: bool) -> Result<Table> {
-    let (budgets, count): (&[u64], u32) = if smoke {
+fn irradiance(context: &Context<'_>) -> Result<Table> {
+    let (budgets, count): (&[u64], u32) = if context.smoke {
         (&[256], 5)
     } else {
         (&[256, 1024, 4096, 16384], 100)
@@ -77,7 +75,11 @@ fn irradiance(smoke: bool) -> Result<Table> {
             "by texels' middles",
         ],
     );
-    for map in MAPS {
+    for (done, map) in MAPS.into_iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(&format!("irradiance of {map}"), done, MAPS.len());
         for budget in budgets {
             let size = size(map, *budget);
             let sky = |d: DVec3| d.z.max(0.0);
@@ -158,7 +160,11 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     let mut curves: Vec<Curve> = Vec::new();
     let mut first = vec![f64::NAN; budgets.len()];
-    for map in MAPS {
+    for (done, map) in MAPS.into_iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(&format!("look-ups of {map}"), done, MAPS.len());
         let mut points = Vec::new();
         for (at, budget) in budgets.iter().enumerate() {
             let size = size(map, *budget);
@@ -216,5 +222,5 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
         atomic::write(&context.folder.join("error.svg"), svg.as_bytes())?;
     }
-    Ok(vec![table, irradiance(context.smoke)?])
+    Ok(vec![table, irradiance(context)?])
 }

@@ -8,24 +8,28 @@ use clerestory::film::{Picture, ToneMap};
 use clerestory::gpu::{Gpu, compute_to_transfer, rw_compute_to_compute};
 use clerestory::maps::box_lobe::{Lobe, RING_BOXES, WeightedBox, box_lobe, ring_lobe};
 use clerestory::maps::directional_map::DirectionalMap;
-use clerestory::maps::prefilter::{PrefilterGgx, ggx_lobe, ggx_solid_angle};
+use clerestory::maps::prefilter::{PrefilterGgx, ggx_mean, ggx_solid_angle, weighted_texels};
 use clerestory::maps::spherical_sat::{SatImage, SatNumbers, SatRange, SphericalSat, sat_half_width};
 use clerestory::maps::{MapImage, Parametrization};
+use clerestory::techniques::preview::probe::probe_level;
 use clerestory::{Error, Result};
 use glam::{DVec3, DVec4, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 use super::sphere::{Sphere, sheet};
 use crate::experiments::measures::{Context, clock};
-use crate::experiments::table::Table;
+use crate::experiments::table::{Cell, Table};
 use crate::random::Random;
 
 const MAP: Parametrization = Parametrization::OctahedronQuadratic;
 /// Rows of the map that is reflected, and of those of which tables are timed.
 const TEXELS: u32 = 128;
 const SIZES: [u32; 4] = [64, 128, 256, 512];
-/// Prefiltered levels: evenly spaced in roughness √α.
+/// Prefiltered maps: evenly spaced in roughness √α.
 const LEVELS: u32 = 6;
+/// Least texels along a side of one.
+const LEAST_FILTERED: u32 = 32;
 const LEAST_ALPHA: f64 = 0.02;
 const EYE: DVec3 = DVec3::new(1.0, 0.3, -0.35);
 /// Steps of lobes whose boxes are about one middle.
@@ -65,25 +69,73 @@ fn filled(gpu: &Gpu, image: &MapImage, border: u32) -> Result<DirectionalMap> {
     Ok(map)
 }
 
-fn alpha_of(level: f64) -> f64 {
-    (level / f64::from(LEVELS - 1)).powi(2).max(LEAST_ALPHA)
+/// Maps filtered by lobes of growing width.
+struct Filtered {
+    alphas: Vec<f32>,
+    maps: Vec<DirectionalMap>,
 }
 
-/// The map for each roughness, half as large each.
-fn prefiltered(gpu: &Gpu, source: &DirectionalMap, target: &DirectionalMap) -> Result<()> {
-    let filter = PrefilterGgx::new(gpu, source)?;
-    for level in 0..LEVELS {
-        let mut recorder = gpu.recorder("prefilter")?;
-        recorder.pass("prefilter", |pass| {
-            filter.record(pass, (source, 0), (target, level), alpha_of(level.into()) as f32)?;
-            pass.barrier(&[rw_compute_to_compute(target.texels())]);
-            target.record_border(pass, level)?;
-            pass.barrier(&[compute_to_transfer(target.texels())]);
-            Ok(())
-        })?;
-        recorder.submit()?.wait()?;
+impl Filtered {
+    fn new(gpu: &Gpu, rows: u32) -> Result<Self> {
+        let alpha = |level: u32| (f64::from(level) / f64::from(LEVELS - 1)).powi(2).max(LEAST_ALPHA);
+        let alphas: Vec<f64> = (0..LEVELS).map(alpha).collect();
+        let maps = alphas.iter().map(|alpha| {
+            // Texels of at most half the lobe's width, as far as the source has so fine ones.
+            let side = (2.0 * (4.0 * PI).sqrt() / alpha).ceil() as u32;
+            let side = side.next_power_of_two().max(LEAST_FILTERED).min(rows);
+            DirectionalMap::new(gpu, MAP, UVec2::splat(side), 1, 1)
+        });
+        Ok(Self {
+            maps: maps.collect::<Result<_>>()?,
+            alphas: alphas.iter().map(|alpha| *alpha as f32).collect(),
+        })
     }
-    Ok(())
+
+    fn fill(&self, gpu: &Gpu, source: &DirectionalMap) -> Result<()> {
+        let filter = PrefilterGgx::new(gpu, source)?;
+        for (map, alpha) in self.maps.iter().zip(&self.alphas) {
+            let mut recorder = gpu.recorder("prefilter")?;
+            recorder.pass("prefilter", |pass| {
+                filter.record(pass, (source, 0), (map, 0), *alpha)?;
+                pass.barrier(&[rw_compute_to_compute(map.texels())]);
+                map.record_border(pass, 0)?;
+                pass.barrier(&[compute_to_transfer(map.texels())]);
+                Ok(())
+            })?;
+            recorder.submit()?.wait()?;
+        }
+        Ok(())
+    }
+
+    /// Mixtures of the two maps whose lobes are next to each pixel's.
+    fn look_up(&self, pixels: &[Pixel]) -> Result<Vec<Vec3>> {
+        let queries: Vec<Vec4> = pixels
+            .iter()
+            .map(|pixel| pixel.direction.as_vec3().extend(0.0))
+            .collect();
+        let held: Vec<Vec<Vec3>> = self
+            .maps
+            .iter()
+            .map(|map| map.look_up(&queries))
+            .collect::<Result<_>>()?;
+        let last = self.maps.len() - 1;
+        let mixed = pixels.iter().enumerate().map(|(at, pixel)| {
+            let level = probe_level(&self.alphas, pixel.alpha);
+            let fine = (level as usize).min(last);
+            held[fine][at].lerp(held[(fine + 1).min(last)][at], level.fract() as f32)
+        });
+        Ok(mixed.collect())
+    }
+
+    /// Sides and widths in words.
+    fn sizes(&self) -> String {
+        let of = |(map, alpha): (&DirectionalMap, &f32)| {
+            let side = map.size(0).map_or(0, |size| size.x);
+            format!("{side}² for α = {}", Cell::from(f64::from(*alpha)))
+        };
+        let all: Vec<String> = self.maps.iter().zip(&self.alphas).map(of).collect();
+        all.join(", ")
+    }
 }
 
 /// A pixel of the sphere: where it looks, and how rough it is.
@@ -108,25 +160,9 @@ fn pixels(sphere: &Sphere) -> Vec<Pixel> {
 }
 
 fn truth(image: &MapImage, pixels: &[Pixel]) -> Vec<Vec3> {
-    let (map, size) = (image.map(), image.size());
-    let held: Vec<(DVec3, DVec4)> = map
-        .texels(size)
-        .filter_map(|texel| {
-            let angle = map.texel_solid_angle(size, texel);
-            Some((
-                map.texel_direction(size, texel)?,
-                (angle * image.at(texel).as_dvec3()).extend(angle),
-            ))
-        })
-        .collect();
-    pixels
-        .par_iter()
-        .map(|pixel| {
-            let weigh = |(d, value): &(DVec3, DVec4)| ggx_lobe(pixel.direction, *d, pixel.alpha) * *value;
-            let sum: DVec4 = held.iter().map(weigh).sum();
-            (sum.truncate() / sum.w).as_vec3()
-        })
-        .collect()
+    let texels = weighted_texels(image);
+    let of = |pixel: &Pixel| ggx_mean(&texels, pixel.direction, pixel.alpha).as_vec3();
+    pixels.par_iter().map(of).collect()
 }
 
 fn shown(side: u32, pixels: &[Pixel], values: &[Vec3]) -> Result<Rgb8> {
@@ -169,17 +205,12 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
     let boxes: Vec<Vec4> = pixels.iter().map(box_query).collect();
     let by_boxes = table.look_up(&boxes)?;
     let plain = filled(gpu, &source, 1)?;
-    let levels = DirectionalMap::new(gpu, MAP, source.size(), LEVELS, 1)?;
-    prefiltered(gpu, &plain, &levels)?;
-    let by_level = |pixel: &Pixel| {
-        let level = pixel.alpha.sqrt() * f64::from(LEVELS - 1);
-        pixel.direction.as_vec3().extend(level as f32)
-    };
-    let lobes: Vec<Vec4> = pixels.iter().map(by_level).collect();
-    let by_levels = levels.look_up(&lobes)?;
+    let levels = Filtered::new(gpu, rows)?;
+    levels.fill(gpu, &plain)?;
+    let by_levels = levels.look_up(&pixels)?;
     let [fill, filter] = [
         clock::seconds(context.smoke, || table.fill(&device))?,
-        clock::seconds(true, || prefiltered(gpu, &plain, &levels))?,
+        clock::seconds(true, || levels.fill(gpu, &plain))?,
     ];
     let mut found = Table::new(
         "Glossy reflections of one map",
@@ -194,8 +225,10 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
     let several: Vec<(Fit, Vec<Vec3>)> = fits()
         .map(|fit| Ok((fit, by_lobes(&table, &pixels, fit)?)))
         .collect::<Result<_>>()?;
+    let mut ranking = Vec::new();
     let mut line = |name: String, seconds: f64, values: &[Vec3]| {
         let [rms, mean] = errors(values, &right);
+        ranking.push((rms, name.clone()));
         found.row([name.into(), (1e3 * seconds).into(), rms.into(), mean.into()]);
     };
     line("one box of the lobe's variance".into(), fill, &by_boxes);
@@ -212,10 +245,17 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
     found.note(format!(
         "A mirror sphere whose roughness √α grows from left to right (α from {LEAST_ALPHA} to 1) in an octahedron map of {rows} × {rows} texels with a \
          sun. Truth is the sum of the GGX lobe with n = v = r over all texels at each pixel; all look-ups stand for that lobe, and their error is that of \
-         the boxes and of interpolation between {LEVELS} levels. One box holds the solid angle over which an even mean has the lobe's variance; several are \
+         the boxes and of mixing two of {LEVELS} filtered maps, octahedra of {}, by the variances of their lobes. One box holds the solid angle over which an even mean has the lobe's variance; several are \
          the staircase nearest to the lobe, of {LOBES} lobes even in roughness the nearest. The border is half the map. Times are by wall clock, medians, with submission; \
          all boxes need one table. Pictures beside this table, `glossiness.png`: truth, four boxes about one middle, four steps in rings, levels.",
+        levels.sizes(),
     ));
+    ranking.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let ranking: Vec<String> = ranking
+        .into_iter()
+        .map(|(rms, name)| format!("{name} {}", Cell::from(rms)))
+        .collect();
+    found.note(format!("From the least RMS error: {}.", ranking.join("; ")));
     Ok(found)
 }
 
@@ -280,17 +320,9 @@ fn by_lobes(table: &SphericalSat, pixels: &[Pixel], fit: Fit) -> Result<Vec<Vec3
 fn lobes(context: &Context<'_>) -> Result<Table> {
     let (rows, count) = if context.smoke { (48, 40) } else { (TEXELS, 1500) };
     let source = image(rows)?;
-    let size = source.size();
     // As far as boxes may reach at all.
     let sat = SatImage::new(&source, rows)?;
-    let held: Vec<(DVec3, DVec4)> = MAP
-        .texels(size)
-        .filter_map(|texel| {
-            let angle = MAP.texel_solid_angle(size, texel);
-            let value = (angle * source.at(texel).as_dvec3()).extend(angle);
-            Some((MAP.texel_direction(size, texel)?, value))
-        })
-        .collect();
+    let held = weighted_texels(&source);
     let mut random = Random::new(23);
     let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
     let mut heads = vec!["lobe".to_owned(), "half of it within (degrees)".into()];
@@ -304,7 +336,13 @@ fn lobes(context: &Context<'_>) -> Result<Table> {
     let mut table = Table::new("RMS error of lobes of boxes over the mean", &heads);
     let kinds = [0.03, 0.1, 0.2, 0.4, 0.7, 1.0].map(|alpha| (format!("GGX α = {alpha}"), Lobe::Ggx { alpha }));
     let others = [10.0, 100.0].map(|exponent| (format!("Phong n = {exponent}"), Lobe::Phong { exponent }));
-    for (name, lobe) in kinds.into_iter().chain(others).take(if context.smoke { 2 } else { 8 }) {
+    let all_lobes = kinds.len() + others.len();
+    let asked = if context.smoke { 2 } else { all_lobes };
+    for (done, (name, lobe)) in kinds.into_iter().chain(others).take(asked).enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(&name, done, asked);
         // By t = 1 − cos: what lies within each box's cap.
         let nested: Vec<Vec<WeightedBox>> = NESTED
             .iter()
@@ -385,7 +423,14 @@ fn numbers(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
             "of boxes of a tenth",
         ],
     );
-    for rows in SIZES.into_iter().take(if context.smoke { 1 } else { SIZES.len() }) {
+    let sizes = if context.smoke { &SIZES[..1] } else { &SIZES[..] };
+    for (done, rows) in sizes.iter().copied().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context
+            .watch
+            .begin(&format!("tables of {rows}² texels"), done, sizes.len());
         let source = image(rows)?;
         let border = rows / 4;
         let device = filled(gpu, &source, border)?;
@@ -442,6 +487,7 @@ fn numbers(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
+    context.watch.begin("reflections of a sphere", 0, 1);
     Ok(vec![
         reflections(context, &gpu)?,
         lobes(context)?,

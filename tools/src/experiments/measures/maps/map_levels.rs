@@ -1,6 +1,7 @@
 //! Levels of detail of look-ups where quads of pixels straddle the seams of an octahedron map, by four ways to find them.
 //!
-//! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.2 and Fig. 7.4. Oracle: the level by the derivatives of the direction's own octant.
+//! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.2 and Fig. 7.4. Oracle: the level by the exact derivatives of each pixel's own
+//! direction, through those of the map's decoding.
 
 use clerestory::film::png::{self, Rgb8};
 use clerestory::maps::level::{
@@ -9,7 +10,7 @@ use clerestory::maps::level::{
 use clerestory::maps::octahedron::octahedron_encode;
 use clerestory::maps::{MapImage, Parametrization};
 use clerestory::{Error, Result};
-use glam::{DVec2, DVec3, UVec2};
+use glam::{DMat2, DVec2, DVec3, UVec2};
 
 use super::sphere::{Sphere, sheet};
 use crate::experiments::measures::Context;
@@ -56,7 +57,8 @@ fn differences(map: Parametrization, quad: Quad) -> f64 {
     level_of_derivatives(across - here, down - here)
 }
 
-fn level(map: Parametrization, way: Way, quad: Quad) -> f64 {
+/// The level of a lane of a quad, whose own direction is `own`.
+fn level(map: Parametrization, way: Way, quad: Quad, own: DVec3) -> f64 {
     let n = f64::from(TEXELS);
     let [d, across, down] = quad;
     let mirrored = || {
@@ -68,9 +70,9 @@ fn level(map: Parametrization, way: Way, quad: Quad) -> f64 {
         (Way::Mirrored, _) => differences(map, quad).min(mirrored()),
         (Way::Gated, _) => octahedron_level_folded(d, across, down, n),
         (Way::Octant, Parametrization::OctahedronRectangular) => {
-            octahedron_rectangular_level(d, [across - d, down - d], n)
+            octahedron_rectangular_level(own, [across - d, down - d], n)
         }
-        (Way::Octant, _) => octahedron_level(d, [across - d, down - d], n),
+        (Way::Octant, _) => octahedron_level(own, [across - d, down - d], n),
     }
 }
 
@@ -79,9 +81,34 @@ fn levels(sphere: &Sphere, map: Parametrization, way: Way) -> Vec<Option<f64>> {
     let pixels = (0..sphere.side).flat_map(|y| (0..sphere.side).map(move |x| (x, y)));
     pixels
         .map(|(x, y)| {
-            let (x, y) = (x & !1, y & !1);
             let at = |x: u32, y: u32| sphere.normal(sphere.place(x, y));
-            Some(level(map, way, [at(x, y)?, at(x + 1, y)?, at(x, y + 1)?]))
+            let own = at(x, y)?;
+            let (x, y) = (x & !1, y & !1);
+            Some(level(map, way, [at(x, y)?, at(x + 1, y)?, at(x, y + 1)?], own))
+        })
+        .collect()
+}
+
+/// How coordinates in \[0, 1\]² move with the direction, by the map's decoding: least squares, of a vector in the tangent plane exact.
+fn moved([along, down]: [DVec3; 2], v: DVec3) -> DVec2 {
+    let gram = DMat2::from_cols(
+        DVec2::new(along.length_squared(), along.dot(down)),
+        DVec2::new(along.dot(down), down.length_squared()),
+    );
+    gram.inverse() * DVec2::new(along.dot(v), down.dot(v))
+}
+
+/// Levels of all pixels by the derivatives of the sphere's normal at their middles.
+fn exact_levels(sphere: &Sphere, map: Parametrization) -> Vec<Option<f64>> {
+    let texels = DVec2::new(f64::from(map.aspect() * TEXELS), f64::from(TEXELS));
+    let pixels = (0..sphere.side).flat_map(|y| (0..sphere.side).map(move |x| (x, y)));
+    pixels
+        .map(|(x, y)| {
+            let p = sphere.place(x, y);
+            let at = map.encode(sphere.normal(p)?)?;
+            let by_map = map.derivatives(at);
+            let [across, below] = sphere.normal_derivatives(p)?.map(|v| texels * moved(by_map, v));
+            Some(level_of_derivatives(across, below))
         })
         .collect()
 }
@@ -178,19 +205,24 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         ],
     );
     std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-    for (map, ways, file) in [
+    let maps = [
         (Parametrization::OctahedronQuadratic, &SQUARE[..], "levels.png"),
         (
             Parametrization::OctahedronRectangular,
             &RECTANGLE[..],
             "levels-rectangular.png",
         ),
-    ] {
+    ];
+    for (done, (map, ways, file)) in maps.into_iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(&map.to_string(), done, maps.len());
         let mut chain = vec![checkers(map)?];
         while let Some(next) = chain.last().and_then(|last| last.coarser().ok()) {
             chain.push(next);
         }
-        let exact = levels(&sphere, map, Way::Octant);
+        let exact = exact_levels(&sphere, map);
         let (mut seen, mut shown) = (Vec::new(), Vec::new());
         for (way, name) in ways {
             let found = levels(&sphere, map, *way);
@@ -212,11 +244,46 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     }
     table.note(format!(
         "A sphere of {0} × {0} pixels painted by its normals with a map of {TEXELS} rows and {SQUARES} squares over them, seen from below; quads of \
-         two by two pixels, as devices find levels. Figures leave out what is farther than {RIM} of the radius from the middle. Differences are finite: \
-         a quad sees about the mean of the derivatives over it, so all but the last way are off by a little everywhere. The rectangle's seam is its upper \
+         two by two pixels, as devices find levels, each pixel with its own direction where a way takes one. The truth is the level by exact derivatives \
+         at each pixel's middle, through the derivatives of the map's decoding. Figures leave out what is farther than {RIM} of the radius from the \
+         middle. Differences are finite: a quad sees about the mean of the derivatives over it, so all ways are off by a little everywhere. The rectangle's seam is its upper \
          and lower edge, on the equator, where a mirrored direction is no other place. Pictures beside this table, ways from left to right, the look-up \
          above and the level below, white at {WHITE_LEVEL}: `levels.png`, `levels-rectangular.png`.",
         sphere.side,
     ));
     Ok(vec![table])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Exact derivatives against differences over a thousandth of a pixel, off folds.
+    #[test]
+    fn exact_levels_are_limits_of_differences() {
+        let (coarse, fine) = (Sphere::new(EYE, 32), 1e-3);
+        for map in [
+            Parametrization::OctahedronQuadratic,
+            Parametrization::OctahedronRectangular,
+        ] {
+            let exact = exact_levels(&coarse, map);
+            let mut compared = 0;
+            for (i, exact) in exact.iter().enumerate() {
+                let p = coarse.place(i as u32 % 32, i as u32 / 32);
+                let Some(exact) = exact.filter(|_| p.length() < RIM) else {
+                    continue;
+                };
+                let step = 2.0 / 32.0 * fine;
+                let places = [p, p + DVec2::new(step, 0.0), p - DVec2::new(0.0, step)];
+                let quad = places.map(|p| coarse.normal(p).unwrap());
+                if quad[0].abs().min_element() < 0.01 {
+                    continue;
+                }
+                let found = differences(map, quad) - fine.log2();
+                assert!((found - exact).abs() < 0.01, "{map} {p}: {found} {exact}");
+                compared += 1;
+            }
+            assert!(compared > 500, "{compared}");
+        }
+    }
 }

@@ -16,7 +16,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-use super::live_maps::{Filled, LiveScene, SPLATS_PER_TEXEL, Seen, Variant, Way, texel_index, variant, variants};
+use super::filled_maps::{
+    Filled, FilledScene, SPLATS_PER_TEXEL, Seen, Variant, Way, Work, texel_index, variant, variants,
+};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::Errors;
 use crate::experiments::plot::{self, Curve, PlotPoint, Words};
@@ -48,7 +50,7 @@ struct ShadowPoint {
     is_lit: bool,
 }
 
-fn shadow_points(live: &LiveScene, count: u32) -> Vec<ShadowPoint> {
+fn shadow_points(live: &FilledScene, count: u32) -> Vec<ShadowPoint> {
     let point = |surfel: &clerestory::gpu::shaders::types::Surfel| {
         let from = Vec3::from_array(surfel.position).as_dvec3() - live.origin.as_dvec3();
         let [a, b, c] = live.corners[surfel.number as usize].map(|corner| corner.as_dvec3());
@@ -132,6 +134,99 @@ fn quality(variant: &Variant, filled: &Filled, seen: &Seen, points: &[ShadowPoin
     }
 }
 
+/// Times of one way in milliseconds: the median and the middle half.
+#[derive(Debug, Clone, Copy)]
+struct Times {
+    median: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Times {
+    fn of(mut seconds: Vec<f64>) -> Self {
+        seconds.sort_by(f64::total_cmp);
+        let quarter = seconds.len() / 4;
+        let at = |index: usize| seconds.get(index).map_or(f64::NAN, |value| 1e3 * value);
+        Self {
+            low: at(quarter),
+            high: at(seconds.len().saturating_sub(1 + quarter)),
+            median: 1e3 * median(seconds),
+        }
+    }
+
+    /// Which is faster, where the middle halves do not meet.
+    fn before(self, other: Self) -> &'static str {
+        if self.high < other.low {
+            "holds"
+        } else if self.low > other.high {
+            "is the reverse"
+        } else {
+            "is not told apart"
+        }
+    }
+}
+
+/// An order from the fastest, and what its pairs of neighbours are.
+fn judged(order: &[(String, Times)]) -> String {
+    let named = order
+        .iter()
+        .map(|(name, times)| format!("{name} {:.3} ms", times.median));
+    let pairs = order
+        .windows(2)
+        .map(|pair| format!("{} before {} {}", pair[0].0, pair[1].0, pair[0].1.before(pair[1].1)));
+    format!(
+        "{}: {}",
+        named.collect::<Vec<_>>().join(", "),
+        pairs.collect::<Vec<_>>().join("; ")
+    )
+}
+
+/// The fastest of some ways.
+fn fastest<'a>(ways: impl Iterator<Item = &'a Measured>) -> Option<(String, Times)> {
+    let fastest = ways.min_by(|a, b| a.times.median.total_cmp(&b.times.median))?;
+    Some((fastest.variant.name.clone(), fastest.times))
+}
+
+/// The document's order, by the fastest of the ways that each of its figures stands for, and where the ways without a figure are.
+fn orders(address: &str, measured: &[Measured]) -> [String; 2] {
+    let mut stated: Vec<f64> = measured.iter().filter_map(|one| one.variant.stated).collect();
+    stated.sort_by(|a, b| b.total_cmp(a));
+    stated.dedup();
+    let of = |figure: &f64| fastest(measured.iter().filter(|one| one.variant.stated == Some(*figure)));
+    let order: Vec<_> = stated.iter().filter_map(of).collect();
+    let figures: Vec<_> = stated.iter().map(f64::to_string).collect();
+    let by_clip_distances =
+        |one: &&Measured| one.variant.way == Way::Raster(Layering::Octants(OctantCut::ClipDistances));
+    let clip = fastest(measured.iter().filter(by_clip_distances));
+    // The engine's own expectation: behind the cube and before all else.
+    let expected: Vec<_> = order
+        .iter()
+        .take(1)
+        .cloned()
+        .chain(clip)
+        .chain(order.get(1).cloned())
+        .collect();
+    [
+        format!(
+            "{address}: the document's order from the fastest, by its {} frames/s. {}.",
+            figures.join(", "),
+            judged(&order)
+        ),
+        format!(
+            "{address}: the document has no figure for clip distances (4g); the engine expects them between its two fastest. {}.",
+            judged(&expected)
+        ),
+    ]
+}
+
+/// One way in one scene.
+struct Measured {
+    variant: Variant,
+    quality: Quality,
+    times: Times,
+    work: Work,
+}
+
 /// Rows of a scene, and its ways by their times.
 fn compare(
     gpu: &Gpu,
@@ -139,7 +234,7 @@ fn compare(
     (side, repeats, points): (u32, usize, u32),
     table: &mut Table,
 ) -> Result<()> {
-    let live = LiveScene::load(gpu, address, share)?;
+    let live = FilledScene::load(gpu, address, share)?;
     let points = shadow_points(&live, points);
     let mut seen: Vec<(Parametrization, Seen)> = Vec::new();
     let (mut measured, mut fillings) = (Vec::new(), Vec::new());
@@ -152,21 +247,36 @@ fn compare(
         let quality = of_rays.map_or_else(Quality::default, |seen| quality(&variant, &filled, seen, &points));
         let (filling, work) = live.filling(gpu, &variant)?;
         fillings.push((filling, Vec::new()));
-        measured.push((variant, quality, f64::NAN, work));
+        measured.push((variant, quality, work));
     }
-    // In turn, so that what else the machine does meets all of them.
+    // In turn: a change of load affects all ways alike.
     for _ in 0..repeats {
         for (filling, seconds) in &mut fillings {
             seconds.push(filling.seconds()?);
         }
     }
-    for (row, (_, seconds)) in measured.iter_mut().zip(fillings) {
-        row.2 = 1e3 * median(seconds);
-    }
-    let is_yardstick = |variant: &Variant| variant.way == Way::Raster(Layering::Passes(CUBE_FACES));
-    let of_cube = measured.iter().find(|(variant, ..)| is_yardstick(variant));
-    let cube = of_cube.map_or([f64::NAN; 2], |(_, q, ms, _)| [*ms, q.shadow.iter().sum()]);
-    for (variant, quality, ms, work) in &measured {
+    let mut measured: Vec<Measured> = measured
+        .into_iter()
+        .zip(fillings)
+        .map(|((variant, quality, work), (_, seconds))| Measured {
+            variant,
+            quality,
+            times: Times::of(seconds),
+            work,
+        })
+        .collect();
+    let by = |way: Way| measured.iter().find(|one| one.variant.way == way);
+    let cube = by(Way::Raster(Layering::Passes(CUBE_FACES)));
+    let yardstick = cube.map_or([f64::NAN; 2], |cube| {
+        [cube.times.median, cube.quality.shadow.iter().sum()]
+    });
+    for Measured {
+        variant,
+        quality,
+        times,
+        work,
+    } in &measured
+    {
         let error: f64 = quality.shadow.iter().sum();
         let ratio = |value: f64, of: f64| {
             if of > 0.0 {
@@ -179,8 +289,10 @@ fn compare(
             address.into(),
             variant.name.as_str().into(),
             variant.stated.into(),
-            (*ms).into(),
-            ratio(*ms, cube[0]),
+            times.median.into(),
+            times.low.into(),
+            times.high.into(),
+            ratio(times.median, yardstick[0]),
             work.vertices.into(),
             work.primitives.into(),
             work.emitted_corners.into(),
@@ -191,45 +303,35 @@ fn compare(
             quality.angles.map(|angles| angles[1]).into(),
             (100.0 * quality.shadow[0]).into(),
             (100.0 * quality.shadow[1]).into(),
-            ratio(error, cube[1]),
+            ratio(error, yardstick[1]),
         ]);
     }
-    let ways = [
-        Way::Raster(Layering::Passes(CUBE_FACES)),
-        Way::Raster(Layering::Octants(OctantCut::ClipDistances)),
-        Way::Raster(Layering::Octants(OctantCut::MaskInRectangles)),
-        Way::Raster(Layering::Octants(OctantCut::Split)),
+    for line in orders(address, &measured) {
+        table.note(line);
+    }
+    let octants = |cut| by(Way::Raster(Layering::Octants(cut)));
+    let counted = [
+        cube,
+        octants(OctantCut::ClipDistances),
+        octants(OctantCut::MaskInRectangles),
+        octants(OctantCut::Split),
     ];
-    let of = |way: &Way| measured.iter().find(|(variant, ..)| variant.way == *way);
-    let found: Vec<_> = ways
-        .iter()
-        .filter_map(of)
-        .map(|(_, _, ms, work)| (*ms, *work))
-        .collect();
-    if let [cube, clip, mask, split] = found[..] {
-        let keeps = cube.0 <= clip.0 && clip.0 <= mask.0 && mask.0 < split.0;
+    if let [Some(cube), Some(clip), Some(mask), Some(split)] = counted.map(|one| one.map(|one| one.work)) {
         let ratio = |a: u64, b: u64| a as f64 / b.max(1) as f64;
         table.note(format!(
-            "{address}: the expected order, from the fastest, is cube, clip distances (4g), mask in rectangles (4d), split (4a); here they take \
-             {:.3}, {:.3}, {:.3} and {:.3} ms: the order {}. Clip distances take {:.2} times the cube's vertices and {:.2} times its fragments; \
-             the mask shades {:.2} times the fragments of clip distances; the split emits {:.2} primitives a triangle and shades {:.2} times the \
-             vertices of clip distances.",
-            cube.0,
-            clip.0,
-            mask.0,
-            split.0,
-            if keeps { "holds" } else { "does not hold" },
-            ratio(clip.1.vertices, cube.1.vertices),
-            ratio(clip.1.fragments, cube.1.fragments),
-            ratio(mask.1.fragments, clip.1.fragments),
-            ratio(split.1.primitives, live.corners.len() as u64),
-            ratio(split.1.vertices, clip.1.vertices),
+            "{address}: clip distances take {:.2} times the cube's vertices and {:.2} times its fragments; the mask in rectangles shades {:.2} \
+             times the fragments of clip distances; the split emits {:.2} primitives a triangle and shades {:.2} times the vertices of clip distances.",
+            ratio(clip.vertices, cube.vertices),
+            ratio(clip.fragments, cube.fragments),
+            ratio(mask.fragments, clip.fragments),
+            ratio(split.primitives, live.corners.len() as u64),
+            ratio(split.vertices, clip.vertices),
         ));
     }
-    measured.sort_by(|a, b| a.2.total_cmp(&b.2));
+    measured.sort_by(|a, b| a.times.median.total_cmp(&b.times.median));
     let order: Vec<_> = measured
         .iter()
-        .map(|(variant, _, ms, _)| format!("{} {ms:.3}", variant.name))
+        .map(|one| format!("{} {:.3}", one.variant.name, one.times.median))
         .collect();
     table.note(format!(
         "{address}: {} triangles, {} points of which {:.1} % are lit. From the fastest, in ms: {}.",
@@ -242,7 +344,7 @@ fn compare(
 }
 
 /// Mean angle, in radians, that edges of pieces are seen at.
-fn edge_length(live: &LiveScene, level: u32) -> f64 {
+fn edge_length(live: &FilledScene, level: u32) -> f64 {
     let origin = live.origin;
     let of = |triangle: &[Vec3; 3]| -> [f64; 2] {
         let pieces = (0..level * level).map(|piece| {
@@ -258,7 +360,7 @@ fn edge_length(live: &LiveScene, level: u32) -> f64 {
 }
 
 /// Pieces from whole triangles on: errors of maps whose edges are not split.
-fn sweep(gpu: &Gpu, smoke: bool, side: u32, points: u32, curves: &mut Vec<Curve>) -> Result<Table> {
+fn sweep(gpu: &Gpu, context: &Context<'_>, side: u32, points: u32, curves: &mut Vec<Curve>) -> Result<Table> {
     let mut table = Table::new(
         "Unsplit maps by the length of edges",
         &[
@@ -275,9 +377,16 @@ fn sweep(gpu: &Gpu, smoke: bool, side: u32, points: u32, curves: &mut Vec<Curve>
         ],
     );
     let levels: Vec<u32> = (0..=MAX_LEVEL.ilog2()).map(|power| 1 << power).collect();
-    let levels = if smoke { &levels[..3] } else { &levels };
-    for (address, share) in &SWEPT[..if smoke { 1 } else { SWEPT.len() }] {
-        let live = LiveScene::load(gpu, address, *share)?;
+    let levels = if context.smoke { &levels[..3] } else { &levels };
+    let scenes = &SWEPT[..if context.smoke { 1 } else { SWEPT.len() }];
+    for (done, (address, share)) in scenes.iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context
+            .watch
+            .begin(&format!("unsplit maps of {address}"), done, scenes.len());
+        let live = FilledScene::load(gpu, address, *share)?;
         let points = shadow_points(&live, points);
         for (name, map) in [
             ("4e unsplit, square", Parametrization::OctahedronQuadratic),
@@ -355,6 +464,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "way",
             "document (frames/s)",
             "GPU time, median (ms)",
+            "middle half from",
+            "to",
             "of the cube by passes",
             "vertices shaded",
             "primitives emitted",
@@ -376,15 +487,18 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
          bias of d (w tan θ + {ROUNDING_BIAS:e}), w being the mean width of the map's texels in radians, θ the angle to the normal; the truth \
          is a ray. Wrong triangles: against the ray through the texel's centre; of points also where holes were filled. Attribute error: the \
          angle between a texel and the interpolated position that it holds. {SPLATS_PER_TEXEL} points a texel are splatted, evenly over all \
-         surfaces. The cost of masks goes with their fragments and that of geometry shaders with \
-         triangles, so that few large triangles favour the split and many small ones the mask. The document's figures are of other \
-         machines, scenes and pictures: their order counts."
+         surfaces. An order of two ways counts as told apart where the middle halves of their times do not meet. The document's figures are of \
+         other machines, scenes and pictures: their order counts."
     ));
-    for scene in &SCENES[..scenes] {
+    for (done, scene) in SCENES[..scenes].iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(scene.0, done, scenes);
         compare(&gpu, *scene, (side, repeats, points), &mut table)?;
     }
     let mut curves = Vec::new();
-    let swept = sweep(&gpu, context.smoke, side, points, &mut curves)?;
+    let swept = sweep(&gpu, context, side, points, &mut curves)?;
     let words = Words {
         title: "Octahedron and paraboloid maps of unsplit pieces",
         x: "mean edge of pieces (rad)",
@@ -395,4 +509,24 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         atomic::write(&context.folder.join("unsplit.svg"), svg.as_bytes())?;
     }
     Ok(vec![table, swept])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_hold_where_middle_halves_do_not_meet() {
+        let of = |from: f64| Times::of((0..9).map(|i| 1e-3 * (from + f64::from(i))).collect());
+        let first = of(1.0);
+        assert!(
+            [(first.median, 5.0), (first.low, 3.0), (first.high, 7.0)]
+                .iter()
+                .all(|(found, right)| (found - right).abs() < 1e-12)
+        );
+        assert_eq!(first.before(of(6.0)), "holds");
+        assert_eq!(first.before(of(4.0)), "is not told apart");
+        assert_eq!(of(6.0).before(first), "is the reverse");
+        assert_eq!(Times::of(Vec::new()).before(first), "is not told apart");
+    }
 }

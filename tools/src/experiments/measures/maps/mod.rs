@@ -2,8 +2,8 @@
 
 mod choice_plot;
 mod environments;
+mod filled_maps;
 mod heat;
-mod live_maps;
 pub mod map_borders;
 pub mod map_choice;
 pub mod map_density;

@@ -39,6 +39,16 @@ impl Sphere {
         (squared < 1.0).then(|| p.x * self.right + p.y * self.up + (1.0 - squared).sqrt() * self.towards)
     }
 
+    /// What the normal changes by from a pixel to the one across, and to the one below: derivatives.
+    pub fn normal_derivatives(&self, p: DVec2) -> Option<[DVec3; 2]> {
+        let squared = p.length_squared();
+        let pixel = 2.0 / f64::from(self.side);
+        (squared < 1.0).then(|| {
+            let by = |axis: DVec3, coordinate: f64| axis - coordinate / (1.0 - squared).sqrt() * self.towards;
+            [pixel * by(self.right, p.x), -pixel * by(self.up, p.y)]
+        })
+    }
+
     /// Where a mirror looks at a place.
     pub fn mirrored(&self, p: DVec2) -> Option<DVec3> {
         let n = self.normal(p)?;

@@ -4,14 +4,14 @@
 
 use clerestory::gpu::Gpu;
 use clerestory::maps::MapImage;
-use clerestory::maps::prefilter::ggx_lobe;
+use clerestory::maps::prefilter::{ggx_mean, weighted_texels};
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{LightKind, Scene};
 use clerestory::techniques::preview::probe::probe_level;
 use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewShadows};
 use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
-use glam::{DVec3, DVec4, Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::experiments::measures::Context;
@@ -112,22 +112,8 @@ impl<'a> Stage<'a> {
 }
 
 fn truth(map: &MapImage, directions: &[DVec3], alpha: f64) -> Vec<DVec3> {
-    let held: Vec<(DVec3, DVec4)> = map
-        .map()
-        .texels(map.size())
-        .filter_map(|texel| {
-            let angle = map.map().texel_solid_angle(map.size(), texel);
-            let direction = map.map().texel_direction(map.size(), texel)?;
-            Some((direction, (angle * map.at(texel).as_dvec3()).extend(angle)))
-        })
-        .collect();
-    directions
-        .par_iter()
-        .map(|r| {
-            let sum: DVec4 = held.iter().map(|(d, value)| ggx_lobe(*r, *d, alpha) * *value).sum();
-            sum.truncate() / sum.w
-        })
-        .collect()
+    let texels = weighted_texels(map);
+    directions.par_iter().map(|r| ggx_mean(&texels, *r, alpha)).collect()
 }
 
 /// RMS of differences over the mean.
@@ -183,7 +169,11 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     );
     let mut random = Random::new(5);
     let directions: Vec<DVec3> = (0..DIRECTIONS).map(|_| random.direction()).collect();
-    for (address, share) in &own {
+    for (done, (address, share)) in own.iter().enumerate() {
+        if context.watch.stopped() {
+            break;
+        }
+        context.watch.begin(address, done, own.len());
         let stage = Stage::new(&gpu, address, *share)?;
         let finest = LightProbeDesc {
             side: reference,

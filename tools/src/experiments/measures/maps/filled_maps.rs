@@ -42,20 +42,14 @@ pub struct Variant {
     pub size: UVec2,
 }
 
-/// Texels of a layer of a map with about `side`² texels in all: 512, 724 × 362, 209 and 362 for the document's 512.
-pub fn size_of_layer(map: Parametrization, side: u32) -> UVec2 {
-    let height = (f64::from(side) / f64::from(map.layers() * map.aspect()).sqrt()).round() as u32;
-    UVec2::new(height * map.aspect(), height)
-}
-
-/// Without a figure of the document.
+/// With about `side`² texels in all (512, 724 × 362, 209 and 362 for the document's 512), without a figure of the document.
 pub fn variant(name: impl Into<String>, map: Parametrization, way: Way, side: u32) -> Variant {
     Variant {
         name: name.into(),
         stated: None,
         map,
         way,
-        size: size_of_layer(map, side),
+        size: map.size_for(f64::from(side).powi(2)),
     }
 }
 
@@ -149,7 +143,7 @@ pub fn variants(side: u32, level: u32) -> Vec<Variant> {
 }
 
 /// A scene, and the place in it that maps are of.
-pub struct LiveScene {
+pub struct FilledScene {
     pub on_device: GpuScene,
     pub corners: Vec<[Vec3; 3]>,
     pub index: Bvh2,
@@ -205,7 +199,7 @@ impl Filling<'_> {
     }
 }
 
-impl LiveScene {
+impl FilledScene {
     /// Loads a scene; `share` is the place in the box around it.
     pub fn load(gpu: &Gpu, address: &str, share: Vec3) -> Result<Self> {
         let on_device = GpuScene::new(gpu, &scene::load(address)?)?;
