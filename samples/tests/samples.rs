@@ -566,8 +566,12 @@ fn the_reflection_preview_refuses_what_it_cannot_show() {
         (&["--metal", "tin"], "tin"),
         (&["--roughness", "2"], "from 0 to 1"),
         (&["--shadows", "paraboloid"], "paraboloid"),
-        (&["--map", "100"], "power of two"),
-        (&["--samples", "0"], "from 1 to 8"),
+        (&["--map", "100"], "--map: 100 is not a power of two"),
+        (&["--samples", "0"], "--samples: 0 is not from 1 to 8"),
+        (&["--shadow", "0"], "--shadow: "),
+        (&["--radius", "0"], "--radius: 0"),
+        (&["--radius", "-1"], "--radius: -1"),
+        (&["--radius", "NaN"], "--radius: NaN"),
         (&["builtin:point-in-fog"], "participating media"),
     ] {
         let folder = tempfile::tempdir().unwrap();

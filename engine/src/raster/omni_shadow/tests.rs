@@ -60,7 +60,7 @@ fn planes_do_not_shade_themselves_where_positions_are_rounded() {
         for width in [0, 1, 3] {
             for _ in 0..4000 {
                 let side = random.choose(&[8, 64, 1024]);
-                let normal = random.direction().as_dvec3();
+                let normal = random.direction().as_dvec3().normalize();
                 let light = random.direction().as_dvec3();
                 let slack = 10f64.powf(-4.0 + 2.0 * f64::from(random.signed()));
                 let height = slack * 10f64.powf(1.5 * f64::from(random.signed()));
