@@ -16,24 +16,38 @@ layout(push_constant, scalar) uniform Push {
 
 layout(set = 0, binding = 0, scalar) restrict writeonly buffer Texels { vec3 texels[]; };
 
+ivec2 target_texel(int i) {
+    return ivec2(i % push.target.size.x, i / push.target.size.x);
+}
+
+vec3 target_direction(int i) {
+    return directional_decode((vec2(target_texel(i)) + 0.5) / vec2(push.target.size));
+}
+
 void main() {
-    int i = int(gl_GlobalInvocationID.x);
-    if (i >= push.target.size.x * push.target.size.y) {
-        return;
-    }
-    ivec2 p = ivec2(i % push.target.size.x, i / push.target.size.x);
-    vec3 r = directional_decode((vec2(p) + 0.5) / vec2(push.target.size));
+    int first = int(PREFILTER_TEXELS_PER_INVOCATION * gl_GlobalInvocationID.x);
+    int count = push.target.size.x * push.target.size.y;
+    // Those past the end are made like the others, and not kept.
+    mat4x3 r = mat4x3(target_direction(first), target_direction(first + 1), target_direction(first + 2), target_direction(first + 3));
     MapLevel level = map_levels[push.source];
-    vec4 sum = vec4(0.0);
+    // Columns are texels: radiance, and what it is divided by.
+    mat4 sum = mat4(0.0);
     for (int y = 0; y < level.size.y; ++y) {
         // By rows, so that small terms meet small sums.
-        vec4 row = vec4(0.0);
+        mat4 row = mat4(0.0);
         for (int x = 0; x < level.size.x; ++x) {
             vec3 d = directional_decode((vec2(x, y) + 0.5) / vec2(level.size));
-            float weight = ggx_lobe(r, d, push.alpha) * map_angles[directional_angle(level, ivec2(x, y))];
-            row += weight * vec4(map_texels[directional_texel(level, ivec2(x, y))], 1.0);
+            vec4 light = vec4(map_texels[directional_texel(level, ivec2(x, y))], 1.0) * map_angles[directional_angle(level, ivec2(x, y))];
+            vec4 lobes = vec4(
+                ggx_lobe(r[0], d, push.alpha), ggx_lobe(r[1], d, push.alpha), ggx_lobe(r[2], d, push.alpha), ggx_lobe(r[3], d, push.alpha)
+            );
+            row += outerProduct(light, lobes);
         }
         sum += row;
     }
-    texels[directional_texel(push.target, p)] = sum.rgb / sum.a;
+    for (int i = 0; i < int(PREFILTER_TEXELS_PER_INVOCATION); ++i) {
+        if (first + i < count) {
+            texels[directional_texel(push.target, target_texel(first + i))] = sum[i].rgb / sum[i].a;
+        }
+    }
 }

@@ -8,6 +8,7 @@ use ash::vk;
 
 use super::barrier::{Access, BufferBarrier, ImageBarrier};
 use super::buffer::{Buffer, BufferDesc, BufferView, Residency};
+use super::caps::DeviceKind;
 use super::device::Gpu;
 use super::interface::{BindingSet, ComputeShader, PushConstants};
 use super::marker::BEGUN;
@@ -134,6 +135,7 @@ impl Recorder {
             }
             if timestamps != vk::QueryPool::null() {
                 device.cmd_write_timestamp2(command_buffer, stage, timestamps, 2 * index as u32);
+                self.take_timestamp_now();
             }
             if counted {
                 device.cmd_begin_query(command_buffer, statistics, index as u32, vk::QueryControlFlags::empty());
@@ -151,12 +153,29 @@ impl Recorder {
             }
             if timestamps != vk::QueryPool::null() {
                 device.cmd_write_timestamp2(command_buffer, stage, timestamps, 2 * index as u32 + 1);
+                self.take_timestamp_now();
             }
             if let Some(debug) = &inner.debug {
                 debug.cmd_end_debug_utils_label(command_buffer);
             }
         }
         result
+    }
+
+    /// Software drivers that have drawn before put a timestamp among the draws to come, and take it with them, after the dispatches between.
+    /// A barrier that nothing waits at makes them take it; validation sees no dependency in it.
+    fn take_timestamp_now(&self) {
+        if self.gpu.caps().kind != DeviceKind::Cpu {
+            return;
+        }
+        let nothing = [vk::MemoryBarrier2::default()];
+        // SAFETY: the command buffer is recording, outside of a rendering.
+        unsafe {
+            self.gpu.inner.device.cmd_pipeline_barrier2(
+                self.resources.command_buffer,
+                &vk::DependencyInfo::default().memory_barriers(&nothing),
+            );
+        }
     }
 
     /// Ends the command buffer and hands it to the queue.

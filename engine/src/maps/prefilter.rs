@@ -15,6 +15,7 @@
 
 use super::MapImage;
 use super::directional_map::DirectionalMap;
+use crate::gpu::shaders::constants::PREFILTER_TEXELS_PER_INVOCATION;
 use crate::gpu::shaders::maps::prefilter_ggx as kernel;
 use crate::gpu::{ComputePipeline, Gpu, Pass};
 use crate::{Error, Result};
@@ -157,7 +158,12 @@ impl PrefilterGgx {
             texels: target.texels().view(),
         };
         let count = (level.size[0] * level.size[1]).cast_unsigned();
-        let groups = [self.pipeline.groups_for(count), 1, 1];
+        let groups = [
+            self.pipeline
+                .groups_for(count.div_ceil(PREFILTER_TEXELS_PER_INVOCATION)),
+            1,
+            1,
+        ];
         pass.dispatch(&self.pipeline, &[&set, &source.set()], &push, groups)
     }
 }

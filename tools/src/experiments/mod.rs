@@ -65,6 +65,11 @@ pub enum Kind<'a> {
 }
 
 impl Experiment {
+    /// The name of its part in a page of results: the title up to its colon.
+    pub fn part(&self) -> &str {
+        self.title.split(':').next().unwrap_or(&self.name)
+    }
+
     /// The first sentence of what it is about.
     pub fn about_in_short(&self) -> &str {
         self.about.find(". ").map_or(&self.about, |end| &self.about[..=end])
@@ -173,6 +178,15 @@ mod tests {
                 .to_string()
                 .contains("is not known")
         );
+    }
+
+    #[test]
+    fn each_has_a_part_of_the_page_to_itself() {
+        let mut parts: Vec<String> = names().map(|name| find(name).unwrap().part().to_owned()).collect();
+        let all = parts.len();
+        parts.sort();
+        parts.dedup();
+        assert_eq!(parts.len(), all, "{parts:?}");
     }
 
     #[test]

@@ -2,6 +2,9 @@
 #ifndef CLERESTORY_MAPS_GGX_LOBE_GLSL
 #define CLERESTORY_MAPS_GGX_LOBE_GLSL
 
+// Texels of the filtered map that an invocation makes, so that what it reads of the source serves all of them.
+const uint PREFILTER_TEXELS_PER_INVOCATION = 4u;
+
 // Between unit directions: where the mirror looks, and from where light comes. Not normalised; at most 1.
 float ggx_lobe(vec3 r, vec3 d, float alpha) {
     vec3 apart = r - d;

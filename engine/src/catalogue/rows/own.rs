@@ -508,7 +508,7 @@ pub(super) const ROWS: &[Row] = &[
             "no interreflection beyond a probe, no parallax, round lobes, unshadowed directional lights",
         )),
         ..measured(
-            "clerestory report live-maps",
+            "clerestory report preview-picture",
             part(
                 "CL-PREVIEW",
                 "raster preview: deferred shading with shadow maps and light probes",
@@ -525,6 +525,7 @@ pub(super) const ROWS: &[Row] = &[
                     "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
                     "engine/src/techniques/preview/probe.rs::lobes_grow_from_level_to_level",
                     "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
+                    "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",
                 ],
             ),
         )

@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     for (experiment, block) in found {
         let command = format!("clerestory report {}", experiment.name);
         let own = Block {
-            name: experiment.title.split(':').next().unwrap_or(&experiment.name),
+            name: experiment.part(),
             command: &command,
         };
         let part = match block {

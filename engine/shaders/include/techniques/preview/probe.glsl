@@ -9,9 +9,12 @@
 // Levels that a probe may have.
 const uint PROBE_LEVELS_MAX = 8u;
 
-// Between two levels of lobe widths a < b: the mixture whose lobe has the variance of width alpha.
+// Between two levels of lobe widths a < b: the share of the second in the mixture whose lobe is nearest to that of width alpha.
 float probe_part(float alpha, float a, float b) {
-    return clamp((alpha * alpha - a * a) / (b * b - a * a), 0.0, 1.0);
+    float x = alpha * alpha;
+    a *= a;
+    b *= b;
+    return clamp(b * (x - a) * (x + 2.0 * a + b) / ((b - a) * (x + a) * (x + b)), 0.0, 1.0);
 }
 
 // Albedo of the reflection by microfacets towards a direction at cos_o, in one reflection.

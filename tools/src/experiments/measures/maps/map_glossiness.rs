@@ -245,7 +245,7 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
     found.note(format!(
         "A mirror sphere whose roughness √α grows from left to right (α from {LEAST_ALPHA} to 1) in an octahedron map of {rows} × {rows} texels with a \
          sun. Truth is the sum of the GGX lobe with n = v = r over all texels at each pixel; all look-ups stand for that lobe, and their error is that of \
-         the boxes and of mixing two of {LEVELS} filtered maps, octahedra of {}, by the variances of their lobes. One box holds the solid angle over which an even mean has the lobe's variance; several are \
+         the boxes and of mixing two of {LEVELS} filtered maps, octahedra of {}, to the lobe that is nearest. One box holds the solid angle over which an even mean has the lobe's variance; several are \
          the staircase nearest to the lobe, of {LOBES} lobes even in roughness the nearest. The border is half the map. Times are by wall clock, medians, with submission; \
          all boxes need one table. Pictures beside this table, `glossiness.png`: truth, four boxes about one middle, four steps in rings, levels.",
         levels.sizes(),
