@@ -2,7 +2,7 @@
 #ifndef CLERESTORY_MAPS_GGX_LOBE_GLSL
 #define CLERESTORY_MAPS_GGX_LOBE_GLSL
 
-// Texels of the filtered map that an invocation makes, so that what it reads of the source serves all of them.
+// Texels of the filtered map that an invocation makes, so that what it reads of the source serves all of them: the columns of a mat4.
 const uint PREFILTER_TEXELS_PER_INVOCATION = 4u;
 
 // Between unit directions: where the mirror looks, and from where light comes. Not normalised; at most 1.

@@ -13,7 +13,7 @@
 //! - Emitting surfaces light others only through a live map.
 //! - Directional lights cast no shadows; shadows of the others have the bias of [`OmniShadowMaps`](crate::raster::OmniShadowMaps).
 //! - A probe's light is neither occluded nor nearer than infinity, and interreflection is as much as a probe holds.
-//! - Microfacet reflections are filtered by a round lobe, without what the lobe's own Fresnel factors and masking do to its shape.
+//! - Microfacet reflections are filtered by a round lobe, mixed of two for roughnesses between those of a probe's levels ([`probe`]), without what the lobe's own Fresnel factors and masking do to its shape.
 //! - Nothing is seen through materials that transmit, and glass casts full shadows.
 //! - Partial alpha is drawn opaque, in the picture, in shadow maps and in live maps.
 //!

@@ -116,7 +116,7 @@ pub const MEASURES: &[Measure] = &[
     on_device("photon-queues", photons::photon_queues::measure),
     on_device("photon-statistics", photons::photon_statistics::measure),
     on_host("picture-formats", rendering::picture_formats::measure),
-    on_device("preview-picture", preview::preview_picture::measure).of_any_scenes(),
+    on_device("preview-picture", preview::preview_picture::measure),
     on_host("ray-offsets", rays::ray_offsets::measure),
     on_host("sample-sums", rendering::sample_sums::measure),
     on_device("scene-profile", rendering::scene_profile::measure),

@@ -9,12 +9,15 @@
 // Levels that a probe may have.
 const uint PROBE_LEVELS_MAX = 8u;
 
-// Between two levels of lobe widths a < b: the share of the second in the mixture whose lobe is nearest to that of width alpha.
+// Between two levels of lobe widths 0 < a < b: the share of the second in the mixture whose lobe is nearest to that of width alpha.
 float probe_part(float alpha, float a, float b) {
+    if (alpha <= a) {
+        return 0.0;
+    }
     float x = alpha * alpha;
     a *= a;
     b *= b;
-    return clamp(b * (x - a) * (x + 2.0 * a + b) / ((b - a) * (x + a) * (x + b)), 0.0, 1.0);
+    return min(log((x + a) * (a + b) / (2.0 * a * (x + b))) / log((a + b) * (a + b) / (4.0 * a * b)), 1.0);
 }
 
 // Albedo of the reflection by microfacets towards a direction at cos_o, in one reflection.

@@ -30,8 +30,8 @@ const SIDES: [u32; 3] = [128, 256, 512];
 const REFERENCE: u32 = 1024;
 /// Means of the reference that lobes are summed over, texels along a side: lobes are many times wider.
 const SUMMED: u32 = 256;
-/// Widths of lobes: irradiance, two of the levels' own, and one between levels.
-const ALPHAS: [f64; 4] = [1.0, 0.35355, 0.125, 0.2];
+/// Widths of lobes: irradiance, two of the levels' own, one between them, and narrower ones than the narrowest.
+const ALPHAS: [f64; 7] = [1.0, 0.35355, 0.125, 0.2, 0.06, 0.03, 0.01];
 const DIRECTIONS: usize = 300;
 const REPEATS: usize = 5;
 /// The parts of a map's frame by the names of their passes.
@@ -164,6 +164,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "of α = 0.35",
             "of α = 0.125",
             "of α = 0.2",
+            "of α = 0.06",
+            "of α = 0.03",
+            "of α = 0.01",
             "of the mirror",
         ],
     );
@@ -217,7 +220,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     found.note(format!(
         "One map a frame at a place in each scene, lit by the scene's lights through octahedron shadow maps of 1024², as an octahedron of that many texels a \
          side. Times are of the device's timestamps, medians of {REPEATS}. Errors are RMS over {DIRECTIONS} directions, over the mean: of look-ups filtered by lobes of width α \
-         (irradiance is α = 1; 0.2 lies between two levels) against the sum of the lobe over a map of {REFERENCE}² texels, by means of {SUMMED}² in f64; \
+         (irradiance is α = 1; 0.2 lies between two levels, and from 0.06 down between the finest filtered one and mirrors) against the sum of the lobe over a map of {REFERENCE}² texels, by means of {SUMMED}² in f64; \
          of unfiltered ones against that map itself, where edges of surfaces lie between texels. The divider room's panel is no light of the preview: its map is dark but \
          for that, the hardest light for lobes. Maps of 128² have no level between α = 0.35 and mirrors."
     ));

@@ -19,40 +19,75 @@ use crate::experiments::measures::Context;
 use crate::experiments::pareto;
 use crate::experiments::plot::{self, Curve, PlotPoint, Words};
 use crate::experiments::table::Table;
-use crate::timing::{median, repeated};
+use crate::timing::{Spread, median, repeated};
 
-/// Scenes lit by point lights, and the live map's place as a share of the box around each.
-const SCENES: [(&str, Vec3); 5] = [
-    ("builtin:cornell-box?source=point", Vec3::new(0.25, 0.5, 0.4)),
-    ("builtin:box-room?source=point", Vec3::new(0.45, 0.4, 0.55)),
-    ("builtin:atrium?source=point", Vec3::new(0.5, 0.3, 0.5)),
-    ("builtin:cathedral?source=point", Vec3::new(0.5, 0.25, 0.55)),
-    ("builtin:conference?source=point", Vec3::new(0.4, 0.5, 0.45)),
+/// Scenes that a point light alone lights.
+const SCENES: [&str; 5] = [
+    "builtin:cornell-box?source=point",
+    "builtin:box-room?source=point",
+    "builtin:atrium?source=point",
+    "builtin:cathedral?source=point",
+    "builtin:conference?source=point",
 ];
-const SIZE: u32 = 128;
 /// Texels along a side of an octahedron, cubes having as many in all, and samples along a side of a pixel.
-const QUALITIES: [(u32, u32); 7] = [
-    (256, 1),
-    (512, 1),
-    (1024, 1),
-    (1024, 2),
-    (2048, 2),
-    (2048, 4),
-    (4096, 4),
-];
-/// What the live map's pictures are drawn with.
-const FINE: (u32, u32) = (2048, 4);
+type Quality = (u32, u32);
+/// What the live maps' pictures are drawn with.
+const FINE: Quality = (2048, 4);
 const MAP: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
-const SPP: [u32; 6] = [1, 2, 4, 8, 16, 32];
-const REFERENCE_SPP: u32 = 1024;
+/// Places of live maps along each axis of the box around a scene, as shares of it: nine at half its height.
+const SHARES: [f32; 3] = [0.25, 0.5, 0.75];
 const REPEATS: usize = 5;
 const SEED: u32 = 1;
 const REFERENCE_SEED: u32 = 2;
 /// The last pass of a shadow map.
 const SHADOWS_DRAWN: &str = "shadow maps: distances";
-/// What lights alone make: emission, and light scattered once.
+/// What point lights alone make: emission, and light scattered once.
 const ONCE: &str = "bounces=0..1";
 const TWICE: &str = "bounces=0..2";
+
+/// Pictures of one size.
+#[derive(Clone, Copy)]
+struct Plan {
+    /// Pixels along a side.
+    size: u32,
+    qualities: &'static [Quality],
+    /// Samples a pixel of the path tracer.
+    spp: &'static [u32],
+    reference_spp: u32,
+    repeats: usize,
+}
+
+const PLANS: [Plan; 2] = [
+    Plan {
+        size: 128,
+        qualities: &[
+            (256, 1),
+            (512, 1),
+            (1024, 1),
+            (1024, 2),
+            (2048, 2),
+            (2048, 4),
+            (4096, 4),
+        ],
+        spp: &[1, 2, 4, 8, 16, 32],
+        reference_spp: 1024,
+        repeats: REPEATS,
+    },
+    Plan {
+        size: 384,
+        qualities: &[(512, 1), (1024, 2), (2048, 4)],
+        spp: &[1, 4, 16],
+        reference_spp: 256,
+        repeats: 3,
+    },
+];
+const SMOKE: Plan = Plan {
+    size: 16,
+    qualities: &[(256, 1), (512, 1)],
+    spp: &[1, 2],
+    reference_spp: 16,
+    repeats: 1,
+};
 
 fn errors(picture: &Picture, reference: &Picture) -> Result<ErrorReport> {
     compare(picture, reference, &CompareOptions::default())
@@ -63,10 +98,10 @@ struct Frame {
     picture: Picture,
     seconds: f64,
     /// Those of its lights and shadow maps.
-    shadows: f64,
+    shadows: Option<f64>,
 }
 
-/// A scene for both.
+/// A scene for the preview and for the path tracer.
 struct Subject<'a> {
     gpu: &'a Gpu,
     renderer: Renderer,
@@ -105,7 +140,7 @@ impl<'a> Subject<'a> {
     fn previewed(
         &self,
         layout: ShadowLayout,
-        (side, samples): (u32, u32),
+        (side, samples): Quality,
         place: Option<Vec3>,
         repeats: usize,
     ) -> Result<Frame> {
@@ -142,23 +177,27 @@ impl<'a> Subject<'a> {
             preview.record(&mut recorder, scene, &surfaces, &self.camera, &[part])?;
             let timings = recorder.submit()?.wait()?;
             // Each light's ends with this pass, and those of the picture follow.
-            let drawn = timings.passes.iter().rposition(|pass| pass.name == SHADOWS_DRAWN);
-            let of_shadows = &timings.passes[..drawn.map_or(0, |last| last + 1)];
-            let nanoseconds: u64 = of_shadows.iter().filter_map(|pass| pass.nanoseconds).sum();
-            shadows.push(1e-9 * nanoseconds as f64);
+            if let Some(last) = timings.passes.iter().rposition(|pass| pass.name == SHADOWS_DRAWN) {
+                let nanoseconds = timings.passes[..=last].iter().filter_map(|pass| pass.nanoseconds);
+                shadows.push(1e-9 * nanoseconds.sum::<u64>() as f64);
+            }
             Ok::<_, Error>(((), timings.seconds()))
         })?;
         Ok(Frame {
             picture: preview.picture()?,
             seconds: median(seconds),
             // The first warms up.
-            shadows: median(shadows[1.min(shadows.len() - 1)..].to_vec()),
+            shadows: shadows.get(1..).map(|timed| median(timed.to_vec())),
         })
     }
 
-    fn at(&self, share: Vec3) -> Vec3 {
+    /// Where live maps are drawn.
+    fn places(&self) -> Vec<Vec3> {
         let [lower, upper] = self.renderer.gpu_scene().bounds();
-        lower + share * (upper - lower)
+        let shares = SHARES
+            .iter()
+            .flat_map(|x| SHARES.iter().map(|z| Vec3::new(*x, 0.5, *z)));
+        shares.map(|share| lower + share * (upper - lower)).collect()
     }
 }
 
@@ -179,32 +218,32 @@ impl Point {
     }
 }
 
-/// How long the path tracer takes for the errors of the preview's quickest setting and of its least error.
+/// How long the path tracer takes for the errors of each of the preview's settings, over the preview's own time: the least and the greatest.
 fn verdict(name: &str, previews: &[Point], traced: &[Point]) -> String {
     let curve: Vec<(f64, f64)> = traced.iter().map(Point::cost_and_error).collect();
-    let beside = |point: &Point| {
-        let (own, error) = point.cost_and_error();
-        let times = match cost_of(&curve, error) {
-            Some(Cost::Measured(seconds)) => format!("{:.2}", seconds / own),
-            Some(Cost::AtMost(seconds)) => format!("at most {:.2}", seconds / own),
-            Some(Cost::Above(seconds)) => format!("more than {:.2}", seconds / own),
-            None => "unknown".to_owned(),
-        };
-        format!("{error:.2e} in {:.1} ms (rays: {times} times as long)", 1e3 * own)
-    };
-    let first = |by: fn(&Point) -> f64| previews.iter().min_by(|a, b| by(a).total_cmp(&by(b)));
-    let both = [first(|point| point.seconds), first(|point| point.errors.relative_mse)];
-    let [quickest, least] = both.map(|point| point.map_or_else(String::new, beside));
-    format!("{name}: relative MSE of the quickest {quickest}, least {least}.")
-}
-
-/// What is measured of each scene.
-struct Plan {
-    size: u32,
-    qualities: &'static [(u32, u32)],
-    spp: &'static [u32],
-    reference_spp: u32,
-    repeats: usize,
+    let mut ratios: Vec<(f64, String)> = previews
+        .iter()
+        .filter_map(|point| {
+            let (own, error) = point.cost_and_error();
+            let (bound, seconds) = match cost_of(&curve, error)? {
+                Cost::Measured(seconds) => ("", seconds),
+                Cost::AtMost(seconds) => ("at most ", seconds),
+                Cost::Above(seconds) => ("more than ", seconds),
+            };
+            let ratio = seconds / own;
+            let (texels, samples) = (point.texels.unwrap_or_default(), point.samples);
+            let words =
+                format!("{bound}{ratio:.2} (relative MSE {error:.2e}, {texels} texels, {samples} samples a pixel)");
+            Some((ratio, words))
+        })
+        .collect();
+    ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
+    match (ratios.first(), ratios.last()) {
+        (Some((_, least)), Some((_, most))) => {
+            format!("{name}: for equal error the path tracer takes, of the preview's time, from {least} to {most}.")
+        }
+        _ => format!("{name}: nothing to compare."),
+    }
 }
 
 impl Plan {
@@ -219,7 +258,7 @@ impl Plan {
                     texels: Some(u64::from(side * side)),
                     samples: u64::from(samples * samples),
                     seconds: frame.seconds,
-                    shadows: Some(frame.shadows),
+                    shadows: frame.shadows,
                     errors: errors(&frame.picture, &right)?,
                 })
             });
@@ -242,8 +281,8 @@ impl Plan {
         Ok(lines)
     }
 
-    /// Rows of pictures without and with a live map at a place, against light scattered twice at most and against all light.
-    fn by_live_map(&self, subject: &Subject<'_>, place: Vec3) -> Result<[Lit; 2]> {
+    /// A picture by lights alone, and those with a live map at each of the places.
+    fn by_live_map(&self, subject: &Subject<'_>) -> Result<[Vec<Lit>; 2]> {
         let (twice, _) = subject.traced(TWICE, self.reference_spp, REFERENCE_SEED)?;
         let (all, _) = subject.traced("all", self.reference_spp, REFERENCE_SEED)?;
         let quality = if self.qualities.contains(&FINE) {
@@ -251,25 +290,41 @@ impl Plan {
         } else {
             self.qualities[0]
         };
-        let lit = |way, place| {
-            let frame = subject.previewed(ShadowLayout::Octahedron, quality, place, self.repeats)?;
-            let both = [errors(&frame.picture, &twice)?, errors(&frame.picture, &all)?];
-            Ok((way, frame.seconds, both))
+        let lit = |place| {
+            let frame = subject.previewed(ShadowLayout::Octahedron, quality, place, 1)?;
+            Ok(Lit {
+                seconds: frame.seconds,
+                twice: errors(&frame.picture, &twice)?,
+                all: errors(&frame.picture, &all)?,
+            })
         };
-        Ok([lit("lights alone", None)?, lit("with a live map", Some(place))?])
+        let with: Result<Vec<Lit>> = subject.places().into_iter().map(|place| lit(Some(place))).collect();
+        Ok([vec![lit(None)?], with?])
     }
 }
 
-/// A way to light a picture, seconds of a frame, and errors against light scattered twice at most and against all light.
-type Lit = (&'static str, f64, [ErrorReport; 2]);
+/// A picture's seconds, and its errors against light scattered twice at most and against all light.
+struct Lit {
+    seconds: f64,
+    twice: ErrorReport,
+    all: ErrorReport,
+}
 
-/// Whether a live map brings a picture nearer to all light.
-fn of_live_map(scene: &str, [(_, _, [_, alone]), (_, _, [_, with])]: &[Lit; 2]) -> String {
-    let nearer = |without: f64, with: f64| if with < without { "nearer to" } else { "farther from" };
+fn spread(all: &[Lit], of: impl Fn(&Lit) -> f64) -> Spread {
+    Spread::of(all.iter().map(of).collect())
+}
+
+/// At how many places a live map brings a picture nearer to all light.
+fn of_live_maps(scene: &str, alone: &[Lit], with: &[Lit]) -> String {
+    let nearer = |of: fn(&Lit) -> f64| {
+        let without = spread(alone, of).median;
+        with.iter().filter(|lit| of(lit) < without).count()
+    };
     format!(
-        "{scene}: a live map brings the mean {} that of all light, and the pixels {} theirs by relative MSE.",
-        nearer(alone.relative_bias.abs(), with.relative_bias.abs()),
-        nearer(alone.relative_mse, with.relative_mse)
+        "{scene}: of {} places, a live map brings the mean nearer to that of all light at {}, and the relative MSE down at {}.",
+        with.len(),
+        nearer(|lit| lit.all.relative_bias.abs()),
+        nearer(|lit| lit.all.relative_mse)
     )
 }
 
@@ -279,35 +334,16 @@ fn of_live_map(scene: &str, [(_, _, [_, alone]), (_, _, [_, with])]: &[Lit; 2]) 
 /// Those of scenes, rendering and files.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
-    let plan = if context.smoke {
-        Plan {
-            size: 16,
-            qualities: &QUALITIES[..2],
-            spp: &SPP[..2],
-            reference_spp: 16,
-            repeats: 1,
-        }
+    let (plans, scenes) = if context.smoke {
+        (&[SMOKE][..], &SCENES[..1])
     } else {
-        Plan {
-            size: SIZE,
-            qualities: &QUALITIES,
-            spp: &SPP,
-            reference_spp: REFERENCE_SPP,
-            repeats: REPEATS,
-        }
-    };
-    let own: Vec<(String, Vec3)> = if context.scenes.is_empty() {
-        let count = if context.smoke { 1 } else { SCENES.len() };
-        let of = |(address, share): &(&str, Vec3)| ((*address).to_owned(), *share);
-        SCENES[..count].iter().map(of).collect()
-    } else {
-        let middle = Vec3::splat(0.5);
-        context.scenes.iter().map(|address| (address.clone(), middle)).collect()
+        (&PLANS[..], &SCENES[..])
     };
     let mut pictures = Table::new(
         "Pictures by lights alone",
         &[
             "scene",
+            "pixels a side",
             "way",
             "texels a light",
             "samples a pixel",
@@ -326,89 +362,128 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "way",
             "GPU time (ms)",
             "relative MSE, light scattered twice at most",
-            "relative bias",
+            "its least of the places",
+            "its greatest",
+            "relative bias, light scattered twice at most",
             "relative MSE, all light",
-            "relative bias of it",
+            "least of the places",
+            "greatest",
+            "relative bias, all light",
         ],
     );
-    for (done, (address, share)) in own.iter().enumerate() {
+    for (done, address) in scenes.iter().enumerate() {
         if context.watch.stopped() {
             break;
         }
-        context.watch.begin(address, done, own.len());
-        let subject = Subject::new(&gpu, &scene::load(address)?, plan.size)?;
-        let lines = plan.by_lights(&subject)?;
-        let all = lines.iter().flat_map(|(_, points)| points);
-        let mut on_front = pareto::front(&all.map(Point::cost_and_error).collect::<Vec<_>>()).into_iter();
-        let mut curves = Vec::new();
-        for (name, points) in &lines {
-            let mut drawn = Vec::new();
-            for (point, ringed) in points.iter().zip(on_front.by_ref()) {
-                let (x, y) = point.cost_and_error();
-                drawn.push(PlotPoint {
-                    x,
-                    y,
-                    y_range: [y; 2],
-                    ringed,
-                });
-                pictures.row([
-                    address.as_str().into(),
-                    name.as_str().into(),
-                    point.texels.into(),
-                    point.samples.into(),
-                    (1e3 * x).into(),
-                    point.shadows.map(|seconds| 1e3 * seconds).into(),
-                    y.into(),
-                    point.errors.relative_bias.into(),
-                    point.errors.flip.into(),
-                    (if ringed { "yes" } else { "no" }).into(),
-                ]);
-            }
-            curves.push(Curve {
-                name: name.clone(),
-                points: drawn,
-            });
-        }
-        if let Some(((_, traced), previews)) = lines.split_last() {
-            for (name, points) in previews {
-                pictures.note(verdict(&format!("{address}, {name}"), points, traced));
+        context.watch.begin(address, done, scenes.len());
+        let scene = scene::load(address)?;
+        for plan in plans {
+            let subject = Subject::new(&gpu, &scene, plan.size)?;
+            let curves = compared(&mut pictures, address, plan, &subject)?;
+            let title = format!("{address}, {} × {} pixels", plan.size, plan.size);
+            let words = Words {
+                title: &title,
+                x: "GPU time (s)",
+                y: "relative MSE",
+            };
+            if let Some(svg) = plot::log_log(words, &curves)? {
+                std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
+                let file = format!("{}-{}.svg", done + 1, plan.size);
+                atomic::write(&context.folder.join(file), svg.as_bytes())?;
             }
         }
-        let words = Words {
-            title: address,
-            x: "GPU time (s)",
-            y: "relative MSE",
-        };
-        if let Some(svg) = plot::log_log(words, &curves)? {
-            std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-            atomic::write(&context.folder.join(format!("{}.svg", done + 1)), svg.as_bytes())?;
-        }
-        let ways = plan.by_live_map(&subject, subject.at(*share))?;
-        interreflection.note(of_live_map(address, &ways));
-        for (way, seconds, [of_twice, of_all]) in ways {
+        let subject = Subject::new(&gpu, &scene, plans[0].size)?;
+        let [alone, with] = plans[0].by_live_map(&subject)?;
+        for (way, all) in [("lights alone", &alone), ("with a live map", &with)] {
+            let [twice, of_all] = [
+                spread(all, |lit| lit.twice.relative_mse),
+                spread(all, |lit| lit.all.relative_mse),
+            ];
             interreflection.row([
-                address.as_str().into(),
+                (*address).into(),
                 way.into(),
-                (1e3 * seconds).into(),
-                of_twice.relative_mse.into(),
-                of_twice.relative_bias.into(),
-                of_all.relative_mse.into(),
-                of_all.relative_bias.into(),
+                (1e3 * spread(all, |lit| lit.seconds).median).into(),
+                twice.median.into(),
+                twice.least.into(),
+                twice.greatest.into(),
+                spread(all, |lit| lit.twice.relative_bias).median.into(),
+                of_all.median.into(),
+                of_all.least.into(),
+                of_all.greatest.into(),
+                spread(all, |lit| lit.all.relative_bias).median.into(),
             ]);
         }
+        interreflection.note(of_live_maps(address, &alone, &with));
     }
+    let [of_references, sizes] = [
+        plans
+            .iter()
+            .map(|plan| plan.reference_spp.to_string())
+            .collect::<Vec<_>>(),
+        plans.iter().map(|plan| format!("{}²", plan.size)).collect(),
+    ]
+    .map(|words| words.join(" and "));
     pictures.note(format!(
-        "Pictures of {SIZE}² against path-traced ones of {REFERENCE_SPP} samples a pixel of the same light paths: emission, and light of the scene's point lights scattered \
-         once. A frame is drawn whole, shadow maps included, whose part does not grow with the picture; cubes have as many texels as octahedra. Times are of the \
-         device's timestamps, medians of {REPEATS}; the path tracer's are of all its passes. The front is that of error and time in this scene; `1.svg` and so on beside \
-         this table are its plots."
+        "Pictures of {sizes} pixels against path-traced ones of {of_references} samples a pixel of the same light paths: emission, and light of the scene's point \
+         light scattered once. A frame is drawn whole, shadow maps included, whose part does not grow with the picture; the mean of a pixel's samples is taken \
+         after it. Cubes have as many texels as octahedra. Times are of the device's timestamps, medians; the path tracer's are of all its passes. The front is that of \
+         error and time in this scene and size, whose plots are beside this table (`1-128.svg` and so on)."
     ));
     interreflection.note(format!(
-        "A live map of {}² at one place of each scene, of light scattered once, lights all surfaces; nothing stands in its way, and it comes from infinity. \
-         {} samples a pixel, shadow maps of {}².",
+        "A live map of {}², of light scattered once, lights all surfaces; nothing stands in its way, and it comes from infinity. It is drawn at nine places at half \
+         the height of the box around the scene, at a quarter, a half and three quarters of its other sides; those inside bodies see nothing. Columns without a name \
+         of their own are medians of the places. {}² pixels, and as shadow maps and samples {}² and {} a pixel (in the smallest form the coarsest).",
         MAP.side,
-        FINE.1 * FINE.1,
-        FINE.0
+        plans[0].size,
+        FINE.0,
+        FINE.1 * FINE.1
     ));
     Ok(vec![pictures, interreflection])
+}
+
+/// Adds the rows and verdicts of a scene in one size: the curves of all ways.
+fn compared(pictures: &mut Table, address: &str, plan: &Plan, subject: &Subject<'_>) -> Result<Vec<Curve>> {
+    let lines = plan.by_lights(subject)?;
+    let all = lines.iter().flat_map(|(_, points)| points);
+    let mut on_front = pareto::front(&all.map(Point::cost_and_error).collect::<Vec<_>>()).into_iter();
+    let mut curves = Vec::new();
+    for (name, points) in &lines {
+        let mut drawn = Vec::new();
+        for (point, ringed) in points.iter().zip(on_front.by_ref()) {
+            let (x, y) = point.cost_and_error();
+            drawn.push(PlotPoint {
+                x,
+                y,
+                y_range: [y; 2],
+                ringed,
+            });
+            pictures.row([
+                address.into(),
+                u64::from(plan.size).into(),
+                name.as_str().into(),
+                point.texels.into(),
+                point.samples.into(),
+                (1e3 * x).into(),
+                point.shadows.map(|seconds| 1e3 * seconds).into(),
+                y.into(),
+                point.errors.relative_bias.into(),
+                point.errors.flip.into(),
+                (if ringed { "yes" } else { "no" }).into(),
+            ]);
+        }
+        curves.push(Curve {
+            name: name.clone(),
+            points: drawn,
+        });
+    }
+    if let Some(((_, traced), previews)) = lines.split_last() {
+        for (name, points) in previews {
+            pictures.note(verdict(
+                &format!("{address}, {}² pixels, {name}", plan.size),
+                points,
+                traced,
+            ));
+        }
+    }
+    Ok(curves)
 }
