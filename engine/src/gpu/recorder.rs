@@ -162,8 +162,8 @@ impl Recorder {
         result
     }
 
-    /// Software drivers that have drawn before put a timestamp among the draws to come, and take it with them, after the dispatches between.
-    /// A barrier that nothing waits at makes them take it; validation sees no dependency in it.
+    /// Once a software driver has drawn, it keeps a timestamp for the draws to come, and would take it after dispatches that were recorded behind it.
+    /// A barrier that nothing waits at makes it take the timestamp now; validation sees no dependency in it.
     fn take_timestamp_now(&self) {
         if self.gpu.caps().kind != DeviceKind::Cpu {
             return;

@@ -384,7 +384,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             let words = Words {
                 title: &title,
                 x: "GPU time (s)",
-                y: "relative MSE",
+                y: "root of the relative MSE",
             };
             if let Some(svg) = plot::log_log(words, &curves)? {
                 std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
@@ -453,8 +453,8 @@ fn compared(pictures: &mut Table, address: &str, plan: &Plan, subject: &Subject<
             let (x, y) = point.cost_and_error();
             drawn.push(PlotPoint {
                 x,
-                y,
-                y_range: [y; 2],
+                y: y.sqrt(),
+                y_range: [y.sqrt(); 2],
                 ringed,
             });
             pictures.row([
