@@ -132,6 +132,7 @@ fn cubes_are_the_same_in_every_way_and_as_rays_see_them() {
                 let differs = *way == "views" && has_defect;
                 assert!(*other == passes || differs, "{address}: by {way}, equal bits");
             }
+            let (mut pixels, mut covered, mut open) = (0, 0, 0);
             for (face, seen) in passes[0].chunks((FACE[0] * FACE[1]) as usize).enumerate() {
                 let view = &views[face];
                 let mut oracle = Oracle::new(FACE, gpu.caps().sub_pixel_bits);
@@ -140,12 +141,16 @@ fn cubes_are_the_same_in_every_way_and_as_rays_see_them() {
                     .iter()
                     .map(|hit| hit.triangle)
                     .collect();
-                compare(&format!("{address}, face {face}"), &oracle, seen, &rays);
+                let tally = compare(&format!("{address}, face {face}"), &oracle, seen, &rays);
+                (pixels, covered, open) = (pixels + tally.pixels, covered + tally.covered, open + tally.open);
                 assert!(
                     !is_closed || !seen.contains(&NO_HIT),
                     "{address}: a hole in face {face}"
                 );
             }
+            // Faces may hold nothing, or a triangle edge on; cubes tell.
+            assert!(open < pixels / OPEN, "{address}: {open} of {pixels} open");
+            assert!(covered > pixels / LEAST_COVERED, "{address}: {covered} of {pixels}");
         }
     });
 }
