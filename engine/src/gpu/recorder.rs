@@ -117,11 +117,9 @@ impl Recorder {
         let inner = Arc::clone(&self.gpu.inner);
         let FrameResources {
             command_buffer,
-            timestamps,
             statistics,
             ..
         } = *self.resources;
-        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         let (device, counted) = (&inner.device, self.counted_from.is_some());
         // SAFETY: the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
         unsafe {
@@ -133,10 +131,7 @@ impl Recorder {
             if let Some(markers) = &self.markers {
                 record_marker(device, command_buffer, markers, index);
             }
-            if timestamps != vk::QueryPool::null() {
-                device.cmd_write_timestamp2(command_buffer, stage, timestamps, 2 * index as u32);
-                self.take_timestamp_now();
-            }
+            self.write_timestamp(2 * index as u32);
             if counted {
                 device.cmd_begin_query(command_buffer, statistics, index as u32, vk::QueryControlFlags::empty());
             }
@@ -151,10 +146,7 @@ impl Recorder {
             if counted {
                 device.cmd_end_query(command_buffer, statistics, index as u32);
             }
-            if timestamps != vk::QueryPool::null() {
-                device.cmd_write_timestamp2(command_buffer, stage, timestamps, 2 * index as u32 + 1);
-                self.take_timestamp_now();
-            }
+            self.write_timestamp(2 * index as u32 + 1);
             if let Some(debug) = &inner.debug {
                 debug.cmd_end_debug_utils_label(command_buffer);
             }
@@ -162,19 +154,30 @@ impl Recorder {
         result
     }
 
+    /// Where the device has timestamps.
+    ///
     /// Once a software driver has drawn, it keeps a timestamp for the draws to come, and would take it after dispatches that were recorded behind it.
     /// A barrier that nothing waits at makes it take the timestamp now; validation sees no dependency in it.
-    fn take_timestamp_now(&self) {
-        if self.gpu.caps().kind != DeviceKind::Cpu {
+    ///
+    /// # Safety
+    /// The command buffer is recording, outside of a rendering, and the index is one of the pool's, reset and not written yet.
+    unsafe fn write_timestamp(&self, index: u32) {
+        let FrameResources {
+            command_buffer,
+            timestamps,
+            ..
+        } = *self.resources;
+        if timestamps == vk::QueryPool::null() {
             return;
         }
+        let device = &self.gpu.inner.device;
         let nothing = [vk::MemoryBarrier2::default()];
-        // SAFETY: the command buffer is recording, outside of a rendering.
+        // SAFETY: the caller's.
         unsafe {
-            self.gpu.inner.device.cmd_pipeline_barrier2(
-                self.resources.command_buffer,
-                &vk::DependencyInfo::default().memory_barriers(&nothing),
-            );
+            device.cmd_write_timestamp2(command_buffer, vk::PipelineStageFlags2::ALL_COMMANDS, timestamps, index);
+            if self.gpu.caps().kind == DeviceKind::Cpu {
+                device.cmd_pipeline_barrier2(command_buffer, &vk::DependencyInfo::default().memory_barriers(&nothing));
+            }
         }
     }
 
