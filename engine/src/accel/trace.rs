@@ -59,11 +59,7 @@ pub struct Traced {
 impl Traced {
     /// GPU seconds of the tracing; 0 without timestamps.
     pub fn seconds(&self) -> f64 {
-        let passes = self.timings.passes.iter().filter(|pass| pass.name == TRACE_PASS);
-        passes
-            .filter_map(|pass| pass.nanoseconds)
-            .map(|ns| ns as f64 * 1e-9)
-            .sum()
+        self.timings.seconds_of(TRACE_PASS)
     }
 }
 

@@ -40,14 +40,21 @@ pub struct Timings {
     pub untimed: Option<&'static str>,
 }
 
+/// Those that have none count as 0.
+fn seconds<'a>(passes: impl IntoIterator<Item = &'a PassTiming>) -> f64 {
+    let timed = passes.into_iter().filter_map(|pass| pass.nanoseconds);
+    timed.map(|ns| ns as f64 * 1e-9).sum()
+}
+
 impl Timings {
     /// GPU seconds of all passes together.
     pub fn seconds(&self) -> f64 {
-        self.passes
-            .iter()
-            .filter_map(|pass| pass.nanoseconds)
-            .map(|ns| ns as f64 * 1e-9)
-            .sum()
+        seconds(&self.passes)
+    }
+
+    /// GPU seconds of the passes with this name; 0 without times.
+    pub fn seconds_of(&self, name: &str) -> f64 {
+        seconds(self.passes.iter().filter(|pass| pass.name == name))
     }
 
     /// Number of passes with this name.

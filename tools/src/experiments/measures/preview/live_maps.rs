@@ -97,11 +97,9 @@ impl<'a> Stage<'a> {
                 self.place,
                 None,
             )?;
-            let passes = recorder.submit()?.wait()?.passes;
+            let timings = recorder.submit()?.wait()?;
             for (time, part) in times.iter_mut().zip(PARTS) {
-                let of_part = passes.iter().filter(|pass| pass.name == part);
-                let nanoseconds: u64 = of_part.filter_map(|pass| pass.nanoseconds).sum();
-                time.push(1e-6 * nanoseconds as f64);
+                time.push(1e3 * timings.seconds_of(part));
             }
             Ok::<_, clerestory::Error>(((), 0.0))
         })?;
