@@ -158,9 +158,7 @@ pub struct Renderer {
 /// # Errors
 /// As [`Renderer::new`], [`Renderer::start`] and [`Rendering::step`].
 pub fn render(gpu: &Gpu, scene: &Scene, options: &RenderOptions) -> Result<Rendered> {
-    let mut rendering = Renderer::new(gpu, scene)?.start(options)?;
-    while rendering.step()?.is_some() {}
-    rendering.finish()
+    Renderer::new(gpu, scene)?.render(options)
 }
 
 impl Renderer {
@@ -209,6 +207,16 @@ impl Renderer {
     /// The scene on the device.
     pub fn gpu_scene(&self) -> &Arc<GpuScene> {
         &self.gpu_scene
+    }
+
+    /// All samples of a picture, and its report.
+    ///
+    /// # Errors
+    /// As [`Renderer::start`] and [`Rendering::step`].
+    pub fn render(&self, options: &RenderOptions) -> Result<Rendered> {
+        let mut rendering = self.start(options)?;
+        while rendering.step()?.is_some() {}
+        rendering.finish()
     }
 
     /// Prepares a picture by one of the engine's techniques.

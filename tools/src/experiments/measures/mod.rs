@@ -16,7 +16,7 @@ mod rendering;
 mod surfaces;
 mod wide;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result};
@@ -32,10 +32,21 @@ pub struct Context<'a> {
     pub scenes: &'a [String],
     /// Opens the device, for measures that need one.
     pub gpu: &'a dyn Fn() -> Result<Gpu>,
-    /// For files beside the tables; a measure that writes some makes it.
+    /// For files beside the tables ([`Context::file`]); it may not be there yet.
     pub folder: &'a Path,
     /// Sees the progress of measures that take long. A measure that is stopped gives the rows that it has.
     pub watch: &'a dyn Watch,
+}
+
+impl Context<'_> {
+    /// Where a file beside the tables goes; its folder is made.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn file(&self, name: &str) -> Result<PathBuf> {
+        std::fs::create_dir_all(self.folder).map_err(|error| Error::io(self.folder, error))?;
+        Ok(self.folder.join(name))
+    }
 }
 
 /// A measure by name.

@@ -33,13 +33,8 @@ impl Image {
             settings: json!({"sampler": "pcg", "path_set": paths}),
             ..RenderOptions::default()
         };
-        let finished = |options| {
-            let mut rendering = renderer.start(&options)?;
-            while rendering.step()?.is_some() {}
-            rendering.finish()
-        };
-        finished(options(1))?;
-        let rendered = finished(options(spp))?;
+        renderer.render(&options(1))?;
+        let rendered = renderer.render(&options(spp))?;
         Self::of(&rendered.picture, rendered.report)
     }
 

@@ -2,9 +2,9 @@
 //!
 //! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.2 and Fig. 7.5. Oracle: seamless look-ups, which do not jump, and ∫ L dω of level 0.
 
+use clerestory::Result;
 use clerestory::film::atomic;
 use clerestory::maps::{MapImage, Parametrization};
-use clerestory::{Error, Result};
 use glam::{DVec3, IVec2, UVec2};
 
 use crate::experiments::lines::{self, Line};
@@ -104,8 +104,7 @@ fn seams(context: &Context<'_>, chain: &[MapImage], deviation: f64) -> Result<Ta
         .map(|(_, y)| *y)
         .fold(0.0, f64::max);
     let svg = lines::draw(words, (chain.len() as u32 - 1, 1.0), 1.1 * top, &curves)?;
-    std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-    atomic::write(&context.folder.join("seams.svg"), svg.as_bytes())?;
+    atomic::write(&context.file("seams.svg")?, svg.as_bytes())?;
     table.note(format!(
         "RMS difference of bilinear look-ups at both sides of seams ({} pairs of directions, {ASIDE:e} beside the planes x = 0 and y = 0 below the \
          equator), over the field's deviation. The map has {TEXELS} × {TEXELS} texels of {LOBES} lobes a twelfth wide, in each level means by solid angle. Tiles whose \

@@ -2,10 +2,10 @@
 //!
 //! Oracle: the environments at random directions, and exact solid angles of texels.
 
+use clerestory::Result;
 use clerestory::film::atomic;
 use clerestory::maps::Parametrization;
 use clerestory::maps::statistics::DensityStatistics;
-use clerestory::{Error, Result};
 use glam::{DMat3, DVec3, UVec2};
 use rayon::prelude::*;
 
@@ -484,8 +484,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         return Ok(vec![curves(&all, &environments)]);
     }
     let svg = plot(&all, &environments)?;
-    std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-    atomic::write(&context.folder.join("choice.svg"), svg.as_bytes())?;
+    atomic::write(&context.file("choice.svg")?, svg.as_bytes())?;
     Ok(vec![choice(&all, &environments), curves(&all, &environments)])
 }
 

@@ -2,13 +2,11 @@
 //!
 //! Oracle: exact solid angles of texels ([`clerestory::maps`]) and what the document and its digest state.
 
-use std::path::Path;
-
+use clerestory::Result;
 use clerestory::film::{atomic, png};
 use clerestory::maps::packed_direction::{pack_octahedral, pack_octahedral_nearest, packed_error, unpack_octahedral};
 use clerestory::maps::statistics::anisotropy;
 use clerestory::maps::{MapPoint, Parametrization};
-use clerestory::{Error, Result};
 use glam::{DVec2, DVec3, UVec2};
 
 use super::heat;
@@ -195,7 +193,7 @@ fn meridian(map: Parametrization, azimuth: f64, value: impl Fn(MapPoint) -> f64)
     }
 }
 
-fn plots(folder: &Path) -> Result<()> {
+fn plots(context: &Context<'_>) -> Result<()> {
     let maps = || STATED.iter().map(|(map, _)| *map);
     let x = "angle from the pole (degrees)";
     for azimuth in [0.0, 45.0] {
@@ -209,7 +207,7 @@ fn plots(folder: &Path) -> Result<()> {
             .map(|map| meridian(map, azimuth, |at| map.density_ratio(at)))
             .collect();
         let svg = lines::draw(words, AXIS, TOPS[0], &curves)?;
-        atomic::write(&folder.join(format!("density-{azimuth}.svg")), svg.as_bytes())?;
+        atomic::write(&context.file(&format!("density-{azimuth}.svg"))?, svg.as_bytes())?;
         let title = format!("Shear along the meridian of azimuth {azimuth}°");
         let words = Words {
             title: &title,
@@ -219,7 +217,7 @@ fn plots(folder: &Path) -> Result<()> {
         let shear = |map: Parametrization, at| anisotropy(map.texel_derivatives(UVec2::new(map.aspect(), 1), at));
         let curves: Vec<Line> = maps().map(|map| meridian(map, azimuth, |at| shear(map, at))).collect();
         let svg = lines::draw(words, AXIS, TOPS[1], &curves)?;
-        atomic::write(&folder.join(format!("shear-{azimuth}.svg")), svg.as_bytes())?;
+        atomic::write(&context.file(&format!("shear-{azimuth}.svg"))?, svg.as_bytes())?;
     }
     Ok(())
 }
@@ -231,10 +229,9 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     } else {
         (512, SIDE, 1 << 20)
     };
-    std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-    plots(context.folder)?;
+    plots(context)?;
     let maps = STATED.map(|(map, _)| map);
-    png::write(context.folder.join("density.png"), &heat::strip(&maps, side))?;
+    png::write(context.file("density.png")?, &heat::strip(&maps, side))?;
     let mut first = statistics(context, size);
     let names: Vec<String> = maps.iter().map(ToString::to_string).collect();
     first.note(format!(

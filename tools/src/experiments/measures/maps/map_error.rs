@@ -3,10 +3,10 @@
 //! Oracle: the light field itself, lobes of three widths in random directions, at random directions; the closed form of irradiance under a
 //! sky that fades to the horizon.
 
+use clerestory::Result;
 use clerestory::film::atomic;
 use clerestory::maps::irradiance::IrradianceSource;
 use clerestory::maps::{MapImage, Parametrization};
-use clerestory::{Error, Result};
 use glam::{DVec3, UVec2};
 
 use crate::experiments::measures::Context;
@@ -219,8 +219,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         y: "RMS error over the field's deviation",
     };
     if let Some(svg) = plot::log_log(words, &curves)? {
-        std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-        atomic::write(&context.folder.join("error.svg"), svg.as_bytes())?;
+        atomic::write(&context.file("error.svg")?, svg.as_bytes())?;
     }
     Ok(vec![table, irradiance(context)?])
 }

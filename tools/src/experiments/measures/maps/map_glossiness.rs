@@ -3,6 +3,7 @@
 //!
 //! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.2 and Fig. 7.6. Oracle: the sum over all texels in f64, and means of boxes in f64.
 
+use clerestory::Result;
 use clerestory::film::png::{self, Rgb8};
 use clerestory::film::{Picture, ToneMap};
 use clerestory::gpu::{Gpu, compute_to_transfer, rw_compute_to_compute};
@@ -12,7 +13,6 @@ use clerestory::maps::prefilter::{PrefilterGgx, ggx_mean, ggx_solid_angle, weigh
 use clerestory::maps::spherical_sat::{SatImage, SatNumbers, SatRange, SphericalSat, sat_half_width};
 use clerestory::maps::{MapImage, Parametrization};
 use clerestory::techniques::preview::probe::probe_level;
-use clerestory::{Error, Result};
 use glam::{DVec3, DVec4, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -240,8 +240,7 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Table> {
     }
     line("prefiltered levels".into(), filter, &by_levels);
     row.push(shown(side, &pixels, &by_levels)?);
-    std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-    png::write(context.folder.join("glossiness.png"), &sheet(&[row]))?;
+    png::write(context.file("glossiness.png")?, &sheet(&[row]))?;
     found.note(format!(
         "A mirror sphere whose roughness √α grows from left to right (α from {LEAST_ALPHA} to 1) in an octahedron map of {rows} × {rows} texels with a \
          sun. Truth is the sum of the GGX lobe with n = v = r over all texels at each pixel; all look-ups stand for that lobe, and their error is that of \

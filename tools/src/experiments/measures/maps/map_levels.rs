@@ -3,13 +3,13 @@
 //! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.2 and Fig. 7.4. Oracle: the level by the exact derivatives of each pixel's own
 //! direction, through those of the map's decoding.
 
+use clerestory::Result;
 use clerestory::film::png::{self, Rgb8};
 use clerestory::maps::level::{
     level_of_derivatives, octahedron_level, octahedron_level_folded, octahedron_rectangular_level,
 };
 use clerestory::maps::octahedron::octahedron_encode;
 use clerestory::maps::{MapImage, Parametrization};
-use clerestory::{Error, Result};
 use glam::{DMat2, DVec2, DVec3, UVec2};
 
 use super::sphere::{Sphere, sheet};
@@ -204,7 +204,6 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             "of",
         ],
     );
-    std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
     let maps = [
         (Parametrization::OctahedronQuadratic, &SQUARE[..], "levels.png"),
         (
@@ -240,7 +239,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             seen.push(a);
             shown.push(b);
         }
-        png::write(context.folder.join(file), &sheet(&[seen, shown]))?;
+        png::write(context.file(file)?, &sheet(&[seen, shown]))?;
     }
     table.note(format!(
         "A sphere of {0} × {0} pixels painted by its normals with a map of {TEXELS} rows and {SQUARES} squares over them, seen from below; quads of \

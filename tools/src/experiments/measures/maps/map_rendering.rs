@@ -3,6 +3,7 @@
 //! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.1, §7.3.2 and Table 7.1. Oracles: the ray through each texel's centre, and shadow
 //! rays from points on surfaces to the map's middle.
 
+use clerestory::Result;
 use clerestory::accel::RayIndex;
 use clerestory::film::atomic;
 use clerestory::gpu::Gpu;
@@ -11,7 +12,6 @@ use clerestory::maps::cube::CUBE_FACES;
 use clerestory::raster::splats::surfels_of;
 use clerestory::raster::tessellation::{MAX_LEVEL, tessellation_point, tessellation_weights};
 use clerestory::raster::{Layering, OctantCut};
-use clerestory::{Error, Result};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -505,8 +505,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         y: "texels with wrong triangles (%)",
     };
     if let Some(svg) = plot::log_log_of_rates(words, &curves)? {
-        std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-        atomic::write(&context.folder.join("unsplit.svg"), svg.as_bytes())?;
+        atomic::write(&context.file("unsplit.svg")?, svg.as_bytes())?;
     }
     Ok(vec![table, swept])
 }

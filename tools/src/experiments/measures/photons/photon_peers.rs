@@ -70,9 +70,8 @@ struct Answer {
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
     let python: PathBuf = std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from);
-    std::fs::create_dir_all(context.folder).map_err(|cause| Error::io(context.folder, cause))?;
     for (name, text) in SCRIPTS {
-        atomic::write(&context.folder.join(name), text.as_bytes())?;
+        atomic::write(&context.file(name)?, text.as_bytes())?;
     }
     let scenes = if context.smoke {
         &SCENES[..SMOKE_SCENES]

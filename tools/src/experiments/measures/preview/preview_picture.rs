@@ -107,38 +107,35 @@ struct Subject<'a> {
     renderer: Renderer,
     camera: Camera,
     lights: Vec<LightKind>,
-    size: u32,
 }
 
 impl<'a> Subject<'a> {
-    fn new(gpu: &'a Gpu, scene: &Scene, size: u32) -> Result<Self> {
+    fn new(gpu: &'a Gpu, scene: &Scene) -> Result<Self> {
         Ok(Self {
             gpu,
             renderer: Renderer::new(gpu, scene)?,
             camera: scene.require_camera(None)?.clone(),
             lights: scene.lights.iter().map(|light| light.kind).collect(),
-            size,
         })
     }
 
     /// A path-traced picture, and seconds of the device.
-    fn traced(&self, paths: &str, spp: u32, seed: u32) -> Result<(Picture, f64)> {
-        let mut rendering = self.renderer.start(&RenderOptions {
+    fn traced(&self, size: u32, paths: &str, spp: u32, seed: u32) -> Result<(Picture, f64)> {
+        let rendered = self.renderer.render(&RenderOptions {
             technique: Some("path".into()),
-            size: [self.size; 2],
+            size: [size; 2],
             spp,
             seed,
             settings: json!({"path_set": paths}),
             ..RenderOptions::default()
         })?;
-        while rendering.step()?.is_some() {}
-        let rendered = rendering.finish()?;
         Ok((rendered.picture, rendered.report.gpu_seconds))
     }
 
     /// A preview's picture: lights, the live map at a place, if one is asked for, and what the camera sees, all drawn anew each time.
     fn previewed(
         &self,
+        size: u32,
         layout: ShadowLayout,
         (side, samples): Quality,
         place: Option<Vec3>,
@@ -147,7 +144,7 @@ impl<'a> Subject<'a> {
         let scene = self.renderer.gpu_scene();
         let texels = u64::from(side) * u64::from(side);
         let desc = PreviewDesc {
-            size: [self.size; 2],
+            size: [size; 2],
             samples,
             lights: self.lights.len() as u32,
             shadows: Some(PreviewShadows {
@@ -249,11 +246,11 @@ fn verdict(name: &str, previews: &[Point], traced: &[Point]) -> String {
 impl Plan {
     /// Pictures by lights alone: each way's name and points, the path tracer last.
     fn by_lights(&self, subject: &Subject<'_>) -> Result<Vec<(String, Vec<Point>)>> {
-        let (right, _) = subject.traced(ONCE, self.reference_spp, REFERENCE_SEED)?;
+        let (right, _) = subject.traced(self.size, ONCE, self.reference_spp, REFERENCE_SEED)?;
         let mut lines = Vec::new();
         for layout in ShadowLayout::ALL {
             let points = self.qualities.iter().map(|(side, samples)| {
-                let frame = subject.previewed(layout, (*side, *samples), None, self.repeats)?;
+                let frame = subject.previewed(self.size, layout, (*side, *samples), None, self.repeats)?;
                 Ok(Point {
                     texels: Some(u64::from(side * side)),
                     samples: u64::from(samples * samples),
@@ -268,7 +265,7 @@ impl Plan {
             ));
         }
         let points = self.spp.iter().map(|spp| {
-            let (picture, seconds) = repeated(self.repeats, || subject.traced(ONCE, *spp, SEED))?;
+            let (picture, seconds) = repeated(self.repeats, || subject.traced(self.size, ONCE, *spp, SEED))?;
             Ok(Point {
                 texels: None,
                 samples: u64::from(*spp),
@@ -283,15 +280,15 @@ impl Plan {
 
     /// A picture by lights alone, and those with a live map at each of the places.
     fn by_live_map(&self, subject: &Subject<'_>) -> Result<[Vec<Lit>; 2]> {
-        let (twice, _) = subject.traced(TWICE, self.reference_spp, REFERENCE_SEED)?;
-        let (all, _) = subject.traced("all", self.reference_spp, REFERENCE_SEED)?;
+        let (twice, _) = subject.traced(self.size, TWICE, self.reference_spp, REFERENCE_SEED)?;
+        let (all, _) = subject.traced(self.size, "all", self.reference_spp, REFERENCE_SEED)?;
         let quality = if self.qualities.contains(&FINE) {
             FINE
         } else {
             self.qualities[0]
         };
         let lit = |place| {
-            let frame = subject.previewed(ShadowLayout::Octahedron, quality, place, 1)?;
+            let frame = subject.previewed(self.size, ShadowLayout::Octahedron, quality, place, 1)?;
             Ok(Lit {
                 seconds: frame.seconds,
                 twice: errors(&frame.picture, &twice)?,
@@ -376,9 +373,8 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             break;
         }
         context.watch.begin(address, done, scenes.len());
-        let scene = scene::load(address)?;
+        let subject = Subject::new(&gpu, &scene::load(address)?)?;
         for plan in plans {
-            let subject = Subject::new(&gpu, &scene, plan.size)?;
             let curves = compared(&mut pictures, address, plan, &subject)?;
             let title = format!("{address}, {} × {} pixels", plan.size, plan.size);
             let words = Words {
@@ -387,12 +383,10 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
                 y: "root of the relative MSE",
             };
             if let Some(svg) = plot::log_log(words, &curves)? {
-                std::fs::create_dir_all(context.folder).map_err(|error| Error::io(context.folder, error))?;
-                let file = format!("{}-{}.svg", done + 1, plan.size);
-                atomic::write(&context.folder.join(file), svg.as_bytes())?;
+                let file = context.file(&format!("{}-{}.svg", done + 1, plan.size))?;
+                atomic::write(&file, svg.as_bytes())?;
             }
         }
-        let subject = Subject::new(&gpu, &scene, plans[0].size)?;
         let [alone, with] = plans[0].by_live_map(&subject)?;
         for (way, all) in [("lights alone", &alone), ("with a live map", &with)] {
             let [twice, of_all] = [

@@ -132,9 +132,7 @@ impl Subject {
             scene,
         })
     }
-}
 
-impl Subject {
     /// Share of places that light reaches.
     fn lit_share(&self) -> f64 {
         self.lit.iter().filter(|lit| **lit).count() as f64 / self.lit.len() as f64
