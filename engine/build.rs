@@ -1,11 +1,18 @@
-//! Compiles `shaders/` to SPIR-V and generates the Rust interface of every shader from reflection: `build/shaders.rs`.
+//! Compiles the shaders to SPIR-V and generates the Rust interface of every one from reflection: `build/shaders.rs`.
 
 #[path = "build/shaders.rs"]
 mod shaders;
 
 fn main() {
+    // A package carries the folder inside; in the repository it stands beside the crate.
+    let own = if std::path::Path::new("shaders").exists() {
+        "shaders"
+    } else {
+        "../shaders"
+    };
     shaders::build(
-        "",
+        own,
+        own,
         &shaders::Paths {
             gpu: "crate::gpu",
             shaders: "crate::gpu::shaders",

@@ -5,7 +5,8 @@ mod shaders;
 
 fn main() {
     shaders::build(
-        "../engine",
+        "shaders",
+        "../shaders",
         &shaders::Paths {
             gpu: "clerestory::gpu",
             shaders: "crate::shaders",

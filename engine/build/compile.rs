@@ -50,7 +50,8 @@ pub struct Shader {
     pub embedded: PathBuf,
     /// The same module unoptimized with all names, for the reflection of names and layouts.
     pub reflected: PathBuf,
-    /// Text of the entry file and of everything that it used, by path: below the folder of shaders, or `include/…`.
+    /// Text of the entry file and of everything that it used, by path: below the folder of shaders, or, of the engine's
+    /// includes in another crate, `engine/…`.
     pub sources: BTreeMap<String, String>,
 }
 
@@ -138,12 +139,13 @@ impl Compiler {
             let text = std::fs::read_to_string(&path).map_err(|error| failed(&path, &error))?;
             for included in text.lines().filter_map(included_file) {
                 let beside = path.parent().unwrap_or(root).join(included);
-                let (name, found) = if beside.exists() {
-                    let name = below(&self.include, &beside).map(|below| format!("include/{below}"));
-                    (name.or_else(|_| below(root, &beside))?, beside)
+                let found = if beside.exists() {
+                    beside
                 } else {
-                    (format!("include/{included}"), self.include.join(included))
+                    self.include.join(included)
                 };
+                let name = below(root, &found);
+                let name = name.or_else(|_| Ok::<_, String>(format!("engine/{}", below(&self.include, &found)?)))?;
                 if !sources.contains_key(&name) && open.iter().all(|(other, _)| *other != name) {
                     open.push((name, found));
                 }

@@ -17,7 +17,7 @@ pub fn generate(root: &Path) -> Result<String, String> {
     let mut text = String::from("/// Constants of the include files.\npub mod constants {\n");
     for file in &files {
         let place = file.strip_prefix(root).unwrap_or(file);
-        let place = place.strip_prefix("include").unwrap_or(place).display().to_string();
+        let place = place.display().to_string();
         let source = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
         for (kind, name, value, comment) in source.lines().filter_map(constant) {
             if let Some(other) = from.insert(name.to_owned(), place.clone()) {

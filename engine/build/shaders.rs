@@ -19,29 +19,33 @@ pub struct Paths {
     pub shaders: &'static str,
 }
 
-/// Compiles the folder `shaders` beside the crate's manifest. `engine` is the engine's folder as seen from there; a failure ends the build.
-pub fn build(engine: &str, paths: &Paths) {
+/// Compiles the folder of shaders `own`; `engine` is the engine's folder of shaders, whose includes all share. Both are seen from the
+/// crate's manifest. A failure ends the build.
+pub fn build(own: &str, engine: &str, paths: &Paths) {
     let folder = |name| PathBuf::from(std::env::var_os(name).unwrap_or_default());
     let (root, out) = (folder("CARGO_MANIFEST_DIR"), folder("OUT_DIR"));
-    // Without `..` in it, the path stands in the compiler's lists as it is here.
-    let mut place = root.clone();
-    for part in Path::new(engine).components() {
-        match part {
-            Component::ParentDir => drop(place.pop()),
-            other => place.push(other),
-        }
-    }
-    if let Err(message) = run(&root, &place, &out, paths) {
+    if let Err(message) = run(&root, &below(&root, own), &below(&root, engine), &out, paths) {
         eprintln!("{message}");
         std::process::exit(1);
     }
 }
 
-fn run(root: &Path, engine: &Path, out: &Path, paths: &Paths) -> Result<(), String> {
-    let include = engine.join("shaders/include");
-    println!("cargo::rerun-if-changed=shaders");
-    println!("cargo::rerun-if-changed={}", include.display());
-    println!("cargo::rerun-if-changed={}", engine.join("build").display());
+/// A path without `..` in it, so that it stands in the compiler's lists as it is here.
+fn below(root: &Path, path: &str) -> PathBuf {
+    let mut place = root.to_owned();
+    for part in Path::new(path).components() {
+        match part {
+            Component::ParentDir => drop(place.pop()),
+            other => place.push(other),
+        }
+    }
+    place
+}
+
+fn run(root: &Path, own: &Path, engine: &Path, out: &Path, paths: &Paths) -> Result<(), String> {
+    for folder in [own, engine] {
+        println!("cargo::rerun-if-changed={}", folder.display());
+    }
     println!("cargo::rerun-if-env-changed=GLSLC");
     let prebuilt = root.join("spirv");
     if prebuilt.exists() {
@@ -49,11 +53,11 @@ fn run(root: &Path, engine: &Path, out: &Path, paths: &Paths) -> Result<(), Stri
     }
     let compiler = compile::Compiler {
         program: std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into()),
-        include,
+        include: engine.to_owned(),
         debug_info: std::env::var("DEBUG").is_ok_and(|level| level != "false" && level != "0"),
         prebuilt,
     };
-    let shaders = compiler.compile_all(&root.join("shaders"), out)?;
+    let shaders = compiler.compile_all(own, out)?;
     let interfaces = shaders
         .iter()
         .map(|shader| {
@@ -63,6 +67,6 @@ fn run(root: &Path, engine: &Path, out: &Path, paths: &Paths) -> Result<(), Stri
                 .map_err(|message| format!("{}: {message}", shader.name))
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let rust = generate::generate(&shaders, &interfaces, paths)? + &constants::generate(&root.join("shaders"))?;
+    let rust = generate::generate(&shaders, &interfaces, paths)? + &constants::generate(own)?;
     std::fs::write(out.join("shaders.rs"), rust).map_err(|error| format!("cannot write shaders.rs: {error}"))
 }

@@ -12,7 +12,7 @@ use crate::accel::{IndexKind, IndexReport};
 use crate::film::picture::{Metadata, NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
 use crate::scene::{Camera, Note, Scene, SceneProfile};
-use crate::techniques::{self, Skipped, Technique, TechniqueInfo, View};
+use crate::techniques::{self, Card, Skipped, Technique, View};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
@@ -237,7 +237,7 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::start`].
-    pub fn start_technique(&self, info: &TechniqueInfo, options: &RenderOptions) -> Result<Rendering> {
+    pub fn start_technique(&self, info: &Card, options: &RenderOptions) -> Result<Rendering> {
         if options.spp == 0 {
             return Err(Error::setting("spp", 0, "is not at least 1"));
         }

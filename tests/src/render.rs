@@ -5,9 +5,10 @@ use std::sync::Arc;
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
-use clerestory::transport::path_tracer::PathCounters;
+use clerestory::techniques::path::PathCounters;
+use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::random::SamplerKind;
-use clerestory::transport::{GpuScene, PathSet, PathTracer, PathTracerSettings};
+use clerestory::transport::{GpuScene, PathSet};
 pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, floor_from_above, lamp, point_triangle};
 
 use crate::statistics::expect_mean;

@@ -5,7 +5,7 @@
 //! rate of 10⁻⁶. Other pictures: the mean by z with the picture's own variance (10⁻⁶ a channel), pixels by the z-test of `film::z_test`.
 
 use clerestory::scene::{AlphaMode, Environment, Filter, Image, LightKind, Material, Mesh, Scene, Texture, Wrap};
-use clerestory::transport::PathTracerSettings;
+use clerestory::techniques::PathTracerSettings;
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{
     Rendered, builtin, camera_down, floor, floor_from_above, independent, paths, pixel_averages, point_triangle, render,

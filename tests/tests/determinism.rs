@@ -2,7 +2,7 @@
 
 use clerestory::gpu::Gpu;
 use clerestory::scene::{Environment, Material, Mesh, Scene};
-use clerestory::transport::PathTracerSettings;
+use clerestory::techniques::PathTracerSettings;
 use clerestory::transport::random::SamplerKind;
 use clerestory_tests::child::hash_in_child;
 use clerestory_tests::random::Random;

@@ -42,7 +42,7 @@ fn loops_end_at_the_cap_on_lavapipe_and_nowhere_else() {
             "invocations differ"
         );
         // The engine's kernels stay below this on every driver.
-        let quota = clerestory::transport::PathTracerSettings::default().ray_quota;
+        let quota = clerestory::techniques::PathTracerSettings::default().ray_quota;
         assert!(
             counted(gpu, quota, 0).iter().all(|n| *n == quota),
             "{driver} ends loops below the engine's quota"

@@ -2,7 +2,7 @@
 
 use clerestory::Error;
 use clerestory::scene::SceneProfile;
-use clerestory::transport::{PathTracer, PathTracerSettings};
+use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory_hard_cases::{HardCase, Outcome, Subject, Verdict, all, judge, subjects};
 use clerestory_tests::render::{builtin, upload};
 use clerestory_tests::with_gpu;

@@ -100,16 +100,15 @@ fn floors_use_only_what_lies_below() {
     let mut seen = 0;
     for (root, ending) in [
         ("engine/src", "rs"),
-        ("engine/shaders", "glsl"),
-        ("engine/shaders", "comp"),
-        ("engine/shaders", "vert"),
-        ("engine/shaders", "geom"),
-        ("engine/shaders", "frag"),
+        ("shaders", "glsl"),
+        ("shaders", "comp"),
+        ("shaders", "vert"),
+        ("shaders", "geom"),
+        ("shaders", "frag"),
     ] {
         let root = repository().join(root);
         for path in files(&root, &[ending]) {
             let below = path.strip_prefix(&root).expect("below the root");
-            let below = below.strip_prefix("include").unwrap_or(below);
             let floor = below.iter().next().expect("name").to_string_lossy();
             let floor = floor.trim_end_matches(".rs");
             let Some(own) = height(floor) else { continue };
@@ -140,8 +139,9 @@ fn uses_are_found_in_all_their_forms() {
 
 /// Whether the text between back-quotes is meant as a file or folder of the repository.
 fn is_path(text: &str) -> bool {
-    const FOLDERS: [&str; 7] = [
+    const FOLDERS: [&str; 8] = [
         "engine/",
+        "shaders/",
         "tests/",
         "tools/",
         "samples/",
@@ -171,7 +171,7 @@ fn pages_name_files_that_exist() {
         let quoted = quoted.filter_map(|text| text.split_whitespace().next()?.split("::").next());
         for name in quoted.filter(|name| is_path(name) && !name.starts_with("out/")) {
             seen += 1;
-            let roots = ["", "engine/src", "engine/shaders/include", "engine/shaders"].map(|below| root.join(below));
+            let roots = ["", "engine/src", "shaders"].map(|below| root.join(below));
             if !roots.iter().any(|folder| folder.join(name).exists()) && !beside.join(name).exists() {
                 faults.push(format!("{}: `{name}`", page.display()));
             }

@@ -6,7 +6,8 @@
 
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
-use clerestory::transport::{PathSet, PathTracerSettings};
+use clerestory::techniques::PathTracerSettings;
+use clerestory::transport::PathSet;
 use clerestory_tests::render::{Rendered, builtin, paths, render, tracer};
 use clerestory_tests::with_gpu;
 

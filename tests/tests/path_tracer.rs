@@ -6,7 +6,7 @@
 use std::f64::consts::PI;
 
 use clerestory::scene::{Environment, LightKind, Material, Mesh, Scene};
-use clerestory::transport::PathTracerSettings;
+use clerestory::techniques::PathTracerSettings;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, LOBE_ALL, bsdf_sample};
 use clerestory_tests::random::Random;

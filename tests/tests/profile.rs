@@ -7,7 +7,7 @@ use clerestory::gpu::{Category, Gpu, PipelineInfo};
 use clerestory::scene::{
     AlphaMode, Camera, Environment, Filter, Image, LightKind, Material, Mesh, Scene, Texture, Wrap,
 };
-use clerestory::transport::{PathTracer, PathTracerSettings};
+use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory_tests::render::{
     Rendered, builtin, camera_down, cuboid, finish, floor, independent, point_triangle, render, tracer,
 };

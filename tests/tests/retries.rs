@@ -7,7 +7,7 @@ use clerestory::film::picture::Picture;
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::fault::{FaultCall, FaultPlan};
 use clerestory::gpu::{GpuOptions, Validation};
-use clerestory::transport::PathTracerSettings;
+use clerestory::techniques::PathTracerSettings;
 use clerestory_tests::render::{builtin, tracer};
 use clerestory_tests::{assert_no_messages, gpu, gpu_with};
 
@@ -69,7 +69,7 @@ fn what_failed_is_done_again_without_a_trace() {
             };
             let camera = &scene.cameras[0];
             let Ok(mut tracer) =
-                clerestory::transport::PathTracer::new(&gpu, uploaded.into(), camera, SIZE, settings.clone())
+                clerestory::techniques::PathTracer::new(&gpu, uploaded.into(), camera, SIZE, settings.clone())
             else {
                 continue;
             };

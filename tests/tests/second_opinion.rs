@@ -57,7 +57,7 @@ fn compiled(file: &Path, environment: &[&str]) -> Result<Vec<u8>, String> {
         .args(environment)
         .arg("-O0")
         .arg("-I")
-        .arg(folder("engine/shaders/include"))
+        .arg(folder("shaders"))
         .arg(file)
         .args(["-o", "-"])
         .output()
@@ -263,9 +263,7 @@ fn shape(place: &str, kind: &Type, theirs: &Theirs) -> Result<usize, String> {
 
 #[test]
 fn spirv_reflect_reads_the_same_interfaces() {
-    let of_engine = clerestory::gpu::shaders::ALL
-        .iter()
-        .map(|info| ("engine/shaders", *info));
+    let of_engine = clerestory::gpu::shaders::ALL.iter().map(|info| ("shaders", *info));
     let of_tests = clerestory_tests::shaders::ALL
         .iter()
         .map(|info| ("tests/shaders", *info));

@@ -31,11 +31,11 @@ struct Tree(tempfile::TempDir);
 impl Tree {
     fn new() -> Self {
         let tree = Self(tempfile::tempdir().unwrap());
-        for below in ["my shaders/include/part", "my shaders/kernels", "out", "spirv"] {
+        for below in ["my shaders/part", "my shaders/kernels", "out", "spirv"] {
             std::fs::create_dir_all(tree.path(below)).unwrap();
         }
-        tree.write("my shaders/include/part/value.glsl", INCLUDED);
-        tree.write("my shaders/include/part/unused.glsl", "");
+        tree.write("my shaders/part/value.glsl", INCLUDED);
+        tree.write("my shaders/part/unused.glsl", "");
         tree.write("my shaders/kernels/write.comp", KERNEL);
         tree
     }
@@ -55,7 +55,7 @@ impl Tree {
         };
         let compiler = Compiler {
             program,
-            include: self.path("my shaders/include"),
+            include: self.path("my shaders"),
             debug_info: false,
             prebuilt: self.path("spirv"),
         };
@@ -98,7 +98,7 @@ fn a_package_needs_no_compiler_until_its_shaders_change() {
     let used: Vec<_> = made[0].sources.keys().map(String::as_str).collect();
     assert_eq!(
         used,
-        ["include/part/value.glsl", "kernels/write.comp"],
+        ["kernels/write.comp", "part/value.glsl"],
         "the unused include is left out"
     );
     tree.pack();
@@ -119,7 +119,7 @@ fn a_package_needs_no_compiler_until_its_shaders_change() {
         "{rust}"
     );
 
-    tree.write("my shaders/include/part/value.glsl", &INCLUDED.replace('7', "8"));
+    tree.write("my shaders/part/value.glsl", &INCLUDED.replace('7', "8"));
     let error = tree.build(NOWHERE).map(|_| ()).unwrap_err();
     assert!(error.contains(NOWHERE), "a module of other sources was used: {error}");
     let changed = tree.build("glslc").unwrap();

@@ -22,8 +22,9 @@ use std::sync::Arc;
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE};
 use clerestory::film::{CompareOptions, Picture, ToneMap, compare, exr, png, z_test};
 use clerestory::gpu::Gpu;
+use clerestory::techniques::{PathTracer, PathTracerSettings};
+use clerestory::transport::GpuScene;
 use clerestory::transport::random::SamplerKind;
-use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
 
 use crate::experiments::watch::Watch;

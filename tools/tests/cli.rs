@@ -476,7 +476,7 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
             .is_some_and(|rows| rows.iter().any(|row| row["id"] == "BG-3"))
     );
     let row = String::from_utf8(succeed(&["list", "bg-3"])?.stdout)?;
-    assert!(row.contains("engine/src/transport/path_tracer/mod.rs"), "{row}");
+    assert!(row.contains("engine/src/techniques/path/mod.rs"), "{row}");
     let devices = json(&succeed(&["info", "--json", "--validation", "off", "--device", "0"])?.stdout)?;
     assert!(devices["devices"][0]["caps"]["subgroup_size"].is_u64());
     let scene = json(&succeed(&["info", "builtin:ring", "--json"])?.stdout)?;

@@ -3,7 +3,7 @@
 //! A plain f32 sum stalls once it is 2²⁴ times its next summand, and is wrong long before. Here each sum is the unevaluated pair
 //! `hi + lo` of two f32 numbers, about 48 significant bits, updated by error-free transformations: `two_sum` (Knuth, *The Art of Computer
 //! Programming* vol. 2, §4.2.2, theorem B), `quick_two_sum`, `split` and `two_product` (Dekker, *A floating-point technique for extending
-//! the available precision*, 1971; the splitting is Veltkamp's). `shaders/include/film/two_float.glsl` holds the same functions under
+//! the available precision*, 1971; the splitting is Veltkamp's). `shaders/film/two_float.glsl` holds the same functions under
 //! the same names; the f32 operations are the same in the same order, so both sides give the same bits wherever the device keeps
 //! subnormal numbers and does not contract (`precise` forbids it).
 //!

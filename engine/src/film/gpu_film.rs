@@ -1,6 +1,6 @@
 //! The film on the device: per pixel the sums of radiance, of its square and of the AOVs, which every technique adds to.
 //!
-//! Kernels bind it as set 3 (`shaders/include/film/film_bindings.glsl`) and add in pairs of floats (see [`accumulate`](super::accumulate)),
+//! Kernels bind it as set 3 (`shaders/film/film_bindings.glsl`) and add in pairs of floats (see [`accumulate`](super::accumulate)),
 //! so sums stay exact for millions of samples. Pixels are split into bands, each with buffers of its own, so that no picture's size meets
 //! `maxStorageBufferRange`. Deterministic as long as each pixel is added to by one invocation at a time, in order.
 

@@ -2,8 +2,8 @@
 //!
 //! # How to add a kernel
 //!
-//! 1. **Write the entry file** `engine/shaders/<floor>/<name>.comp`. It begins with `#version 460` and a comment block, which becomes the
-//!    documentation of the generated module. Mathematics goes to `engine/shaders/include/<floor>/`, with include guards, as functions of
+//! 1. **Write the entry file** `shaders/<floor>/<name>.comp`. It begins with `#version 460` and a comment block, which becomes the
+//!    documentation of the generated module. Mathematics goes to `shaders/<floor>/`, with include guards, as functions of
 //!    the same names as their Rust twins. Keep the file short: software drivers compile about a hundred lines a second.
 //!
 //!    ```glsl

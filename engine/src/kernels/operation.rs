@@ -1,4 +1,4 @@
-//! The operations of scans and reductions over words; twins of `shaders/include/kernels/operation.glsl` and `scan.glsl`.
+//! The operations of scans and reductions over words; twins of `shaders/kernels/operation.glsl` and `scan.glsl`.
 
 use crate::gpu::shaders::constants::{OPERATION_MAX, OPERATION_MIN, OPERATION_SUM};
 

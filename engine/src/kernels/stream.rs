@@ -1,6 +1,6 @@
 //! Streams of elements cut into blocks, one a team: how the host plans and begins every reduce-then-scan kernel.
 //!
-//! The arithmetic of blocks is that of `shaders/include/kernels/stream.glsl`. Guarantees: every element is in exactly one block, no team's
+//! The arithmetic of blocks is that of `shaders/kernels/stream.glsl`. Guarantees: every element is in exactly one block, no team's
 //! block is longer than the quota that its form allows, and no more workgroups are dispatched than every device takes.
 
 use super::form::Shape;

@@ -20,7 +20,7 @@ pub use model::{CostModel, ErrorModel};
 pub use noise::{relative_mse_by_variance, relative_mse_of_pair};
 
 use crate::render::{RenderOptions, Renderer};
-use crate::techniques::{self, TechniqueInfo};
+use crate::techniques::{self, Card};
 use crate::transport::PathSet;
 use crate::{Error, Result};
 use pilot::{PILOT_SHARE, Trial, rounds};
@@ -219,7 +219,7 @@ fn candidates(options: &RenderOptions) -> Result<Vec<Candidate>> {
 }
 
 /// Puts what is fixed over a variant's settings; keys that the technique does not have are none of its business.
-fn merge(settings: &mut Value, fixed: &Value, info: &TechniqueInfo) {
+fn merge(settings: &mut Value, fixed: &Value, info: &Card) {
     let known = (info.default_settings)();
     if let (Some(settings), Some(fixed)) = (settings.as_object_mut(), fixed.as_object()) {
         for (key, value) in fixed.iter().filter(|(key, _)| known.get(key).is_some()) {

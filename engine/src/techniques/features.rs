@@ -3,12 +3,12 @@
 use crate::gpu::Caps;
 use crate::{Error, Result};
 
-use super::TechniqueInfo;
+use super::Card;
 
 /// A feature's Vulkan name, and whether a device has it enabled.
 type Feature = (&'static str, fn(&Caps) -> bool);
 
-/// What [`TechniqueInfo::needs`] may name.
+/// What [`Card::needs`] may name.
 const FEATURES: [Feature; 16] = [
     ("geometryShader", |caps| caps.geometry_shader),
     ("shaderInt64", |caps| caps.int64),
@@ -35,7 +35,7 @@ pub fn offers(caps: &Caps, feature: &str) -> Option<bool> {
 }
 
 /// Refuses a device that lacks what the technique needs.
-pub(super) fn check(caps: &Caps, technique: &TechniqueInfo) -> Result<()> {
+pub(super) fn check(caps: &Caps, technique: &Card) -> Result<()> {
     for feature in technique.needs {
         match offers(caps, feature) {
             Some(true) => {}
@@ -63,7 +63,7 @@ pub(super) fn check(caps: &Caps, technique: &TechniqueInfo) -> Result<()> {
 
 /// What to do on a device that does not do: the engine's own techniques that run on it.
 fn way_round(caps: &Caps) -> String {
-    let fits = |technique: &&TechniqueInfo| technique.needs.iter().all(|need| offers(caps, need) == Some(true));
+    let fits = |technique: &&Card| technique.needs.iter().all(|need| offers(caps, need) == Some(true));
     let ids: Vec<_> = super::all().iter().filter(fits).map(|technique| technique.id).collect();
     format!(
         "choose a device that has it (or enable it, where the host made the device), or one of the techniques that run here: {}",

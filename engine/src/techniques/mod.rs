@@ -8,17 +8,16 @@
 //! # How to add one
 //!
 //! 1. A type with settings, pipelines, working memory and a [`GpuFilm`](crate::film::GpuFilm), made from a [`Gpu`], a [`GpuScene`] and a
-//!    [`View`]. [`PathTracer`](crate::transport::PathTracer) shows the pattern: a file each for the settings (serde with defaults, and a
+//!    [`View`]. [`PathTracer`](crate::techniques::PathTracer) shows the pattern: a file each for the settings (serde with defaults, and a
 //!    check of their ranges), the pipelines (specialized to [`GpuScene::profile`]), the working memory and the recording of passes.
 //! 2. [`Technique`] for it: each [`step`](Technique::step) is a bounded piece of work that adds whole samples to the film, in an order
 //!    that depends on settings and seed alone. What the scene does not need is left out, and said by [`skipped`](Technique::skipped).
-//! 3. A constant [`TechniqueInfo`]. Its [`create`](TechniqueInfo::create) is called once device and scene have been found fit.
+//! 3. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
 //! 4. In the engine: a file in this folder with the constant in [`all`], and a row in the [`catalogue`](crate::catalogue). In a host:
 //!    nothing more; [`Renderer::start_technique`](crate::render::Renderer::start_technique) takes the constant as it is.
 
 mod features;
-mod path;
-mod photon;
+pub mod path;
 pub mod photon_mapping;
 pub mod preview;
 
@@ -33,6 +32,7 @@ use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
 pub use features::offers;
+pub use path::{PathTracer, PathTracerSettings};
 
 /// How a technique's expected picture relates to the truth on its own path set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -47,7 +47,7 @@ pub enum Bias {
 }
 
 /// A technique as the catalogue knows it.
-pub struct TechniqueInfo {
+pub struct Card {
     /// Name on the command line.
     pub id: &'static str,
     /// One sentence.
@@ -69,7 +69,7 @@ pub struct TechniqueInfo {
     /// Settings that an automatic choice tries ([`plan`](mod@crate::plan)): all of them give the same expected picture. The first are the
     /// defaults.
     pub variants: &'static [Variant],
-    /// Makes the technique. Whoever wants one calls [`TechniqueInfo::prepare`], which looks at device and scene first.
+    /// Makes the technique. Whoever wants one calls [`Card::prepare`], which looks at device and scene first.
     pub create: Create,
 }
 
@@ -82,7 +82,7 @@ pub struct Variant {
     pub settings: fn() -> serde_json::Value,
 }
 
-/// A setting of a technique, in words. Its default is in [`TechniqueInfo::default_settings`].
+/// A setting of a technique, in words. Its default is in [`Card::default_settings`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct SettingInfo {
     /// Its name in the JSON.
@@ -98,11 +98,9 @@ pub struct SettingInfo {
 /// Makes a technique for a view, with its settings as JSON; [`from_json`](crate::settings::from_json) reads them.
 pub type Create = fn(&Gpu, Arc<GpuScene>, &View<'_>, &serde_json::Value) -> Result<Box<dyn Technique>>;
 
-impl std::fmt::Debug for TechniqueInfo {
+impl std::fmt::Debug for Card {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("TechniqueInfo")
-            .field("id", &self.id)
-            .finish_non_exhaustive()
+        f.debug_struct("Card").field("id", &self.id).finish_non_exhaustive()
     }
 }
 
@@ -172,22 +170,22 @@ pub struct Skipped {
 }
 
 /// Every technique of the engine.
-pub fn all() -> &'static [TechniqueInfo] {
-    &[path::INFO, photon::INFO]
+pub fn all() -> &'static [Card] {
+    &[path::card::CARD, photon_mapping::card::CARD]
 }
 
 /// The technique of that id.
 ///
 /// # Errors
 /// [`Error::Setting`] that lists the ids there are.
-pub fn by_id(id: &str) -> Result<&'static TechniqueInfo> {
+pub fn by_id(id: &str) -> Result<&'static Card> {
     all().iter().find(|technique| technique.id == id).ok_or_else(|| {
         let ids: Vec<_> = all().iter().map(|technique| technique.id).collect();
         Error::setting("technique", id, format!("is unknown; there is: {}", ids.join(", ")))
     })
 }
 
-impl TechniqueInfo {
+impl Card {
     /// Prepares the technique for a view, with its settings as JSON (missing ones take their defaults).
     ///
     /// # Errors

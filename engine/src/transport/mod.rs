@@ -1,4 +1,4 @@
-//! What light does: reflectance, Fresnel, samplers, path sets, the reference path tracer.
+//! What light does: reflectance, Fresnel, samplers, path sets, the scene on the device.
 
 pub mod albedo;
 pub mod bsdf;
@@ -13,7 +13,6 @@ pub mod lights;
 pub mod medium;
 pub mod packing;
 pub mod path_set;
-pub mod path_tracer;
 pub mod phase;
 pub mod phong;
 pub mod random;
@@ -22,7 +21,6 @@ pub mod warp;
 
 pub use gpu_scene::GpuScene;
 pub use path_set::PathSet;
-pub use path_tracer::{PathTracer, PathTracerSettings};
 
 #[cfg(test)]
 pub(crate) mod testing;

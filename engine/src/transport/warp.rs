@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(UNIFORM_SPHERE_PDF as f32, constants::UNIFORM_SPHERE_PDF);
         assert_eq!(UNIFORM_HEMISPHERE_PDF as f32, constants::UNIFORM_HEMISPHERE_PDF);
         // Rust's own constants stand for the shaders' in `constants`: here is what the file says.
-        let source = include_str!("../../shaders/include/pi.glsl");
+        let source = include_str!("../../../shaders/pi.glsl");
         for (name, value) in [("PI", std::f64::consts::PI), ("INV_PI", FRAC_1_PI)] {
             let line = source
                 .lines()

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clerestory::film::picture::{RADIANCE, SAMPLES, VARIANCE};
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
-use clerestory::techniques::{Bias, Technique, TechniqueInfo, View};
+use clerestory::techniques::{Bias, Card, Technique, View};
 use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
 use serde_json::Value;
@@ -23,7 +23,7 @@ pub struct Easel<'a> {
     /// The device.
     pub gpu: &'a Gpu,
     /// The technique.
-    pub info: &'static TechniqueInfo,
+    pub info: &'static Card,
     settings: serde_json::Map<String, Value>,
     seed: u32,
 }
@@ -69,7 +69,7 @@ impl Painted {
 
 impl<'a> Easel<'a> {
     /// A technique with settings that differ from its defaults.
-    pub fn new(gpu: &'a Gpu, info: &'static TechniqueInfo, settings: serde_json::Map<String, Value>) -> Self {
+    pub fn new(gpu: &'a Gpu, info: &'static Card, settings: serde_json::Map<String, Value>) -> Self {
         Self {
             gpu,
             info,
@@ -120,7 +120,7 @@ impl<'a> Easel<'a> {
     /// Prepares the technique for the scene's first camera.
     ///
     /// # Errors
-    /// As [`Easel::upload`] and [`TechniqueInfo::prepare`].
+    /// As [`Easel::upload`] and [`Card::prepare`].
     pub fn prepare(&self, scene: &Scene, size: [u32; 2]) -> Result<Box<dyn Technique>> {
         self.prepare_uploaded(self.upload(scene)?, scene, size)
     }
@@ -128,7 +128,7 @@ impl<'a> Easel<'a> {
     /// As [`Easel::prepare`], with the scene on the device.
     ///
     /// # Errors
-    /// As [`TechniqueInfo::prepare`].
+    /// As [`Card::prepare`].
     pub fn prepare_uploaded(
         &self,
         uploaded: Arc<GpuScene>,

@@ -1,7 +1,7 @@
 //! Runs cases on subjects and gives verdicts.
 
 use clerestory::gpu::Gpu;
-use clerestory::techniques::{self, Bias, TechniqueInfo};
+use clerestory::techniques::{self, Bias, Card};
 use clerestory::{Error, Result};
 
 use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
@@ -17,7 +17,7 @@ pub enum Subject {
     /// A technique with one of its samplers, where it has a choice.
     Technique {
         /// The technique.
-        info: &'static TechniqueInfo,
+        info: &'static Card,
         /// Value of its setting `sampler`.
         sampler: Option<&'static str>,
     },

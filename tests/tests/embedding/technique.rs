@@ -7,7 +7,7 @@ use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
 use clerestory::gpu::{Access, Buffer, BufferDesc, Category, EnabledFeatures, Gpu, PipelineInfo};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::Camera;
-use clerestory::techniques::{Bias, Skipped, Technique, TechniqueInfo};
+use clerestory::techniques::{Bias, Card, Skipped, Technique};
 use clerestory::transport::PathSet;
 use clerestory::{Error, Result};
 use clerestory_tests::{assert_no_messages, gpu};
@@ -22,7 +22,7 @@ struct Even {
     samples: u32,
 }
 
-const EVEN: TechniqueInfo = TechniqueInfo {
+const EVEN: Card = Card {
     id: "even",
     summary: "the same radiance everywhere",
     publication: "none",
@@ -162,7 +162,7 @@ fn a_technique_of_the_hosts_own_renders_into_the_same_film() {
 
 #[test]
 fn a_technique_is_refused_with_the_reason_before_it_is_made() {
-    const NEVER: TechniqueInfo = TechniqueInfo {
+    const NEVER: Card = Card {
         create: |_, _, _, _| panic!("made in spite of the refusal"),
         ..EVEN
     };
@@ -170,12 +170,12 @@ fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     let gpu = host.lend(EnabledFeatures::REQUIRED).unwrap();
     let sky = Renderer::new(&gpu, &clerestory::scene::load("builtin:box-city?n=2").unwrap()).unwrap();
     let closed = Renderer::new(&gpu, &clerestory::scene::load("builtin:cornell-box").unwrap()).unwrap();
-    let refusal = |renderer: &Renderer, info: &TechniqueInfo| {
+    let refusal = |renderer: &Renderer, info: &Card| {
         let options = RenderOptions::default();
         renderer.start_technique(info, &options).err().expect("a refusal")
     };
     // The host did not enable it.
-    let needy = TechniqueInfo {
+    let needy = Card {
         needs: &["geometryShader"],
         ..NEVER
     };
@@ -191,7 +191,7 @@ fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     ] {
         assert!(text.contains(word), "{word:?} is not in: {text}");
     }
-    let misspelt = TechniqueInfo {
+    let misspelt = Card {
         needs: &["geometryShaders"],
         ..NEVER
     };

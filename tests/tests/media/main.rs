@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 
 use clerestory::gpu::Gpu;
 use clerestory::scene::{Camera, DensityGrid, LightKind, Material, Medium, Phase, Projection, Scene};
-use clerestory::transport::PathTracerSettings;
+use clerestory::techniques::PathTracerSettings;
 use clerestory_tests::render::{Rendered, cuboid, render};
 use clerestory_tests::statistics::expect_mean;
 use glam::{DVec3, Vec3};

@@ -15,8 +15,9 @@ use std::sync::Arc;
 
 use clerestory::gpu::Gpu;
 use clerestory::scene::Camera;
+use clerestory::techniques::{PathTracer, PathTracerSettings};
+use clerestory::transport::GpuScene;
 use clerestory::transport::random::SamplerKind;
-use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
 use clerestory::{Error, Result};
 
 use super::peer::{Integrator, Peer, Request, Variant};

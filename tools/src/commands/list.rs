@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::catalogue::{self, Row};
-use clerestory::techniques::{self, Bias, SettingInfo, TechniqueInfo};
+use clerestory::techniques::{self, Bias, Card, SettingInfo};
 
 use crate::failure::{Failure, Outcome};
 use crate::output::{self, Table};
@@ -43,8 +43,8 @@ struct Technique {
     default_settings: serde_json::Value,
 }
 
-impl From<&TechniqueInfo> for Technique {
-    fn from(info: &TechniqueInfo) -> Self {
+impl From<&Card> for Technique {
+    fn from(info: &Card) -> Self {
         Self {
             id: info.id,
             summary: info.summary,

@@ -91,7 +91,7 @@ impl LbvhBuilder {
             KeyWidth::Bits64
         };
         let is_cpu = gpu.caps().kind == DeviceKind::Cpu;
-        // See shaders/include/accel/lbvh_fence.glsl.
+        // See shaders/accel/lbvh_fence.glsl.
         let lbvh_fences = !(is_cpu && gpu.caps().driver.contains("llvmpipe"));
         let run = if is_cpu { CPU_RUN } else { GPU_RUN };
         let mut options = RadixSortOptions::new(key, true);

@@ -61,7 +61,7 @@ pub(super) const ROWS: &[Row] = &[
             "MET-B8",
             "path estimation: light sampling, BRDF sampling, Russian roulette",
             "Kajiya 1986; Veach 1997, chapters 9 and 10",
-            "engine/src/transport/path_tracer/mod.rs",
+            "engine/src/techniques/path/mod.rs",
             ESTIMATION,
         )),
     ),

@@ -216,7 +216,7 @@ pub(super) const ROWS: &[Row] = &[
             "CL-ALPHA",
             "alpha: masks, and blending by chance",
             "Enderton, Sintorn, Shirley and Luebke 2010",
-            "engine/src/transport/path_tracer/mod.rs",
+            "engine/src/techniques/path/mod.rs",
             &[
                 "tests/tests/alpha.rs::masks_are_all_or_nothing",
                 "tests/tests/alpha.rs::blended_walls_thin_out_the_light_behind_them",
@@ -231,7 +231,7 @@ pub(super) const ROWS: &[Row] = &[
             "CL-ABSORPTION",
             "absorption inside of solids",
             "Khronos, KHR_materials_volume (law of Beer and Lambert)",
-            "engine/src/transport/path_tracer/mod.rs",
+            "engine/src/techniques/path/mod.rs",
             &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
         ),
     ),

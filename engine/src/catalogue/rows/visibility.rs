@@ -76,7 +76,7 @@ pub(super) const ROWS: &[Row] = &[
             "BG-3",
             "path tracer, surfaces and media: technique `path`",
             "Kajiya 1986; Veach 1997, chapters 9 and 10; Laine, Karras and Aila 2013",
-            "engine/src/transport/path_tracer/mod.rs",
+            "engine/src/techniques/path/mod.rs",
             PATH_TRACER,
         ))
     },
@@ -86,7 +86,7 @@ pub(super) const ROWS: &[Row] = &[
             "BG-4",
             "free flight and transmittance: analytic, delta and ratio tracking, equi-angular",
             "Woodcock et al. 1965; Kulla and Fajardo 2012; Novák et al. 2014; Miller et al. 2019",
-            "engine/src/transport/path_tracer/mod.rs",
+            "engine/src/techniques/path/mod.rs",
             FREE_FLIGHT,
         )),
     ),

@@ -15,9 +15,9 @@ use crate::gpu::shaders::sets::{PathBuffers, PhotonMapSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
 use crate::gpu::shaders::types::AskSettings;
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
-use crate::transport::path_tracer::pipelines::surface_spec;
-use crate::transport::path_tracer::stages::stage_barrier;
-use crate::transport::path_tracer::{ArrivalStage, Places, StoppedPlaces};
+use crate::techniques::path::pipelines::surface_spec;
+use crate::techniques::path::stages::stage_barrier;
+use crate::techniques::path::{ArrivalStage, Places, StoppedPlaces};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 

@@ -27,8 +27,9 @@ use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
-use crate::transport::path_tracer::{ArrivalStage, PathCounters};
-use crate::transport::{GpuScene, PathTracer, PathTracerSettings};
+use crate::techniques::path::{ArrivalStage, PathCounters};
+use crate::techniques::{PathTracer, PathTracerSettings};
+use crate::transport::GpuScene;
 
 /// Exact counts, and what the host's share took.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]

@@ -2,6 +2,7 @@
 
 pub mod kernel;
 
+pub(super) mod card;
 mod gather;
 mod map;
 mod mapper;

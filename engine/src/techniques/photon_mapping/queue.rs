@@ -10,10 +10,10 @@ use crate::gpu::shaders::techniques::photon_mapping::{photon_queue_blocks, photo
 use crate::gpu::shaders::types::AskSettings;
 use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::kernels::{Count, IndirectCount, Partition, PartitionBuffers, PartitionOptions};
+use crate::techniques::path::Places;
+use crate::techniques::path::pipelines::surface_spec;
+use crate::techniques::path::stages::stage_barrier;
 use crate::transport::GpuScene;
-use crate::transport::path_tracer::Places;
-use crate::transport::path_tracer::pipelines::surface_spec;
-use crate::transport::path_tracer::stages::stage_barrier;
 use crate::{Error, Result};
 
 /// Places that a workgroup of the queue in blocks walks.

@@ -20,13 +20,11 @@ use crate::gpu::shaders::techniques::photon_mapping::{photon_append, photon_emit
 use crate::gpu::shaders::types::{self, Differentials};
 use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder};
 use crate::gpu::{TexelView, Timings};
+use crate::techniques::path::PathTracerSettings;
+use crate::techniques::path::pipelines::{TracePipelines, ray_quota, surface_spec};
+use crate::techniques::path::stages::{Compaction, StallWatch, WaveKey, indirect, stage_barrier};
+use crate::techniques::path::wave::{Status, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device};
 use crate::transport::GpuScene;
-use crate::transport::path_tracer::PathTracerSettings;
-use crate::transport::path_tracer::pipelines::{TracePipelines, ray_quota, surface_spec};
-use crate::transport::path_tracer::stages::{Compaction, StallWatch, WaveKey, indirect, stage_barrier};
-use crate::transport::path_tracer::wave::{
-    Status, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device,
-};
 use crate::{Error, Result};
 
 /// Bounces recorded into one command buffer.

@@ -210,7 +210,7 @@ impl GpuScene {
     /// Moves or turns a point, spot or directional light, by its index in [`Scene::lights`]: as if the scene had been made with the light like
     /// this. The probabilities by which light sampling chooses stay, so its kind and its power must.
     ///
-    /// Pictures under way must begin anew ([`PathTracer::restart`](super::PathTracer::restart),
+    /// Pictures under way must begin anew ([`PathTracer::restart`](crate::techniques::PathTracer::restart),
     /// [`PhotonMapper::restart`](crate::techniques::photon_mapping::PhotonMapper::restart) or
     /// [`Technique::set_camera`](crate::techniques::Technique::set_camera)), or they mix both; none of the scene's may be in the middle of a step.
     ///

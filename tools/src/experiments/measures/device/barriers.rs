@@ -6,7 +6,8 @@
 use std::sync::Arc;
 
 use clerestory::gpu::{Access, Buffer, BufferDesc, Category, Gpu, Pass};
-use clerestory::transport::{GpuScene, PathTracer, PathTracerSettings};
+use clerestory::techniques::{PathTracer, PathTracerSettings};
+use clerestory::transport::GpuScene;
 use clerestory::{Error, Result, scene};
 
 use crate::experiments::measures::Context;

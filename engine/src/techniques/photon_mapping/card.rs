@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use super::photon_mapping::{PhotonMapper, PhotonSettings};
-use super::{Bias, SettingInfo, Skipped, Technique, TechniqueInfo, Variant};
+use super::{PhotonMapper, PhotonSettings};
 use crate::Result;
 use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::from_json;
+use crate::techniques::{Bias, Card, SettingInfo, Skipped, Technique, Variant};
 use crate::transport::PathSet;
 
 /// The catalogue's entry.
-pub(super) const INFO: TechniqueInfo = TechniqueInfo {
+pub(in crate::techniques) const CARD: Card = Card {
     id: "photon",
     summary: "progressive photon mapping: what diffuse surfaces get indirectly from a map of photons, anew for each pass, with kernels that shrink",
     publication: "Jensen 2001; Hachisuka and Jensen 2009; Knaus and Zwicker 2011; Interactive Manycore Photon Mapping, 2011",

@@ -8,10 +8,11 @@
 //! may lie in bodies as long as their surfaces neither cross nor coincide; the camera may be in any of them, where its position counts for
 //! the whole lens and for all of an orthographic picture. Nothing from infinity is seen through an endless medium that extinguishes it.
 //!
-//! Unbiased: paths end by Russian roulette or by the [`PathSet`](super::PathSet) alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
+//! Unbiased: paths end by Russian roulette or by the [`PathSet`](crate::transport::PathSet) alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
 //! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
 
+pub(super) mod card;
 pub(crate) mod pipelines;
 mod record;
 mod settings;
@@ -28,7 +29,6 @@ use self::wave::{
     Cursor, MediumCounters, Status, Wave, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device,
     slots_of_picture,
 };
-use super::gpu_scene::GpuScene;
 use crate::Result;
 use crate::accel::trace::wide_counter;
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -38,6 +38,7 @@ use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::{Access, Buffer, BufferView, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
+use crate::transport::GpuScene;
 use glam::DVec3;
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::{Bias, SettingInfo, Skipped, Technique, TechniqueInfo, Variant};
 use crate::Result;
 use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -10,11 +9,12 @@ use crate::gpu::shaders::transport::path_shade;
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
 use crate::settings::from_json;
+use crate::techniques::path::{PathTracer, PathTracerSettings};
+use crate::techniques::{Bias, Card, SettingInfo, Skipped, Technique, Variant};
 use crate::transport::PathSet;
-use crate::transport::path_tracer::{PathTracer, PathTracerSettings};
 
 /// The catalogue's entry.
-pub(super) const INFO: TechniqueInfo = TechniqueInfo {
+pub(in crate::techniques) const CARD: Card = Card {
     id: "path",
     summary: "unidirectional path tracing with next-event estimation and multiple importance sampling",
     publication: "Kajiya 1986; Veach 1997, chapters 9 and 10",
