@@ -4,11 +4,12 @@
 //! step by step, so that a host can show progress, stop at any time and keep what is there.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::accel::{IndexKind, IndexReport};
+use crate::film::PixelFormat;
 use crate::film::picture::{Metadata, NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
 use crate::scene::{Camera, Note, Scene, SceneProfile};
@@ -54,6 +55,7 @@ impl Default for RenderOptions {
 
 /// A finished picture with its report.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Rendered {
     /// Layers `radiance`, `variance` (of the mean), `samples`, and AOVs.
     pub picture: Picture,
@@ -63,6 +65,7 @@ pub struct Rendered {
 
 /// GPU time of all passes of one name.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct PassReport {
     /// The pass's name.
     pub name: String,
@@ -74,6 +77,7 @@ pub struct PassReport {
 
 /// Everything that is known about how a picture was made.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// File or `builtin:` address.
     pub scene: String,
@@ -134,7 +138,8 @@ pub struct FrameReport {
 }
 
 /// Where a rendering stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Progress {
     /// Share of the work that is done, by samples or by the time budget, whichever is further.
     pub fraction: f64,
@@ -142,6 +147,27 @@ pub struct Progress {
     pub seconds: f64,
     /// Rays traced so far.
     pub rays: u64,
+}
+
+/// How a scene is kept on a device. What it says changes times, not pictures.
+///
+/// ```
+/// use clerestory::accel::IndexKind;
+/// use clerestory::render::RendererDesc;
+///
+/// let desc = RendererDesc {
+///     index: "lbvh".parse::<IndexKind>()?,
+///     ..RendererDesc::default()
+/// };
+/// # clerestory::Result::Ok(())
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct RendererDesc {
+    /// Kind of the ray index.
+    pub index: IndexKind,
+    /// Folder where a kd-tree is read from if the same was kept there before, and kept otherwise. The report says which
+    /// ([`IndexReport::kept`]); what cannot be read or written there is no error.
+    pub index_folder: Option<PathBuf>,
 }
 
 /// A scene on a device, ready to be rendered.
@@ -167,25 +193,17 @@ impl Renderer {
     /// # Errors
     /// [`Error::Scene`], [`Error::LimitExceeded`], [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
-        Self::with_index(gpu, scene, &IndexKind::default())
+        Self::with(gpu, scene, &RendererDesc::default())
     }
 
-    /// As [`Renderer::new`], with the ray index of the host's choice. It changes times, not pictures: see [`IndexKind`].
+    /// As [`Renderer::new`], as the description says.
     ///
     /// # Errors
     /// As [`Renderer::new`], and [`Error::Setting`] for settings of the index that are out of range.
-    pub fn with_index(gpu: &Gpu, scene: &Scene, index: &IndexKind) -> Result<Self> {
-        Self::with_kept_index(gpu, scene, index, None)
-    }
-
-    /// As [`Renderer::with_index`]; with a folder a kd-tree is read from there where the same was kept before, and kept there otherwise.
-    /// The report says which ([`IndexReport::kept`]).
-    ///
-    /// # Errors
-    /// As [`Renderer::with_index`]; what cannot be read or written there is none.
-    pub fn with_kept_index(gpu: &Gpu, scene: &Scene, index: &IndexKind, folder: Option<&Path>) -> Result<Self> {
+    pub fn with(gpu: &Gpu, scene: &Scene, desc: &RendererDesc) -> Result<Self> {
         let start = Instant::now();
-        let gpu_scene = Arc::new(GpuScene::with_kept_index(gpu, scene, index, folder)?);
+        let folder = desc.index_folder.as_deref();
+        let gpu_scene = Arc::new(GpuScene::with_kept_index(gpu, scene, &desc.index, folder)?);
         let upload_seconds = start.elapsed().as_secs_f64();
         // Only names and cameras are needed from here on; the geometry lives on the device.
         let scene = Scene {
@@ -351,8 +369,8 @@ impl Rendering {
     ///
     /// # Errors
     /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
-    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
-        self.technique.display(target, exposure, bgra)
+    pub fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        self.technique.display(target, exposure, format)
     }
 
     /// The picture as it is now, without its report.

@@ -1,5 +1,7 @@
 //! Pictures put together from panels, with words, frames and scales of colours.
 
+use clerestory::film::PixelFormat;
+
 use crate::lettering;
 
 /// A picture of red, green and blue bytes.
@@ -78,9 +80,12 @@ impl Sheet {
         lettering::write(text, dot, |x, y| self.put(left + x, top + y, color));
     }
 
-    /// Red, green, blue, alpha, rows from top to bottom; or blue first.
-    pub fn bytes(&self, bgra: bool) -> Vec<u8> {
-        let of = |[r, g, b]: [u8; 3]| if bgra { [b, g, r, u8::MAX] } else { [r, g, b, u8::MAX] };
+    /// Four bytes a pixel, rows from top to bottom.
+    pub fn bytes(&self, format: PixelFormat) -> Vec<u8> {
+        let of = |[r, g, b]: [u8; 3]| match format {
+            PixelFormat::Rgba8 => [r, g, b, u8::MAX],
+            PixelFormat::Bgra8 => [b, g, r, u8::MAX],
+        };
         self.pixels.iter().flat_map(|pixel| of(*pixel)).collect()
     }
 }
@@ -107,6 +112,6 @@ mod tests {
         assert_eq!(dots, 11 + 10);
         sheet.write("WWWWWWWW", [15, 8], 3, [9; 3]);
         assert_eq!(lettering::width("AB", 2), 22);
-        assert_eq!(sheet.bytes(true).len(), 800);
+        assert_eq!(sheet.bytes(PixelFormat::Bgra8).len(), 800);
     }
 }

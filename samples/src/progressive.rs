@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use clerestory::Result;
+use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
 use clerestory::render::{RenderOptions, Renderer, Rendering};
 
@@ -19,7 +20,7 @@ pub struct Progressive {
     renderer: Renderer,
     options: RenderOptions,
     exposure: f32,
-    bgra: bool,
+    format: PixelFormat,
     state: Option<State>,
 }
 
@@ -47,8 +48,8 @@ pub struct Frame {
 
 impl Progressive {
     /// A picture of the renderer's scene, by the camera and with the settings of `options` (size and samples are the window's matter);
-    /// with bytes in the order blue, green, red, alpha where `bgra` says so, else red first. `exposure` is in stops.
-    pub fn new(gpu: &Gpu, renderer: Renderer, options: RenderOptions, exposure: f32, bgra: bool) -> Self {
+    /// with bytes in the order of `format`. `exposure` is in stops.
+    pub fn new(gpu: &Gpu, renderer: Renderer, options: RenderOptions, exposure: f32, format: PixelFormat) -> Self {
         Self {
             gpu: gpu.clone(),
             renderer,
@@ -57,7 +58,7 @@ impl Progressive {
                 ..options
             },
             exposure,
-            bgra,
+            format,
             state: None,
         }
     }
@@ -89,7 +90,7 @@ impl Progressive {
             rays: state.rays - rays_before,
             seconds: begin.elapsed().as_secs_f64(),
         };
-        state.rendering.display(&state.pixels, self.exposure, self.bgra)?;
+        state.rendering.display(&state.pixels, self.exposure, self.format)?;
         self.state = Some(state);
         Ok(frame)
     }

@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use clerestory::gpu::ash::vk;
+use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, Gpu, GpuOptions, Presented, Surface};
 use clerestory::scene::{self, Scene, SceneProfile};
 use clerestory::{Error, Result};
@@ -73,8 +73,8 @@ pub struct Canvas<'a> {
     pub camera: Option<&'a str>,
     /// Exposure in stops.
     pub exposure: f32,
-    /// Whether the order of bytes is blue, green, red, alpha; else red comes first.
-    pub bgra: bool,
+    /// Order of a shown pixel's bytes.
+    pub format: PixelFormat,
 }
 
 /// The part of a command line that is about the window.
@@ -217,7 +217,7 @@ impl<S: Show> Open<S> {
             scene,
             camera: options.camera.as_deref(),
             exposure: options.exposure.unwrap_or(scene.defaults.exposure),
-            bgra: surface.format() == vk::Format::B8G8R8A8_UNORM,
+            format: PixelFormat::of(surface.format()).unwrap_or_default(),
         })?;
         Ok(Self {
             show,
@@ -262,7 +262,7 @@ impl<S: Show> Open<S> {
         self.show.end();
         if let (Some(path), Some((pixels, size))) = (screenshot, &self.last) {
             let mut bytes: Vec<u8> = self.gpu.read(pixels.view(), 4 * (size[0] * size[1]) as usize)?;
-            if self.surface.format() == vk::Format::B8G8R8A8_UNORM {
+            if PixelFormat::of(self.surface.format()) == Some(PixelFormat::Bgra8) {
                 bytes.chunks_exact_mut(4).for_each(|pixel| pixel.swap(0, 2));
             }
             crate::save_png(&path, *size, &bytes)?;

@@ -8,7 +8,7 @@ use clerestory::accel::bvh2::Bvh2Settings;
 use clerestory::accel::kd::KdSettings;
 use clerestory::film::picture::{NORMAL, VARIANCE};
 use clerestory::gpu::{DeviceKind, Gpu};
-use clerestory::render::{RenderOptions, Rendered, Renderer};
+use clerestory::render::{RenderOptions, Rendered, Renderer, RendererDesc};
 use clerestory::scene::{AlphaMode, Instance, Scene};
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::GpuScene;
@@ -20,8 +20,15 @@ use glam::Vec3;
 /// Iterations at which rays of a city stop.
 const SMALL_QUOTA: u32 = 128;
 
+fn with(index: IndexKind) -> RendererDesc {
+    RendererDesc {
+        index,
+        ..RendererDesc::default()
+    }
+}
+
 fn render(gpu: &Gpu, scene: &Scene, index: &IndexKind) -> Result<Rendered> {
-    let mut rendering = Renderer::with_index(gpu, scene, index)?.start(&RenderOptions {
+    let mut rendering = Renderer::with(gpu, scene, &with(*index))?.start(&RenderOptions {
         size: [40, 32],
         spp: 3,
         seed: 5,
@@ -184,7 +191,7 @@ fn leaves_that_software_devices_cannot_end_are_refused() {
 fn settings_of_the_index_that_are_out_of_range_are_refused() {
     with_gpu(|gpu| {
         let index = IndexKind::Bvh2(Bvh2Settings { leaf_size: 9, bins: 16 });
-        let refused = Renderer::with_index(gpu, &builtin("builtin:cornell-box"), &index);
+        let refused = Renderer::with(gpu, &builtin("builtin:cornell-box"), &with(index));
         assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
     });
 }

@@ -225,6 +225,7 @@ pub enum IndexKept {
 
 /// The ray index of a scene, as frame reports have it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct IndexReport {
     /// One of [`IndexKind::NAMES`].
     pub kind: &'static str,

@@ -119,6 +119,7 @@ impl Hit {
 
 /// Size and quality of an index.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct IndexStatistics {
     /// Triangles that rays can meet.
     pub triangles: u64,
@@ -140,6 +141,7 @@ pub struct IndexStatistics {
 
 /// Exact work counters of a traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct TraversalCounters {
     /// Inner nodes visited (two box tests each).
     pub nodes: u64,

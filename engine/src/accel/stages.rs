@@ -5,6 +5,7 @@ use std::time::Instant;
 /// Milliseconds of the stages that build a ray index; 0 for those that its kind does not have. On the host by wall clock, on the device
 /// by its timestamps, but for `transfer`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct BuildStages {
     /// Finding the triangles that rays can meet, and their boxes.
     pub triangles: f64,

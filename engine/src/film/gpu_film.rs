@@ -6,6 +6,7 @@
 
 use super::accumulate::TwoFloat;
 use super::picture::{ALBEDO, DEPTH, NORMAL, NonFiniteSamples, Picture, RADIANCE, SAMPLES, VARIANCE};
+use super::pixel_format::PixelFormat;
 use crate::gpu::shaders::constants::{AOV_ALBEDO, AOV_DEPTH, AOV_NORMAL};
 use crate::gpu::shaders::film::display;
 use crate::gpu::shaders::sets::FilmSet;
@@ -154,11 +155,11 @@ impl GpuFilm {
     }
 
     /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
-    /// and sRGB-encoded, blue first where `bgra` says so.
+    /// and sRGB-encoded.
     ///
     /// # Errors
     /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
-    pub fn display(&self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+    pub fn display(&self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
         let bytes = 4 * u64::from(self.size[0]) * u64::from(self.size[1]);
         if target.bytes() < bytes {
             let cause = format!("has {} bytes; the picture needs {bytes}", target.bytes());
@@ -172,7 +173,7 @@ impl GpuFilm {
                     first_pixel: band.first_pixel,
                     pixel_count: band.pixels,
                     scale: exposure.exp2(),
-                    bgra: bgra.into(),
+                    bgra: format.blue_first(),
                 };
                 let set = display::Set0 {
                     film_pixels: band.sums.view(),

@@ -42,6 +42,7 @@ impl Default for CompareOptions {
 
 /// All error metrics of a test picture a against a reference b. Means run over the values (pixels × channels) of the finite pixels.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct ErrorReport {
     /// Pixels across.
     pub width: u32,

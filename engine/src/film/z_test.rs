@@ -24,6 +24,7 @@ pub const RELATIVE_DEVIATION_FLOOR: f64 = 1.0 / 131_072.0;
 
 /// What a z-test found.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct ZTest {
     /// Significance level of the whole family of values.
     pub alpha: f64,

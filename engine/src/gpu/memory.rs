@@ -41,6 +41,7 @@ const CATEGORIES: [Category; 7] = [
 
 /// Bytes in use, by category, in the order of the enum; empty categories are left out.
 #[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct MemoryReport {
     /// Category and bytes.
     pub bytes: Vec<(Category, u64)>,
@@ -65,6 +66,7 @@ impl MemoryReport {
 
 /// One live allocation.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[non_exhaustive]
 pub struct AllocationInfo {
     /// The buffer's or image's name.
     pub name: String,

@@ -7,6 +7,7 @@
 
 /// One pass of a submission.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct PassTiming {
     /// The pass's name.
     pub name: String,
@@ -33,6 +34,7 @@ pub struct Drawn {
 
 /// All passes of a submission, in recording order.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct Timings {
     /// The passes.
     pub passes: Vec<PassTiming>,

@@ -5,6 +5,7 @@ use glam::{DVec3, UVec2};
 
 /// Ratios of texels' solid angles to the mean one: above 1 a texel is too coarse. Texels on the rim of a disc count by the part within.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct DensityStatistics {
     /// The finest texel.
     pub min_ratio: f64,

@@ -41,6 +41,7 @@ pub struct Goal {
 
 /// What became of a technique with its settings.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Candidate {
     /// Technique id.
     pub technique: &'static str,
@@ -70,6 +71,7 @@ pub struct Candidate {
 
 /// The choice, its prediction, and all that was looked at.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Plan {
     /// What was asked for.
     pub goal: Goal,

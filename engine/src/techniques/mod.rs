@@ -24,8 +24,8 @@ pub mod preview;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::transport::{GpuScene, PathSet};
@@ -131,12 +131,11 @@ pub trait Technique: Send {
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)>;
 
-    /// Writes the picture so far to a buffer of four bytes a pixel on the device: `exposure` in stops, clipped, sRGB-encoded, blue first
-    /// where `bgra` says so.
+    /// Writes the picture so far to a buffer of four bytes a pixel on the device: `exposure` in stops, clipped, sRGB-encoded.
     ///
     /// # Errors
     /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
-    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()>;
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()>;
 
     /// Begins anew through another camera.
     ///

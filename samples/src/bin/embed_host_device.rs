@@ -9,6 +9,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
+use clerestory::film::PixelFormat;
 use clerestory::gpu::ash::{self, vk};
 use clerestory::gpu::{BufferDesc, Category, EnabledFeatures, Gpu, GpuOptions, HostDevice};
 use clerestory::render::{RenderOptions, Renderer};
@@ -115,7 +116,7 @@ impl Host {
             let _guard = gpu.lock_queue();
             self.submit(vk::CommandBuffer::null())?;
         }
-        rendering.display(&rendered, scene.defaults.exposure, false)?;
+        rendering.display(&rendered, scene.defaults.exposure, PixelFormat::Rgba8)?;
         let readback = gpu.buffer(&BufferDesc::readback("the host's copy", bytes as u64))?;
 
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(self.queue_family);

@@ -16,6 +16,7 @@ use std::time::Instant;
 
 use clerestory::accel::bvh2::Bvh2;
 use clerestory::accel::{NO_HIT, RayIndex};
+use clerestory::film::PixelFormat;
 use clerestory::gpu::shaders::types::SceneTriangle;
 use clerestory::gpu::{Category, Gpu, GpuOptions};
 use clerestory::maps::Texel;
@@ -69,19 +70,26 @@ fn run() -> Result<()> {
     let Some(output) = given.text("--output") else {
         let options = window::Options::of(&given, SCENE)?;
         return window::show(options, |canvas| {
-            Lab::new(canvas.gpu, canvas.scene, canvas.bgra, choice, texels, turn.to_radians())
+            Lab::new(
+                canvas.gpu,
+                canvas.scene,
+                canvas.format,
+                choice,
+                texels,
+                turn.to_radians(),
+            )
         });
     };
     let scene = scene::load(given.alone(0).unwrap_or(SCENE))?;
     let gpu = Gpu::headless(&GpuOptions::default())?;
     let log = gpu.validation_log();
     let size = given.size("--size")?.unwrap_or(SIZE);
-    let mut lab = Lab::new(&gpu, &scene, false, choice, texels, turn.to_radians())?;
+    let mut lab = Lab::new(&gpu, &scene, PixelFormat::Rgba8, choice, texels, turn.to_radians())?;
     let mut sheet = lab.next(size)?;
     for _ in 1..given.value("--frames")?.unwrap_or(1u32) {
         sheet = lab.next(size)?;
     }
-    clerestory_samples::save_png(Path::new(output), size, &sheet.bytes(false))?;
+    clerestory_samples::save_png(Path::new(output), size, &sheet.bytes(PixelFormat::Rgba8))?;
     println!("wrote {output}");
     lab.end();
     drop(lab);
@@ -152,7 +160,7 @@ struct Lab {
     /// By object.
     albedos: Vec<Vec3>,
     index: Bvh2,
-    bgra: bool,
+    format: PixelFormat,
     choice: Choice,
     texels: u32,
     live: Live,
@@ -164,7 +172,7 @@ struct Lab {
 }
 
 impl Lab {
-    fn new(gpu: &Gpu, scene: &Scene, bgra: bool, choice: Choice, texels: u32, turn: f64) -> Result<Self> {
+    fn new(gpu: &Gpu, scene: &Scene, format: PixelFormat, choice: Choice, texels: u32, turn: f64) -> Result<Self> {
         let on_device = GpuScene::new(gpu, scene)?;
         let surfaces = on_device.surfaces();
         let triangles: Vec<SceneTriangle> = gpu.read(
@@ -197,7 +205,7 @@ impl Lab {
             scene: on_device,
             triangles,
             objects,
-            bgra,
+            format,
             choice,
             texels,
             angle: START,
@@ -479,7 +487,7 @@ impl<'a> Page<'a> {
 impl Show for Lab {
     fn frame(&mut self, _: &mut Orbit, size: [u32; 2]) -> Result<Shown> {
         let begin = Instant::now();
-        let bytes = self.next(size)?.bytes(self.bgra);
+        let bytes = self.next(size)?.bytes(self.format);
         let pixels = self.gpu.buffer_with("shown pixels", Category::Film, &bytes)?;
         Ok(Shown {
             pixels,

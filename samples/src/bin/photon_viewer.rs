@@ -16,6 +16,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
+use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
 use clerestory::settings::from_json;
 use clerestory::techniques;
@@ -64,7 +65,7 @@ struct PhotonViewer {
     scene: Arc<GpuScene>,
     settings: PhotonSettings,
     exposure: f32,
-    bgra: bool,
+    format: PixelFormat,
     light: Carousel,
     /// Where the light is, and by how much it goes on; radians.
     angle: f64,
@@ -119,7 +120,7 @@ impl PhotonViewer {
             scene: Arc::new(scene),
             settings,
             exposure: canvas.exposure,
-            bgra: canvas.bgra,
+            format: canvas.format,
             light,
             angle: 0.0,
             turn,
@@ -209,7 +210,7 @@ impl Show for PhotonViewer {
         let before = view.mapper.counts();
         view.samples += self.settings.samples_per_pass;
         while view.mapper.step(view.samples)?.is_some() {}
-        view.mapper.display(&view.pixels, self.exposure, self.bgra)?;
+        view.mapper.display(&view.pixels, self.exposure, self.format)?;
         let (done, counts) = (Instant::now(), view.mapper.counts());
         let seconds = (done - begin).as_secs_f64();
         let [trace, map] = [

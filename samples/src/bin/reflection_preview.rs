@@ -16,6 +16,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu, GpuOptions, Recorder};
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{self, LightKind, Material, Mesh, Scene, SceneProfile, metals};
@@ -73,7 +74,7 @@ fn run() -> Result<()> {
         return without_window(&given, &scene, body, settings, Path::new(path));
     }
     window::show_scene(window::Options::of(&given, "")?, scene, |canvas| {
-        Stage::new(canvas.gpu, canvas.scene, body, settings, canvas.exposure, canvas.bgra)
+        Stage::new(canvas.gpu, canvas.scene, body, settings, canvas.exposure, canvas.format)
     })
 }
 
@@ -86,7 +87,7 @@ fn without_window(given: &Arguments, scene: &Scene, body: Body, settings: Settin
     let exposure = given.value("--exposure")?.unwrap_or(scene.defaults.exposure);
     let size = given.size("--size")?.unwrap_or(SIZE);
     let frames: u32 = given.value("--frames")?.unwrap_or(1);
-    let mut stage = Stage::new(&gpu, scene, body, settings, exposure, false)?;
+    let mut stage = Stage::new(&gpu, scene, body, settings, exposure, PixelFormat::Rgba8)?;
     let mut last = None;
     for _ in 0..frames.max(1) {
         last = Some(stage.frame(&mut orbit, size)?.pixels);
@@ -257,7 +258,7 @@ struct Stage {
     body: Body,
     settings: Settings,
     exposure: f32,
-    bgra: bool,
+    format: PixelFormat,
     angle: f64,
     held: bool,
     view: Option<View>,
@@ -278,7 +279,14 @@ struct View {
 }
 
 impl Stage {
-    fn new(gpu: &Gpu, scene: &Scene, body: Body, settings: Settings, exposure: f32, bgra: bool) -> Result<Self> {
+    fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        body: Body,
+        settings: Settings,
+        exposure: f32,
+        format: PixelFormat,
+    ) -> Result<Self> {
         Ok(Self {
             gpu: gpu.clone(),
             on_device: GpuScene::new(gpu, scene)?,
@@ -287,7 +295,7 @@ impl Stage {
             body,
             settings,
             exposure,
-            bgra,
+            format,
             angle: 0.0,
             held: false,
             view: None,
@@ -358,7 +366,7 @@ impl Stage {
         view.preview
             .record(recorder, scene, &surfaces, &orbit.camera(), &parts)?;
         view.preview
-            .record_display(recorder, &view.pixels, self.exposure, self.bgra)
+            .record_display(recorder, &view.pixels, self.exposure, self.format)
     }
 }
 

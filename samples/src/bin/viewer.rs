@@ -40,7 +40,7 @@ impl Viewer {
         };
         let renderer = Renderer::new(canvas.gpu, canvas.scene)?;
         Ok(Self {
-            picture: Progressive::new(canvas.gpu, renderer, options, canvas.exposure, canvas.bgra),
+            picture: Progressive::new(canvas.gpu, renderer, options, canvas.exposure, canvas.format),
             work: (0, 0.0),
             samples: 0.0,
         })

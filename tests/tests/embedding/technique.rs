@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use clerestory::film::{GpuFilm, NonFiniteSamples, Picture, Step};
+use clerestory::film::{GpuFilm, NonFiniteSamples, Picture, PixelFormat, Step};
 use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
 use clerestory::gpu::{Access, Buffer, BufferDesc, Category, EnabledFeatures, Gpu, PipelineInfo};
 use clerestory::render::{RenderOptions, Renderer};
@@ -91,8 +91,8 @@ impl Technique for Even {
         self.film.picture()
     }
 
-    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
-        self.film.display(target, exposure, bgra)
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        self.film.display(target, exposure, format)
     }
 
     fn set_camera(&mut self, _: &Camera) -> Result<()> {
@@ -137,10 +137,13 @@ fn a_technique_of_the_hosts_own_renders_into_the_same_film() {
     let screen = gpu
         .buffer(&BufferDesc::storage("screen", 4 * 15, Category::Film))
         .unwrap();
-    rendering.display(&screen, 2.0, false).unwrap();
+    rendering.display(&screen, 2.0, PixelFormat::Rgba8).unwrap();
     assert_eq!(gpu.read::<u32>(screen.view(), 15).unwrap(), [u32::MAX; 15]);
     let small = gpu.buffer(&BufferDesc::storage("small", 56, Category::Film)).unwrap();
-    let error = rendering.display(&small, 0.0, false).unwrap_err().to_string();
+    let error = rendering
+        .display(&small, 0.0, PixelFormat::Rgba8)
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains("small") && error.contains("56") && error.contains("60"),
         "{error}"

@@ -1,6 +1,7 @@
 //! Live maps: irradiance in a closed room against rays, reflections at the map's middle against rays, and parallax beside it.
 
 use clerestory::Error;
+use clerestory::film::PixelFormat;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{Camera, Material, Mesh, Scene};
@@ -325,7 +326,9 @@ fn large_pictures_take_several_rows_of_workgroups() {
         preview
             .record(&mut recorder, &scene, &scene.surfaces(), &camera, &[part])
             .unwrap();
-        preview.record_display(&mut recorder, &shown, 0.0, false).unwrap();
+        preview
+            .record_display(&mut recorder, &shown, 0.0, PixelFormat::Rgba8)
+            .unwrap();
         recorder.submit().unwrap().wait().unwrap();
         let pixels = (size[0] * size[1]) as usize;
         let shown: Vec<u32> = gpu.read(shown.view(), pixels).unwrap();

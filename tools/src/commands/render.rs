@@ -14,7 +14,7 @@ use clerestory::accel::IndexKind;
 use clerestory::film::picture::{ALBEDO, DEPTH, NORMAL, SAMPLES, VARIANCE};
 use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
 use clerestory::plan::Goal;
-use clerestory::render::{RenderOptions, Rendered, Renderer};
+use clerestory::render::{RenderOptions, Rendered, Renderer, RendererDesc};
 use clerestory::scene::{self, Scene};
 use clerestory::techniques;
 use clerestory::transport::PathSet;
@@ -233,8 +233,11 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
     let interruptible = Interruptible::start()?;
-    let folder = arguments.index_cache.as_deref();
-    let renderer = Renderer::with_kept_index(&gpu, &scene, &arguments.index, folder)?;
+    let desc = RendererDesc {
+        index: arguments.index,
+        index_folder: arguments.index_cache.clone(),
+    };
+    let renderer = Renderer::with(&gpu, &scene, &desc)?;
     let goal = Goal {
         error: arguments.error,
         time: arguments.time,

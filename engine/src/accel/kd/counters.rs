@@ -9,6 +9,7 @@ const WORD_PAIR: u64 = 8;
 
 /// Exact work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct KdCounters {
     /// Inner nodes visited.
     pub nodes: u64,

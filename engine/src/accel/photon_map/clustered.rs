@@ -12,6 +12,7 @@ use crate::accel::lbvh::SortedCodes;
 
 /// How much was left to sort and to pass over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct ClusterCounts {
     /// Runs of the input that share their upper bits; so many keys the first sort takes.
     pub clusters: u64,

@@ -66,6 +66,7 @@ pub struct RootDescriptor {
 
 /// Exact work of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct QueryCounters {
     /// Nodes fetched, two a pair.
     pub nodes: u64,

@@ -21,6 +21,7 @@ struct Range {
 
 /// What the lists held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct SplitListCounts {
     /// Entries of the list of splits.
     pub splits: u64,

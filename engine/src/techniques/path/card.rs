@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::Result;
-use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
 use crate::gpu::shaders::transport::path_shade;
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
@@ -165,8 +165,8 @@ impl Technique for PathTracer {
         PathTracer::picture(self)
     }
 
-    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
-        PathTracer::display(self, target, exposure, bgra)
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        PathTracer::display(self, target, exposure, format)
     }
 
     fn set_camera(&mut self, camera: &Camera) -> Result<()> {

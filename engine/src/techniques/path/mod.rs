@@ -32,7 +32,7 @@ use self::wave::{
 use crate::Result;
 use crate::accel::trace::wide_counter;
 use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{GpuFilm, Step};
+use crate::film::{GpuFilm, PixelFormat, Step};
 use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
 use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::{Access, Buffer, BufferView, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
@@ -48,6 +48,7 @@ const SUBMISSION_SECONDS: f64 = 0.25;
 
 /// Exact counts of what the device did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct PathCounters {
     /// Paths begun.
     pub paths: u64,
@@ -270,13 +271,13 @@ impl PathTracer {
     }
 
     /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
-    /// and sRGB-encoded, blue first where `bgra` says so.
+    /// and sRGB-encoded.
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) when the buffer is too small, [`Error::DeviceLost`](crate::Error::DeviceLost).
-    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+    pub fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
         self.flush()?;
-        self.film.display(target, exposure, bgra)
+        self.film.display(target, exposure, format)
     }
 
     /// Renders a wave, in as many submissions as it takes.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::{PhotonMapper, PhotonSettings};
 use crate::Result;
-use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::from_json;
@@ -169,8 +169,8 @@ impl Technique for PhotonMapper {
         PhotonMapper::picture(self)
     }
 
-    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
-        PhotonMapper::display(self, target, exposure, bgra)
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        PhotonMapper::display(self, target, exposure, format)
     }
 
     fn set_camera(&mut self, camera: &Camera) -> Result<()> {

@@ -32,6 +32,7 @@ const LINEAR_RECORDS: u64 = 1 << 28;
 
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct GatherCounts {
     /// Points at which the map was asked.
     pub queries: u64,

@@ -23,8 +23,8 @@ use super::map::PhotonMap;
 use super::settings::PhotonSettings;
 use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
 use crate::Result;
-use crate::film::Step;
 use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::techniques::path::{ArrivalStage, PathCounters};
@@ -33,6 +33,7 @@ use crate::transport::GpuScene;
 
 /// Exact counts, and what the host's share took.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct MapperCounts {
     /// Maps made; 0 where the picture has nothing of one.
     pub passes: u64,
@@ -317,7 +318,7 @@ impl PhotonMapper {
     ///
     /// # Errors
     /// As there.
-    pub fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
-        self.eye.display(target, exposure, bgra)
+    pub fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        self.eye.display(target, exposure, format)
     }
 }

@@ -38,6 +38,7 @@ const BOUNCES_MAX: u32 = 4096;
 
 /// Exact counts of a pass, or of several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct PhotonCounts {
     /// Photons emitted.
     pub emitted: u64,

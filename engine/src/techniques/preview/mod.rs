@@ -30,7 +30,7 @@ pub use probe::{LightProbe, LightProbeDesc};
 pub use shade::{PARTS_MAX, PreviewPart};
 
 use self::shade::{Eye, OUTPUTS, Seen, Shade, Target};
-use crate::film::Picture;
+use crate::film::{Picture, PixelFormat};
 use crate::gpu::shaders::techniques::preview::preview_display;
 use crate::gpu::{Area, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute};
 use crate::raster::{GBuffer, GBufferDesc, Layering, Surfaces, View};
@@ -186,12 +186,18 @@ impl Preview {
         })
     }
 
-    /// Records the way to the screen: four bytes a pixel, rows from the top, exposed by `exposure` stops, clipped and sRGB-encoded, blue first
-    /// where `bgra` says so. Earlier uses of the target by compute shaders and copies must have ended.
+    /// Records the way to the screen: four bytes a pixel, rows from the top, exposed by `exposure` stops, clipped and sRGB-encoded.
+    /// Earlier uses of the target by compute shaders and copies must have ended.
     ///
     /// # Errors
     /// [`Error::Setting`] when the target is too small; [`Error::MissingBarrier`] in debug builds.
-    pub fn record_display(&self, recorder: &mut Recorder, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+    pub fn record_display(
+        &self,
+        recorder: &mut Recorder,
+        target: &Buffer,
+        exposure: f32,
+        format: PixelFormat,
+    ) -> Result<()> {
         let [width, height] = self.desc.size;
         let bytes = 4 * u64::from(width) * u64::from(height);
         if target.bytes() < bytes {
@@ -208,7 +214,7 @@ impl Preview {
                 height,
                 samples: self.desc.samples,
                 scale: exposure.exp2(),
-                bgra: bgra.into(),
+                bgra: format.blue_first(),
             };
             let groups = self.display.groups_over(width * height);
             pass.dispatch(&self.display, &[&set], &push, groups)?;

@@ -96,10 +96,10 @@ mod tests {
 
     #[test]
     fn rates_leave_compilation_out() {
-        let at = |fraction, seconds, rays| Progress {
-            fraction,
-            seconds,
-            rays,
+        let at = |fraction, seconds, rays| {
+            let mut progress = Progress::default();
+            (progress.fraction, progress.seconds, progress.rays) = (fraction, seconds, rays);
+            progress
         };
         assert_eq!(message(at(0.1, 20.0, 1000), at(0.1, 20.0, 1000)), "");
         assert_eq!(
