@@ -13,11 +13,28 @@ use crate::film::PixelFormat;
 use crate::film::picture::{Metadata, NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
 use crate::scene::{Camera, Note, Scene, SceneProfile};
+use crate::settings::Settings;
 use crate::techniques::{self, Card, Skipped, Technique, View};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
 /// What to render and how.
+///
+/// ```
+/// use clerestory::render::RenderOptions;
+/// use clerestory::techniques::PathTracerSettings;
+///
+/// // Settings typed in Rust; those of files come as `serde_json::Value`.
+/// let options = RenderOptions {
+///     technique: Some("path".into()),
+///     settings: PathTracerSettings {
+///         roulette_start: 8,
+///         ..PathTracerSettings::default()
+///     }
+///     .into(),
+///     ..RenderOptions::default()
+/// };
+/// ```
 #[derive(Debug, Clone)]
 pub struct RenderOptions {
     /// Technique id; `None` takes the scene's own, else `path`.
@@ -34,8 +51,8 @@ pub struct RenderOptions {
     pub aovs: bool,
     /// Stops after about this long, with what is there.
     pub time_budget: Option<Duration>,
-    /// The technique's settings as JSON; `null` for its defaults.
-    pub settings: serde_json::Value,
+    /// The technique's settings: its struct, or JSON. Seed and AOVs are those above, whatever a struct says.
+    pub settings: Settings,
 }
 
 impl Default for RenderOptions {
@@ -48,7 +65,7 @@ impl Default for RenderOptions {
             seed: 0,
             aovs: false,
             time_budget: None,
-            settings: serde_json::Value::Null,
+            settings: Settings::default(),
         }
     }
 }

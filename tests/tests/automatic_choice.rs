@@ -36,7 +36,7 @@ fn predictions_come_true() {
                 let options = RenderOptions {
                     spp,
                     seed,
-                    settings: serde_json::json!({ "sampler": "pcg" }),
+                    settings: serde_json::json!({ "sampler": "pcg" }).into(),
                     ..options()
                 };
                 render(&renderer, &options).picture
@@ -102,7 +102,7 @@ fn what_cannot_be_chosen_says_why() {
         assert!(dark.choice().spp > 1, "{dark:?}");
         // What is fixed stays fixed.
         let fixed = RenderOptions {
-            settings: serde_json::json!({ "sampler": "pcg", "path_set": "direct" }),
+            settings: serde_json::json!({ "sampler": "pcg", "path_set": "direct" }).into(),
             ..options()
         };
         let goal = Goal {

@@ -175,7 +175,7 @@ fn path_traced(gpu: &Gpu, between: impl Fn()) -> Vec<f32> {
     let options = RenderOptions {
         size: [32, 32],
         spp: 4,
-        settings: serde_json::json!({"paths_in_flight": 1024}),
+        settings: serde_json::json!({"paths_in_flight": 1024}).into(),
         ..RenderOptions::default()
     };
     let mut rendering = Renderer::new(gpu, &scene).unwrap().start(&options).unwrap();

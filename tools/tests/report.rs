@@ -98,7 +98,7 @@ fn a_second_run_measures_nothing_and_a_change_only_what_it_must() -> Tested {
 }
 
 fn default_start() -> Result<u64, Box<dyn std::error::Error>> {
-    let settings = (clerestory::techniques::by_id("path")?.default_settings)();
+    let settings = clerestory::techniques::by_id("path")?.settings.defaults();
     Ok(settings["roulette_start"].as_u64().ok_or("no roulette_start")?)
 }
 

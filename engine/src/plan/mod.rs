@@ -97,7 +97,7 @@ impl Plan {
         let left = |time: Duration| time.saturating_sub(Duration::from_secs_f64(self.pilot_seconds));
         RenderOptions {
             technique: Some(choice.technique.into()),
-            settings: choice.settings.clone(),
+            settings: choice.settings.clone().into(),
             spp: choice.spp,
             time_budget: self.goal.time.map(left).or(base.time_budget),
             ..base.clone()
@@ -120,7 +120,7 @@ pub fn plan(
 ) -> Result<Plan> {
     let start = Instant::now();
     check(goal)?;
-    let wanted = wanted_path_set(&options.settings)?;
+    let wanted = wanted_path_set(&options.settings.to_json())?;
     let mut candidates = candidates(options)?;
     let mut trials: Vec<Option<Trial>> = Vec::new();
     let pixels = f64::from(options.size[0]) * f64::from(options.size[1]);
@@ -191,10 +191,11 @@ fn candidates(options: &RenderOptions) -> Result<Vec<Candidate>> {
         None => techniques::all().iter().collect(),
     };
     let mut found: Vec<Candidate> = Vec::new();
+    let fixed = options.settings.to_json();
     for info in infos {
         for variant in info.variants {
             let mut settings = (variant.settings)();
-            merge(&mut settings, &options.settings, info);
+            merge(&mut settings, &fixed, info);
             if found
                 .iter()
                 .any(|other| other.technique == info.id && other.settings == settings)
@@ -222,9 +223,8 @@ fn candidates(options: &RenderOptions) -> Result<Vec<Candidate>> {
 
 /// Puts what is fixed over a variant's settings; keys that the technique does not have are none of its business.
 fn merge(settings: &mut Value, fixed: &Value, info: &Card) {
-    let known = (info.default_settings)();
     if let (Some(settings), Some(fixed)) = (settings.as_object_mut(), fixed.as_object()) {
-        for (key, value) in fixed.iter().filter(|(key, _)| known.get(key).is_some()) {
+        for (key, value) in fixed.iter().filter(|(key, _)| info.settings.has(key)) {
             settings.insert(key.clone(), value.clone());
         }
     }
@@ -281,7 +281,7 @@ mod tests {
         let free = candidates(&RenderOptions::default()).unwrap();
         assert!(free.len() > 1, "{free:?}");
         let options = RenderOptions {
-            settings: serde_json::json!({ "sampler": "pcg", "path_set": "direct" }),
+            settings: serde_json::json!({ "sampler": "pcg", "path_set": "direct" }).into(),
             ..RenderOptions::default()
         };
         let fixed = candidates(&options).unwrap();

@@ -70,7 +70,7 @@ impl Trial {
         let begin = |seed_steps: u32| {
             renderer.start(&RenderOptions {
                 technique: Some(candidate.technique.into()),
-                settings: candidate.settings.clone(),
+                settings: candidate.settings.clone().into(),
                 size,
                 spp: 1,
                 seed: options.seed.wrapping_add(seed_steps.wrapping_mul(SEED_STEP)),

@@ -8,8 +8,8 @@
 //! # How to add one
 //!
 //! 1. A type with settings, pipelines, working memory and a [`GpuFilm`](crate::film::GpuFilm), made from a [`Gpu`], a [`GpuScene`] and a
-//!    [`View`]. [`PathTracer`](crate::techniques::PathTracer) shows the pattern: a file each for the settings (serde with defaults, and a
-//!    check of their ranges), the pipelines (specialized to [`GpuScene::profile`]), the working memory and the recording of passes.
+//!    [`View`]. [`PathTracer`](crate::techniques::PathTracer) shows the pattern: a file each for the settings (declared by
+//!    [`settings!`](crate::settings!)), the pipelines (specialized to [`GpuScene::profile`]), the working memory and the recording of passes.
 //! 2. [`Technique`] for it: each [`step`](Technique::step) is a bounded piece of work that adds whole samples to the film, in an order
 //!    that depends on settings and seed alone. What the scene does not need is left out, and said by [`skipped`](Technique::skipped).
 //! 3. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
@@ -28,6 +28,7 @@ use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
+use crate::settings::{Settings, SettingsDecl};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
@@ -62,10 +63,8 @@ pub struct Card {
     pub path_set: PathSet,
     /// Why it cannot model a scene; empty when it can.
     pub refusals: fn(&SceneProfile) -> Vec<String>,
-    /// What each of its settings means, in the order to explain them in.
-    pub settings: &'static [SettingInfo],
-    /// Default settings as JSON.
-    pub default_settings: fn() -> serde_json::Value,
+    /// Its settings, as [`settings!`](crate::settings!) declares them.
+    pub settings: SettingsDecl,
     /// Settings that an automatic choice tries ([`plan`](mod@crate::plan)): all of them give the same expected picture. The first are the
     /// defaults.
     pub variants: &'static [Variant],
@@ -82,21 +81,8 @@ pub struct Variant {
     pub settings: fn() -> serde_json::Value,
 }
 
-/// A setting of a technique, in words. Its default is in [`Card::default_settings`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct SettingInfo {
-    /// Its name in the JSON.
-    pub name: &'static str,
-    /// What it may be.
-    pub range: &'static str,
-    /// Its unit; empty for what has none.
-    pub unit: &'static str,
-    /// What it does, and whether it changes the expected picture.
-    pub meaning: &'static str,
-}
-
-/// Makes a technique for a view, with its settings as JSON; [`from_json`](crate::settings::from_json) reads them.
-pub type Create = fn(&Gpu, Arc<GpuScene>, &View<'_>, &serde_json::Value) -> Result<Box<dyn Technique>>;
+/// Makes a technique for a view, with its settings, which [`Settings::read`] makes its own struct.
+pub type Create = fn(&Gpu, Arc<GpuScene>, &View<'_>, &Settings) -> Result<Box<dyn Technique>>;
 
 impl std::fmt::Debug for Card {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -185,7 +171,7 @@ pub fn by_id(id: &str) -> Result<&'static Card> {
 }
 
 impl Card {
-    /// Prepares the technique for a view, with its settings as JSON (missing ones take their defaults).
+    /// Prepares the technique for a view, with its settings.
     ///
     /// # Errors
     /// [`Error::MissingFeature`] for a device that lacks one of its needs, [`Error::Unsupported`] with every reason why the scene cannot
@@ -195,7 +181,7 @@ impl Card {
         gpu: &Gpu,
         scene: Arc<GpuScene>,
         view: &View<'_>,
-        settings: &serde_json::Value,
+        settings: &Settings,
     ) -> Result<Box<dyn Technique>> {
         features::check(gpu.caps(), self)?;
         let mut reasons = (self.refusals)(scene.profile());
@@ -210,8 +196,8 @@ impl Card {
     }
 
     /// Why the path set in settings cannot be rendered, if it can be read and is no part of the technique's own.
-    fn path_set_refusal(&self, settings: &serde_json::Value) -> Option<String> {
-        let wanted: PathSet = settings.get("path_set")?.as_str()?.parse().ok()?;
+    fn path_set_refusal(&self, settings: &Settings) -> Option<String> {
+        let wanted: PathSet = settings.to_json().get("path_set")?.as_str()?.parse().ok()?;
         let missing = !wanted.is_subset_of(&self.path_set);
         missing.then(|| {
             format!(
@@ -227,19 +213,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_setting_is_explained() {
+    fn every_setting_is_explained_and_defaults_and_variants_fit() {
         for technique in all() {
-            let defaults = (technique.default_settings)();
-            let mut known: Vec<&str> = defaults
-                .as_object()
-                .expect("object")
-                .keys()
-                .map(String::as_str)
-                .collect();
-            let mut named: Vec<&str> = technique.settings.iter().map(|setting| setting.name).collect();
-            known.sort_unstable();
-            named.sort_unstable();
-            assert_eq!(named, known, "{}", technique.id);
+            for info in technique.settings.infos() {
+                let texts = [&info.meaning, &info.range];
+                assert!(texts.iter().all(|text| !text.is_empty()), "{}: {info:?}", technique.id);
+            }
+            let variants = technique.variants.iter().map(|variant| (variant.settings)());
+            for json in variants.chain([technique.settings.defaults()]) {
+                technique.settings.check(&json).expect(technique.id);
+            }
         }
     }
 }

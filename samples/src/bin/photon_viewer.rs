@@ -18,7 +18,7 @@ use std::time::Instant;
 
 use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
-use clerestory::settings::from_json;
+use clerestory::settings::TypedSettings;
 use clerestory::techniques;
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 use clerestory::transport::GpuScene;
@@ -47,7 +47,7 @@ fn main() -> ExitCode {
 fn run() -> Result<()> {
     let own = ["--photons", "--shape", "--spread", "--radius", "--turn", "--flight"];
     let given = Arguments::of_process(&[&own[..], &window::Options::NAMES].concat(), 1)?;
-    let settings: PhotonSettings = from_json(&serde_json::json!({
+    let settings = PhotonSettings::from_json(&serde_json::json!({
         "photons": given.value("--photons")?.unwrap_or(PHOTONS),
         "shape": given.text("--shape").unwrap_or("skewed"),
         "spread": given.value("--spread")?.unwrap_or(SPREAD),

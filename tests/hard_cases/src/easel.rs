@@ -80,7 +80,7 @@ impl<'a> Easel<'a> {
 
     /// Whether the technique knows a setting.
     pub fn has(&self, setting: &str) -> bool {
-        self.info.settings.iter().any(|known| known.name == setting)
+        self.info.settings.has(setting)
     }
 
     /// The same with another setting, where the technique knows it.
@@ -141,7 +141,7 @@ impl<'a> Easel<'a> {
             seed: self.seed,
             aovs: false,
         };
-        let settings = Value::Object(self.settings.clone());
+        let settings = Value::Object(self.settings.clone()).into();
         self.info.prepare(self.gpu, uploaded, &view, &settings)
     }
 

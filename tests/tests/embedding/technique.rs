@@ -7,12 +7,21 @@ use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
 use clerestory::gpu::{Access, Buffer, BufferDesc, Category, EnabledFeatures, Gpu, PipelineInfo};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::Camera;
-use clerestory::techniques::{Bias, Card, Skipped, Technique};
+use clerestory::settings::{Settings, SettingsDecl};
+use clerestory::techniques::{Bias, Card, PathTracerSettings, Skipped, Technique};
 use clerestory::transport::PathSet;
 use clerestory::{Error, Result};
 use clerestory_tests::{assert_no_messages, gpu};
 
 use crate::Host;
+
+clerestory::settings! {
+    /// Settings as a host would declare them.
+    pub struct EvenSettings {
+        /// Radiance of every sample.
+        pub radiance: f32 = 1.0, in 0.0.., unit "W·m⁻²·sr⁻¹";
+    }
+}
 
 /// A technique as a host would write it: every sample of every pixel has the radiance that its settings name.
 struct Even {
@@ -33,15 +42,14 @@ const EVEN: Card = Card {
         let lit = !profile.has_environment();
         lit.then(|| "there is no sky".to_owned()).into_iter().collect()
     },
-    settings: &[],
-    default_settings: || serde_json::json!({"radiance": 1.0}),
+    settings: SettingsDecl::of::<EvenSettings>(),
     variants: &[],
     create: |gpu, _, view, settings| {
-        let radiance = settings["radiance"].as_f64().unwrap_or(1.0);
+        let settings: EvenSettings = settings.read()?;
         Ok(Box::new(Even {
             gpu: gpu.clone(),
             film: GpuFilm::new(gpu, view.size, view.aovs)?,
-            radiance: radiance as f32,
+            radiance: settings.radiance,
             samples: 0,
         }))
     },
@@ -129,7 +137,7 @@ fn a_technique_of_the_hosts_own_renders_into_the_same_film() {
     let options = RenderOptions {
         size: [5, 3],
         spp: 4,
-        settings: serde_json::json!({"radiance": 0.25}),
+        settings: EvenSettings { radiance: 0.25 }.into(),
         ..RenderOptions::default()
     };
     let mut rendering = renderer.start_technique(&EVEN, &options).unwrap();
@@ -206,4 +214,53 @@ fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     let text = refusal(&closed, &NEVER).to_string();
     assert!(text.contains("even") && text.contains("there is no sky"), "{text}");
     drop((sky, closed, gpu));
+}
+
+#[test]
+fn settings_of_a_hosts_own_come_as_struct_or_json_and_are_checked_by_their_declaration() {
+    let host = Host::new();
+    let gpu = host.lend(EnabledFeatures::REQUIRED).unwrap();
+    let renderer = Renderer::new(&gpu, &clerestory::scene::load("builtin:box-city?n=2").unwrap()).unwrap();
+    let start = |settings: Settings| {
+        let options = RenderOptions {
+            size: [2, 2],
+            settings,
+            ..RenderOptions::default()
+        };
+        renderer.start_technique(&EVEN, &options)
+    };
+    let brightness = |settings| {
+        let mut rendering = start(settings).unwrap();
+        while rendering.step().unwrap().is_some() {}
+        rendering.picture().unwrap().layer("radiance").unwrap().values()[0]
+    };
+    let typed = |radiance| EvenSettings { radiance };
+    assert_eq!(brightness(Settings::default()), 1.0);
+    assert_eq!(brightness(typed(0.5).into()), 0.5);
+    assert_eq!(brightness(serde_json::json!({"radiance": 0.5}).into()), 0.5);
+    for (settings, words) in [
+        (
+            typed(-1.0).into(),
+            "setting radiance: -1 is out of range; it may be 0 or more (W·m⁻²·sr⁻¹)",
+        ),
+        (
+            serde_json::json!({"radiance": -1.5}).into(),
+            "setting radiance: -1.5 is out of range",
+        ),
+        (
+            serde_json::json!({"radiance": "x"}).into(),
+            "setting radiance: \"x\" does not fit",
+        ),
+        (serde_json::json!({"colour": 1}).into(), "there is: radiance"),
+        (Settings::of(PathTracerSettings::default()), "EvenSettings"),
+    ] {
+        let text = start(settings).err().expect("a refusal").to_string();
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let info = &EVEN.settings.infos()[0];
+    assert_eq!(
+        (info.name, info.meaning.as_str()),
+        ("radiance", "Radiance of every sample")
+    );
+    drop((renderer, gpu));
 }

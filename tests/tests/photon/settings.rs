@@ -3,6 +3,7 @@
 use super::*;
 use clerestory::Error;
 use clerestory::film::picture::RADIANCE;
+use clerestory::settings::Settings;
 use clerestory::techniques::{View, by_id};
 use clerestory_tests::render::builtin;
 use clerestory_tests::with_gpu;
@@ -338,7 +339,7 @@ fn what_cannot_be_is_refused_by_name() {
             aovs: false,
         };
         let prepared =
-            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &fog), &view, &serde_json::json!({})));
+            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &fog), &view, &Settings::default()));
         match prepared {
             Ok(_) => panic!("fog was accepted"),
             Err(error) => assert!(error.to_string().contains("media"), "{error}"),

@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::catalogue::{self, Row};
-use clerestory::techniques::{self, Bias, Card, SettingInfo};
+use clerestory::settings::SettingInfo;
+use clerestory::techniques::{self, Bias, Card};
 
 use crate::failure::{Failure, Outcome};
 use crate::output::{self, Table};
@@ -39,7 +40,7 @@ struct Technique {
     path_set: String,
     bias: Bias,
     needs: &'static [&'static str],
-    settings: &'static [SettingInfo],
+    settings: Vec<SettingInfo>,
     default_settings: serde_json::Value,
 }
 
@@ -52,8 +53,8 @@ impl From<&Card> for Technique {
             path_set: info.path_set.to_string(),
             bias: info.bias,
             needs: info.needs,
-            settings: info.settings,
-            default_settings: (info.default_settings)(),
+            settings: info.settings.infos(),
+            default_settings: info.settings.defaults(),
         }
     }
 }
@@ -165,13 +166,13 @@ fn text(technique: &Technique) -> String {
 /// What each setting means.
 fn settings_table(technique: &Technique) -> String {
     let mut table = Table::new(&["setting", "default", "unit", "range", "meaning"], &[1, 2, 3, 4]);
-    for setting in technique.settings {
+    for setting in &technique.settings {
         table.row([
             setting.name.to_owned(),
-            technique.default_settings[setting.name].to_string(),
+            setting.default.to_string(),
             if setting.unit.is_empty() { "-" } else { setting.unit }.to_owned(),
-            setting.range.to_owned(),
-            setting.meaning.to_owned(),
+            setting.range.clone(),
+            setting.meaning.clone(),
         ]);
     }
     table.text()

@@ -16,6 +16,7 @@ use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
 use clerestory::plan::Goal;
 use clerestory::render::{RenderOptions, Rendered, Renderer, RendererDesc};
 use clerestory::scene::{self, Scene};
+use clerestory::settings::Settings;
 use clerestory::techniques;
 use clerestory::transport::PathSet;
 use clerestory_tools::machine::available_memory;
@@ -334,20 +335,14 @@ fn check_memory(size: [u32; 2], available: Option<u64>) -> Outcome {
 }
 
 /// The technique's settings: those given as JSON, changed by the options of their own.
-fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
+fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Settings> {
     let mut settings = match arguments.settings.as_deref() {
         None => Map::new(),
         Some(text) => read_settings(text)?,
     };
     let technique = arguments.technique.as_deref().or(scene.defaults.technique.as_deref());
     let info = techniques::by_id(technique.unwrap_or("path"))?;
-    let known = (info.default_settings)();
-    let names: Vec<&str> = known
-        .as_object()
-        .into_iter()
-        .flat_map(Map::keys)
-        .map(String::as_str)
-        .collect();
+    let names = info.settings.names();
     if let Some(unknown) = settings.keys().find(|key| !names.contains(&key.as_str())) {
         return Err(
             Failure::usage(format!("--settings: technique {} has no {unknown:?}", info.id)).hint(
@@ -358,13 +353,6 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
             ),
         );
     }
-    for (key, value) in &settings {
-        let default = &known[key];
-        if !default.is_null() && std::mem::discriminant(value) != std::mem::discriminant(default) {
-            let message = format!("--settings: {key}: {value} is of another type than the default, {default}");
-            return Err(Failure::usage(message));
-        }
-    }
     let path_set = arguments.path_set.map(|set| set.to_string());
     let sampler = arguments.sampler.map(|sampler| match sampler {
         Sampler::Sobol => "sobol".to_owned(),
@@ -372,16 +360,14 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Value> {
     });
     for (key, option, value) in [("path_set", "--path-set", path_set), ("sampler", "--sampler", sampler)] {
         let Some(value) = value else { continue };
-        if known.get(key).is_none() {
+        if !info.settings.has(key) {
             return Err(Failure::usage(format!("technique {} has no {option}", info.id)));
         }
         settings.insert(key.to_owned(), Value::String(value));
     }
-    Ok(if settings.is_empty() {
-        Value::Null
-    } else {
-        Value::Object(settings)
-    })
+    let settings = Value::Object(settings);
+    info.settings.check(&settings)?;
+    Ok(settings.into())
 }
 
 /// The option of the command line for what is no technique's setting.

@@ -327,7 +327,7 @@ impl Running<'_> {
                 Budget::Spp(_) => None,
                 Budget::Seconds(seconds) => Some(Duration::from_secs_f64(seconds)),
             },
-            settings: settings.clone(),
+            settings: settings.clone().into(),
             ..RenderOptions::default()
         }
     }

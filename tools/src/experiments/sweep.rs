@@ -265,7 +265,7 @@ impl Sweep {
     /// [`Error::Setting`] for a technique or setting that there is not, and for a path set that the technique cannot be restricted to.
     pub fn settings(&self, technique: &str, given: &Map<String, Value>) -> Result<Value> {
         let info = techniques::by_id(technique)?;
-        let mut settings = match (info.default_settings)() {
+        let mut settings = match info.settings.defaults() {
             Value::Object(settings) => settings,
             _ => Map::new(),
         };
@@ -299,7 +299,7 @@ impl Sweep {
     pub fn reference_settings(&self) -> Result<Value> {
         let mut given = self.reference.settings.clone();
         let info = techniques::by_id(&self.reference.technique)?;
-        if (info.default_settings)().get("sampler").is_some() {
+        if info.settings.has("sampler") {
             given
                 .entry("sampler")
                 .or_insert_with(|| Value::String(INDEPENDENT.into()));

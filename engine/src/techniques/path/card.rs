@@ -8,9 +8,9 @@ use crate::film::{PixelFormat, Step};
 use crate::gpu::shaders::transport::path_shade;
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
-use crate::settings::from_json;
+use crate::settings::{SettingsDecl, TypedSettings};
 use crate::techniques::path::{PathTracer, PathTracerSettings};
-use crate::techniques::{Bias, Card, SettingInfo, Skipped, Technique, Variant};
+use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
 use crate::transport::PathSet;
 
 /// The catalogue's entry.
@@ -22,8 +22,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     needs: &[],
     path_set: PathSet::ALL,
     refusals: |_| Vec::new(),
-    settings: &SETTINGS,
-    default_settings: || serde_json::to_value(PathTracerSettings::default()).unwrap_or_default(),
+    settings: SettingsDecl::of::<PathTracerSettings>(),
     variants: &[
         Variant {
             name: "defaults",
@@ -43,69 +42,12 @@ pub(in crate::techniques) const CARD: Card = Card {
         },
     ],
     create: |gpu, scene, view, settings| {
-        let mut settings: PathTracerSettings = from_json(settings)?;
+        let mut settings: PathTracerSettings = settings.read()?;
         settings.seed = view.seed;
         settings.aovs = view.aovs;
         Ok(Box::new(PathTracer::new(gpu, scene, view.camera, view.size, settings)?))
     },
 };
-
-const SETTINGS: [SettingInfo; 9] = [
-    SettingInfo {
-        name: "path_set",
-        range: "all | emitted | direct | indirect | bounces=A..B, with lobes=diffuse+glossy+…; or path expressions: LDE, LS+DE, L[DG]{1,3}E, !L.*S.*E …",
-        unit: "",
-        meaning: "which light paths the picture contains",
-    },
-    SettingInfo {
-        name: "sampler",
-        range: "sobol | pcg",
-        unit: "",
-        meaning: "Owen-scrambled Sobol' points, or independent samples; changes the noise only",
-    },
-    SettingInfo {
-        name: "roulette_start",
-        range: "0 … 4096",
-        unit: "bounces",
-        meaning: "first bounce at which Russian roulette may end a path; changes the noise only",
-    },
-    SettingInfo {
-        name: "roulette_cap",
-        range: "above 0, at most 0.999",
-        unit: "probability",
-        meaning: "most likely survival of a round of roulette; changes the noise only",
-    },
-    SettingInfo {
-        name: "multiple_scattering",
-        range: "true | false",
-        unit: "",
-        meaning: "compensates rough metals for scattering among microfacets; changes the picture",
-    },
-    SettingInfo {
-        name: "separable_masking",
-        range: "true | false",
-        unit: "",
-        meaning: "uncorrelated instead of height-correlated masking of microfacets; changes the picture",
-    },
-    SettingInfo {
-        name: "equiangular",
-        range: "true | false",
-        unit: "",
-        meaning: "samples light of points and spots in homogeneous media also by the angle under which they see the ray; changes the noise only",
-    },
-    SettingInfo {
-        name: "paths_in_flight",
-        range: "0 … 4194304",
-        unit: "paths",
-        meaning: "0 chooses by the kind of device; never changes the picture",
-    },
-    SettingInfo {
-        name: "ray_quota",
-        range: "128 … 60000",
-        unit: "loop iterations",
-        meaning: "after which a ray goes on in a later dispatch; never changes the picture",
-    },
-];
 
 /// What each specialization constant of the shading stage stands for, and why it is off where nothing else is known.
 const FEATURES: [(&str, &str, &str); 19] = [
@@ -178,7 +120,7 @@ impl Technique for PathTracer {
     }
 
     fn settings(&self) -> serde_json::Value {
-        serde_json::to_value(PathTracer::settings(self)).unwrap_or_default()
+        PathTracer::settings(self).to_json()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {

@@ -38,6 +38,7 @@ use crate::gpu::shaders::sets::PathBuffers;
 use crate::gpu::{Access, Buffer, BufferView, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
+use crate::settings::TypedSettings;
 use crate::transport::GpuScene;
 use glam::DVec3;
 

@@ -8,8 +8,8 @@ use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
-use crate::settings::from_json;
-use crate::techniques::{Bias, Card, SettingInfo, Skipped, Technique, Variant};
+use crate::settings::{SettingsDecl, TypedSettings};
+use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
 use crate::transport::PathSet;
 
 /// The catalogue's entry.
@@ -21,14 +21,13 @@ pub(in crate::techniques) const CARD: Card = Card {
     needs: &[],
     path_set: PathSet::ALL,
     refusals,
-    settings: SETTINGS,
-    default_settings: || serde_json::to_value(PhotonSettings::default()).unwrap_or_default(),
+    settings: SettingsDecl::of::<PhotonSettings>(),
     variants: &[Variant {
         name: "defaults",
         settings: || serde_json::json!({}),
     }],
     create: |gpu, scene, view, settings| {
-        let mut settings: PhotonSettings = from_json(settings)?;
+        let mut settings: PhotonSettings = settings.read()?;
         settings.seed = view.seed;
         settings.aovs = view.aovs;
         Ok(Box::new(PhotonMapper::new(
@@ -48,117 +47,6 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
         Vec::new()
     }
 }
-
-const SETTINGS: &[SettingInfo] = &[
-    SettingInfo {
-        name: "path_set",
-        range: "all | emitted | direct | indirect | bounces=A..B, up to 63",
-        unit: "",
-        meaning: "which light paths the picture contains",
-    },
-    SettingInfo {
-        name: "photons",
-        range: "1 … 16777216",
-        unit: "photons a pass",
-        meaning: "more have less noise, and less bias with kernels that follow footprints",
-    },
-    SettingInfo {
-        name: "shape",
-        range: "fixed | isotropic | principal | skewed",
-        unit: "",
-        meaning: "kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials",
-    },
-    SettingInfo {
-        name: "neighbors",
-        range: "0, or 2 … 1000",
-        unit: "photons",
-        meaning: "takes the nearest so many photons of each point under one kernel, as wide as the last is away, fewer as passes go on, down to 2; 0: photons have kernels of their own",
-    },
-    SettingInfo {
-        name: "profile",
-        range: "uniform | cone | epanechnikov",
-        unit: "",
-        meaning: "how kernels fall off: noise against visible rims",
-    },
-    SettingInfo {
-        name: "radius",
-        range: "0 or more",
-        unit: "m",
-        meaning: "of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 chooses by the size of the scene, for neighbours by its area and the photons",
-    },
-    SettingInfo {
-        name: "spread",
-        range: "above 0",
-        unit: "footprints",
-        meaning: "size of kernels that follow footprints, in the first pass",
-    },
-    SettingInfo {
-        name: "dampening",
-        range: "above 0, at most 1",
-        unit: "exponent",
-        meaning: "of kernels that follow footprints: evens out the sizes of footprints; 1 leaves them as they are",
-    },
-    SettingInfo {
-        name: "unit_length",
-        range: "0 or more",
-        unit: "m",
-        meaning: "size that the dampening leaves as it is; 0 for a ninth of the scene's diagonal",
-    },
-    SettingInfo {
-        name: "flatness",
-        range: "0 or more, below 1",
-        unit: "",
-        meaning: "of kernels that follow footprints: least area over the square of the longer axis of a footprint that is not flat",
-    },
-    SettingInfo {
-        name: "widen_flat",
-        range: "true | false",
-        unit: "",
-        meaning: "widens flat footprints to the least flatness; else photons that have them are left out, with their light, in every pass",
-    },
-    SettingInfo {
-        name: "reduction",
-        range: "above 0, at most 1",
-        unit: "",
-        meaning: "α of progressive photon mapping: pass i + 1 has kernels of (i + α)/(i + 1) the area; less has less bias and more noise, 1 keeps the bias",
-    },
-    SettingInfo {
-        name: "samples_per_pass",
-        range: "1 … 1024",
-        unit: "samples",
-        meaning: "eye paths of a pixel that ask the same map",
-    },
-    SettingInfo {
-        name: "direct_photons",
-        range: "true | false",
-        unit: "",
-        meaning: "takes direct light from the map too; not with final_gather",
-    },
-    SettingInfo {
-        name: "final_gather",
-        range: "true | false",
-        unit: "",
-        meaning: "sees the map after one more diffuse reflection, caustics directly; not with direct_photons",
-    },
-    SettingInfo {
-        name: "query",
-        range: "single | packet",
-        unit: "",
-        meaning: "points ask the map by themselves, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, last bits may differ",
-    },
-    SettingInfo {
-        name: "queue",
-        range: "slots | compacted | blocks",
-        unit: "",
-        meaning: "invocations of queries are for every path under way, for those that ask the map by stream compaction, or in blocks that subgroups collect; changes no picture but as query does",
-    },
-    SettingInfo {
-        name: "sampler",
-        range: "sobol | pcg",
-        unit: "",
-        meaning: "Owen-scrambled Sobol' points, or independent samples; changes the noise only",
-    },
-];
 
 impl Technique for PhotonMapper {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
@@ -182,7 +70,7 @@ impl Technique for PhotonMapper {
     }
 
     fn settings(&self) -> serde_json::Value {
-        serde_json::to_value(PhotonMapper::settings(self)).unwrap_or_default()
+        PhotonMapper::settings(self).to_json()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {

@@ -27,6 +27,7 @@ use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
+use crate::settings::TypedSettings;
 use crate::techniques::path::{ArrivalStage, PathCounters};
 use crate::techniques::{PathTracer, PathTracerSettings};
 use crate::transport::GpuScene;

@@ -3,24 +3,19 @@
 use super::kernel::{KernelProfile, KernelSettings, KernelShape};
 use super::tracer::Stored;
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
+use crate::settings::{Above, AboveTo, OrZero};
 use crate::transport::PathSet;
 use crate::transport::differentials::global_step;
 use crate::transport::path_set::PATH_SET_LOBES;
 use crate::transport::random::SamplerKind;
 use crate::{Error, Result};
 use std::f64::consts::PI;
-use std::ops::RangeInclusive;
 
-/// Most photons of a pass.
-const PHOTONS_MAX: u32 = 1 << 24;
-/// Most samples of a pixel in a pass.
-const SAMPLES_MAX: u32 = 1024;
 /// Automatic lengths as shares of the diagonal of the scene's box: the radius of fixed kernels, the greatest axis of others, and the unit of
 /// the dampening. A room of 6 m × 6 m × 3 m has a diagonal of 9 m; the source's unit and greatest axis are 1 m.
 const RADIUS_SHARE: f64 = 1.0 / 100.0;
 const UNIT_SHARE: f64 = 1.0 / 9.0;
-/// Most photons under a kernel about a point, and least: the last one only says how wide it is.
-const NEIGHBORS_MAX: u32 = 1000;
+/// Least photons under a kernel about a point: the last one only says how wide it is.
 const NEIGHBORS_MIN: u32 = 2;
 /// Neighbours are looked for as far as this many times their number would lie.
 const NEIGHBORS_MARGIN: f64 = 4.0;
@@ -53,146 +48,74 @@ pub enum MapQueue {
     Blocks,
 }
 
-/// Settings of photon mapping.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PhotonSettings {
-    /// Which light paths the picture contains: all, or a range of bounces.
-    pub path_set: PathSet,
-    /// Photons of a pass, 1 to 2²⁴.
-    pub photons: u32,
-    /// What the kernels' axes are.
-    pub shape: KernelShape,
-    /// Photons under one kernel about each point that is looked up, in the first pass; 0 for kernels about the photons.
-    pub neighbors: u32,
-    /// How kernels fall off.
-    pub profile: KernelProfile,
-    /// Radius of fixed kernels, greatest axis of others, farthest neighbour, in the first pass, m. 0 stands for a hundredth of the scene's
-    /// diagonal for fixed kernels, a ninth for others, and four times the neighbours' area if photons were spread evenly.
-    #[serde(serialize_with = "crate::settings::serialize_f32")]
-    pub radius: f32,
-    /// Axes of kernels that follow footprints, as multiples of these, in the first pass.
-    #[serde(serialize_with = "crate::settings::serialize_f32")]
-    pub spread: f32,
-    /// Exponent by which footprints are dampened, in (0, 1]; 1 leaves them as they are.
-    #[serde(serialize_with = "crate::settings::serialize_f32")]
-    pub dampening: f32,
-    /// Unit length of the dampening, m; 0 for a ninth of the scene's diagonal.
-    #[serde(serialize_with = "crate::settings::serialize_f32")]
-    pub unit_length: f32,
-    /// Footprints are flat whose area over the square of their longer axis is less than this, in [0, 1).
-    #[serde(serialize_with = "crate::settings::serialize_f32")]
-    pub flatness: f32,
-    /// Widens flat footprints, so that no light is lost; the source leaves them without a kernel.
-    pub widen_flat: bool,
-    /// α of progressive photon mapping (Hachisuka and Jensen 2009; Knaus and Zwicker 2011), in (0, 1]: kernels of pass i + 1 have
-    /// (i + α) / (i + 1) of the area of those of pass i. 1 keeps kernels, and their bias.
-    #[serde(serialize_with = "crate::settings::serialize_f32")]
-    pub reduction: f32,
-    /// Eye paths of a pixel in a pass.
-    pub samples_per_pass: u32,
-    /// Direct light comes from the map too, not from shadow rays.
-    pub direct_photons: bool,
-    /// The map is seen after one more diffuse reflection; caustics stay directly seen.
-    pub final_gather: bool,
-    /// How the map is asked. The picture is the same, up to the order of sums where a query's quota stops it; with neighbours, where a quota
-    /// is an error, points that ask together meet it sooner.
-    pub query: MapQuery,
-    /// How queries are queued, and so which points ask together. The picture is the same, as with `query`.
-    pub queue: MapQueue,
-    /// Random numbers: Owen-scrambled Sobol' or PCG.
-    pub sampler: SamplerKind,
-    /// Seed of the random numbers; the view's, where settings come as text.
-    #[serde(skip)]
-    pub seed: u32,
-    /// Also gathers albedo, normal and depth of what is seen first; the view's, where settings come as text.
-    #[serde(skip)]
-    pub aovs: bool,
-    /// Nodes and records after which a query of the map is given up and its place goes through all records instead. Changes the order of
-    /// sums only.
-    #[serde(skip)]
-    pub query_quota: u32,
-}
-
-impl Default for PhotonSettings {
-    fn default() -> Self {
-        Self {
-            path_set: PathSet::ALL,
-            photons: 1 << 16,
-            shape: KernelShape::Fixed,
-            neighbors: 0,
-            profile: KernelProfile::Epanechnikov,
-            radius: 0.0,
-            spread: 20.0,
-            dampening: 0.25,
-            unit_length: 0.0,
-            flatness: 0.05,
-            widen_flat: true,
-            reduction: 2.0 / 3.0,
-            samples_per_pass: 1,
-            direct_photons: false,
-            final_gather: false,
-            query: MapQuery::Single,
-            queue: MapQueue::Slots,
-            sampler: SamplerKind::Sobol,
-            seed: 0,
-            aovs: false,
-            query_quota: QUERY_QUOTA,
-        }
+crate::settings! {
+    /// Settings of photon mapping.
+    pub struct PhotonSettings {
+        /// Which light paths the picture contains.
+        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63";
+        /// More have less noise, and less bias with kernels that follow footprints.
+        pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons a pass";
+        /// Kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials.
+        pub shape: KernelShape = KernelShape::Fixed;
+        /// Takes the nearest so many photons of each point under one kernel, as wide as the last is away, fewer as passes go on, down to 2;
+        /// 0: photons have kernels of their own.
+        pub neighbors: u32 = 0, in OrZero(NEIGHBORS_MIN..=1000), unit "photons";
+        /// How kernels fall off: noise against visible rims.
+        pub profile: KernelProfile = KernelProfile::Epanechnikov;
+        /// Radius of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 chooses by the size of the scene, for
+        /// neighbours by its area and the photons.
+        ///
+        /// 0 stands for a hundredth of the scene's diagonal for fixed kernels, a ninth for others, and four times the neighbours' area if
+        /// photons were spread evenly.
+        pub radius: f32 = 0.0, in 0.0.., unit "m";
+        /// Size of kernels that follow footprints, in the first pass: multiples of the footprints' axes.
+        pub spread: f32 = 20.0, in Above(0.0), unit "footprints";
+        /// Evens out the sizes of footprints, for kernels that follow them; 1 leaves them as they are.
+        pub dampening: f32 = 0.25, in AboveTo(0.0, 1.0), unit "exponent";
+        /// Size that the dampening leaves as it is; 0 for a ninth of the scene's diagonal.
+        pub unit_length: f32 = 0.0, in 0.0.., unit "m";
+        /// Of kernels that follow footprints: least area over the square of the longer axis of a footprint that is not flat.
+        pub flatness: f32 = 0.05, in 0.0..1.0;
+        /// Widens flat footprints to the least flatness; else photons that have them are left out, with their light, in every pass.
+        ///
+        /// The source leaves them without a kernel.
+        pub widen_flat: bool = true;
+        /// α of progressive photon mapping: pass i + 1 has kernels of (i + α)/(i + 1) the area; less has less bias and more noise, 1 keeps the
+        /// bias.
+        ///
+        /// Sources: Hachisuka and Jensen 2009; Knaus and Zwicker 2011.
+        pub reduction: f32 = 2.0 / 3.0, in AboveTo(0.0, 1.0);
+        /// Eye paths of a pixel that ask the same map.
+        pub samples_per_pass: u32 = 1, in 1..=1024, unit "samples";
+        /// Takes direct light from the map too, not by shadow rays; not with final_gather.
+        pub direct_photons: bool = false;
+        /// Sees the map after one more diffuse reflection, caustics directly; not with direct_photons.
+        pub final_gather: bool = false;
+        /// Points ask the map by themselves, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, last
+        /// bits may differ.
+        ///
+        /// With neighbours, where a quota is an error, points that ask together meet it sooner.
+        pub query: MapQuery = MapQuery::Single;
+        /// Invocations of queries are for every path under way, for those that ask the map by stream compaction, or in blocks that subgroups
+        /// collect; changes no picture but as query does.
+        pub queue: MapQueue = MapQueue::Slots;
+        /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
+        pub sampler: SamplerKind = SamplerKind::Sobol;
     }
+    unlisted {
+        /// Seed of the random numbers. A [`View`](crate::techniques::View) gives its own.
+        pub seed: u32 = 0;
+        /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
+        pub aovs: bool = false;
+        /// Nodes and records after which a query of the map is given up and its place goes through all records instead. Changes the order of
+        /// sums only.
+        pub query_quota: u32 = QUERY_QUOTA, in 1..=QUERY_QUOTA;
+    }
+    check PhotonSettings::sees_direct_light_once;
 }
 
 impl PhotonSettings {
-    /// Refuses what is out of range.
-    pub(super) fn check(&self) -> Result<()> {
-        let in_range = |name: &str, value: u32, range: RangeInclusive<u32>| {
-            let cause = || format!("is not in {range:?}");
-            range
-                .contains(&value)
-                .then_some(())
-                .ok_or_else(|| Error::setting(name, value, cause()))
-        };
-        in_range("photons", self.photons, 1..=PHOTONS_MAX)?;
-        in_range("samples_per_pass", self.samples_per_pass, 1..=SAMPLES_MAX)?;
-        if self.neighbors > 0 {
-            in_range("neighbors", self.neighbors, NEIGHBORS_MIN..=NEIGHBORS_MAX)?;
-        }
-        in_range("query_quota", self.query_quota, 1..=QUERY_QUOTA)?;
-        let fits = |name: &str, value: f32, fits: bool, cause: &str| {
-            fits.then_some(()).ok_or_else(|| Error::setting(name, value, cause))
-        };
-        let length = |value: f32| value >= 0.0 && value.is_finite();
-        fits("radius", self.radius, length(self.radius), "is no length")?;
-        fits(
-            "unit_length",
-            self.unit_length,
-            length(self.unit_length),
-            "is no length",
-        )?;
-        fits(
-            "spread",
-            self.spread,
-            self.spread > 0.0 && self.spread.is_finite(),
-            "is not positive",
-        )?;
-        fits(
-            "dampening",
-            self.dampening,
-            self.dampening > 0.0 && self.dampening <= 1.0,
-            "is not in (0, 1]",
-        )?;
-        fits(
-            "flatness",
-            self.flatness,
-            (0.0..1.0).contains(&self.flatness),
-            "is not in [0, 1)",
-        )?;
-        fits(
-            "reduction",
-            self.reduction,
-            self.reduction > 0.0 && self.reduction <= 1.0,
-            "is not in (0, 1]",
-        )?;
+    fn sees_direct_light_once(&self) -> Result<()> {
         if self.direct_photons && self.final_gather {
             let cause = "cannot be had with direct_photons: direct light would be seen twice";
             return Err(Error::setting("final_gather", true, cause));

@@ -30,7 +30,7 @@ impl Image {
             size: [size; 2],
             spp,
             seed,
-            settings: json!({"sampler": "pcg", "path_set": paths}),
+            settings: json!({"sampler": "pcg", "path_set": paths}).into(),
             ..RenderOptions::default()
         };
         renderer.render(&options(1))?;

@@ -126,7 +126,7 @@ impl<'a> Subject<'a> {
             size: [size; 2],
             spp,
             seed,
-            settings: json!({"path_set": paths}),
+            settings: json!({"path_set": paths}).into(),
             ..RenderOptions::default()
         })?;
         Ok((rendered.picture, rendered.report.gpu_seconds))

@@ -88,7 +88,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let of_reference = RenderOptions {
             spp: reference_spp,
             seed: REFERENCE_SEED,
-            settings: serde_json::json!({ "sampler": "pcg" }),
+            settings: serde_json::json!({ "sampler": "pcg" }).into(),
             ..base.clone()
         };
         let Some(reference) = render(&renderer, &of_reference, watch)? else {
