@@ -43,3 +43,33 @@ pub fn expect_mean(what: &str, mean: f64, variance: f64, expected: f64, bias: f6
         variance.sqrt()
     );
 }
+
+/// The standard normal variable that lies as far out as Student's t of so many degrees of freedom (D. L. Wallace, "Bounds on normal
+/// approximations to Student's and the chi-square distributions", 1959).
+pub fn normal_of_t(t: f64, degrees: f64) -> f64 {
+    (degrees * (t * t / degrees).ln_1p()).sqrt() * (8.0 * degrees + 1.0) / (8.0 * degrees + 3.0)
+}
+
+/// Fails when independent values of one distribution do not have the mean `expected`, itself known with the standard error `error`, at
+/// [`FALSE_ALARM`]: by Student's t. A difference of at most `bias` is allowed for and has to be justified where it is stated.
+pub fn expect_mean_of(what: &str, values: &[f64], expected: f64, error: f64, bias: f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n * (n - 1.0));
+    let excess = ((mean - expected).abs() - bias).max(0.0);
+    let t = excess / (variance + error * error).sqrt();
+    println!(
+        "{what}: {mean:.6} ± {:.1e}, expected {expected:.6} ± {error:.1e}, t = {t:.2}",
+        variance.sqrt()
+    );
+    let p = if excess == 0.0 {
+        1.0
+    } else {
+        two_sided_p(normal_of_t(t, n - 1.0))
+    };
+    assert!(
+        p >= FALSE_ALARM,
+        "{what}: {mean} ± {:.3e}, expected {expected} ± {error:.1e} (bias of at most {bias:.1e} allowed), p = {p:.3e}",
+        variance.sqrt()
+    );
+}

@@ -479,6 +479,7 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
     assert!(row.contains("engine/src/techniques/path/mod.rs"), "{row}");
     let devices = json(&succeed(&["info", "--json", "--validation", "off", "--device", "0"])?.stdout)?;
     assert!(devices["devices"][0]["caps"]["subgroup_size"].is_u64());
+    assert!(devices["devices"][0]["techniques"][0]["fault"].is_null());
     let scene = json(&succeed(&["info", "builtin:ring", "--json"])?.stdout)?;
     assert_eq!(scene["cameras"][0]["name"], "main");
     assert_eq!(scene["techniques"][0]["refusals"], serde_json::json!([]));

@@ -26,7 +26,7 @@ use clerestory::techniques::photon_mapping::{MapQuery, MapperCounts, PhotonMappe
 use clerestory::transport::PathSet;
 use clerestory::transport::random::SamplerKind;
 use clerestory_tests::render::{Rendered, camera_down, floor, paths, render, upload};
-use clerestory_tests::statistics::expect_mean;
+use clerestory_tests::statistics::{expect_mean, normal_of_t};
 use glam::Vec3;
 
 /// Pixels a side.
@@ -161,8 +161,7 @@ fn means(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, passes: u32) -> Me
 impl Means {
     /// Fails unless a part has the expectation `expected` up to a relative bias; `noise` is the variance of the expectation.
     ///
-    /// The variance of the passes' mean is taken wider, such that Student's t of its degrees of freedom becomes standard normal
-    /// (D. L. Wallace, "Bounds on normal approximations to Student's and the chi-square distributions", 1959).
+    /// The variance of the passes' mean is taken wider, such that Student's t of its degrees of freedom becomes standard normal.
     fn expect(&self, what: &str, part: usize, channel: usize, expected: Mean, bias: f64) {
         let mean = self.parts[part][channel];
         let what = format!("{what}, {}, channel {channel}", PARTS[part]);
@@ -178,11 +177,9 @@ impl Means {
             mean.value / expected.value,
             excess / deviation,
         );
-        let nu = self.degrees;
         let t = excess / deviation;
-        let z = (nu * (t * t / nu).ln_1p()).sqrt() * (8.0 * nu + 1.0) / (8.0 * nu + 3.0);
         if t > 0.0 {
-            expect_mean(&what, z, 1.0, 0.0, 0.0);
+            expect_mean(&what, normal_of_t(t, self.degrees), 1.0, 0.0, 0.0);
         }
     }
 

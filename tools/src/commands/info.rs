@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::gpu::{Caps, DeviceSelection, DeviceSummary, Gpu, GpuOptions};
+use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{self, Camera, Projection, Scene, SceneProfile};
 use clerestory::techniques;
 
@@ -90,6 +91,8 @@ struct DeviceInfo {
 struct TechniqueNeeds {
     id: &'static str,
     needs: Vec<Need>,
+    /// Why it cannot be made here even for [`PROBE`], by its default settings; `None` when it can, or the device is unusable.
+    fault: Option<String>,
 }
 
 #[derive(serde::Serialize)]
@@ -99,13 +102,34 @@ struct Need {
     present: Option<bool>,
 }
 
-/// Why a device cannot be made or used; the validation layers are heard when the options ask for them.
-fn fault_of(options: &GpuOptions) -> Option<String> {
-    let log = match Gpu::headless(options) {
-        Ok(gpu) => gpu.validation_log(),
-        Err(error) => return Some(error.to_string()),
+/// The scene that techniques are made for, to see whether a device's limits hold all of their kernels.
+const PROBE: &str = "builtin:furnace-box";
+
+/// Why a device cannot be made or used, and each technique's fault on it; the validation layers are heard when the options ask for them.
+fn faults_of(options: &GpuOptions) -> (Option<String>, Vec<Option<String>>) {
+    let gpu = match Gpu::headless(options) {
+        Ok(gpu) => gpu,
+        Err(error) => return (Some(error.to_string()), Vec::new()),
     };
-    check_validation(&log).err().map(|failure| failure.message)
+    let renderer = scene::load(PROBE).and_then(|scene| Renderer::new(&gpu, &scene));
+    let faults = match renderer {
+        Ok(renderer) => techniques::all()
+            .iter()
+            .map(|technique| {
+                let options = RenderOptions {
+                    technique: Some(technique.id.into()),
+                    size: [8, 8],
+                    spp: 1,
+                    ..RenderOptions::default()
+                };
+                renderer.start(&options).err().map(|error| error.to_string())
+            })
+            .collect(),
+        Err(error) => vec![Some(error.to_string()); techniques::all().len()],
+    };
+    let log = gpu.validation_log();
+    drop(gpu);
+    (check_validation(&log).err().map(|failure| failure.message), faults)
 }
 
 impl DeviceInfo {
@@ -119,13 +143,17 @@ impl DeviceInfo {
             feature,
             present: techniques::offers(&caps, feature),
         };
+        let (unusable, faults) = faults_of(&options);
+        let faults = faults.into_iter().chain(std::iter::repeat(None));
         Self {
-            unusable: fault_of(&options),
+            unusable,
             techniques: techniques::all()
                 .iter()
-                .map(|technique| TechniqueNeeds {
+                .zip(faults)
+                .map(|(technique, fault)| TechniqueNeeds {
                     id: technique.id,
                     needs: technique.needs.iter().map(need).collect(),
+                    fault,
                 })
                 .collect(),
             summary,
@@ -201,6 +229,10 @@ impl DeviceInfo {
                 needs.join(", ")
             };
             lines.push(format!("  technique    {} needs {needs}", technique.id));
+            if let Some(fault) = &technique.fault {
+                let text = format!("  technique    {} cannot run: {}", technique.id, output::one_line(fault));
+                lines.push(output::red(&text, Stream::Output));
+            }
         }
         lines.join("\n") + "\n"
     }
@@ -353,5 +385,39 @@ impl SceneInfo {
             output::one_line(&text)
         }));
         lines.join("\n") + "\n"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clerestory::gpu::{DescriptorLimits, Lesser};
+
+    #[test]
+    fn what_a_device_of_small_limits_lacks_is_named() {
+        let usual = Gpu::headless(&GpuOptions::default()).unwrap().caps().descriptors;
+        let with = |storage_buffers| {
+            let descriptors = DescriptorLimits {
+                per_stage_storage_buffers: storage_buffers,
+                ..usual
+            };
+            faults_of(&GpuOptions {
+                lesser: Lesser {
+                    descriptors: Some(descriptors),
+                    ..Lesser::default()
+                },
+                ..GpuOptions::default()
+            })
+        };
+        let (unusable, faults) = with(usual.per_stage_storage_buffers);
+        assert_eq!((unusable, faults), (None, vec![None; techniques::all().len()]));
+        // A kernel of the walk has more than two.
+        let (unusable, faults) = with(2);
+        assert_eq!(unusable, None);
+        assert_eq!(faults.len(), techniques::all().len());
+        for fault in faults {
+            let fault = fault.unwrap_or_default();
+            assert!(fault.contains("maxPerStageDescriptorStorageBuffers >= "), "{fault}");
+        }
     }
 }

@@ -86,58 +86,76 @@ impl Measure {
     }
 }
 
-/// All measures, each called as its experiment and, with underscores, its module in the folder of its topic.
-pub const MEASURES: &[Measure] = &[
-    on_device("absorption", media::absorption::measure),
-    on_device("alpha", surfaces::alpha::measure),
-    on_device("automatic-choice", rendering::automatic_choice::measure),
-    on_device("barriers", device::barriers::measure),
-    on_device("build-stages", rays::build_stages::measure),
-    on_host("compact-map", photon_maps::compact_map::measure),
-    on_host("compact-rays", photon_maps::compact_rays::measure),
-    on_host("coupled-reflection", surfaces::coupled_reflection::measure),
-    on_device("device-model", device::device_model::measure),
-    on_host("free-flight", media::free_flight::measure),
-    on_device("kd-caches", kd::kd_caches::measure).of_any_scenes(),
-    on_device("kd-heuristics", kd::kd_heuristics::measure).of_any_scenes(),
-    on_device("kd-or-bvh", kd::kd_or_bvh::measure).of_any_scenes(),
-    on_host("kd-probability", kd::kd_probability::measure),
-    on_device("kd-rays", kd::kd_rays::measure).of_any_scenes(),
-    on_device("kd-threads", kd::kd_threads::measure).of_any_scenes(),
-    on_device("kd-traversal", kd::kd_traversal::measure).of_any_scenes(),
-    on_host("leaf-sizes", photon_maps::leaf_sizes::measure),
-    on_device("live-maps", preview::live_maps::measure).of_any_scenes(),
-    on_host("map-borders", maps::map_borders::measure),
-    on_host("map-choice", maps::map_choice::measure),
-    on_device("map-construction", photon_maps::map_construction::measure),
-    on_host("map-density", maps::map_density::measure),
-    on_host("map-error", maps::map_error::measure),
-    on_device("map-glossiness", maps::map_glossiness::measure),
-    on_host("map-levels", maps::map_levels::measure),
-    on_host("map-quality", photon_maps::map_quality::measure),
-    on_device("map-rendering", maps::map_rendering::measure),
-    on_host("merge-example", photon_maps::merge_example::measure),
-    on_device("mitsuba", rendering::mitsuba::measure),
-    on_host("multiple-scattering", surfaces::multiple_scattering::measure),
-    on_device("path-sets", rendering::path_sets::measure),
-    on_device("persistent-threads", rays::persistent_threads::measure),
-    on_host("phase-functions", media::phase_functions::measure),
-    on_device("photon-frame", photons::photon_frame::measure),
-    on_device("photon-peers", photons::photon_peers::measure),
-    on_device("photon-queues", photons::photon_queues::measure),
-    on_device("photon-statistics", photons::photon_statistics::measure),
-    on_host("picture-formats", rendering::picture_formats::measure),
-    on_device("preview-picture", preview::preview_picture::measure),
-    on_host("ray-offsets", rays::ray_offsets::measure),
-    on_host("sample-sums", rendering::sample_sums::measure),
-    on_device("scene-profile", rendering::scene_profile::measure),
-    on_device("shadow-maps", preview::shadow_maps::measure).of_any_scenes(),
-    on_host("shading-normals", surfaces::shading_normals::measure),
-    on_host("sphere-tests", rays::sphere_tests::measure),
-    on_host("tangents", surfaces::tangents::measure),
-    on_host("tree-quality", rays::tree_quality::measure),
-    on_host("triangle-tests", rays::triangle_tests::measure),
-];
+/// [`MEASURES`], and a test of each measure's quick form, from a line a measure: `where it runs "name" topic::module`.
+macro_rules! measures {
+    ($($place:ident $name:literal $topic:ident::$module:ident $(.$also:ident())?;)*) => {
+        /// All measures, each called as its experiment and, with underscores, its module in the folder of its topic.
+        pub const MEASURES: &[Measure] = &[$($place($name, $topic::$module::measure)$(.$also())?),*];
+
+        /// A test a measure, so that each has its own time and its own failure.
+        #[cfg(test)]
+        mod gives_sound_tables {
+            $(
+                #[test]
+                fn $module() {
+                    super::tests::check_quick_form($name);
+                }
+            )*
+        }
+    };
+}
+
+measures! {
+    on_device "absorption" media::absorption;
+    on_device "alpha" surfaces::alpha;
+    on_device "automatic-choice" rendering::automatic_choice;
+    on_device "barriers" device::barriers;
+    on_device "build-stages" rays::build_stages;
+    on_host "compact-map" photon_maps::compact_map;
+    on_host "compact-rays" photon_maps::compact_rays;
+    on_host "coupled-reflection" surfaces::coupled_reflection;
+    on_device "device-model" device::device_model;
+    on_host "free-flight" media::free_flight;
+    on_device "kd-caches" kd::kd_caches.of_any_scenes();
+    on_device "kd-heuristics" kd::kd_heuristics.of_any_scenes();
+    on_device "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
+    on_host "kd-probability" kd::kd_probability;
+    on_device "kd-rays" kd::kd_rays.of_any_scenes();
+    on_device "kd-threads" kd::kd_threads.of_any_scenes();
+    on_device "kd-traversal" kd::kd_traversal.of_any_scenes();
+    on_host "leaf-sizes" photon_maps::leaf_sizes;
+    on_device "live-maps" preview::live_maps.of_any_scenes();
+    on_host "map-borders" maps::map_borders;
+    on_host "map-choice" maps::map_choice;
+    on_device "map-construction" photon_maps::map_construction;
+    on_host "map-density" maps::map_density;
+    on_host "map-error" maps::map_error;
+    on_device "map-glossiness" maps::map_glossiness;
+    on_host "map-levels" maps::map_levels;
+    on_host "map-quality" photon_maps::map_quality;
+    on_device "map-rendering" maps::map_rendering;
+    on_host "merge-example" photon_maps::merge_example;
+    on_device "mitsuba" rendering::mitsuba;
+    on_host "multiple-scattering" surfaces::multiple_scattering;
+    on_device "path-sets" rendering::path_sets;
+    on_device "persistent-threads" rays::persistent_threads;
+    on_host "phase-functions" media::phase_functions;
+    on_device "photon-frame" photons::photon_frame;
+    on_device "photon-peers" photons::photon_peers;
+    on_device "photon-queues" photons::photon_queues;
+    on_device "photon-statistics" photons::photon_statistics;
+    on_host "picture-formats" rendering::picture_formats;
+    on_device "preview-picture" preview::preview_picture;
+    on_host "ray-offsets" rays::ray_offsets;
+    on_host "sample-sums" rendering::sample_sums;
+    on_device "scene-profile" rendering::scene_profile;
+    on_device "shadow-maps" preview::shadow_maps.of_any_scenes();
+    on_host "shading-normals" surfaces::shading_normals;
+    on_host "sphere-tests" rays::sphere_tests;
+    on_host "tangents" surfaces::tangents;
+    on_host "tree-quality" rays::tree_quality;
+    on_host "triangle-tests" rays::triangle_tests;
+}
 
 /// The measure of that name.
 ///
@@ -155,38 +173,25 @@ mod tests {
     use super::super::watch::Unwatched;
     use super::*;
 
-    fn check(measure: &Measure, tables: &[Table]) {
-        assert!(!tables.is_empty(), "{}", measure.name);
-        for table in tables {
-            assert_eq!(table.fault(), None, "{}: {}", measure.name, table.title);
-        }
-    }
-
-    fn run_all(needs_device: bool, gpu: &dyn Fn() -> Result<Gpu>) {
+    /// Takes a measure with few inputs; one of functions alone must not open the device.
+    pub(super) fn check_quick_form(name: &str) {
+        let measure = find(name).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let context = Context {
             smoke: true,
             scenes: &[],
-            gpu,
+            gpu: &|| {
+                assert!(measure.needs_device, "{name} says that it needs no device");
+                Gpu::headless(&clerestory::gpu::GpuOptions::default())
+            },
             folder: folder.path(),
             watch: &Unwatched,
         };
-        for measure in MEASURES.iter().filter(|measure| measure.needs_device == needs_device) {
-            match (measure.run)(&context) {
-                Ok(tables) => check(measure, &tables),
-                Err(error) => panic!("{}: {error}", measure.name),
-            }
+        let tables = (measure.run)(&context).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(!tables.is_empty(), "{name}");
+        for table in tables {
+            assert_eq!(table.fault(), None, "{name}: {}", table.title);
         }
-    }
-
-    #[test]
-    fn measures_of_functions_give_sound_tables_without_a_device() {
-        run_all(false, &|| Err(Error::setting("device", "none", "is not to be opened")));
-    }
-
-    #[test]
-    fn measures_of_kernels_give_sound_tables() {
-        run_all(true, &|| Gpu::headless(&clerestory::gpu::GpuOptions::default()));
     }
 
     #[test]
