@@ -38,7 +38,14 @@ fn quarters(radiance: &[f32]) -> [f64; VALUES] {
 }
 
 /// The quarters of a picture by one seed after the other.
-fn pictures(gpu: &Gpu, scene: &Scene, technique: &str, settings: &Value, samples: u32, seeds: u32) -> Vec<[f64; VALUES]> {
+fn pictures(
+    gpu: &Gpu,
+    scene: &Scene,
+    technique: &str,
+    settings: &Value,
+    samples: u32,
+    seeds: u32,
+) -> Vec<[f64; VALUES]> {
     let picture = |seed| {
         let options = RenderOptions {
             technique: Some(technique.into()),
@@ -51,7 +58,10 @@ fn pictures(gpu: &Gpu, scene: &Scene, technique: &str, settings: &Value, samples
         let rendered = render(gpu, scene, &options).unwrap_or_else(|error| panic!("{technique}: {error}"));
         assert_no_messages(gpu);
         assert_eq!(rendered.report.non_finite_samples.total(), 0);
-        let radiance = rendered.picture.require("radiance").unwrap_or_else(|error| panic!("{error}"));
+        let radiance = rendered
+            .picture
+            .require("radiance")
+            .unwrap_or_else(|error| panic!("{error}"));
         quarters(radiance.values())
     };
     (0..seeds).map(picture).collect()
@@ -129,7 +139,14 @@ impl Known {
             let scene = load(self.address);
             if let Ok(seeds) = std::env::var("CLERESTORY_WRITE_MEANS") {
                 let seeds = seeds.parse().unwrap_or_else(|error| panic!("{seeds}: {error}"));
-                self.write_anew(&pictures(gpu, &scene, self.technique, &self.settings, self.samples, seeds));
+                self.write_anew(&pictures(
+                    gpu,
+                    &scene,
+                    self.technique,
+                    &self.settings,
+                    self.samples,
+                    seeds,
+                ));
                 return;
             }
             let found = pictures(gpu, &scene, self.technique, &self.settings, self.samples, SEEDS);
@@ -145,9 +162,15 @@ impl Known {
             let squares = pictures.iter().map(|quarters| (quarters[i] - mean(i)).powi(2));
             (squares.sum::<f64>() / (n * (n - 1.0))).sqrt()
         };
-        let list = |value: &dyn Fn(usize) -> f64| (0..VALUES).map(|i| format!("{:.3e}, ", value(i))).collect::<String>();
+        let list =
+            |value: &dyn Fn(usize) -> f64| (0..VALUES).map(|i| format!("{:.3e}, ", value(i))).collect::<String>();
         let means: String = (0..VALUES).map(|i| format!("{:.6}, ", mean(i))).collect();
-        println!("{} of {}: means: [{means}], errors: [{}]", self.technique, self.address, list(&error));
+        println!(
+            "{} of {}: means: [{means}], errors: [{}]",
+            self.technique,
+            self.address,
+            list(&error)
+        );
     }
 }
 

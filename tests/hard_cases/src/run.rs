@@ -11,6 +11,9 @@ use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
 const PHOTONS: u32 = 1 << 14;
 const SAMPLES_PER_PASS: u32 = 1024;
 
+/// Samplers that a technique may offer.
+const SAMPLERS: [&str; 2] = ["sobol", "pcg"];
+
 /// What a case is run against.
 #[derive(Debug, Clone, Copy)]
 pub enum Subject {
@@ -60,9 +63,11 @@ impl Subject {
 pub fn subjects() -> Vec<Subject> {
     let mut all = Vec::new();
     for info in techniques::all() {
-        match info.settings.iter().find(|setting| setting.name == "sampler") {
+        let infos = info.settings.infos();
+        match infos.iter().find(|setting| setting.name == "sampler") {
             Some(setting) if matches!(info.bias, Bias::Unbiased) => {
-                all.extend(setting.range.split(" | ").map(|sampler| Subject::Technique {
+                let offered = |name: &&str| setting.range.split(" | ").any(|offered| offered == *name);
+                all.extend(SAMPLERS.into_iter().filter(offered).map(|sampler| Subject::Technique {
                     info,
                     sampler: Some(sampler),
                 }))

@@ -230,7 +230,11 @@ impl DeviceInfo {
             };
             lines.push(format!("  technique    {} needs {needs}", technique.id));
             if let Some(fault) = &technique.fault {
-                let text = format!("  technique    {} cannot run: {}", technique.id, output::one_line(fault));
+                let text = format!(
+                    "  technique    {} cannot run: {}",
+                    technique.id,
+                    output::one_line(fault)
+                );
                 lines.push(output::red(&text, Stream::Output));
             }
         }
