@@ -15,10 +15,11 @@
 //! ```
 //!
 //! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`kernels`] (sort, scan
-//! and the like), [`scene`] and [`film`], [`accel`] (spatial indexes) and [`maps`] (maps of directions), [`raster`] (rasterization), [`transport`] (what light does), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] says where each
+//! and the like), [`scene`] and [`film`], [`accel`] (spatial indexes) and [`maps`] (maps of directions), [`raster`] (rasterization), [`transport`] (what light does), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] gathers the rows ([`card`]) that say where each
 //! published method lives.
 
 pub mod accel;
+pub mod card;
 pub mod catalogue;
 pub mod error;
 pub mod film;

@@ -476,7 +476,31 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
             .is_some_and(|rows| rows.iter().any(|row| row["id"] == "BG-3"))
     );
     let row = String::from_utf8(succeed(&["list", "bg-3"])?.stdout)?;
-    assert!(row.contains("engine/src/techniques/path/mod.rs"), "{row}");
+    for said in [
+        "engine/src/techniques/path/card.rs",
+        "role         technique",
+        "limits       Slow where",
+        "J. Kajiya: The Rendering Equation, SIGGRAPH, 1986",
+    ] {
+        assert!(row.contains(said), "{said}: {row}");
+    }
+    // Where everything of a technique is stands in the list itself.
+    let all = String::from_utf8(succeed(&["list"])?.stdout)?;
+    for said in [
+        "  code         engine/src/techniques/photon_mapping/\n",
+        "  kernels      shaders/techniques/photon_mapping/\n",
+        "  tests        tests/tests/photon/convergence.rs (2)\n",
+        "  experiment   clerestory report photon-convergence",
+        "  results      RESULTS.md, \"",
+        "  settings     path_set, photons",
+    ] {
+        assert!(all.contains(said), "{said}: {all}");
+    }
+    assert_eq!(list["techniques"][0]["row"]["role"]["kind"], "technique");
+    assert_eq!(list["techniques"][0]["row"]["sources"][0]["key"], "kajiya-1986");
+    assert_eq!(list["techniques"][0]["results"][0], "Error against time");
+    let sources = String::from_utf8(succeed(&["list", "--sources"])?.stdout)?;
+    assert!(sources.contains("| kajiya-1986 | J. Kajiya"), "{sources}");
     let devices = json(&succeed(&["info", "--json", "--validation", "off", "--device", "0"])?.stdout)?;
     assert!(devices["devices"][0]["caps"]["subgroup_size"].is_u64());
     assert!(devices["devices"][0]["techniques"][0]["fault"].is_null());

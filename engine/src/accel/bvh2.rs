@@ -20,6 +20,7 @@ use super::{
     Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
 };
 use crate::Result;
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -183,3 +184,31 @@ impl RayIndex for Bvh2 {
 
 #[cfg(test)]
 pub(super) mod tests;
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "BG-14",
+    name: "ray index: binary BVH by binned surface-area heuristic",
+    role: Role::Kernel,
+    limits: "Built on the host and never refitted: what moves is built anew.",
+    sources: &[
+        sources::WALD_2007.whole(),
+        sources::AILA_LAINE_2009.whole(),
+        sources::LAINE_2010.whole(),
+        sources::IZE_2013.whole(),
+    ],
+    shaders: &["shaders/accel/bvh2.glsl"],
+    tests: &[
+        "engine/src/accel/bvh2/tests.rs::traversal_equals_trying_all_triangles_bit_for_bit",
+        "engine/src/accel/bvh2/tests.rs::hits_agree_with_f64_up_to_their_stated_error",
+        "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
+        "engine/src/accel/bvh2/tests.rs::stopped_traversals_go_on_without_loss_or_repetition",
+        "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
+        "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
+        "tests/tests/hard_cases.rs::ray_indexes_answer_as_a_search_through_all_triangles",
+        "tests/tests/raster/gbuffer.rs::what_is_seen_is_what_rays_meet",
+        "tests/tests/raster/gbuffer.rs::hard_cases_are_seen_as_rays_meet_them",
+    ],
+    experiment: "clerestory index --peers",
+    ..Row::of(file!())
+}];

@@ -10,15 +10,15 @@
 //! [`BOX_SLACK`](super::bvh2::BOX_SLACK) derives for slabs, and leaves are gone through until they begin beyond the best hit.
 
 pub mod bounds;
-mod build;
-mod cache;
+pub(crate) mod build;
+pub(crate) mod cache;
 mod clip;
 mod counters;
 mod entries;
 mod kept;
 pub mod probability;
 pub mod shifted_restart;
-mod traverse;
+pub(crate) mod traverse;
 mod tree;
 
 pub use cache::{KdCaches, MAX_BYTE_LEVELS, MAX_CACHED_LEVELS, StackCache};

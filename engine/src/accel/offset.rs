@@ -13,6 +13,7 @@
 //! distance is not skipped. Limits: within the offset distance of an edge at which surfaces fold more sharply towards the ray, the start can lie
 //! behind the neighbour; a needle thinner than some 10⁻⁵ of its length has no dependable normal.
 
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 
@@ -75,6 +76,22 @@ pub fn shadow_segment(from: &SurfacePoint, from_normal: Vec3, to: &SurfacePoint,
     let end = offset_ray_origin(to.position, to.error, to_normal, -direction);
     (start, end - start)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-OFFSET",
+    name: "ray origins off their surface by error bounds",
+    role: Role::PartOf("BG-3"),
+    limits: "Close to an edge that folds sharply towards the ray a start can lie behind the neighbour; needles thinner than 10⁻⁵ of their length have no dependable normal.",
+    sources: &[sources::PHARR_2016.at("3.9")],
+    shaders: &["shaders/accel/offset.glsl"],
+    tests: &[
+        "engine/src/accel/offset/tests.rs::position_lies_within_its_rounding_bound",
+        "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
+    ],
+    experiment: "clerestory report ray-offsets",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests;

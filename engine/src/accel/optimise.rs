@@ -20,6 +20,7 @@ pub use treelets::MAX_TREELET;
 use super::Aabb;
 use super::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use super::leaf_rule::{LeafRule, half_area};
+use crate::card::{Role, Row, sources};
 use leaves::{choose, with_leaves};
 
 /// How much to do.
@@ -63,6 +64,27 @@ pub fn optimise(tree: &BoxTree, boxes: &[Aabb], settings: &Optimisation) -> BoxT
     }
     with_leaves(&best, &leaves)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-TREELETS",
+    name: "optimisation of trees by treelets, mini trees and reinsertion",
+    role: Role::PartOf("CL-LBVH"),
+    limits: "On the host only; guards the expected cost, which overlap of boxes hardly shows in.",
+    sources: &[
+        sources::DOMINGUES_PEDRINI_2015.whole(),
+        sources::GANESTAM_2015.whole(),
+        sources::MEISTER_BITTNER_2018.whole(),
+    ],
+    tests: &[
+        "engine/src/accel/optimise/tests.rs::every_step_gives_valid_trees_that_cost_no_more",
+        "engine/src/accel/optimise/tests.rs::trees_do_not_depend_on_the_number_of_threads",
+        "engine/src/accel/lbvh/tests.rs::restructured_trees_are_valid_and_cost_no_more",
+        "engine/src/accel/lbvh/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
+    ],
+    experiment: "clerestory report tree-quality",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests;

@@ -6,6 +6,8 @@
 
 use glam::DVec3;
 
+use crate::card::{Role, Row, sources};
+
 /// Where a ray is closest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClosestApproach {
@@ -37,6 +39,22 @@ pub fn intersect_sphere(origin: DVec3, direction: DVec3, centre: DVec3, radius: 
     let half = chord_squared.sqrt();
     Some([approach.t - half, approach.t + half])
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-I-1",
+    name: "ray/sphere hit and closest approach",
+    role: Role::Kernel,
+    limits: "One sphere at a time: no index holds spheres.",
+    sources: &[sources::HAINES_2019.whole()],
+    shaders: &["shaders/accel/sphere.glsl"],
+    tests: &[
+        "engine/src/accel/sphere.rs::approach_matches_the_definition",
+        "engine/src/accel/sphere.rs::spheres_are_hit_from_outside_inside_and_behind_and_touched_once",
+    ],
+    experiment: "clerestory report sphere-tests",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -15,6 +15,7 @@ pub use settings::{Execution, PersistentThreads, Query, TraceSettings};
 
 use super::kd::KdCounters;
 use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
+use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
@@ -390,3 +391,40 @@ impl RayTracer {
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-X-1",
+        name: "closest hits of a buffer of rays: one thread a ray",
+        role: Role::Kernel,
+        limits: "A subgroup takes as long as its slowest ray.",
+        sources: &[sources::AILA_LAINE_2009.whole()],
+        shaders: &["shaders/accel/trace_rays.comp"],
+        tests: &[
+            "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+            "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
+            "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
+        ],
+        experiment: "clerestory report persistent-threads kd-threads",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-X-2",
+        name: "closest hits of a buffer of rays: persistent threads on a queue with quotas",
+        role: Role::Kernel,
+        limits: "Which workgroup traces which ray differs from run to run, and shows in the time alone.",
+        sources: &[
+            sources::AILA_LAINE_2009.whole(),
+            sources::FABIANOWSKI_2011.at("§2.2.3.4"),
+        ],
+        shaders: &["shaders/accel/trace_queue.comp", "shaders/accel/trace_queue_vote.comp"],
+        tests: &[
+            "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+            "tests/tests/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
+            "tests/tests/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
+        ],
+        experiment: "clerestory report persistent-threads kd-threads",
+        ..Row::of(file!())
+    },
+];

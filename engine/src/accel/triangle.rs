@@ -20,6 +20,7 @@
 pub mod wald;
 
 use super::Ray;
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec3, Vec3};
 
@@ -166,6 +167,34 @@ pub fn moller_trumbore(ray: &Ray, vertices: &[Vec3; 3]) -> Option<TriangleHit<f6
     let hit = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= f64::from(ray.t_min) && t <= f64::from(ray.t_max);
     hit.then_some(TriangleHit { t, u, v })
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-I-2",
+        name: "Möller–Trumbore triangle test (oracle in f64)",
+        role: Role::Yardstick,
+        limits: "Not watertight: rays can pass between triangles that share an edge.",
+        sources: &[sources::MOLLER_TRUMBORE_1997.whole()],
+        tests: &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
+        experiment: "clerestory report triangle-tests",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-TRIANGLE",
+        name: "watertight triangle test",
+        role: Role::Kernel,
+        limits: "Misses triangles with two equal corners or seen exactly edge-on; its bounds hold for edge products above 2⁻¹⁰⁰ m².",
+        sources: &[sources::WOOP_2013.whole()],
+        shaders: &["shaders/accel/triangle.glsl"],
+        tests: &[
+            "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
+            "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
+        ],
+        experiment: "clerestory bench",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests;

@@ -1,112 +1,82 @@
-//! The catalogue: one row for every system that the engine carries, so that a reader finds where a publication lives in the code.
+//! The catalogue: the rows of all modules, so that a reader finds where a publication lives in the code.
 //!
+//! A row ([`Row`]) stands beside its module; those of techniques come with their [`Card`](crate::techniques::Card), the others by the list in `modules.rs`.
 //! Ids with the prefixes `BG-`, `DP-`, `OEM-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility
 //! and media, photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
 //! the prefix `CL-` are the engine's own, for published methods outside of those documents. Guarantee: the tests below check that the
-//! module, every test and every row's experiment exist, and that `docs/catalogue.md` is [`markdown`].
+//! module, shaders, every test and every row's experiment exist, that rows and sources are sound, and that `docs/catalogue.md` and
+//! `third_party_notes/sources.md` are [`markdown`] and [`sources_markdown`].
 
-mod rows;
+mod modules;
+mod pages;
 #[cfg(test)]
 mod tests;
 
-use crate::techniques::Bias;
-use crate::transport::PathSet;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
-/// One system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct Row {
-    /// Unique id with its prefix, such as `BG-3`.
-    pub id: &'static str,
-    /// What it is.
-    pub name: &'static str,
-    /// Where it was published.
-    pub publication: &'static str,
-    /// Its main file, from the repository's root.
-    pub module: &'static str,
-    /// The light paths of its picture; `None` for what makes no picture by itself.
-    pub path_set: Option<PathSet>,
-    /// Its bias as an estimator; `None` for what is evaluated, not estimated.
-    pub bias: Option<Bias>,
-    /// Device features beyond the baseline, by their Vulkan names.
-    pub needs: &'static [&'static str],
-    /// Its tests as `file::function`, the file from the repository's root.
-    pub tests: &'static [&'static str],
-    /// The command that measures it, from the repository's root.
-    pub experiment: &'static str,
-}
+pub use crate::card::{Bias, Cite, Role, Row, Source};
+use crate::techniques::{self, Card};
+pub use pages::{markdown, sources_markdown};
 
-/// A row of something exact that runs everywhere and makes no picture by itself; [`measured`] adds its experiment.
-const fn part(
-    id: &'static str,
-    name: &'static str,
-    publication: &'static str,
-    module: &'static str,
-    tests: &'static [&'static str],
-) -> Row {
-    Row {
-        id,
-        name,
-        publication,
-        module,
-        path_set: None,
-        bias: None,
-        needs: &[],
-        tests,
-        experiment: "",
-    }
-}
-
-/// As [`part`], for estimators without bias.
-const fn unbiased(row: Row) -> Row {
-    Row {
-        bias: Some(Bias::Unbiased),
-        ..row
-    }
-}
-
-/// As [`part`], with the command that measures it.
-const fn measured(command: &'static str, row: Row) -> Row {
-    Row {
-        experiment: command,
-        ..row
-    }
-}
-
-/// The catalogue as a page of Markdown.
-pub fn markdown() -> String {
-    let mut page = String::from(
-        "# Catalogue\n\nWhere each publication lives in the code. Written by `clerestory list --markdown`; `clerestory list ID` also names \
-         the tests of a system.\n\n| id | system | publication | module | bias | path set | needs | tests | measured by |\n\
-         |---|---|---|---|---|---|---|---:|---|\n",
-    );
-    for row in all() {
-        let bias = match row.bias {
-            None => "–".to_owned(),
-            Some(Bias::Unbiased) => "unbiased".to_owned(),
-            Some(Bias::Consistent(cause)) => format!("consistent: {cause}"),
-            Some(Bias::Biased(cause)) => format!("biased: {cause}"),
-        };
-        let path_set = row.path_set.map_or("–".to_owned(), |set| set.to_string());
-        let needs = if row.needs.is_empty() {
-            "baseline".to_owned()
-        } else {
-            row.needs.join(", ")
-        };
-        page += &format!(
-            "| {} | {} | {} | [{}](../{}) | {bias} | {path_set} | {needs} | {} | `{}` |\n",
-            row.id,
-            row.name,
-            row.publication,
-            row.module.trim_start_matches("engine/src/"),
-            row.module,
-            row.tests.len(),
-            row.experiment,
-        );
-    }
-    page
-}
+/// Prefixes of ids, in the order of the catalogue.
+const PREFIXES: [&str; 6] = ["BG-", "DP-", "OEM-", "PM-", "MET-", "CL-"];
 
 /// All rows, ordered by document and id.
 pub fn all() -> &'static [Row] {
-    &rows::ROWS
+    static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| {
+        let of_techniques = techniques::all().iter().flat_map(|card| card.rows);
+        let rows = of_techniques.chain(modules::MODULES).copied().flatten();
+        let mut rows: Vec<Row> = rows.copied().collect();
+        rows.sort_by_cached_key(|row| order(row.id));
+        rows
+    });
+    &ROWS
+}
+
+/// The row of that id, in letters of either case.
+pub fn find(id: &str) -> Option<&'static Row> {
+    all().iter().find(|row| row.id.eq_ignore_ascii_case(id))
+}
+
+/// A technique's own row, which says where it was published, what it cannot do, and where its tests are; `None` for a host's card without one.
+pub fn row_of(card: &Card) -> Option<&'static Row> {
+    let mut rows = card.rows.iter().copied().flatten();
+    rows.find(|row| row.role == Role::Technique)
+}
+
+/// The rows that are part of that row, in the order of the catalogue.
+pub fn parts_of(id: &str) -> impl Iterator<Item = &'static Row> {
+    all()
+        .iter()
+        .filter(move |row| matches!(row.role, Role::PartOf(of) if of == id))
+}
+
+/// What sources have a part in: each with the rows that cite it and the places in it, ordered by key.
+pub fn citations() -> Vec<(Source, Vec<(&'static str, &'static str)>)> {
+    let mut found: BTreeMap<&str, (Source, Vec<_>)> = BTreeMap::new();
+    for row in all() {
+        for cite in row.sources {
+            let entry = found.entry(cite.source.key).or_insert((cite.source, Vec::new()));
+            entry.1.push((row.id, cite.place));
+        }
+    }
+    found.into_values().collect()
+}
+
+/// Where an id stands: by its prefix, then by its words and numbers, so that `PM-MAP-10` comes after `PM-MAP-9`.
+fn order(id: &str) -> (usize, Vec<(u64, String)>) {
+    let prefix = PREFIXES.iter().position(|prefix| id.starts_with(prefix));
+    let mut parts: Vec<(u64, String)> = Vec::new();
+    for c in id.chars() {
+        match (c.to_digit(10), parts.last_mut()) {
+            (Some(digit), Some((number, text))) if text.is_empty() => {
+                *number = number.saturating_mul(10).saturating_add(digit.into());
+            }
+            (Some(digit), _) => parts.push((digit.into(), String::new())),
+            (None, Some((_, text))) if !text.is_empty() => text.push(c),
+            (None, _) => parts.push((0, c.into())),
+        }
+    }
+    (prefix.unwrap_or(PREFIXES.len()), parts)
 }

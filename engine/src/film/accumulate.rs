@@ -10,6 +10,7 @@
 //! Guarantees: deterministic for a fixed order of samples. One addition errs by at most 2⁻⁴⁶ of the operands' magnitudes, so n additions of
 //! one sign err by at most n · 2⁻⁴⁶ relative: 1.5e-8 for 10⁶ samples, below half an f32 ulp.
 
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 
 /// The unevaluated sum `hi + lo`, with |lo| at most half an ulp of `hi`.
@@ -156,6 +157,22 @@ impl Accumulator {
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-SUM",
+    name: "sums of samples in pairs of floats",
+    role: Role::PartOf("BG-3"),
+    limits: "About 48 bits: an addition errs by up to 2⁻⁴⁶ of its operands.",
+    sources: &[sources::DEKKER_1971.whole(), sources::JOLDES_2017.whole()],
+    shaders: &["shaders/film/two_float.glsl"],
+    tests: &[
+        "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
+        "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
+    ],
+    experiment: "clerestory report sample-sums",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

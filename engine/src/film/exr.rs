@@ -15,6 +15,7 @@ use exr::prelude::*;
 use super::picture::{DEPTH, Metadata, NORMAL, POSITION, Picture, RADIANCE};
 use crate::Error as EngineError;
 use crate::Result as EngineResult;
+use crate::card::{Role, Row, sources};
 
 /// Samples (values, not pixels) that a file may hold in all; a header asking for more is refused before anything is allocated.
 const MAX_SAMPLES: usize = 1 << 29;
@@ -272,6 +273,22 @@ fn add_unique(picture: &mut Picture, name: &str, channels: usize, values: Vec<f3
     }
     picture.add_layer(&unique, channels, values)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-EXR",
+    name: "pictures as OpenEXR with layers and facts, Radiance HDR and PNG",
+    role: Role::Service,
+    limits: "Deep data and subsampled channels are refused; Radiance HDR keeps eight bits of a colour's mantissas, PNG eight of its display value.",
+    sources: &[sources::OPENEXR.whole(), sources::WARD_1991.whole()],
+    tests: &[
+        "engine/src/film/exr.rs::every_bit_and_every_attribute_comes_back",
+        "engine/src/film/hdr.rs::round_trip_errs_by_at_most_a_step_of_the_largest_channel",
+        "engine/src/film/png.rs::a_written_file_reads_back_to_the_byte",
+    ],
+    experiment: "clerestory report picture-formats",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -10,6 +10,7 @@ pub use super::z_test::{ZTest, z_test};
 
 use super::picture::{Layer, Picture};
 use super::tone::ToneMap;
+use crate::card::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// ε of the relative MSE, in squared units of the reference's radiance.
@@ -258,6 +259,21 @@ fn mean_flip(test: &Layer, reference: &Layer, size: (u32, u32), options: &Compar
     }
     sum.value() / map.len().max(1) as f64
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-ERROR",
+    name: "error metrics: MSE, relative MSE, bias, quantile, FLIP",
+    role: Role::Service,
+    limits: "Pixels that are not finite in either picture are left out and counted; FLIP sees tone-mapped pictures.",
+    sources: &[sources::ROUSSELLE_2011.whole(), sources::ANDERSSON_2020.whole()],
+    tests: &[
+        "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
+        "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
+    ],
+    experiment: "clerestory report error-against-time",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -6,6 +6,7 @@
 //! Guarantees: deterministic; values that are not finite are counted as rejected.
 
 use super::metrics::Sum;
+use crate::card::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// The share of accepted values with which a picture passes, as in Mitsuba 3's render tests: it leaves room for the few pixels whose rare bright
@@ -163,6 +164,21 @@ pub fn two_sided_p(z: f64) -> f64 {
 pub fn sidak_threshold(alpha: f64, tests: usize) -> f64 {
     -((-alpha).ln_1p() / tests as f64).exp_m1()
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-ZTEST",
+    name: "agreement of two pictures by z-test with Šidák's correction",
+    role: Role::Service,
+    limits: "Takes means as normally distributed, which fireflies keep them from being.",
+    sources: &[sources::SUBR_ARVO_2007.whole(), sources::SIDAK_1967.whole()],
+    tests: &[
+        "engine/src/film/z_test.rs::false_alarms_come_at_the_stated_rate",
+        "engine/src/film/z_test.rs::a_bias_of_one_per_cent_is_found",
+    ],
+    experiment: "clerestory agreement",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -30,7 +30,7 @@ mod memory;
 mod options;
 mod pipeline;
 mod pipeline_cache;
-mod recorder;
+pub(crate) mod recorder;
 #[cfg(feature = "hot-reload")]
 #[path = "../../build/reflect.rs"]
 mod reflect;

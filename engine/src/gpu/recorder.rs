@@ -17,6 +17,7 @@ use super::pipeline::ComputePipeline;
 use super::resources::{FrameResources, Lease};
 use super::submission::{self, Submission};
 use super::tracker::Tracker;
+use crate::card::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// Passes that one recorder can hold.
@@ -516,3 +517,19 @@ impl Pass<'_> {
         Ok(())
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-BARRIERS",
+    name: "hand-recorded passes whose missing barriers are errors",
+    role: Role::Service,
+    limits: "Debug builds only, and only what passes declare to read and write.",
+    sources: &[sources::KHRONOS_VULKAN.at("chapter 7")],
+    tests: &[
+        "tests/tests/gpu_floor.rs::missing_barrier_is_an_error_that_names_both_passes",
+        "tests/tests/gpu_floor.rs::write_after_read_and_wrong_scope_are_hazards",
+        "tests/tests/layers.rs::the_recorder_catches_a_missing_barrier_between_dispatches",
+    ],
+    experiment: "clerestory report barriers",
+    ..Row::of(file!())
+}];

@@ -10,6 +10,7 @@
 
 use std::time::Instant;
 
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::kernels::{model_chain, model_copy, model_queue};
 use crate::gpu::{
     Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, compute_to_transfer, rw_compute_to_compute,
@@ -290,6 +291,29 @@ impl Copies<'_> {
         Ok(read(&self.from)? == read(&self.to)?)
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-X-0",
+    name: "cost model of the device: dependent loads, copies, tickets of a queue, boundaries",
+    role: Role::Yardstick,
+    limits: "Seconds are those of one device while nothing else runs there.",
+    sources: &[
+        sources::FABIANOWSKI_2011.at("§2.2.2 to §2.2.4"),
+        sources::WONG_2010.whole(),
+    ],
+    shaders: &[
+        "shaders/kernels/model_chain.comp",
+        "shaders/kernels/model_copy.comp",
+        "shaders/kernels/model_queue.comp",
+    ],
+    tests: &[
+        "engine/src/kernels/device_model.rs::chains_visit_every_place_before_they_come_back",
+        "tests/tests/kernels/device_model.rs::timed_runs_have_walked_copied_and_counted_what_was_asked",
+    ],
+    experiment: "clerestory report device-model",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

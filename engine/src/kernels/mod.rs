@@ -45,13 +45,13 @@ pub mod device_model;
 mod form;
 mod histogram;
 mod operation;
-mod partition;
+pub(crate) mod partition;
 mod permute;
 mod radix_plan;
 mod radix_small;
-mod radix_sort;
+pub(crate) mod radix_sort;
 mod reduce;
-mod scan;
+pub(crate) mod scan;
 mod stream;
 
 pub use form::Form;

@@ -6,6 +6,7 @@
 use super::form::{Form, Variant};
 use super::scan::{ScanOptions, ScanTotals};
 use super::stream::{self, Count};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::kernels::{partition, partition_subgroup};
 use crate::gpu::shaders::sets::PartitionSet;
 use crate::gpu::{Buffer, BufferView, Gpu, Pass};
@@ -144,3 +145,38 @@ pub fn split(flags: &[u32], elements: &[u32]) -> Vec<u32> {
     let others = others.map(|(_, element)| *element);
     others.chain(compact(flags, elements)).collect()
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-B-2",
+        name: "stream compaction",
+        role: Role::Kernel,
+        limits: "Moves words of 32 bits or the numbers of elements, no longer records.",
+        sources: &[sources::BLELLOCH_1990.whole()],
+        shaders: &[
+            "shaders/kernels/partition.comp",
+            "shaders/kernels/partition_subgroup.comp",
+        ],
+        tests: &["tests/tests/kernels/blocks.rs::partitions_are_as_their_twins"],
+        experiment: "clerestory bench --sort",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-B-3",
+        name: "split",
+        role: Role::Kernel,
+        limits: "Moves words of 32 bits or the numbers of elements, no longer records.",
+        sources: &[sources::BLELLOCH_1990.whole()],
+        shaders: &[
+            "shaders/kernels/partition.comp",
+            "shaders/kernels/partition_subgroup.comp",
+        ],
+        tests: &[
+            "tests/tests/kernels/blocks.rs::partitions_are_as_their_twins",
+            "tests/tests/kernels/blocks.rs::splits_by_bits_sort",
+        ],
+        experiment: "clerestory bench --sort",
+        ..Row::of(file!())
+    },
+];

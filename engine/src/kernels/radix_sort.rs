@@ -15,6 +15,7 @@ use super::form::Form;
 use super::radix_plan::{Plan, Tuning};
 use super::radix_small::SmallSort;
 use super::stream::{self, Count, MAX_COUNT, Prepare};
+use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::kernels::radix_scan;
 use crate::gpu::shaders::types::StreamPlan;
@@ -316,6 +317,32 @@ pub fn radix_sort(keys: &mut [u64], values: &mut [u32], bits: Range<u32>, order:
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-B-4",
+    name: "radix sort of 32- and 64-bit keys, with or without values",
+    role: Role::Kernel,
+    limits: "Keys are unsigned: others want an order-preserving map first; the device bounds how many there may be.",
+    sources: &[sources::SATISH_2009.whole(), sources::ASHKIANI_2016.whole()],
+    shaders: &[
+        "shaders/kernels/radix_count_serial.comp",
+        "shaders/kernels/radix_count_subgroup.comp",
+        "shaders/kernels/radix_scan.comp",
+        "shaders/kernels/radix_scatter_serial.comp",
+        "shaders/kernels/radix_scatter_subgroup.comp",
+        "shaders/kernels/radix_small.comp",
+    ],
+    tests: &[
+        "tests/tests/kernels/sort.rs::every_size_and_pattern_is_as_by_std",
+        "tests/tests/kernels/sort.rs::bits_and_orders_are_those_asked_for",
+        "tests/tests/kernels/sort.rs::repeated_sorts_give_the_same_bits_in_every_form",
+        "tests/tests/kernels/sort.rs::many_keys_take_the_other_plan",
+        "tests/tests/kernels/many_sorts.rs::sorts_of_random_sizes_and_patterns_are_as_by_std",
+    ],
+    experiment: "clerestory bench --sort --peers",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -9,6 +9,7 @@
 use super::form::{Form, Teams, Variant};
 use super::operation::Operation;
 use super::stream::{self, Count, Prepare, Stream};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::STREAM_HEADER_WORDS;
 use crate::gpu::shaders::kernels::{scan_apply, scan_apply_subgroup, scan_reduce, scan_reduce_subgroup, scan_totals};
 use crate::gpu::shaders::sets::{ScanApplySet, ScanReduceSet};
@@ -225,3 +226,33 @@ pub fn scan(values: &[u32], heads: Option<&[u32]>, operation: Operation, inclusi
     }
     (result, running)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-B-1",
+    name: "inclusive and exclusive scan, segmented scan, reductions",
+    role: Role::Kernel,
+    limits: "Words of 32 bits; sums of scans are modulo 2³².",
+    sources: &[
+        sources::BLELLOCH_1990.whole(),
+        sources::SENGUPTA_2007.whole(),
+        sources::DOTSENKO_2008.whole(),
+    ],
+    shaders: &[
+        "shaders/kernels/scan_reduce.comp",
+        "shaders/kernels/scan_reduce_subgroup.comp",
+        "shaders/kernels/scan_totals.comp",
+        "shaders/kernels/scan_apply.comp",
+        "shaders/kernels/scan_apply_subgroup.comp",
+        "shaders/kernels/reduce_words.comp",
+        "shaders/kernels/reduce_box.comp",
+    ],
+    tests: &[
+        "tests/tests/kernels/blocks.rs::scans_are_as_their_twin",
+        "tests/tests/kernels/blocks.rs::reductions_of_words_are_as_their_twin",
+        "tests/tests/kernels/blocks.rs::boxes_are_exact_and_leave_nans_out",
+        "engine/src/kernels/stream.rs::every_element_is_in_one_block",
+    ],
+    experiment: "clerestory bench --sort",
+    ..Row::of(file!())
+}];

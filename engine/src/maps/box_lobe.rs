@@ -14,6 +14,7 @@
 use super::Parametrization;
 use super::directional_map::answer_of;
 use super::spherical_sat::{SatImage, SphericalSat, half_width_at};
+use crate::card::{Role, Row, sources};
 use crate::gpu::Pass;
 use crate::gpu::shaders::maps::sat_lobe;
 use crate::gpu::shaders::types::{LobeBox, LobeQuery};
@@ -325,3 +326,22 @@ impl SphericalSat {
         })
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-BOX-LOBE",
+    name: "lobes of glossy reflections as staircases of boxes of a summed-area table",
+    role: Role::PartOf("OEM-6"),
+    limits: "Squares of the map stand for discs of the sphere: more than some four gain little, unless they are rings of sectors.",
+    sources: &[sources::BELLMAN_1961.at("the best staircase; boxes as lobes are the engine's own")],
+    shaders: &["shaders/maps/box_lobe.glsl", "shaders/maps/sat_lobe.comp"],
+    tests: &[
+        "engine/src/maps/tests/box_lobes.rs::weights_share_the_lobe",
+        "engine/src/maps/tests/box_lobes.rs::the_staircase_is_the_best_one",
+        "engine/src/maps/tests/box_lobes.rs::borders_hold_the_largest_box",
+        "engine/src/maps/tests/box_lobes.rs::constant_radiance_is_constant_through_every_lobe",
+        "tests/tests/directional_maps.rs::lobes_are_their_twins",
+    ],
+    experiment: "clerestory report map-glossiness",
+    ..Row::of(file!())
+}];

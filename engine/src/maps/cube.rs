@@ -5,6 +5,8 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::card::{Role, Row, sources};
+
 /// Number of faces.
 pub const CUBE_FACES: u32 = 6;
 
@@ -56,3 +58,26 @@ pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
     let corner = |u: f64, v: f64| (u * v).atan2((1.0 + u * u + v * v).sqrt());
     corner(upper.x, upper.y) - corner(lower.x, upper.y) - corner(upper.x, lower.y) + corner(lower.x, lower.y)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "DP-3",
+    name: "cube map",
+    role: Role::Kernel,
+    limits: "A texel in the corner of a face has about a fifth of the solid angle of one in its middle.",
+    sources: &[sources::GREENE_1986.whole()],
+    shaders: &["shaders/maps/cube.glsl"],
+    tests: &[
+        "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+        "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+        "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+        "engine/src/maps/tests/places.rs::the_poles_and_axes_are_where_they_belong",
+        "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+        "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+        "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+        "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
+        "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
+    ],
+    experiment: "clerestory report map-density map-error map-choice",
+    ..Row::of(file!())
+}];

@@ -11,6 +11,7 @@
 //! the twin of a look-up is [`MapImage::look_up`], that of a level [`MapImage::coarser`].
 
 use super::{MapImage, Parametrization};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     DIRECTIONAL_CUBE, DIRECTIONAL_EQUAL_AREA, DIRECTIONAL_LAT_LONG, DIRECTIONAL_NUSSELT, DIRECTIONAL_OCTAHEDRON,
     DIRECTIONAL_OCTAHEDRON_RECTANGULAR, DIRECTIONAL_PARABOLOID, DIRECTIONAL_SPHERE,
@@ -419,3 +420,34 @@ pub(super) fn answer_of<Q: bytemuck::Pod>(
     let values: Vec<[f32; 3]> = gpu.read(values.view(), queries.len())?;
     Ok(values.into_iter().map(Vec3::from_array).collect())
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "OEM-5",
+    name: "look-ups in octahedron maps: unfiltered, repaired levels of detail, borders at each level",
+    role: Role::Kernel,
+    limits: "Bilinear in the map, not on the sphere; cubes and discs have no borders, so that texels there share the weight of missing ones.",
+    sources: &[
+        sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+        sources::ENGELHARDT_2013.at("7.2.2"),
+    ],
+    shaders: &[
+        "shaders/maps/directional_border.comp",
+        "shaders/maps/directional_coarser.comp",
+        "shaders/maps/directional_look_up.comp",
+    ],
+    tests: &[
+        "tests/tests/directional_maps.rs::borders_are_texels_of_the_inside",
+        "tests/tests/directional_maps.rs::levels_keep_the_integral",
+        "tests/tests/directional_maps.rs::look_ups_are_seamless",
+        "tests/tests/directional_maps.rs::seams_hold_no_energy",
+        "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+        "engine/src/maps/tests/levels.rs::the_mirrored_direction_repairs_the_lower_seams",
+        "engine/src/maps/tests/levels.rs::the_octants_own_map_has_no_seams",
+        "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+        "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
+        "engine/src/maps/tests/glossy.rs::levels_keep_the_integral",
+    ],
+    experiment: "clerestory report map-levels map-borders",
+    ..Row::of(file!())
+}];

@@ -6,6 +6,7 @@
 
 use super::octahedron::octahedron_signs;
 use super::turn::{turn_vector, vector_turn};
+use crate::card::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -53,3 +54,21 @@ pub(super) fn derivatives(uv: DVec2) -> [DVec3; 2] {
         (across * s).extend(-2.0 * r * by_r * side)
     })
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-EQUAL-AREA",
+    name: "equal-area octahedron map",
+    role: Role::Kernel,
+    limits: "No projection: triangles cannot be drawn into it; shapes of texels are sheared off the axes.",
+    sources: &[sources::CLARBERG_2008.whole()],
+    shaders: &["shaders/maps/equal_area.glsl"],
+    tests: &[
+        "engine/src/maps/tests/density.rs::statistics_are_those_of_the_table",
+        "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+        "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
+        "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+    ],
+    experiment: "clerestory report map-density map-error map-choice",
+    ..Row::of(file!())
+}];

@@ -11,6 +11,7 @@
 //! [`PrefilterGgx`](super::prefilter::PrefilterGgx), times π, where texels have one direction each.
 
 use super::{MapImage, MapPoint, Parametrization, Texel};
+use crate::card::{Role, Row, sources};
 use crate::{Error, Result};
 use glam::{DVec2, DVec3, UVec2};
 
@@ -155,3 +156,24 @@ pub fn irradiance(image: &MapImage, normal: DVec3) -> Result<DVec3> {
     let found = IrradianceSource::new(image).irradiance(normal);
     found.ok_or_else(|| Error::setting("normal", normal, "has no direction"))
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-IRRADIANCE",
+    name: "irradiance under a map, and maps of it over normals",
+    role: Role::Kernel,
+    limits: "Texels are constant each; at the rims of the sphere map and of Nusselt's off by up to 3·10⁻⁴ and 3·10⁻³.",
+    sources: &[
+        sources::LAMBERT_1760.whole(),
+        sources::RAMAMOORTHI_HANRAHAN_2001.whole(),
+    ],
+    tests: &[
+        "engine/src/maps/tests/irradiance.rs::constant_radiance_gives_pi_for_every_normal",
+        "engine/src/maps/tests/irradiance.rs::a_sky_that_fades_to_the_horizon_gives_two_thirds_of_pi",
+        "engine/src/maps/tests/irradiance.rs::a_sun_of_one_texel_is_lamberts_polygon",
+        "engine/src/maps/tests/irradiance.rs::maps_of_irradiance_hold_it_for_every_normal",
+        "tests/tests/directional_maps.rs::the_widest_lobe_is_irradiance",
+    ],
+    experiment: "clerestory report map-error",
+    ..Row::of(file!())
+}];

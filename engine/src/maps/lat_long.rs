@@ -4,6 +4,7 @@
 //! arguments, which keeps its precision at the poles; the periodic seam is in longitude. Twin of `maps/lat_long.glsl`.
 
 use super::turn::{turn_vector, vector_turn};
+use crate::card::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
@@ -45,3 +46,26 @@ pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
     let (middle, half) = (0.5 * PI * (lower.y + upper.y), 0.5 * PI * (upper.y - lower.y));
     TAU * (upper.x - lower.x) * 2.0 * middle.sin() * half.sin()
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "DP-1",
+    name: "latitude–longitude map; environments take it with y up, as glTF",
+    role: Role::Kernel,
+    limits: "Texels crowd at the poles, where their width goes to zero.",
+    sources: &[sources::BLINN_NEWELL_1976.whole()],
+    shaders: &["shaders/maps/lat_long.glsl"],
+    tests: &[
+        "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+        "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+        "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+        "engine/src/maps/tests/solid_angles.rs::midpoint_sums_are_off_as_stated",
+        "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+        "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+        "engine/src/transport/environment.rs::directions_and_coordinates_agree",
+        "engine/src/maps/tests/printed.rs::a_longitude_of_a_quotient_folds_half_turns",
+        "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
+    ],
+    experiment: "clerestory report map-density map-error map-choice",
+    ..Row::of(file!())
+}];

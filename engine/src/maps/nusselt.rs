@@ -4,6 +4,7 @@
 //! are without bound at the horizon. Twin of `maps/nusselt.glsl`.
 
 use super::disc;
+use crate::card::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Coordinates on the unit disc of a unit direction with z ≥ 0.
@@ -32,3 +33,24 @@ pub(super) fn derivatives(uv: DVec2) -> [DVec3; 2] {
 pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
     disc::integrate(disc::over_cosine, lower, upper)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "DP-5",
+    name: "Nusselt's map of the hemisphere",
+    role: Role::Kernel,
+    limits: "Half of the sphere only; solid angles of texels are without bound at the horizon.",
+    sources: &[sources::NUSSELT_1928.whole()],
+    shaders: &["shaders/maps/nusselt.glsl"],
+    tests: &[
+        "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+        "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+        "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+        "engine/src/maps/tests/solid_angles.rs::rectangles_have_the_integral_of_the_density",
+        "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+        "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+        "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
+    ],
+    experiment: "clerestory report map-density map-choice",
+    ..Row::of(file!())
+}];

@@ -8,6 +8,7 @@
 //! Twin of `maps/octahedron.glsl`.
 
 use super::spherical::{Polygon, derivatives_of_projection};
+use crate::card::{Role, Row, sources};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// ±1 by sign; +1 for both zeros.
@@ -192,3 +193,74 @@ pub(super) fn rectangular_solid_angle(lower: DVec2, upper: DVec2) -> f64 {
     }
     sum
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "OEM-1",
+        name: "octahedron map, square layout",
+        role: Role::Kernel,
+        limits: "A texel at an axis has about a fifth of the solid angle of one in the middle of an octant.",
+        sources: &[
+            sources::PRAUN_HOPPE_2003.whole(),
+            sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+        ],
+        shaders: &["shaders/maps/octahedron.glsl"],
+        tests: &[
+            "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+            "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+            "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+            "engine/src/maps/tests/printed.rs::a_sign_of_zero_that_is_zero_folds_the_map_onto_itself",
+            "engine/src/maps/tests/printed.rs::matrices_of_octants_are_the_map",
+            "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+            "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
+            "engine/src/maps/tests/levels.rs::the_mirrored_direction_repairs_the_lower_seams",
+            "engine/src/maps/tests/irradiance.rs::constant_radiance_gives_pi_for_every_normal",
+            "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+            "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
+            "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
+        ],
+        experiment: "clerestory report map-density map-error map-choice",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "OEM-2",
+        name: "octahedron map, rectangular layout",
+        role: Role::Kernel,
+        limits: "A texel at an axis has about a fifth of the solid angle of one in the middle of an octant.",
+        sources: &[sources::ENGELHARDT_DACHSBACHER_2008.whole()],
+        shaders: &["shaders/maps/octahedron.glsl"],
+        tests: &[
+            "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+            "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+            "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+            "engine/src/maps/tests/printed.rs::a_second_half_that_is_not_mirrored_tears_the_rectangle",
+            "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",
+            "engine/src/maps/tests/levels.rs::the_octants_own_map_has_no_seams",
+            "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+            "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+            "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
+        ],
+        experiment: "clerestory report map-density map-error map-choice",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "OEM-3",
+        name: "octahedron maps by other central projections",
+        role: Role::Kernel,
+        limits: "Moves texels between axes and middles of octants; none of these projections has the same solid angle everywhere.",
+        sources: &[sources::ENGELHARDT_2013.at("7.1.2")],
+        shaders: &["shaders/maps/octahedron.glsl"],
+        tests: &[
+            "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+            "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+            "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+            "engine/src/maps/tests/density.rs::the_perspective_family_is_best_at_one",
+            "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+            "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+        ],
+        experiment: "clerestory report map-density map-error map-choice",
+        ..Row::of(file!())
+    },
+];

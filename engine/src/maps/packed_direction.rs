@@ -6,6 +6,7 @@
 //! 5.2·10⁻⁴ for 13, 1.3·10⁻⁴ for 15, 6.5·10⁻⁵ for 16. Packing is in f32 as on the device. Twin of `maps/packed_direction.glsl`.
 
 use super::octahedron::octahedron_decode;
+use crate::card::{Role, Row, sources};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// The greatest angle between a direction and what comes back from [`pack_octahedral`] with that many bits, rad: that of half a step in
@@ -57,6 +58,23 @@ pub fn unpack_octahedral(word: u32, bits: u32) -> DVec3 {
     let coordinate = |shift: u32| f64::from((word >> shift) & mask) / steps(bits) - 1.0;
     octahedron_decode(DVec2::new(coordinate(0), coordinate(bits)))
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-PACKED",
+    name: "directions in a word",
+    role: Role::Kernel,
+    limits: "Directions are off by up to 3/(√2 s) radians for s steps a side; those along axes are exact.",
+    sources: &[sources::MEYER_2010.whole(), sources::CIGOLLE_2014.whole()],
+    shaders: &["shaders/maps/packed_direction.glsl"],
+    tests: &[
+        "engine/src/maps/packed_direction.rs::directions_come_back_within_their_bounds",
+        "engine/src/maps/packed_direction.rs::the_nearest_of_four_is_two_thirds_as_far_off",
+        "tests/tests/twins/maps.rs::levels_borders_and_words_agree_with_their_twins",
+    ],
+    experiment: "clerestory report map-density",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

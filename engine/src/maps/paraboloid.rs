@@ -4,6 +4,7 @@
 //! it the stereographic projection, which keeps angles. The back divides by 1 − z, as the front by 1 + z. Twin of `maps/paraboloid.glsl`.
 
 use super::disc;
+use crate::card::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Layer, 1 for z < 0, and coordinates on the unit disc of a unit direction.
@@ -39,3 +40,26 @@ pub(super) fn derivatives(layer: u32, uv: DVec2) -> [DVec3; 2] {
 pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
     disc::integrate(disc::stereographic, lower, upper)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "DP-4",
+    name: "dual paraboloid map",
+    role: Role::Kernel,
+    limits: "A texel at the rim of a disc has a quarter of the solid angle of one in its middle, and a fifth of the picture is unused.",
+    sources: &[sources::HEIDRICH_SEIDEL_1998.whole()],
+    shaders: &["shaders/maps/paraboloid.glsl"],
+    tests: &[
+        "tests/tests/raster/cuts.rs::paraboloids_come_nearer_with_smaller_pieces",
+        "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+        "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+        "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+        "engine/src/maps/tests/solid_angles.rs::rectangles_have_the_integral_of_the_density",
+        "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+        "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+        "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
+        "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
+    ],
+    experiment: "clerestory report map-density map-error map-choice",
+    ..Row::of(file!())
+}];

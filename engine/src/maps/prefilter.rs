@@ -15,6 +15,7 @@
 
 use super::MapImage;
 use super::directional_map::DirectionalMap;
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::PREFILTER_TEXELS_PER_INVOCATION;
 use crate::gpu::shaders::maps::prefilter_ggx as kernel;
 use crate::gpu::{ComputePipeline, Gpu, Pass};
@@ -167,3 +168,21 @@ impl PrefilterGgx {
         pass.dispatch(&self.pipeline, &[&set, &source.set()], &push, groups)
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-PREFILTER",
+    name: "environment maps filtered by the GGX lobe, a map for each roughness",
+    role: Role::Kernel,
+    limits: "Round lobes without masking and Fresnel factors; roughnesses narrower than texels interpolate between texels.",
+    sources: &[sources::KAUTZ_2000.whole(), sources::KARIS_2013.whole()],
+    shaders: &["shaders/maps/prefilter_ggx.comp"],
+    tests: &[
+        "tests/tests/directional_maps.rs::filtered_maps_are_sums_over_the_lobe",
+        "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+        "engine/src/maps/tests/glossy.rs::filtered_maps_are_integrals_of_the_lobe",
+        "engine/src/maps/tests/glossy.rs::lobes_have_the_width_that_is_said",
+    ],
+    experiment: "clerestory report map-glossiness",
+    ..Row::of(file!())
+}];

@@ -9,6 +9,7 @@
 //! less; it is the caller's to compare ([`MapImage::integral`]).
 
 use super::{MapImage, MapPoint, Parametrization, Texel};
+use crate::card::{Role, Row};
 use crate::{Error, Result};
 use glam::{DMat3, DVec2, DVec3, UVec2};
 use rayon::prelude::*;
@@ -181,3 +182,24 @@ fn steps(source: &MapImage, to: Parametrization, size: UVec2, texel: Texel, to_s
     let doublings = (SLACK * ratio).log2().ceil().max(0.0);
     samples << (doublings as u32).min(16)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-RESAMPLE",
+    name: "conversion between maps by solid angle, `clerestory maps`",
+    role: Role::Service,
+    limits: "A texel is off by less than 2.5/s of the range of radiance that it touches, with s rectangles along the finer map's texels.",
+    tests: &[
+        "engine/src/maps/tests/conversions.rs::constant_radiance_stays_constant_in_every_map",
+        "engine/src/maps/tests/conversions.rs::halves_of_a_map_are_means_of_its_texels",
+        "engine/src/maps/tests/conversions.rs::conversions_keep_the_integral",
+        "engine/src/maps/tests/conversions.rs::smooth_light_comes_back",
+        "engine/src/maps/tests/conversions.rs::conversions_can_be_watched_and_stopped",
+        "tools/tests/maps.rs::every_format_leads_to_every_other",
+        "tools/tests/maps.rs::a_conversion_that_is_stopped_leaves_the_old_file",
+        "tools/tests/maps.rs::directions_are_those_of_environments",
+        "tools/tests/maps.rs::scenes_look_the_same_after_a_round_trip",
+    ],
+    experiment: "clerestory maps sky.hdr sky.exr --to octahedron",
+    ..Row::of(file!())
+}];

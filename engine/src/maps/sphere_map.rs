@@ -5,6 +5,7 @@
 //! only its shape degrades, without bound at the rim, which is (0, 0, −1) all round. Twin of `maps/sphere_map.glsl`.
 
 use super::disc;
+use crate::card::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Coordinates on the unit disc of a unit direction; (1, 0) for (0, 0, −1).
@@ -44,3 +45,25 @@ pub(super) fn derivatives(uv: DVec2) -> [DVec3; 2] {
 pub(super) fn solid_angle(lower: DVec2, upper: DVec2) -> f64 {
     sphere_map_density(lower) * disc::area(lower, upper)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "DP-2",
+    name: "sphere map (mirror ball)",
+    role: Role::Kernel,
+    limits: "Texels degrade in shape without bound at the rim, which is one direction all round.",
+    sources: &[sources::MILLER_HOFFMAN_1984.whole()],
+    shaders: &["shaders/maps/sphere_map.glsl"],
+    tests: &[
+        "engine/src/maps/tests/places.rs::directions_come_back_from_their_places",
+        "engine/src/maps/tests/solid_angles.rs::texels_sum_to_the_sphere",
+        "engine/src/maps/tests/density.rs::extremes_are_where_the_table_says",
+        "engine/src/maps/tests/printed.rs::the_printed_sphere_map_is_that_of_the_negated_direction",
+        "engine/src/maps/tests/density.rs::anisotropies_are_those_of_the_table",
+        "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
+        "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
+        "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
+    ],
+    experiment: "clerestory report map-density map-error map-choice",
+    ..Row::of(file!())
+}];

@@ -20,6 +20,7 @@
 use super::directional_map::{DirectionalMap, answer};
 use super::lat_long::lat_long_pole_density;
 use super::{MapImage, Parametrization};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::{SAT_FIXED, SAT_FLOAT, SAT_TWO_FLOAT};
 use crate::gpu::shaders::maps::{sat_columns, sat_look_up, sat_rows};
 use crate::gpu::shaders::sets::SphericalSatSet;
@@ -343,3 +344,28 @@ pub fn box_mean(image: &MapImage, border: u32, uv: DVec2, half_width: f64) -> DV
     }
     sums.truncate() / sums.w
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "OEM-6",
+    name: "spherical summed-area table: means over boxes, and lobes of several, for continuous glossiness",
+    role: Role::Kernel,
+    limits: "A box is a square of the map, not a cone, and no larger than the border is wide.",
+    sources: &[sources::CROW_1984.whole(), sources::ENGELHARDT_DACHSBACHER_2008.whole()],
+    shaders: &[
+        "shaders/maps/sat_rows.comp",
+        "shaders/maps/sat_columns.comp",
+        "shaders/maps/sat_look_up.comp",
+    ],
+    tests: &[
+        "tests/tests/directional_maps.rs::tables_hold_means_of_boxes_under_a_sun",
+        "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+        "engine/src/maps/tests/glossy.rs::tables_hold_the_means_of_boxes",
+        "engine/src/maps/tests/glossy.rs::boxes_have_no_seams",
+        "tests/tests/directional_maps.rs::lobes_are_their_twins",
+        "engine/src/maps/tests/box_lobes.rs::borders_hold_the_largest_box",
+        "engine/src/maps/tests/box_lobes.rs::lobes_on_folds_and_edges_are_as_good_as_elsewhere",
+    ],
+    experiment: "clerestory report map-glossiness",
+    ..Row::of(file!())
+}];

@@ -19,6 +19,7 @@ use serde_json::Value;
 pub use model::{CostModel, ErrorModel};
 pub use noise::{relative_mse_by_variance, relative_mse_of_pair};
 
+use crate::card::{Role, Row};
 use crate::render::{RenderOptions, Renderer};
 use crate::techniques::{self, Card};
 use crate::transport::PathSet;
@@ -264,6 +265,23 @@ fn shortfall(choice: &Candidate, goal: Goal, pilot_seconds: f64) -> String {
         _ => String::new(),
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-PLAN",
+    name: "automatic choice of technique, settings and samples by pilot pictures",
+    role: Role::Service,
+    limits: "A pilot does not see what is rarer than its samples, and times are those of a machine that does nothing else.",
+    tests: &[
+        "engine/src/plan/noise.rs::pairs_know_their_error",
+        "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",
+        "engine/src/plan/mod.rs::what_cannot_be_had_is_said",
+        "tests/tests/automatic_choice.rs::predictions_come_true",
+        "tests/tests/automatic_choice.rs::what_cannot_be_chosen_says_why",
+    ],
+    experiment: "clerestory report automatic-choice",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

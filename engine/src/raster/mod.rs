@@ -14,11 +14,11 @@
 //! paraboloids guarantee nothing of this: they are here to be compared.
 
 mod gbuffer;
-mod octahedron;
+pub(crate) mod octahedron;
 pub mod octants;
-mod omni_shadow;
+pub(crate) mod omni_shadow;
 mod output;
-mod pipelines;
+pub(crate) mod pipelines;
 pub mod splats;
 mod surfaces;
 pub mod tessellation;

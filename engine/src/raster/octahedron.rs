@@ -10,6 +10,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::View;
 use crate::Result;
+use crate::card::{Role, Row, sources};
 use crate::gpu::Area;
 use crate::maps::octahedron::{OctahedronLayout, octant_matrix};
 
@@ -55,3 +56,23 @@ impl View {
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "OEM-4g",
+    name: "octahedron maps rendered live: linear octants with clip distances",
+    role: Role::PartOf("CL-LIVE-MAP"),
+    limits: "Exact, but every triangle is drawn once for each octant.",
+    sources: &[sources::ENGELHARDT_DACHSBACHER_2008.at("octahedra drawn live; linear octants are the engine's own")],
+    shaders: &["shaders/raster/surface_octant.vert"],
+    needs: &["shaderClipDistance"],
+    tests: &[
+        "tests/tests/raster/directions.rs::octahedra_are_as_rays_see_them_and_have_no_holes",
+        "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
+        "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+        "tests/tests/raster/directions.rs::views_project_as_the_maps_encode",
+        "engine/src/maps/tests/printed.rs::matrices_of_octants_are_the_map",
+    ],
+    experiment: "clerestory report map-rendering",
+    ..Row::of(file!())
+}];

@@ -13,6 +13,8 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::card::{Bias, Role, Row, sources};
+
 /// Corners that the cut of a triangle along three planes makes at most: of 8 polygons, or 15 triangles. `max_vertices` of
 /// `raster/surface_split.geom`.
 pub const SPLIT_CORNERS: usize = 31;
@@ -218,6 +220,65 @@ pub fn octant_strip_corner(place: usize, count: usize) -> usize {
         count - step
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "OEM-4a",
+        name: "octahedron maps rendered live: exact split by a geometry shader",
+        role: Role::Kernel,
+        limits: "Exact but for cracks of the rasterizer's own rounding; needs geometry shaders.",
+        sources: &[sources::ENGELHARDT_2013.at("7.2.1 and 7.3.2")],
+        shaders: &["shaders/raster/surface_split.geom"],
+        needs: &["geometryShader"],
+        tests: &[
+            "tests/tests/raster/directions.rs::octahedra_are_as_rays_see_them_and_have_no_holes",
+            "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
+            "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+            "engine/src/raster/octants.rs::triangles_in_general_position_give_thirteen_at_most",
+            "engine/src/raster/octants.rs::triangles_on_a_lattice_give_no_more_than_shaders_may_emit",
+            "engine/src/raster/octants.rs::pieces_cover_the_triangle_and_lie_in_their_octants",
+            "engine/src/raster/octants.rs::cuts_are_the_same_from_both_ends",
+            "tests/tests/twins/raster.rs::pieces_of_octants_agree_with_their_twins",
+        ],
+        experiment: "clerestory report map-rendering",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "OEM-4b",
+        name: "octahedron maps rendered live: split along the equator alone",
+        role: Role::Kernel,
+        limits: "Edges stay straight over x = 0 and y = 0, where their images bend; rectangular layout only.",
+        sources: &[sources::ENGELHARDT_2013.at("7.2.1 and 7.3.2")],
+        shaders: &["shaders/raster/surface_halves.geom"],
+        bias: Some(Bias::Biased("edges stay straight where their images bend")),
+        needs: &["geometryShader"],
+        tests: &[
+            "tests/tests/raster/cuts.rs::halves_and_outlines_are_wrong_as_stated",
+            "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+            "tests/tests/raster/cuts.rs::the_split_emits_least",
+        ],
+        experiment: "clerestory report map-rendering",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "OEM-4c",
+        name: "octahedron maps rendered live: split outlines",
+        role: Role::Kernel,
+        limits: "Silhouettes are exact, depth and attributes inside of them are not; rectangular layout only.",
+        sources: &[sources::ENGELHARDT_2013.at("7.2.1 and 7.3.2")],
+        shaders: &["shaders/raster/surface_outlines.geom"],
+        bias: Some(Bias::Biased("what is interpolated inside of outlines")),
+        needs: &["geometryShader"],
+        tests: &[
+            "tests/tests/raster/cuts.rs::halves_and_outlines_are_wrong_as_stated",
+            "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+            "tests/tests/twins/raster.rs::outlines_agree_with_their_twins",
+        ],
+        experiment: "clerestory report map-rendering",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {

@@ -35,6 +35,7 @@
 use glam::{DVec3, IVec2, UVec2, Vec3};
 
 use super::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
+use crate::card::{Bias, Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_CUBE, SHADOW_FOLD, SHADOW_MOVE_MAX, SHADOW_OCTAHEDRON, SHADOW_ROUNDING};
 use crate::gpu::shaders::raster::omni_shadow_look_up as kernel;
@@ -508,6 +509,42 @@ impl OmniShadowImage {
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "BG-10",
+    name: "omnidirectional shadow maps of point lights, as cubes or octahedra",
+    role: Role::PartOf("CL-PREVIEW"),
+    limits: "Borders follow texels, contact shadows begin late, whatever is nearer than the near plane casts none, and partial alpha and glass cast full ones.",
+    sources: &[
+        sources::WILLIAMS_1978.whole(),
+        sources::GERASIMOV_2004.whole(),
+        sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+        sources::HOLBERT_2011.whole(),
+    ],
+    shaders: &[
+        "shaders/raster/omni_shadow.glsl",
+        "shaders/raster/omni_shadow_look_up.comp",
+    ],
+    bias: Some(Bias::Biased(
+        "borders of shadows are those of texels; contact shadows begin `width + 1` texel diagonals late",
+    )),
+    tests: &[
+        "engine/src/raster/omni_shadow/tests.rs::radii_are_those_of_texels",
+        "engine/src/raster/omni_shadow/tests.rs::planes_do_not_shade_themselves",
+        "engine/src/raster/omni_shadow/tests.rs::planes_do_not_shade_themselves_where_positions_are_rounded",
+        "tests/tests/preview/shadows.rs::maps_agree_with_rays_but_for_the_borders_of_shadows",
+        "tests/tests/preview/shadows.rs::lights_close_to_surfaces_and_in_planes_of_geometry_are_wrong_at_borders_alone",
+        "tests/tests/preview/shadows.rs::shadows_do_not_depend_on_the_scale",
+        "tests/tests/preview/shadows.rs::look_ups_are_their_twins",
+        "tests/tests/preview/shadows.rs::filters_keep_the_mean",
+        "tests/tests/preview/shadows.rs::convex_rooms_have_no_shadows",
+        "tests/tests/preview/penumbra.rs::filtered_edges_are_ramps_about_the_edge",
+        "tests/tests/twins/shadows.rs::shadow_maps_agree_with_their_twins",
+    ],
+    experiment: "clerestory report shadow-maps",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests;

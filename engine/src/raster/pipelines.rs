@@ -6,6 +6,7 @@ use super::output::Output;
 use super::surfaces::{SurfaceFeatures, Surfaces};
 use super::tessellation::MAX_LEVEL;
 use super::view::View;
+use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::VertexShader;
 use crate::gpu::shaders::raster::{
@@ -328,3 +329,20 @@ fn make<V: VertexShader, G: GeometryStage>(
 pub(super) fn used_locations(outputs: &[Output]) -> usize {
     outputs.iter().map(|output| *output as usize + 1).max().unwrap_or(0)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "OEM-4d",
+    name: "octahedron maps rendered live: mask of each octant",
+    role: Role::Kernel,
+    limits: "Exact, but fragments of all other octants are made and discarded.",
+    sources: &[sources::ENGELHARDT_2013.at("7.2.1 and 7.3.2")],
+    shaders: &["shaders/raster/surface_instance.vert"],
+    tests: &[
+        "tests/tests/raster/directions.rs::octahedra_are_as_rays_see_them_and_have_no_holes",
+        "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
+        "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+    ],
+    experiment: "clerestory report map-rendering",
+    ..Row::of(file!())
+}];

@@ -10,6 +10,7 @@
 use glam::{DVec2, DVec3, UVec2, Vec3};
 
 use crate::accel::MAX_COORDINATE;
+use crate::card::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{SPLAT_NOTHING, SPLAT_SAME_SURFACE};
 use crate::gpu::shaders::raster::{splat_points, splat_pull, splat_push};
 use crate::gpu::shaders::types::{SplatLevel, SplatTexel, Surfel};
@@ -347,6 +348,28 @@ pub fn surfels_of(triangles: &[[Vec3; 3]], count: u32) -> Vec<Surfel> {
         })
         .collect()
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "OEM-4f",
+    name: "octahedron maps of points: splats, pull and push",
+    role: Role::Kernel,
+    limits: "Holes, and points in front of others, are as wide as texels.",
+    sources: &[sources::ENGELHARDT_2013.at("7.4"), sources::RITSCHEL_2008.whole()],
+    shaders: &[
+        "shaders/raster/splat_points.comp",
+        "shaders/raster/splat_pull.comp",
+        "shaders/raster/splat_push.comp",
+    ],
+    bias: Some(Bias::Biased("holes and points as wide as texels")),
+    tests: &[
+        "tests/tests/raster/splats.rs::splats_and_their_fill_are_those_of_the_twin",
+        "tests/tests/raster/splats.rs::rooms_of_splats_are_closed_and_as_far_as_rays_go",
+        "engine/src/raster/splats.rs::surfels_share_the_area_evenly",
+    ],
+    experiment: "clerestory report map-rendering",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

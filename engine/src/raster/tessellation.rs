@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::card::{Bias, Role, Row, sources};
+
 /// The most pieces along an edge.
 pub const MAX_LEVEL: u32 = 64;
 
@@ -24,6 +26,24 @@ pub fn tessellation_point(weights: [u32; 3], level: u32, [a, b, c]: [Vec3; 3]) -
     let [x, y, z] = weights.map(|weight| weight as f32);
     (x * a + y * b + z * c) / level as f32
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "OEM-4e",
+    name: "octahedron maps rendered live: unsplit pieces of triangles",
+    role: Role::Kernel,
+    limits: "Edges stay straight along a piece, and what lies over a seam is left out: right only as pieces shrink.",
+    sources: &[sources::ENGELHARDT_2013.at("7.2.1 and 7.3.2")],
+    shaders: &["shaders/raster/surface_unsplit.vert"],
+    bias: Some(Bias::Consistent("straight edges, and gaps at seams, as long as pieces")),
+    tests: &[
+        "tests/tests/raster/cuts.rs::unsplit_maps_come_nearer_with_smaller_pieces",
+        "engine/src/raster/tessellation.rs::pieces_fill_the_triangle_and_share_their_edges",
+        "tests/tests/twins/raster.rs::pieces_of_triangles_agree_with_their_twins",
+    ],
+    experiment: "clerestory report map-rendering",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

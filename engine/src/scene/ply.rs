@@ -9,6 +9,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::{Material, Mesh, Scene, files};
+use crate::card::{Role, Row, sources};
 use crate::srgb::linear_from_srgb;
 use crate::{Error, Result};
 
@@ -365,6 +366,22 @@ fn faces(body: &mut Body<'_>, element: &Element, mesh: &mut Mesh) -> Result<(), 
     }
     Ok(())
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-MESH",
+    name: "readers of PLY and OBJ",
+    role: Role::Service,
+    limits: "Triangles and polygons cut into fans; of .mtl files Kd and Ke alone.",
+    sources: &[sources::TURK_1994.whole(), sources::WAVEFRONT_OBJ.whole()],
+    tests: &[
+        "engine/src/scene/ply.rs::all_encodings_are_read",
+        "engine/src/scene/ply.rs::every_cut_is_an_error_and_no_panic",
+        "engine/src/scene/obj.rs::faces_materials_and_coordinates_are_read",
+    ],
+    experiment: "tools/models",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

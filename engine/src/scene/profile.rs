@@ -8,6 +8,7 @@ use std::fmt;
 use glam::{DVec3, Vec3};
 
 use super::{AlphaMode, Image, LightKind, Material, Medium, Phase, Scene, Texture};
+use crate::card::{Role, Row, sources};
 
 /// How alpha is used by the materials that are placed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -451,3 +452,19 @@ impl fmt::Display for MediaUse {
             .try_for_each(|(name, _)| write!(f, ", {name}"))
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-PROFILE",
+    name: "only what a scene needs: profile and specialization",
+    role: Role::Service,
+    limits: "Knows what a scene holds, not what is seen of it.",
+    sources: &[sources::KHRONOS_SPIRV.at("2.12, specialization constants")],
+    tests: &[
+        "tests/tests/profile.rs::what_is_absent_costs_no_pass",
+        "tests/tests/profile.rs::what_is_absent_costs_no_byte",
+        "tests/tests/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
+    ],
+    experiment: "clerestory report scene-profile",
+    ..Row::of(file!())
+}];

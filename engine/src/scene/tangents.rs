@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::Mesh;
+use crate::card::{Role, Row, sources};
 
 struct Corners<'a> {
     mesh: &'a Mesh,
@@ -141,6 +142,21 @@ pub fn sound_tangent(tangent: Vec4, normal: Vec3) -> Vec4 {
     };
     unit.unwrap_or_else(|| normal.any_orthonormal_vector()).extend(sign)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-TANGENT",
+    name: "tangent frames of normal maps",
+    role: Role::Service,
+    limits: "Meshes without texture coordinates have none.",
+    sources: &[sources::MIKKELSEN_2008.at("MikkTSpace")],
+    tests: &[
+        "engine/src/scene/tangents.rs::tangents_follow_u_and_the_sign_follows_mirroring",
+        "engine/src/scene/tangents.rs::disagreeing_corners_split_vertices",
+    ],
+    experiment: "clerestory report tangents",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -7,6 +7,7 @@
 use glam::{DVec2, DVec3, DVec4};
 
 use super::{Filter, Image, Texture, Wrap};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::TEXTURE_COORDINATE_LIMIT;
 use crate::srgb::linear_from_srgb;
 
@@ -66,6 +67,22 @@ pub fn sample_texture(image: &Image, texture: &Texture, srgb: bool, uvs: [DVec2;
     let row = |y: f64| fetch(base.x, y).lerp(fetch(base.x + 1.0, y), w.x);
     row(base.y).lerp(row(base.y + 1.0), w.y)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-TEXTURE",
+    name: "texture look-ups: nearest, bilinear, three ways to wrap, sRGB",
+    role: Role::PartOf("BG-3"),
+    limits: "No levels of detail: fine textures alias until samples have averaged them.",
+    sources: &[sources::KHRONOS_GLTF.at("3.8"), sources::IEC_61966_2_1.whole()],
+    shaders: &["shaders/scene/texture.glsl"],
+    tests: &[
+        "engine/src/scene/texture.rs::half_texels_and_wrap_modes_meet_at_borders",
+        "tests/tests/twin_texture.rs::look_ups_agree_with_their_twins",
+    ],
+    experiment: "tools/models",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

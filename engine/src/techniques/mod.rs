@@ -13,8 +13,8 @@
 //! 2. [`Technique`] for it: each [`step`](Technique::step) is a bounded piece of work that adds whole samples to the film, in an order
 //!    that depends on settings and seed alone. What the scene does not need is left out, and said by [`skipped`](Technique::skipped).
 //! 3. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
-//! 4. In the engine: a file in this folder with the constant in [`all`], and a row in the [`catalogue`](crate::catalogue). In a host:
-//!    nothing more; [`Renderer::start_technique`](crate::render::Renderer::start_technique) takes the constant as it is.
+//! 4. In the engine: a folder of this one whose `card.rs` has the constant, with the technique's rows of the
+//!    [`catalogue`](crate::catalogue), and its line in [`all`]. In a host: nothing more; [`Renderer::start_technique`](crate::render::Renderer::start_technique) takes the constant as it is.
 
 mod features;
 pub mod path;
@@ -24,6 +24,7 @@ pub mod preview;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::card::Row;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
@@ -32,20 +33,9 @@ use crate::settings::{Settings, SettingsDecl};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
+pub use crate::card::Bias;
 pub use features::offers;
 pub use path::{PathTracer, PathTracerSettings};
-
-/// How a technique's expected picture relates to the truth on its own path set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case", tag = "kind", content = "cause")]
-pub enum Bias {
-    /// The expected picture is right at any number of samples.
-    Unbiased,
-    /// The error goes to zero with more work, but the expected picture is wrong before.
-    Consistent(&'static str),
-    /// An error stays, for this reason.
-    Biased(&'static str),
-}
 
 /// A technique as the catalogue knows it.
 pub struct Card {
@@ -53,8 +43,9 @@ pub struct Card {
     pub id: &'static str,
     /// One sentence.
     pub summary: &'static str,
-    /// Where it was published.
-    pub publication: &'static str,
+    /// Its rows of the [`catalogue`](crate::catalogue), of it and of its parts, a list a file. The first is the technique's own
+    /// ([`Role::Technique`](crate::card::Role::Technique)); a host's card may have none.
+    pub rows: &'static [&'static [Row]],
     /// Bias.
     pub bias: Bias,
     /// Device features beyond the baseline, by the Vulkan names that [`offers`] knows.

@@ -13,6 +13,7 @@
 
 use super::fresnel::{fresnel_dielectric, fresnel_f0, schlick_weight};
 use super::ggx::{ALPHA_MIN, ggx_g1, ggx_g2, ggx_sample_visible};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -200,3 +201,19 @@ pub fn albedo_layer(eta: f64) -> (usize, f64) {
     let (i, t) = node((eta - 1.0) / (eta + 1.0) / ETA_PARAMETER_MAX, ETA_NODES);
     (i + 1, t)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-MULTISCATTER",
+    name: "compensation of rough metals for scattering among microfacets",
+    role: Role::PartOf("BG-3"),
+    limits: "Metals only; keeps the energy, with a lobe that is not that of the microfacets.",
+    sources: &[sources::KULLA_CONTY_2017.whole()],
+    shaders: &["shaders/transport/albedo.glsl"],
+    tests: &[
+        "engine/src/transport/bsdf/tests.rs::white_furnace",
+        "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
+    ],
+    experiment: "clerestory report multiple-scattering",
+    ..Row::of(file!())
+}];

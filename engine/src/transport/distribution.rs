@@ -5,6 +5,7 @@
 //! probability is exactly the share of random numbers that choose it, and no entry with a positive weight is lost however small it
 //! is. Guarantee: at most 24 steps. Twin of `transport/distribution.glsl`.
 
+use crate::card::{Bias, Role, Row, sources};
 use crate::{Error, Result};
 use glam::{DVec2, UVec2};
 
@@ -129,6 +130,24 @@ pub fn distribution_sample_2d(cdf: &[f32], base: usize, size: UVec2, u: DVec2) -
     #[expect(clippy::cast_possible_truncation, reason = "below the grid's size")]
     (UVec2::new(column as u32, row as u32), p_row * p_column)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-LIGHTS",
+    name: "choice of lights by power, limited for distant ones",
+    role: Role::PartOf("BG-3"),
+    limits: "Blind to shadows and to where a light is from the point that it lights.",
+    sources: &[sources::SHIRLEY_1996.at("inversion of the cumulative distribution")],
+    shaders: &["shaders/transport/distribution.glsl"],
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "engine/src/transport/distribution.rs::probabilities_follow_weights_and_none_is_lost",
+        "engine/src/transport/distribution.rs::cells_follow_their_probability",
+        "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
+    ],
+    experiment: "clerestory report light-sampling",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

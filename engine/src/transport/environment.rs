@@ -6,6 +6,7 @@
 //! `transport/environment.glsl`.
 
 use super::distribution::{build_distribution_2d, distribution_probability_2d, distribution_sample_2d};
+use crate::card::{Bias, Role, Row, sources};
 use crate::scene::Environment;
 use crate::{Error, Result};
 use glam::{DVec2, DVec3, UVec2};
@@ -100,6 +101,26 @@ pub fn environment_distribution(environment: &Environment) -> Result<Vec<f32>> {
         .collect();
     build_distribution_2d(&format!("environment {}", environment.name), size, &weights)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-ENVIRONMENT",
+    name: "environment light with importance sampling",
+    role: Role::PartOf("BG-3"),
+    limits: "Chooses by luminance and solid angle, blind to what the surface reflects and to what hides the sky.",
+    sources: &[sources::PHARR_2016.at("14.2.4")],
+    shaders: &["shaders/transport/environment.glsl"],
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "engine/src/transport/environment.rs::directions_and_coordinates_agree",
+        "engine/src/transport/environment.rs::samples_follow_the_density",
+        "engine/src/transport/environment.rs::light_is_never_missed_and_bad_maps_are_errors",
+        "tests/tests/samplers.rs::environments_are_sampled_by_their_texels_and_evenly_within",
+        "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
+    ],
+    experiment: "clerestory agreement --scene box-city-sky",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,8 @@
 //! bound, or bound on average. Distances in metres; extinction coefficients in m⁻¹, finite and not negative, by the distance along the ray.
 //! The path tracer's own tracking is in `transport/media_tracking.glsl`, by [`sample_null_collision`](super::medium::sample_null_collision).
 
+use crate::card::{Bias, Role, Row, sources};
+
 /// exp(−Σ Δt σ(tᵢ)) over `steps` equal steps up to `t_max`, each looked up at `place` of its length: 1 at its end, ½ in its middle.
 ///
 /// Of an extinction that is smooth the error falls with 1/steps, for ½ with 1/steps². A uniformly random `place` makes the optical depth
@@ -117,6 +119,19 @@ fn tracking_step(majorant: f64, u: f64) -> f64 {
 fn exponential(u: f64) -> f64 {
     -(1.0 - u).ln()
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-VOL-3",
+    name: "free flight by ray marching, steps fixed or adaptive (baseline)",
+    role: Role::Yardstick,
+    limits: "Wrong by its step, and never in a picture.",
+    sources: &[sources::JENSEN_CHRISTENSEN_1998.whole()],
+    bias: Some(Bias::Consistent("the step")),
+    tests: &["engine/src/transport/free_flight.rs::marched_flights_are_biased_by_their_step"],
+    experiment: "clerestory report free-flight",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -6,6 +6,8 @@
 
 use glam::DVec3;
 
+use crate::card::{Role, Row, sources};
+
 /// Reflectance at normal incidence for a relative index of refraction.
 pub fn fresnel_f0(eta: f64) -> f64 {
     let r = (eta - 1.0) / (eta + 1.0);
@@ -65,6 +67,32 @@ pub fn schlick_weight(cos_i: f64) -> f64 {
 pub fn fresnel_schlick(cos_i: f64, f0: DVec3) -> DVec3 {
     f0 + (DVec3::ONE - f0) * schlick_weight(cos_i)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "MET-F1",
+        name: "exact unpolarised conductor Fresnel",
+        role: Role::PartOf("BG-3"),
+        limits: "Unpolarized light at a smooth interface, by three bands.",
+        sources: &[sources::BORN_WOLF_1999.at("14.2")],
+        shaders: &["shaders/transport/fresnel.glsl"],
+        tests: &["engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric"],
+        experiment: "clerestory agreement --scene cornell-metals,ring-mirror",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-FRESNEL",
+        name: "exact dielectric Fresnel",
+        role: Role::PartOf("BG-3"),
+        limits: "Unpolarized light at a smooth interface, with one index for all bands.",
+        sources: &[sources::BORN_WOLF_1999.at("1.5")],
+        shaders: &["shaders/transport/fresnel.glsl"],
+        tests: &["engine/src/transport/fresnel.rs::dielectric_equals_the_textbook_form_and_its_edges"],
+        experiment: "clerestory agreement --scene cornell-glass",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,8 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
+use crate::card::{Bias, Role, Row, sources};
+
 /// Below this the lobe is a Dirac delta: half vectors carry f32 errors of 1e-7, a part in 10⁴ of this width. The shader has it rounded;
 /// the albedo table is laid out by the exact value.
 pub const ALPHA_MIN: f64 = 1e-3;
@@ -54,6 +56,29 @@ pub fn ggx_sample_visible(wo: DVec3, alpha: f64, u: DVec2) -> DVec3 {
     let h = DVec3::new(r * cos, r * sin, z) + v;
     DVec3::new(alpha * h.x, alpha * h.y, h.z).normalize()
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-GGX",
+    name: "GGX distribution, height-correlated masking, visible normals by spherical caps",
+    role: Role::PartOf("BG-3"),
+    limits: "Isotropic, without scattering among microfacets.",
+    sources: &[
+        sources::WALTER_2007.whole(),
+        sources::HEITZ_2014.whole(),
+        sources::DUPUY_BENYOUB_2023.whole(),
+    ],
+    shaders: &["shaders/transport/ggx.glsl"],
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "engine/src/transport/ggx.rs::densities_are_normalised",
+        "engine/src/transport/ggx.rs::visible_normals_follow_their_density",
+        "engine/src/transport/ggx.rs::masking_limits",
+        "tests/tests/samplers.rs::visible_normals_follow_their_density",
+    ],
+    experiment: "clerestory agreement --scene cornell-frosted,ring-rough",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

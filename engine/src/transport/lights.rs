@@ -5,6 +5,7 @@
 //! `transport/lights.glsl`.
 
 use super::warp::square_to_triangle;
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::scene::LightKind;
 use glam::{DVec2, DVec3};
@@ -71,6 +72,46 @@ pub fn light_power(kind: &LightKind, scene_radius: f64) -> DVec3 {
 pub fn triangle_power(radiance: DVec3, area: f64, double_sided: bool) -> DVec3 {
     radiance * (PI * area * if double_sided { 2.0 } else { 1.0 })
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-F-1",
+        name: "radiometry of point and spot lights, split into direct and indirect light",
+        role: Role::PartOf("BG-3"),
+        limits: "Points and spots have no extent: no ray meets them, so that mirrors do not show them.",
+        sources: &[
+            sources::VEACH_1997.at("chapter 3"),
+            sources::KHRONOS_LIGHTS_PUNCTUAL.whole(),
+        ],
+        shaders: &["shaders/transport/lights.glsl"],
+        tests: &[
+            "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
+            "engine/src/transport/lights.rs::spot_flux_and_falloff",
+            "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+            "tests/tests/path_tracer.rs::path_sets_are_a_partition",
+        ],
+        experiment: "clerestory agreement --scene cornell-point,sphere-flake",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "MET-B1",
+        name: "radiometry and rendering equation",
+        role: Role::PartOf("BG-3"),
+        limits: "Geometric optics in three bands, without polarization and fluorescence.",
+        sources: &[sources::KAJIYA_1986.whole()],
+        shaders: &["shaders/transport/lights.glsl"],
+        tests: &[
+            "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
+            "engine/src/transport/lights.rs::spot_flux_and_falloff",
+            "engine/src/transport/lights.rs::a_triangle_seen_by_its_density_has_its_solid_angle",
+            "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+            "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+        ],
+        experiment: "clerestory agreement --scene cornell-box,cornell-point",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {

@@ -4,6 +4,7 @@
 //! Formulation of Light Transport" (2019); Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media" (2012).
 //! Guarantees: weights are finite, and unbiased for each band whatever the bands' probabilities. Distances in metres, coefficients in m⁻¹.
 
+use crate::card::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::DVec3;
 
@@ -158,6 +159,109 @@ pub fn sample_null_collision(
     let weight = weight * if collides { scattered } else { share } * inverse;
     (collides, bands * share * inverse, weight)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "BG-1",
+        name: "radiometry, transport between surfaces and in media",
+        role: Role::PartOf("BG-3"),
+        limits: "Geometric optics in three bands, without polarization; light takes no time.",
+        sources: &[sources::CHANDRASEKHAR_1960.whole(), sources::VEACH_1997.at("chapter 3")],
+        shaders: &["shaders/transport/medium.glsl"],
+        tests: &[
+            "engine/src/transport/lights.rs::a_triangle_seen_by_its_density_has_its_solid_angle",
+            "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
+            "engine/src/transport/phase.rs::samples_follow_their_density",
+            "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+            "tests/tests/media/absorption.rs::beers_law_is_exact",
+            "tests/tests/media/absorption.rs::emission_is_integrated_exactly",
+            "tests/tests/media/furnace.rs::lossless_media_vanish",
+        ],
+        experiment: "clerestory report error-in-media",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "BG-4",
+        name: "free flight and transmittance: analytic, delta and ratio tracking, equi-angular",
+        role: Role::PartOf("BG-3"),
+        limits: "Tracking takes the more steps, and ratio tracking has the more noise, the looser the bound of the density is.",
+        sources: &[
+            sources::WOODCOCK_1965.whole(),
+            sources::KULLA_FAJARDO_2012.whole(),
+            sources::NOVAK_2014.whole(),
+            sources::MILLER_2019.whole(),
+        ],
+        shaders: &[
+            "shaders/transport/path_medium.comp",
+            "shaders/transport/media_tracking.glsl",
+        ],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
+            "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
+            "engine/src/transport/medium.rs::equi_angular_samples_follow_their_density",
+            "tests/tests/twins/media.rs::free_flight_agrees_with_its_twin",
+            "tests/tests/media/homogeneous.rs::single_scattering_is_the_airlight_integral",
+            "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
+            "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
+            "tests/tests/media/heterogeneous.rs::layered_slabs_depend_on_their_optical_depth_alone",
+            "tests/tests/media/slab.rs::bands_of_a_chromatic_medium_are_those_of_grey_ones",
+        ],
+        experiment: "clerestory agreement --scene fog-box,smoke",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-VOL-1",
+        name: "transmittance: analytic and by ratio tracking; ray marching as their baseline",
+        role: Role::PartOf("BG-3"),
+        limits: "Ratio tracking has the more noise the looser the bound of the density is.",
+        sources: &[sources::JENSEN_CHRISTENSEN_1998.whole(), sources::NOVAK_2014.whole()],
+        shaders: &["shaders/transport/medium.glsl", "shaders/transport/media_tracking.glsl"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "tests/tests/media/absorption.rs::beers_law_is_exact",
+            "tests/tests/media/absorption.rs::shadow_rays_are_attenuated_exactly",
+            "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
+            "engine/src/transport/free_flight.rs::marched_transmittance_errs_by_the_step_and_in_the_middle_by_its_square",
+            "engine/src/transport/free_flight.rs::ratio_tracking_is_unbiased_however_loose_the_majorant",
+        ],
+        experiment: "clerestory report free-flight",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-VOL-2",
+        name: "free flight through homogeneous media",
+        role: Role::PartOf("BG-3"),
+        limits: "Media of one density only.",
+        sources: &[sources::JENSEN_CHRISTENSEN_1998.whole(), sources::WILKIE_2014.whole()],
+        shaders: &["shaders/transport/medium.glsl"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
+            "engine/src/transport/medium.rs::extremes_stay_finite",
+        ],
+        experiment: "clerestory report free-flight",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-VOL-4",
+        name: "free flight by delta tracking",
+        role: Role::PartOf("BG-3"),
+        limits: "Needs a bound of the density, and takes the more steps the looser it is.",
+        sources: &[sources::WOODCOCK_1965.whole(), sources::COLEMAN_1968.whole()],
+        shaders: &["shaders/transport/medium.glsl", "shaders/transport/media_tracking.glsl"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/free_flight.rs::tracked_flights_follow_their_distribution_however_loose_the_majorant",
+            "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
+            "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
+            "tests/tests/media/heterogeneous.rs::emptiness_and_loose_majorants_cost_noise_only",
+        ],
+        experiment: "clerestory report free-flight",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {

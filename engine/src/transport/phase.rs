@@ -6,6 +6,7 @@
 //! `transport/phase.glsl`.
 
 use super::warp::{UNIFORM_SPHERE_PDF, direction_below_pole, orthonormal_basis};
+use crate::card::{Bias, Role, Row, sources};
 use crate::scene::Phase;
 use glam::DVec3;
 
@@ -99,6 +100,23 @@ pub fn phase_direction(w: DVec3, c: f64, u: f64) -> DVec3 {
     let (t, b) = orthonormal_basis(w);
     t * local.x + b * local.y + w * local.z
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-F-3",
+    name: "phase functions of Henyey and Greenstein, Schlick and Rayleigh",
+    role: Role::PartOf("BG-3"),
+    limits: "Rotationally symmetric and without polarization; no measured tables.",
+    sources: &[sources::HENYEY_GREENSTEIN_1941.whole(), sources::BLASI_1993.whole()],
+    shaders: &["shaders/transport/phase.glsl"],
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
+        "engine/src/transport/phase.rs::samples_follow_their_density",
+    ],
+    experiment: "clerestory report phase-functions",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

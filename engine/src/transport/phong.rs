@@ -6,6 +6,7 @@
 //! normal incidence only. Frame: z is the normal; `wo.z` > 0. Twin of `transport/phong.glsl`.
 
 use super::warp::{direction_below_pole, orthonormal_basis};
+use crate::card::{Bias, Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_1_PI;
 
@@ -40,6 +41,27 @@ pub fn phong_sample(exponent: f64, wo: DVec3, u: DVec2) -> DVec3 {
     let (t, b) = orthonormal_basis(axis);
     t * w.x + b * w.y + axis * w.z
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-F-2",
+    name: "surface models: Lambert, mirror, refraction (path tracer); modified Phong (function)",
+    role: Role::PartOf("BG-3"),
+    limits: "The modified Phong lobe is a function alone: no material of a scene has it.",
+    sources: &[sources::LAFORTUNE_WILLEMS_1994.whole(), sources::WALTER_2007.whole()],
+    shaders: &["shaders/transport/phong.glsl"],
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "engine/src/transport/phong.rs::white_furnace",
+        "engine/src/transport/phong.rs::reciprocal",
+        "engine/src/transport/phong.rs::samples_follow_their_density",
+        "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
+        "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
+        "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
+    ],
+    experiment: "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -5,6 +5,7 @@
 //! with the hash constants of Vegdahl (2021). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
 //! values lie on the 2⁻²⁴ grid of [0, 1). Twin of `transport/random.glsl`, bit for bit.
 
+use crate::card::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{SAMPLER_PCG, SAMPLER_SOBOL, SEQUENCE_KEY};
 use glam::{DVec2, UVec3, UVec4};
 
@@ -141,6 +142,42 @@ pub fn sample_2d(s: &mut Sampler, kind: SamplerKind) -> DVec2 {
     s.dimension = s.dimension.wrapping_add(1);
     DVec2::new(unit_float(x), unit_float(y))
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "CL-SOBOL",
+        name: "Owen-scrambled Sobol' points by hashing",
+        role: Role::PartOf("BG-3"),
+        limits: "Even in pairs of dimensions only, so that the gain fades with the bounces.",
+        sources: &[sources::BURLEY_2020.whole(), sources::LAINE_KARRAS_2011.whole()],
+        shaders: &["shaders/transport/random.glsl"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/random.rs::pascal_steps_equal_the_direction_numbers",
+            "engine/src/transport/random.rs::sobol_pairs_are_stratified_plain_and_scrambled",
+            "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
+            "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
+        ],
+        experiment: "clerestory report samplers",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-PCG",
+        name: "counter-based random numbers by PCG hashes",
+        role: Role::PartOf("BG-3"),
+        limits: "Values on a grid of 2⁻²⁴; independent by statistical tests, not by proof.",
+        sources: &[sources::JARZYNSKI_OLANO_2020.whole()],
+        shaders: &["shaders/transport/random.glsl"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/random.rs::pcg_avalanche_and_means",
+            "engine/src/transport/random.rs::floats_stay_below_one",
+        ],
+        experiment: "clerestory agreement",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {

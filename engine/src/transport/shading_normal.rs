@@ -6,6 +6,7 @@
 //! normal| is integrated over a part of its domain. Reciprocity is lost, as with every shading normal. Twin of
 //! `transport/shading_normal.glsl`.
 
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::DVec3;
 
@@ -29,6 +30,22 @@ pub fn adapt_shading_normal(ns: DVec3, ng: DVec3, wo: DVec3) -> DVec3 {
 pub fn sides_agree(ns: DVec3, ng: DVec3, wi: DVec3) -> bool {
     ns.dot(wi) * ng.dot(wi) > 0.0
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-NORMALS",
+    name: "shading normals and normal maps that never gain energy",
+    role: Role::PartOf("BG-3"),
+    limits: "Loses light where the two normals disagree, and reciprocity with every shading normal.",
+    sources: &[sources::VEACH_1997.at("5.3 for the problem; the bend towards the viewer is the engine's own")],
+    shaders: &["shaders/transport/shading_normal.glsl"],
+    tests: &[
+        "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_lose_energy_only",
+        "engine/src/scene/normal_map.rs::flat_maps_keep_the_normal",
+    ],
+    experiment: "clerestory report shading-normals",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -9,6 +9,8 @@ pub use crate::scene::normal_map::orthonormal_basis;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
+use crate::card::{Bias, Role, Row, sources};
+
 /// Density of [`square_to_sphere`], sr⁻¹.
 pub const UNIFORM_SPHERE_PDF: f64 = 0.25 * FRAC_1_PI;
 /// Density of [`square_to_hemisphere`], sr⁻¹.
@@ -72,6 +74,26 @@ pub fn square_to_triangle(u: DVec2) -> DVec3 {
     let (b1, b2) = if u.x < u.y { (low, u.y - low) } else { (u.x - low, low) };
     DVec3::new(1.0 - b1 - b2, b1, b2)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "BG-2",
+    name: "Monte Carlo and importance sampling",
+    role: Role::PartOf("BG-3"),
+    limits: "Sampling follows closed forms and tables; nothing is learned from samples already taken.",
+    sources: &[sources::VEACH_1997.at("chapters 2 and 9")],
+    shaders: &["shaders/transport/warp.glsl"],
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "engine/src/transport/warp.rs::directions_follow_their_density",
+        "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
+        "engine/src/transport/bsdf/tests.rs::weight_is_value_over_density_and_density_integrates",
+        "tests/tests/samplers.rs::warps_keep_areas",
+        "tests/tests/samplers.rs::pairs_fill_the_square_evenly",
+    ],
+    experiment: "clerestory report convergence",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -34,7 +34,7 @@ struct Even {
 const EVEN: Card = Card {
     id: "even",
     summary: "the same radiance everywhere",
-    publication: "none",
+    rows: &[],
     bias: Bias::Biased("looks at nothing"),
     needs: &[],
     path_set: PathSet::ALL,

@@ -13,6 +13,7 @@ use super::probability::{Heuristic, InteriorOrigin};
 use super::{KdSettings, MAX_DEPTH};
 use crate::accel::Aabb;
 use crate::accel::input::bounds_of;
+use crate::card::{Role, Row, sources};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -358,3 +359,19 @@ fn merge(kept: impl Iterator<Item = Event>, fresh: &[Event], capacity: usize) ->
     merged.extend(fresh);
     merged
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-KD-1",
+    name: "kd-trees by the surface area heuristic, O(n log n), with perfect splits",
+    role: Role::Kernel,
+    limits: "Built on the host, the slowest of the builds; what moves is built anew.",
+    sources: &[sources::WALD_HAVRAN_2006.whole()],
+    tests: &[
+        "engine/src/accel/kd/tests.rs::every_point_of_a_triangle_lies_in_a_leaf_that_holds_it",
+        "engine/src/accel/kd/tests.rs::a_wall_ends_in_a_leaf_without_volume",
+        "engine/src/accel/kd/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
+    ],
+    experiment: "clerestory report kd-heuristics",
+    ..Row::of(file!())
+}];

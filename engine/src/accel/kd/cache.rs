@@ -4,6 +4,7 @@
 //! and, with a leaf that waits, how much is visited; never a hit.
 
 use crate::accel::input::check_range;
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 
@@ -127,3 +128,87 @@ impl KdCaches {
         Err(Error::setting("kd.caches", format!("{self:?}"), because))
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-CA-1",
+        name: "kd node cache I: the top of the tree in shared memory",
+        role: Role::PartOf("PM-X-2"),
+        limits: "Only persistent threads that traverse kd-trees by a stack have it, and only as many levels as fit shared memory.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
+        shaders: &["shaders/accel/kd_cache.glsl"],
+        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        experiment: "clerestory report kd-caches kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-CA-2",
+        name: "node cache II: the same with boxes",
+        role: Role::PartOf("PM-X-2"),
+        limits: "As node cache I, with fewer levels for the same memory.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
+        shaders: &["shaders/accel/kd_cache.glsl"],
+        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        experiment: "clerestory report kd-caches kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-CA-3",
+        name: "stack cache I: the last entry in registers",
+        role: Role::PartOf("PM-X-2"),
+        limits: "Only persistent threads that traverse kd-trees by a stack have it, for one entry.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
+        shaders: &["shaders/accel/kd_cache.glsl"],
+        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        experiment: "clerestory report kd-caches kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-CA-4",
+        name: "stack cache II: entries as bytes in registers",
+        role: Role::PartOf("PM-X-2"),
+        limits: "Eight entries at most, which name cached nodes alone: wants node cache II.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
+        shaders: &["shaders/accel/kd_cache.glsl"],
+        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        experiment: "clerestory report kd-caches kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-CA-5",
+        name: "stack cache III: a leaf that waits",
+        role: Role::PartOf("PM-X-2"),
+        limits: "Visits leaves that a hit would have spared.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
+        shaders: &["shaders/accel/kd_cache.glsl"],
+        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        experiment: "clerestory report kd-caches kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-CA-6",
+        name: "speculation: rays with a leaf that waits go on until all of their subgroup have one",
+        role: Role::PartOf("PM-X-2"),
+        limits: "What a ray visits depends on its neighbours; needs subgroup votes.",
+        sources: &[
+            sources::AILA_LAINE_2009.whole(),
+            sources::FABIANOWSKI_2011.at("§4.3.2.3"),
+        ],
+        shaders: &["shaders/accel/trace_queue_vote.comp"],
+        tests: &["tests/tests/kd.rs::votes_change_no_hit"],
+        experiment: "clerestory report kd-threads",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-CA-7",
+        name: "caches of nodes and of the last entry together",
+        role: Role::PartOf("PM-X-2"),
+        limits: "As its two caches.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
+        shaders: &["shaders/accel/kd_cache.glsl"],
+        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        experiment: "clerestory report kd-caches kd-rays",
+        ..Row::of(file!())
+    },
+];

@@ -13,6 +13,7 @@
 use std::f64::consts::PI;
 
 use super::bounds::Bounds;
+use crate::card::{Role, Row, sources};
 use glam::DVec3;
 
 /// The measure of how probable a visit is.
@@ -268,6 +269,46 @@ fn inverse_distance_antiderivative(u: f64, v: f64, h: f64) -> f64 {
         - (u * u - 2.0 * h * h + v * v) * r / 6.0
         - angle
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-KD-2",
+        name: "exact probability of a visit from inside the scene, in closed form",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Origins are even in the scene's box and nothing hides a node; some hundred times slower a candidate than the surface area.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.1.1"), sources::HOER_LOVE_1965.whole()],
+        tests: &[
+            "engine/src/accel/kd/probability/tests.rs::the_closed_form_is_the_integral_of_solid_angles",
+            "engine/src/accel/kd/probability/tests.rs::probabilities_are_those_of_the_reference_table",
+        ],
+        experiment: "clerestory report kd-probability",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-KD-3",
+        name: "the same by 26 regions",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "The solid angle in each region is that at its centre, wrong where the node is near.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.1.2")],
+        tests: &["engine/src/accel/kd/probability/tests.rs::probabilities_are_those_of_the_reference_table"],
+        experiment: "clerestory report kd-probability",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-KD-4",
+        name: "the same by overlapping slabs (SIROH), incrementally",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Solid angles are ratios of areas over overlapping slabs, which can exceed the surface area heuristic.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.1.3")],
+        tests: &[
+            "engine/src/accel/kd/probability/tests.rs::parts_handed_down_are_those_of_the_children",
+            "engine/src/accel/kd/probability/tests.rs::every_heuristic_gives_the_scene_itself_one",
+        ],
+        experiment: "clerestory report kd-heuristics",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests;

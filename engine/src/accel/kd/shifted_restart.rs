@@ -9,6 +9,7 @@ use super::KdTree;
 use super::tree::KdKind;
 use crate::accel::Ray;
 use crate::accel::bvh2::traverse::BoxTest;
+use crate::card::{Role, Row, sources};
 
 /// What a restart takes for its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,3 +108,17 @@ pub fn leaves_by_stack(tree: &KdTree, ray: &Ray) -> LeafSequence {
     }
     sequence
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-TR-2",
+    name: "restart behind a leaf in three forms, each shown to fail",
+    role: Role::Yardstick,
+    limits: "Loses or repeats leaves that begin at one distance: kept to show that it fails.",
+    sources: &[sources::FOLEY_SUGERMAN_2005.whole()],
+    tests: &[
+        "engine/src/accel/kd/shifted_restart_tests.rs::restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not",
+    ],
+    experiment: "clerestory report kd-traversal",
+    ..Row::of(file!())
+}];

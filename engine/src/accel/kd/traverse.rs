@@ -14,6 +14,7 @@ use crate::accel::bvh2::FINISHED;
 use crate::accel::bvh2::traverse::BoxTest;
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
 use crate::accel::{CandidateFilter, Hit, Ray};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 
@@ -430,3 +431,79 @@ impl<'a> Walk<'a> {
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-TR-1",
+        name: "traversal of kd-trees with a stack",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Each ray keeps a stack of eight-byte entries, as many as the tree is deep.",
+        sources: &[sources::WALD_2004.at("7.1")],
+        shaders: &["shaders/accel/kd.glsl"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+        ],
+        experiment: "clerestory report kd-traversal kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-TR-3",
+        name: "the same without a stack, by a word of flags",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Walks down from the root again after each leaf.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.2.2")],
+        shaders: &["shaders/accel/kd.glsl"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+            "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+        ],
+        experiment: "clerestory report kd-traversal kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-TR-4",
+        name: "flags with push-down",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Spares only the nodes above the smallest subtree that holds the ray.",
+        sources: &[sources::HORN_2007.whole()],
+        shaders: &["shaders/accel/kd.glsl"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+        ],
+        experiment: "clerestory report kd-traversal kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-TR-5",
+        name: "flags with a short stack",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Restarts where the short stack has run empty.",
+        sources: &[sources::HORN_2007.whole()],
+        shaders: &["shaders/accel/kd.glsl"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+        ],
+        experiment: "clerestory report kd-traversal kd-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-TR-6",
+        name: "flags with both",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Restarts, below the root, where the short stack has run empty.",
+        sources: &[sources::HORN_2007.whole()],
+        shaders: &["shaders/accel/kd.glsl"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+            "engine/src/accel/kd/tests.rs::work_is_in_the_order_of_the_schemes",
+            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+        ],
+        experiment: "clerestory report kd-traversal kd-rays",
+        ..Row::of(file!())
+    },
+];

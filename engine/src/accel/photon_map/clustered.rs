@@ -9,6 +9,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 use crate::accel::lbvh::SortedCodes;
+use crate::card::{Role, Row, sources};
 
 /// How much was left to sort and to pass over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -156,3 +157,18 @@ fn fill_bounds(boxes: &[Aabb], tree: &mut BoxTree) {
     }
     tree.bounds = leaf(tree, tree.root);
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-MAP-11",
+    name: "linear hierarchy by clusters",
+    role: Role::Yardstick,
+    limits: "What it saves depends on how coherent the input is.",
+    sources: &[sources::PANTALEONI_LUEBKE_2010.whole()],
+    tests: &[
+        "engine/src/accel/photon_map/tests.rs::sorting_by_clusters_is_the_stable_sort",
+        "engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+    ],
+    experiment: "clerestory report map-construction",
+    ..Row::of(file!())
+}];

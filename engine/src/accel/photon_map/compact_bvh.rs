@@ -14,6 +14,7 @@ use super::complete_bvh::{
 };
 use crate::accel::Aabb;
 use crate::accel::box_tree::TreeFault;
+use crate::card::{Role, Row, sources};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -257,6 +258,52 @@ fn encode_pair(pair: &RayPair, parent: &Aabb, place: u32) -> Result<CompactPair,
         right: pair.references[1] | upper_mask,
     })
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-MAP-8",
+        name: "compact sibling pairs",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Boxes must be tight: trees without, such as refitted ones, are refused until they are encoded anew.",
+        sources: &[sources::FABIANOWSKI_2011.at("§6.2.1")],
+        shaders: &["shaders/accel/compact_bvh.glsl"],
+        tests: &[
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes",
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::loose_boxes_are_refused",
+        ],
+        experiment: "clerestory report compact-map",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-MAP-9",
+        name: "point queries on compact pairs",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Visits the leaves whose boxes hold a point; what is in them is for the caller to test.",
+        sources: &[sources::FABIANOWSKI_2011.at("§6.2.3")],
+        shaders: &["shaders/accel/compact_bvh.glsl", "shaders/accel/compact_points.comp"],
+        tests: &[
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
+            "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+        ],
+        experiment: "clerestory report compact-map photon-frame",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-MAP-10",
+        name: "ray queries on compact pairs",
+        role: Role::Yardstick,
+        limits: "No picture takes it: their rays go through the ray indexes.",
+        sources: &[sources::FABIANOWSKI_2011.at("§6.2.2")],
+        shaders: &["shaders/accel/compact_bvh.glsl", "shaders/accel/compact_rays.comp"],
+        tests: &[
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+            "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+        ],
+        experiment: "clerestory report compact-rays",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests;

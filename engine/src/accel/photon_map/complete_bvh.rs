@@ -8,6 +8,7 @@
 
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -301,3 +302,55 @@ impl SlabRay {
 pub fn met([enter, leave]: [f32; 2]) -> bool {
     enter <= leave + leave.abs() * SPAN_SLACK
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-X-3",
+        name: "traffic model: every access served by itself, as exact counts of bytes",
+        role: Role::Yardstick,
+        limits: "Counts bytes as if there were no cache, and says nothing of time.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.3.3")],
+        tests: &[
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+        ],
+        experiment: "clerestory report compact-map compact-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-MAP-7",
+        name: "complete nodes and sibling pairs",
+        role: Role::Yardstick,
+        limits: "Twice the bytes of compact pairs, which it is the baseline of.",
+        sources: &[sources::FABIANOWSKI_2011.at("§6.2.4")],
+        tests: &[
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes",
+        ],
+        experiment: "clerestory report compact-map",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-I-4",
+        name: "slabs test of boxes",
+        role: Role::PartOf("PM-MAP-7"),
+        limits: "Says that a leaf's box is met, not what in it is.",
+        sources: &[sources::KAY_KAJIYA_1986.whole()],
+        tests: &[
+            "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+            "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+        ],
+        experiment: "clerestory report compact-rays",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-I-5",
+        name: "points in boxes",
+        role: Role::PartOf("PM-MAP-7"),
+        limits: "A point on the border of a box may count as outside.",
+        sources: &[sources::FABIANOWSKI_2011.at("§3.2.4.2")],
+        tests: &["engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order"],
+        experiment: "clerestory report compact-map",
+        ..Row::of(file!())
+    },
+];

@@ -10,6 +10,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use crate::accel::lbvh::SortedCodes;
+use crate::card::{Role, Row, sources};
 
 /// Two neighbours whose codes differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,3 +129,18 @@ pub fn merged_hierarchy(
         root: ascent.child(0),
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-MAP-5",
+    name: "linear hierarchy by merging",
+    role: Role::PartOf("PM-SYS-1"),
+    limits: "A run of equal codes is one leaf, whatever the leaf size; quality is that of splits in the middle.",
+    sources: &[sources::FABIANOWSKI_2011.at("§6.1.2")],
+    tests: &[
+        "engine/src/accel/photon_map/tests.rs::the_worked_example_of_the_merge_comes_out_step_by_step",
+        "engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
+    ],
+    experiment: "clerestory report map-construction map-quality merge-example",
+    ..Row::of(file!())
+}];

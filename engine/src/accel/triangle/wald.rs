@@ -8,6 +8,7 @@
 
 use super::TriangleHit;
 use crate::accel::Ray;
+use crate::card::{Role, Row, sources};
 use glam::Vec3;
 
 /// A triangle made ready: nine numbers and an axis, of which the plane's four are read first.
@@ -74,6 +75,18 @@ impl WaldTriangle {
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then_some(TriangleHit { t, u, v })
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-I-3",
+    name: "projected triangle test, made ready beforehand (measured, not in the kernels)",
+    role: Role::Yardstick,
+    limits: "Not watertight, and weights lose digits where a triangle is far smaller than its distance from the origin of coordinates.",
+    sources: &[sources::WALD_2004.at("7.1")],
+    tests: &["engine/src/accel/triangle/wald.rs::hits_differ_from_the_oracle_only_near_edges"],
+    experiment: "clerestory report triangle-tests",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

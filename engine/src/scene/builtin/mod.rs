@@ -25,6 +25,7 @@ mod volumes;
 
 pub use parameters::{Parameter, ParameterKind};
 
+use crate::card::{Role, Row, sources};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use parameters::Values;
@@ -130,6 +131,25 @@ pub fn generate(address: &str) -> Result<Scene> {
     scene.check()?;
     Ok(scene)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-CORNELL",
+    name: "Cornell box and the other generated scenes",
+    role: Role::Service,
+    limits: "The same bits only with the same mathematics library; the Cornell box has colours in common use, not its measured spectra.",
+    sources: &[
+        sources::GORAL_1984.whole(),
+        sources::CORNELL_BOX_DATA.whole(),
+        sources::HAINES_1987.whole(),
+    ],
+    tests: &[
+        "engine/src/scene/builtin/cornell.rs::the_areas_are_those_of_the_published_data",
+        "engine/src/scene/builtin/mod.rs::every_entry_builds_with_its_defaults_and_has_what_it_promises",
+    ],
+    experiment: "clerestory agreement",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

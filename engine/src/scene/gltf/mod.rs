@@ -24,6 +24,7 @@ use std::path::Path;
 use ::gltf::json::{self, Index, Root};
 
 use super::{Note, Scene};
+use crate::card::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// Extensions that are carried over.
@@ -220,3 +221,19 @@ impl<'a> Reader<'a> {
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-GLTF",
+    name: "reader of glTF 2.0",
+    role: Role::Service,
+    limits: "Animations, skins and morph targets are reported and left out.",
+    sources: &[sources::KHRONOS_GLTF.whole()],
+    tests: &[
+        "engine/src/scene/gltf/tests/features.rs::text_and_binary_containers_give_the_same_scene",
+        "engine/src/scene/gltf/tests/features.rs::material_extensions_are_carried_over",
+        "engine/src/scene/gltf/tests/malformed.rs::every_truncation_is_an_error",
+    ],
+    experiment: "tools/models",
+    ..Row::of(file!())
+}];

@@ -12,6 +12,7 @@ mod spectra;
 use glam::DVec3;
 
 use super::ConductorIor;
+use crate::card::{Role, Row, sources};
 use spectra::Spectrum;
 
 impl Spectrum {
@@ -53,6 +54,26 @@ pub fn by_name(name: &str) -> Option<ConductorIor> {
         k: spectrum.mean(2).as_vec3(),
     })
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-METALS",
+    name: "measured metals: gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt",
+    role: Role::PartOf("BG-3"),
+    limits: "Three channels for a spectrum: reflectances are off by up to 0.012, and gold's red, outside of Rec. 709, is 0.98.",
+    sources: &[
+        sources::JOHNSON_CHRISTY_1972.whole(),
+        sources::JOHNSON_CHRISTY_1974.whole(),
+        sources::RAKIC_1995.whole(),
+    ],
+    tests: &[
+        "engine/src/scene/metals/mod.rs::spectra_reflect_what_others_computed_of_them",
+        "engine/src/scene/metals/mod.rs::channels_reflect_as_their_spectra_do",
+        "engine/src/scene/metals/mod.rs::channels_reflect_like_other_samples_of_the_metals",
+    ],
+    experiment: "clerestory agreement --scene cornell-metals",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

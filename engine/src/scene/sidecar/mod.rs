@@ -39,6 +39,7 @@ use serde::Deserialize;
 use medium::MediumTable;
 
 use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, builtin, metals};
+use crate::card::{Role, Row};
 use crate::{Error, Result};
 
 /// Greatest number of texels of an environment map.
@@ -418,3 +419,17 @@ fn read_hdr(path: &Path) -> Result<Texels, String> {
         image.pixels().map(|p| Vec3::from_array(p.0)).collect(),
     ))
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-SIDECAR",
+    name: "sidecar of a model: environment, metals, cameras, exposure, technique, participating media with grids of densities",
+    role: Role::Service,
+    limits: "Says what glTF cannot; geometry and textures stay in the model.",
+    tests: &[
+        "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
+        "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
+    ],
+    experiment: "tools/models",
+    ..Row::of(file!())
+}];

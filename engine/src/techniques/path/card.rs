@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::Result;
+use crate::card::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::shaders::transport::path_shade;
@@ -17,7 +18,7 @@ use crate::transport::PathSet;
 pub(in crate::techniques) const CARD: Card = Card {
     id: "path",
     summary: "unidirectional path tracing with next-event estimation and multiple importance sampling",
-    publication: "Kajiya 1986; Veach 1997, chapters 9 and 10",
+    rows: &[ROWS, super::ROWS],
     bias: Bias::Unbiased,
     needs: &[],
     path_set: PathSet::ALL,
@@ -167,6 +168,47 @@ impl Technique for PathTracer {
             .collect()
     }
 }
+
+/// Rows of the catalogue.
+const ROWS: &[Row] = &[Row {
+    id: "BG-3",
+    name: "path tracer, surfaces and media: technique `path`",
+    role: Role::Technique,
+    limits: "Slow where light comes through small specular chains, and blind to those that end in a point or directional light, such as its caustics.",
+    sources: &[
+        sources::KAJIYA_1986.whole(),
+        sources::VEACH_1997.at("chapters 9 and 10"),
+        sources::LAINE_2013.whole(),
+    ],
+    shaders: &[
+        "shaders/transport/path_camera.comp",
+        "shaders/transport/path_extend.comp",
+        "shaders/transport/path_medium.comp",
+        "shaders/transport/path_shade.comp",
+        "shaders/transport/path_shadow.comp",
+        "shaders/transport/path_resolve.comp",
+    ],
+    path_set: Some("all"),
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+        "tests/tests/path_tracer.rs::a_light_in_a_lambert_sphere_fills_it_evenly",
+        "tests/tests/path_tracer.rs::white_objects_vanish_in_a_white_furnace",
+        "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
+        "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
+        "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
+        "tests/tests/path_tracer.rs::rough_glass_loses_what_the_f64_twin_says",
+        "tests/tests/media/homogeneous.rs::fluence_about_a_source_is_the_exact_one",
+        "tests/tests/media/homogeneous.rs::rays_past_a_source_have_the_exact_multiple_scattering",
+        "tests/tests/media/slab.rs::reflectance_and_transmittance_are_those_of_the_tables",
+        "tests/tests/media/mechanics.rs::parts_of_everything_sum_to_the_whole",
+        "tests/tests/hard_cases.rs::techniques_take_every_second_case_as_documented",
+        "tests/tests/hard_cases.rs::techniques_take_the_cases_between_as_documented",
+        "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
+    ],
+    experiment: "clerestory report error-against-time",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

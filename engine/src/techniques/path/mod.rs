@@ -31,6 +31,7 @@ use self::wave::{
 };
 use crate::Result;
 use crate::accel::trace::wide_counter;
+use crate::card::{Bias, Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
 use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
@@ -440,3 +441,59 @@ impl PathTracer {
         Ok(())
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "MET-B8",
+        name: "path estimation: light sampling, BRDF sampling, Russian roulette",
+        role: Role::PartOf("BG-3"),
+        limits: "Paths begin at the eye alone: caustics of small lights are noise, and those of points are not found.",
+        sources: &[
+            sources::KAJIYA_1986.whole(),
+            sources::VEACH_1997.at("chapters 9 and 10"),
+        ],
+        shaders: &["shaders/transport/path_shade.comp"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/lights.rs::heuristics_sum_to_one",
+            "tests/tests/path_tracer.rs::lights_are_chosen_in_the_end_as_often_as_their_weights_say",
+            "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+            "tests/tests/path_tracer.rs::the_variance_layer_is_the_variance_of_the_means",
+            "tests/tests/path_tracer.rs::sobol_draws_have_the_same_expectation_and_less_variance_between_seeds",
+        ],
+        experiment: "clerestory report roulette",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-ALPHA",
+        name: "alpha: masks, and blending by chance",
+        role: Role::PartOf("BG-3"),
+        limits: "Blending by chance costs noise.",
+        sources: &[sources::ENDERTON_2010.whole()],
+        shaders: &[
+            "shaders/transport/path_extend_alpha.comp",
+            "shaders/transport/path_shadow_alpha.comp",
+        ],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "tests/tests/alpha.rs::masks_are_all_or_nothing",
+            "tests/tests/alpha.rs::blended_walls_thin_out_the_light_behind_them",
+            "tests/tests/alpha.rs::blended_surfaces_scatter_in_proportion_to_alpha",
+            "tests/tests/alpha.rs::textures_and_vertex_colours_carry_alpha",
+        ],
+        experiment: "clerestory report alpha",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-ABSORPTION",
+        name: "absorption inside of solids",
+        role: Role::PartOf("BG-3"),
+        limits: "Solids of one absorption whose surfaces neither cross nor coincide.",
+        sources: &[sources::KHRONOS_MATERIALS_VOLUME.at("law of Beer and Lambert")],
+        shaders: &["shaders/transport/path_shade.comp"],
+        tests: &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
+        experiment: "clerestory report absorption",
+        ..Row::of(file!())
+    },
+];

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{PhotonMapper, PhotonSettings};
+use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer};
 use crate::Result;
+use crate::card::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, PipelineInfo};
@@ -16,8 +17,8 @@ use crate::transport::PathSet;
 pub(in crate::techniques) const CARD: Card = Card {
     id: "photon",
     summary: "progressive photon mapping: what diffuse surfaces get indirectly from a map of photons, anew for each pass, with kernels that shrink",
-    publication: "Jensen 2001; Hachisuka and Jensen 2009; Knaus and Zwicker 2011; Interactive Manycore Photon Mapping, 2011",
-    bias: Bias::Consistent("kernels blur what they gather, and lose light at edges, until they have shrunk"),
+    rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS],
+    bias: BIAS,
     needs: &[],
     path_set: PathSet::ALL,
     refusals,
@@ -115,3 +116,37 @@ impl Technique for PhotonMapper {
         skipped
     }
 }
+
+const BIAS: Bias = Bias::Consistent("kernels blur what they gather, and lose light at edges, until they have shrunk");
+
+/// Rows of the catalogue.
+const ROWS: &[Row] = &[Row {
+    id: "PM-SYS-1",
+    name: "technique `photon`: direct light and specular chains by rays, all else from a photon map, anew for each pass (stochastic progressive photon mapping)",
+    role: Role::Technique,
+    limits: "Refuses scenes with media; light of unlit surfaces beyond the first diffuse reflection is missing, and glossy lobes never use the map.",
+    sources: &[
+        sources::JENSEN_2001.whole(),
+        sources::HACHISUKA_JENSEN_2009.whole(),
+        sources::KNAUS_ZWICKER_2011.whole(),
+        sources::FABIANOWSKI_2011.at("§6.3"),
+    ],
+    shaders: &["shaders/techniques/photon_mapping/"],
+    path_set: Some("all"),
+    bias: Some(BIAS),
+    tests: &[
+        "tests/tests/photon/convergence.rs::bias_and_variance_fall_as_radii_foretell",
+        "tests/tests/photon/convergence.rs::radii_fall_at_the_rate_of_the_theory",
+        "tests/tests/photon/settings.rs::every_shape_agrees_with_the_path_tracer",
+        "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
+        "tests/tests/photon/settings.rs::parts_of_the_light_sum_to_the_whole",
+        "tests/tests/photon/sphere.rs::furnaces_are_uniform",
+        "tests/tests/photon/scale.rs::powers_of_two_never_show",
+        "tests/tests/photon/traps.rs::glass_is_not_black",
+        "tests/tests/photon/traps.rs::the_ring_has_its_cusp_where_geometry_puts_it",
+        "tests/tests/photon/traps.rs::colours_bleed_through_the_passage_as_they_should",
+        "tests/tests/hard_cases.rs::techniques_take_every_second_case_as_documented",
+    ],
+    experiment: "clerestory report photon-convergence photon-or-path photon-nearest photon-ring photon-frame photon-peers photon-settings",
+    ..Row::of(file!())
+}];

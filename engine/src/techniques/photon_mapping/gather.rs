@@ -6,6 +6,7 @@ use super::map::PhotonMap;
 use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
 use crate::accel::trace::wide_counter;
+use crate::card::{Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_GROUP, PATH_SET_DEAD,
@@ -370,6 +371,77 @@ fn gathering_states(settings: &PhotonSettings, eye: &PathSet) -> (u32, u32) {
     }
     (gathering, caustic)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-DE-1",
+        name: "density estimation with kernels of one radius",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Blurs by its radius, and loses light at edges and on curved surfaces.",
+        sources: &[sources::JENSEN_2001.whole(), sources::FABIANOWSKI_2011.at("§3.4.2")],
+        shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::equal_disks_are_the_estimator_of_fixed_bandwidth",
+            "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
+            "tests/tests/photon/traps.rs::thin_walls_let_no_photon_through",
+        ],
+        experiment: "clerestory report photon-kernels photon-convergence",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-DE-3",
+        name: "nearest neighbours: one kernel about each point, up to its k-th photon",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Wrong where light changes within the width of the nearest photons, as at edges and contacts.",
+        sources: &[sources::JENSEN_2001.at("§7"), sources::FABIANOWSKI_2011.at("§3.4.2.1")],
+        shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
+        tests: &["tests/tests/photon/settings.rs::nearest_neighbours_agree_with_the_path_tracer"],
+        experiment: "clerestory report photon-kernels photon-nearest photon-ring",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-DE-4",
+        name: "variable kernels: a bandwidth of each photon's own",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Blurs and loses light at edges as far as each footprint reaches.",
+        sources: &[sources::FABIANOWSKI_2011.at("§3.4.2.3")],
+        shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::equal_disks_are_the_estimator_of_fixed_bandwidth",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::even_light_is_estimated_without_bias",
+            "tests/tests/photon/settings.rs::every_shape_agrees_with_the_path_tracer",
+        ],
+        experiment: "clerestory report photon-statistics photon-kernels",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-ST-5",
+        name: "queries of the photon map, one a thread",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Neighbouring threads walk different parts of the tree.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
+        shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
+        tests: &[
+            "tests/tests/photon/determinism.rs::queries_that_a_quota_stops_go_through_all_records",
+            "tests/tests/photon/flux.rs::the_picture_has_the_flux_of_the_map",
+            "tests/tests/photon/determinism.rs::threads_never_show",
+        ],
+        experiment: "clerestory report photon-frame photon-queues",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-ST-6",
+        name: "queries of the photon map, a subgroup's together",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Needs subgroup votes; visits what any point of the subgroup asks for.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
+        shaders: &["shaders/techniques/photon_mapping/photon_gather_packet.comp"],
+        tests: &["tests/tests/photon/settings.rs::points_that_ask_together_see_the_same"],
+        experiment: "clerestory report photon-kernels photon-queues",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {

@@ -13,6 +13,7 @@ mod room_tests;
 #[cfg(test)]
 mod tests;
 
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
     PHOTON_BOUNCE_SHIFT, PHOTON_DIFFUSED_BIT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
@@ -257,3 +258,64 @@ pub fn photon_weight(profile: KernelProfile, words: &PhotonWords, x: DVec3, n: D
         0.0
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-DE-2",
+        name: "kernels: uniform, cone, Epanechnikov",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "No profile takes the bias away: they trade noise for visible rims.",
+        sources: &[
+            sources::JENSEN_2001.whole(),
+            sources::SILVERMAN_1986.whole(),
+            sources::FABIANOWSKI_2011.at("§3.4.2"),
+        ],
+        shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::profiles_integrate_to_one_with_their_variance",
+            "tests/tests/twins/photons.rs::weights_agree_with_their_twins",
+            "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
+        ],
+        experiment: "clerestory report photon-kernels photon-settings",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-DE-5",
+        name: "kernels as skewed ellipsoids of footprints, in nine numbers and a normal",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Flat in the tangent plane, so that curved surfaces are misjudged; the printed way to recover the normal does not hold and is not used.",
+        sources: &[sources::FABIANOWSKI_2011.at("§5.2.1")],
+        shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::weights_are_those_of_the_inverse_matrix",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::kernels_integrate_to_one_over_the_tangent_plane",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::boxes_hold_the_ellipsoid_and_touch_it",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::the_normal_is_no_product_of_the_axes",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::records_come_back",
+            "tests/tests/twins/photons.rs::kernels_agree_with_their_twins",
+            "tests/tests/twins/photons.rs::records_agree_with_their_twins",
+        ],
+        experiment: "clerestory report photon-statistics photon-kernels photon-settings",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-DE-6",
+        name: "dampening, clamp and discard of kernels",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Discarding loses the light of footprints that are too flat; widening them blurs instead.",
+        sources: &[sources::FABIANOWSKI_2011.at("§5.2.2")],
+        shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::flat_footprints_are_widened_where_asked_for",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::dampening_takes_the_root_of_the_longer_axis",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::flat_and_empty_footprints_have_no_kernel_and_long_ones_are_clamped",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::scaling_the_scene_and_the_unit_scales_the_kernel",
+            "engine/src/techniques/photon_mapping/kernel/room_tests.rs::kernels_cover_the_room_as_published",
+            "engine/src/techniques/photon_mapping/kernel/room_tests.rs::stronger_dampening_means_fewer_kernels_over_a_point",
+            "engine/src/techniques/photon_mapping/kernel/room_tests.rs::the_room_looks_the_same_at_every_scale_when_the_unit_goes_with_it",
+        ],
+        experiment: "clerestory report photon-statistics photon-kernels",
+        ..Row::of(file!())
+    },
+];

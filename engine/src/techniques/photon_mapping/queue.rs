@@ -4,6 +4,7 @@
 //! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
 
 use super::settings::MapQueue;
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP, QUEUE_BLOCKS, QUEUE_COMPACTED, QUEUE_SLOTS};
 use crate::gpu::shaders::sets::{GatherQueue, PathBuffers};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_queue_blocks, photon_queue_flags};
@@ -233,3 +234,53 @@ impl Queue {
         }
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-ST-2",
+        name: "queue of queries, type I: an invocation a place of the wave",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Places that ask nothing idle.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
+        shaders: &["shaders/techniques/photon_mapping/photon_queue.glsl"],
+        tests: &[
+            "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
+            "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
+            "tests/tests/photon/queues.rs::queues_take_places_that_all_lie_in_the_same_thousand_kernels",
+        ],
+        experiment: "clerestory report photon-queues",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-ST-3",
+        name: "queue of queries, type II: places that ask, by stream compaction",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Costs passes over all places before each query.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
+        shaders: &["shaders/techniques/photon_mapping/photon_queue_flags.comp"],
+        tests: &[
+            "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
+            "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
+            "tests/tests/photon/queues.rs::queues_may_stay_empty",
+        ],
+        experiment: "clerestory report photon-queues",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-ST-4",
+        name: "queue of queries, type III: places that ask, in blocks that subgroups collect in shared memory",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Needs full subgroups with ballots; blocks may be partial and come in any order, which no picture shows.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
+        shaders: &["shaders/techniques/photon_mapping/photon_queue_blocks.comp"],
+        tests: &[
+            "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
+            "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
+            "tests/tests/photon/queues.rs::queues_may_stay_empty",
+            "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
+        ],
+        experiment: "clerestory report photon-queues",
+        ..Row::of(file!())
+    },
+];

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use super::kernel::KernelSettings;
 use super::settings::PhotonSettings;
 use crate::accel::trace::wide_counter;
+use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{PATH_GROUP, PHOTON_QUARTERS, STALLED_NOT};
 use crate::gpu::shaders::sets::PhotonWave;
@@ -438,3 +439,47 @@ fn record_texels(gpu: &Gpu, records: u32) -> Result<TexelView> {
     let texels = u64::from(records) * u64::from(PHOTON_QUARTERS);
     gpu.storage_texels("photon records", Category::Work, vk::Format::R32G32B32A32_UINT, texels)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-PH-1",
+        name: "photon tracing on surfaces, from every kind of light",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Surfaces only; unlit surfaces send no photons.",
+        sources: &[
+            sources::JENSEN_2001.whole(),
+            sources::FABIANOWSKI_2011.at("§3.4.1 and §5.2.3"),
+        ],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_emit.comp",
+            "shaders/techniques/photon_mapping/photon_scatter.comp",
+            "shaders/techniques/photon_mapping/photon_append.comp",
+        ],
+        tests: &[
+            "tests/tests/photon/flux.rs::closed_rooms_keep_every_photon_and_lose_flux_by_reflection_alone",
+            "tests/tests/photon/flux.rs::photons_that_leave_are_counted",
+            "tests/tests/photon/lights.rs::points_spots_and_suns_shine_as_they_should",
+            "tests/tests/photon/lights.rs::lamps_and_skies_shine_as_they_should",
+            "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
+            "tests/tests/photon/determinism.rs::runs_are_equal_and_seeds_are_not",
+        ],
+        experiment: "clerestory report photon-statistics photon-frame",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PH-2",
+        name: "random numbers of photons: Owen-scrambled Sobol' points, or independent",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Sobol' points are even in pairs of dimensions, so that their gain fades with the bounces.",
+        sources: &[sources::OWEN_1995.whole(), sources::FABIANOWSKI_2011.at("§3.3.3")],
+        shaders: &["shaders/transport/random.glsl"],
+        tests: &[
+            "engine/src/techniques/mod.rs::every_setting_is_explained",
+            "tests/tests/photon/determinism.rs::runs_are_equal_and_seeds_are_not",
+            "tests/tests/photon/sphere.rs::reflections_in_a_sphere_are_those_of_the_closed_form",
+        ],
+        experiment: "clerestory report photon-settings",
+        ..Row::of(file!())
+    },
+];

@@ -13,6 +13,7 @@ use glam::Vec3;
 use super::probe::{LightProbe, LightProbeDesc};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use super::{Preview, PreviewLights};
+use crate::card::{Bias, Role, Row, sources};
 use crate::gpu::{Area, Gpu, Recorder};
 use crate::maps::octahedron::OctahedronLayout;
 use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Surfaces, View};
@@ -119,3 +120,26 @@ impl LiveProbe {
         self.probe.record(recorder)
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-LIVE-MAP",
+    name: "live maps: light at a place drawn each frame as an octahedron, for reflections of objects that move",
+    role: Role::PartOf("CL-PREVIEW"),
+    limits: "No parallax: a reflection shows what lies in its direction from the map's own place.",
+    sources: &[
+        sources::BLINN_NEWELL_1976.whole(),
+        sources::GREENE_1986.whole(),
+        sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+    ],
+    shaders: &["shaders/techniques/preview/preview_shade.comp"],
+    bias: Some(Bias::Biased("radiance at texel centres; parallax beside its place")),
+    tests: &[
+        "tests/tests/preview/live.rs::irradiance_in_a_closed_room_is_that_of_rays",
+        "tests/tests/preview/live.rs::reflections_at_the_middle_are_those_of_rays",
+        "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
+        "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
+    ],
+    experiment: "clerestory report live-maps",
+    ..Row::of(file!())
+}];

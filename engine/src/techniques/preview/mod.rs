@@ -20,7 +20,7 @@
 //! Deterministic: the same bits for the same frame.
 
 mod lights;
-mod live;
+pub(crate) mod live;
 pub mod probe;
 mod shade;
 
@@ -30,6 +30,7 @@ pub use probe::{LightProbe, LightProbeDesc};
 pub use shade::{PARTS_MAX, PreviewPart};
 
 use self::shade::{Eye, OUTPUTS, Seen, Shade, Target};
+use crate::card::{Bias, Role, Row, sources};
 use crate::film::{Picture, PixelFormat};
 use crate::gpu::shaders::techniques::preview::preview_display;
 use crate::gpu::{Area, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute};
@@ -257,3 +258,36 @@ impl Preview {
         self.gbuffer.bytes() + self.radiance.bytes() + shadows
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-PREVIEW",
+    name: "raster preview: deferred shading with shadow maps and light probes",
+    role: Role::Kernel,
+    limits: "No interreflection beyond a probe, no shadows of directional lights, nothing seen through glass, partial alpha drawn opaque.",
+    sources: &[
+        sources::DEERING_1988.whole(),
+        sources::SAITO_TAKAHASHI_1990.whole(),
+        sources::KAUTZ_2000.whole(),
+        sources::KARIS_2013.whole(),
+    ],
+    shaders: &["shaders/techniques/preview/"],
+    bias: Some(Bias::Biased(
+        "no interreflection beyond a probe, no parallax, round lobes, unshadowed directional lights",
+    )),
+    tests: &[
+        "tests/tests/preview/light.rs::white_surfaces_vanish_in_a_white_furnace",
+        "tests/tests/preview/light.rs::albedos_in_a_uniform_environment_are_the_path_tracers",
+        "tests/tests/preview/light.rs::a_lambert_sphere_under_a_cosine_sky_has_the_closed_form",
+        "tests/tests/preview/light.rs::a_mirror_sphere_shows_the_environment",
+        "tests/tests/preview/light.rs::rough_reflections_are_close_to_the_path_tracers",
+        "tests/tests/preview/light.rs::direct_light_is_the_path_tracers",
+        "tests/tests/preview/moving.rs::moved_objects_are_as_if_made_there",
+        "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
+        "engine/src/techniques/preview/probe.rs::lobes_grow_from_level_to_level",
+        "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
+        "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",
+    ],
+    experiment: "clerestory report preview-picture",
+    ..Row::of(file!())
+}];

@@ -27,6 +27,7 @@ use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
 use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
+use crate::card::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants;
 
 /// The diffuse base.
@@ -265,6 +266,44 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
         flags,
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "MET-B2",
+        name: "microfacet product of distribution, masking and Fresnel factor",
+        role: Role::PartOf("BG-3"),
+        limits: "Isotropic; what rough transmission scatters among microfacets is lost.",
+        sources: &[sources::WALTER_2007.whole(), sources::HEITZ_2014.whole()],
+        shaders: &["shaders/transport/bsdf.glsl"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+            "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
+        ],
+        experiment: "clerestory agreement --scene furnace-metal,furnace-glass",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "MET-B7",
+        name: "coupled matte and specular reflection",
+        role: Role::PartOf("BG-3"),
+        limits: "Exact but for the interpolation of its table of albedos.",
+        sources: &[
+            sources::KELEMEN_SZIRMAY_KALOS_2001.whole(),
+            sources::SHIRLEY_1997.whole(),
+        ],
+        shaders: &["shaders/transport/bsdf.glsl"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "engine/src/transport/bsdf/tests.rs::white_furnace",
+            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
+        ],
+        experiment: "clerestory report coupled-reflection",
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests;

@@ -18,6 +18,7 @@ pub mod path_differentials;
 pub(crate) mod testing;
 
 use super::warp::orthonormal_basis;
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
@@ -213,3 +214,141 @@ pub fn guard_differentials(d: &Differentials, unit_length: f64) -> (Differential
         && within(d.w2, DIFFERENTIAL_MAX);
     (if fit { *d } else { Differentials::default() }, fit)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-PD-0",
+        name: "photon differentials: four vectors and one global step",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "First derivatives only: footprints that bend within themselves are misjudged, which changes the size of kernels and no light.",
+        sources: &[
+            sources::IGEHY_1999.whole(),
+            sources::SCHJOTH_2007.whole(),
+            sources::FABIANOWSKI_2011.at("§3.1.2 and §5.1"),
+        ],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/chain_tests.rs::chains_of_events_agree_with_finite_differences",
+            "engine/src/transport/differentials/footprint_tests.rs::scaling_the_scene_scales_positions_alone",
+            "engine/src/transport/differentials/footprint_tests.rs::what_is_not_a_number_or_too_large_is_zeroed",
+            "tests/tests/twins/photons.rs::guards_agree_with_their_twins",
+        ],
+        experiment: "clerestory report photon-statistics",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-1",
+        name: "differentials of emission",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Both derivatives have the length that the density says: the shape of a light's cell is not kept.",
+        sources: &[sources::FABIANOWSKI_2011.at("§5.1.1")],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/footprint_tests.rs::emitted_photons_share_what_they_meet",
+            "engine/src/transport/differentials/footprint_tests.rs::lights_with_area_and_beams_share_their_surface",
+            "tests/tests/twins/photons.rs::emissions_agree_with_their_twins",
+        ],
+        experiment: "clerestory report photon-statistics",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-2",
+        name: "differentials of propagation to a surface",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Takes the surface as a plane where it is met.",
+        sources: &[sources::IGEHY_1999.whole(), sources::FABIANOWSKI_2011.at("§3.1.2.3")],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/chain_tests.rs::each_event_agrees_with_finite_differences",
+            "engine/src/transport/differentials/footprint_tests.rs::grazing_transfers_stay_finite_and_in_the_plane",
+            "tests/tests/twins/photons.rs::events_agree_with_their_twins",
+        ],
+        experiment: "clerestory report photon-statistics",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-3",
+        name: "differentials of mirror reflection",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Sees curvature in interpolated normals alone; the printed form is corrected.",
+        sources: &[sources::IGEHY_1999.whole(), sources::FABIANOWSKI_2011.at("§3.1.2.4")],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/chain_tests.rs::the_printed_reflection_is_wrong",
+            "engine/src/transport/differentials/chain_tests.rs::each_event_agrees_with_finite_differences",
+            "engine/src/transport/differentials/footprint_tests.rs::a_concave_mirror_about_the_light_focuses_to_nothing",
+            "engine/src/transport/differentials/footprint_tests.rs::mirrors_and_flat_glass_have_the_areas_of_unfolded_paths",
+        ],
+        experiment: "clerestory report photon-statistics",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-4",
+        name: "derivatives of interpolated normals from a hit's coordinates",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Facets have none: without interpolated normals a surface is flat.",
+        sources: &[sources::FABIANOWSKI_2011.at("§5.1.2")],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/chain_tests.rs::derivatives_of_normals_agree_with_finite_differences",
+            "tests/tests/twins/photons.rs::derivatives_of_normals_agree_with_their_twins",
+        ],
+        experiment: "clerestory report photon-statistics",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-5",
+        name: "differentials of refraction",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "First derivatives only, which misjudge footprints close to total reflection.",
+        sources: &[sources::IGEHY_1999.whole(), sources::FABIANOWSKI_2011.at("§3.1.2.5")],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/chain_tests.rs::each_event_agrees_with_finite_differences",
+            "engine/src/transport/differentials/footprint_tests.rs::mirrors_and_flat_glass_have_the_areas_of_unfolded_paths",
+        ],
+        experiment: "clerestory report photon-kernels",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-6",
+        name: "differentials of diffuse reflection: absorbed and emitted anew",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Keeps the area of a footprint, on average, and forgets its shape.",
+        sources: &[sources::FABIANOWSKI_2011.at("§5.1.3")],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/footprint_tests.rs::reemission_keeps_the_expected_area",
+            "engine/src/techniques/photon_mapping/kernel/room_tests.rs::footprints_after_a_diffuse_bounce_follow_the_density_of_photons",
+            "engine/src/transport/differentials/path_differentials.rs::reemission_stands_between_its_two_parameters_and_all_four",
+        ],
+        experiment: "clerestory report photon-statistics",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-7",
+        name: "differentials of Russian roulette",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Scales by the probability of survival, right for many photons and not for each.",
+        sources: &[sources::FABIANOWSKI_2011.at("§5.1.4")],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &["engine/src/transport/differentials/footprint_tests.rs::roulette_makes_up_for_those_that_it_ends"],
+        experiment: "clerestory report photon-statistics",
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-13",
+        name: "differentials of camera rays",
+        role: Role::Kernel,
+        limits: "Pinholes only; a function, since no kernel filters textures by it.",
+        sources: &[sources::IGEHY_1999.whole()],
+        shaders: &["shaders/transport/differentials.glsl"],
+        tests: &[
+            "engine/src/transport/differentials/footprint_tests.rs::camera_footprints_are_pixels",
+            "tests/tests/twins/photons.rs::emissions_agree_with_their_twins",
+        ],
+        experiment: "tools/test",
+        ..Row::of(file!())
+    },
+];

@@ -9,6 +9,7 @@
 use super::{
     Differentials, emission_differentials, reflect_differentials, refract_differentials, transfer_differentials,
 };
+use crate::card::{Role, Row, sources};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -99,6 +100,25 @@ impl PathDifferentials {
             .sum()
     }
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "PM-PD-8",
+    name: "path differentials (reference)",
+    role: Role::Yardstick,
+    limits: "Storage grows with the path: a reference for the footprints that photons carry.",
+    sources: &[
+        sources::SUYKENS_WILLEMS_2001.whole(),
+        sources::FABIANOWSKI_2011.at("§3.1.2.5"),
+    ],
+    tests: &[
+        "engine/src/transport/differentials/path_differentials.rs::two_parameters_are_photon_differentials",
+        "engine/src/transport/differentials/path_differentials.rs::parallelograms_fill_the_footprint",
+        "engine/src/transport/differentials/path_differentials.rs::scattering_derivatives_agree_with_finite_differences",
+    ],
+    experiment: "tools/test",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

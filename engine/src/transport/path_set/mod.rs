@@ -15,6 +15,7 @@ use std::hash::{Hash, Hasher};
 use self::automaton::{DEAD, Dfa, SYMBOLS, TooLarge};
 use self::expression::Node;
 use super::bsdf::{LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION};
+use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     self, PATH_SET_DEAD, PATH_SET_MAX_SHIFT, PATH_SET_MIN_SHIFT, PATH_SET_STATE_BITS, PATH_SET_STATES,
 };
@@ -374,6 +375,27 @@ fn check_range(min: u32, max: Option<u32>) -> Result<()> {
     }
     Ok(())
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-PATHSET",
+    name: "restriction of a picture to a set of light paths",
+    role: Role::Service,
+    limits: "Expressions of more than 512 terms, or whose automata have more than 1024 states, are refused.",
+    sources: &[sources::HECKBERT_1990.at("path notation")],
+    shaders: &["shaders/transport/path_set.glsl"],
+    tests: &[
+        "engine/src/transport/path_set/tests.rs::text_round_trips",
+        "engine/src/transport/path_set/tests.rs::automata_accept_what_backtracking_accepts",
+        "tests/tests/path_sets.rs::glass_casts_caustics_that_are_a_part",
+        "tests/tests/path_sets.rs::coats_over_diffuse_bases_are_told_apart",
+        "tests/tests/path_sets.rs::drawn_labels_agree_with_masks",
+        "tests/tests/path_tracer.rs::path_sets_are_a_partition",
+        "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
+    ],
+    experiment: "clerestory report path-sets",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests;
