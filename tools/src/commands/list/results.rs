@@ -1,6 +1,6 @@
 //! Where the figures of an experiment are kept: the parts of `RESULTS.md` that its command wrote.
 
-use crate::experiments;
+use clerestory_tools::experiments;
 
 /// The page of results as it was when the program was built.
 const PAGE: &str = include_str!("../../../../RESULTS.md");
