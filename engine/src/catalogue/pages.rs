@@ -6,8 +6,8 @@ use super::{Cite, Row, all, citations};
 pub fn markdown() -> String {
     let mut page = String::from(
         "# Catalogue\n\nWhere each publication lives in the code. Written by `clerestory list --markdown`; `clerestory list ID` also names \
-         the tests and shaders of a system. Roles: a *technique* makes pictures (`clerestory render --technique`), a *kernel* is for hosts to use \
-         by itself, a *service* is what the engine does around both, a *yardstick* is only measured. Keys of sources are those of \
+         the tests and shaders of a system. Roles: a *technique* makes pictures (`clerestory render --technique`), a *kernel* is a building \
+         block for hosts, a *service* is what the engine does around both, a *yardstick* is only measured. Keys of sources are those of \
          [`third_party_notes/sources.md`](../third_party_notes/sources.md).\n\n\
          | id | system | role | limits | sources | module | bias | path set | needs | tests | measured by |\n\
          |---|---|---|---|---|---|---|---|---|---:|---|\n",

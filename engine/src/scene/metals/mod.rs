@@ -60,7 +60,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-METALS",
     name: "measured metals: gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt",
     role: Role::PartOf("BG-3"),
-    limits: "Three channels for a spectrum: reflectances are off by up to 0.012, and gold's red, outside of Rec. 709, is 0.98.",
+    limits: "Three channels for a spectrum: reflectances are off by up to 0.012, and gold's red, which is out of gamut, is 0.98.",
     sources: &[
         sources::JOHNSON_CHRISTY_1972.whole(),
         sources::JOHNSON_CHRISTY_1974.whole(),
