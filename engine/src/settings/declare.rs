@@ -16,6 +16,9 @@ pub struct SettingInfo {
     pub name: &'static str,
     /// What it may be.
     pub range: String,
+    /// The names that it may have, for an enum or a `bool`; else empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<&'static str>,
     /// Its unit; empty for what has none.
     pub unit: &'static str,
     /// Its default.
@@ -132,6 +135,7 @@ pub fn info<T: Serialize + 'static>(
     SettingInfo {
         name,
         range: range.text(),
+        names: range.names(),
         unit,
         default: write(default),
         meaning: meaning.strip_suffix('.').unwrap_or(&meaning).to_owned(),

@@ -233,6 +233,7 @@ mod tests {
         // As typed: 0.95 as an f32 is no 0.95 of an f64.
         let defaults = json!({"count": 3, "share": 0.95, "order": "from_left"});
         assert_eq!(Declared::default().to_json(), defaults);
+        assert_eq!(infos[2].names, ["from_left", "from_right"]);
         assert!(infos.iter().all(|info| info.default == defaults[info.name]));
         let decl = SettingsDecl::of::<Declared>();
         assert_eq!(

@@ -60,11 +60,11 @@ impl Subject {
 pub fn subjects() -> Vec<Subject> {
     let mut all = Vec::new();
     for info in techniques::all() {
-        match info.settings.iter().find(|setting| setting.name == "sampler") {
+        match info.settings.infos().iter().find(|setting| setting.name == "sampler") {
             Some(setting) if matches!(info.bias, Bias::Unbiased) => {
-                all.extend(setting.range.split(" | ").map(|sampler| Subject::Technique {
+                all.extend(setting.names.iter().map(|sampler| Subject::Technique {
                     info,
-                    sampler: Some(sampler),
+                    sampler: Some(*sampler),
                 }))
             }
             _ => all.push(Subject::Technique { info, sampler: None }),
