@@ -6,6 +6,7 @@
 #[doc(hidden)]
 pub mod declare;
 mod given;
+mod macros;
 mod range;
 
 pub use declare::{SettingInfo, SettingsDecl, TypedSettings};

@@ -12,6 +12,11 @@ pub trait Allowed<T> {
 
     /// These values in words: `0 … 4096`.
     fn text(&self) -> String;
+
+    /// Their names in JSON, where they have some.
+    fn names(&self) -> Vec<&'static str> {
+        Vec::new()
+    }
 }
 
 /// What has an order and can be out of range.
@@ -128,10 +133,14 @@ impl<T: DeserializeOwned> Allowed<T> for AnyValue {
     }
 
     fn text(&self) -> String {
+        Allowed::<T>::names(self).join(" | ")
+    }
+
+    fn names(&self) -> Vec<&'static str> {
         let mut names = Names(Vec::new());
         // It always ends in an error: only what the type asks for is looked at.
         let _ = T::deserialize(&mut names);
-        names.0.join(" | ")
+        names.0
     }
 }
 

@@ -11,9 +11,6 @@ use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
 const PHOTONS: u32 = 1 << 14;
 const SAMPLES_PER_PASS: u32 = 1024;
 
-/// Samplers that a technique may offer.
-const SAMPLERS: [&str; 2] = ["sobol", "pcg"];
-
 /// What a case is run against.
 #[derive(Debug, Clone, Copy)]
 pub enum Subject {
@@ -63,13 +60,11 @@ impl Subject {
 pub fn subjects() -> Vec<Subject> {
     let mut all = Vec::new();
     for info in techniques::all() {
-        let infos = info.settings.infos();
-        match infos.iter().find(|setting| setting.name == "sampler") {
+        match info.settings.infos().iter().find(|setting| setting.name == "sampler") {
             Some(setting) if matches!(info.bias, Bias::Unbiased) => {
-                let offered = |name: &&str| setting.range.split(" | ").any(|offered| offered == *name);
-                all.extend(SAMPLERS.into_iter().filter(offered).map(|sampler| Subject::Technique {
+                all.extend(setting.names.iter().map(|sampler| Subject::Technique {
                     info,
-                    sampler: Some(sampler),
+                    sampler: Some(*sampler),
                 }))
             }
             _ => all.push(Subject::Technique { info, sampler: None }),
