@@ -30,7 +30,9 @@ fn attribute<'a>(element: &'a str, name: &str) -> Option<&'a str> {
 
 /// The tests in nextest's report, which has an element a line.
 fn read(report: &str) -> Vec<Ran> {
-    let elements = report.lines().filter(|line| line.trim_start().starts_with("<testcase "));
+    let elements = report
+        .lines()
+        .filter(|line| line.trim_start().starts_with("<testcase "));
     let ran = |element: &str| {
         Some(Ran {
             program: attribute(element, "classname")?.into(),
@@ -50,7 +52,10 @@ fn is(ran: &Ran, test: &str) -> bool {
     if modules.pop() != Some(function) {
         return false;
     }
-    let stem = file.trim_end_matches(".rs").trim_end_matches("/mod").trim_end_matches("/main");
+    let stem = file
+        .trim_end_matches(".rs")
+        .trim_end_matches("/mod")
+        .trim_end_matches("/main");
     // The file of an integration test is its program, or a module of it; of other tests, it is a module, or holds an inner one.
     let last = stem.rsplit('/').next().unwrap_or(stem);
     let package = match file.split('/').next() {
@@ -131,7 +136,10 @@ mod tests {
     #[test]
     fn tests_are_found_in_the_report_and_by_their_file() {
         let ran = read(REPORT);
-        assert_eq!(ran.iter().map(|ran| ran.seconds).collect::<Vec<_>>(), [2.25, 0.5, 0.125]);
+        assert_eq!(
+            ran.iter().map(|ran| ran.seconds).collect::<Vec<_>>(),
+            [2.25, 0.5, 0.125]
+        );
         for (i, test) in [
             "tests/tests/photon/sphere.rs::furnaces_are_uniform",
             "tests/tests/path_tracer.rs::furnaces",
