@@ -121,9 +121,9 @@ fn a_light_in_a_sphere_fills_it_evenly() {
     });
 }
 
-/// A picture by fixed settings, with its means over quarters and their standard errors from some hundred seeds on lavapipe 22.3.6, those judged among them. A technique's
-/// own bias is in them, so that they hold on every driver. `CLERESTORY_WRITE_MEANS=1024` makes the tests print them from so many seeds, with
-/// `--nocapture`.
+/// A picture by fixed settings, with its means over quarters and their standard errors from some hundred seeds on lavapipe 22.3.6, those judged
+/// among them. A technique's own bias is in them, so that they hold on every driver. `CLERESTORY_WRITE_MEANS=1024` makes the tests print them
+/// from so many seeds, with `--nocapture`.
 struct Known {
     technique: &'static str,
     address: &'static str,
