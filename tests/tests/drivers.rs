@@ -121,9 +121,9 @@ fn a_light_in_a_sphere_fills_it_evenly() {
     });
 }
 
-/// A picture by fixed settings, with its means over quarters and their standard errors from many seeds on Mesa's lavapipe 22.3.6. A technique's
-/// own bias is in them, so that they hold on every driver. `CLERESTORY_WRITE_MEANS=4096` makes the tests print them from so many seeds, with
-/// `--nocapture`.
+/// A picture by fixed settings, with its means over quarters and their standard errors from some hundred seeds on lavapipe 22.3.6, those judged
+/// among them. A technique's own bias is in them, so that they hold on every driver. `CLERESTORY_WRITE_MEANS=1024` makes the tests print them
+/// from so many seeds, with `--nocapture`.
 struct Known {
     technique: &'static str,
     address: &'static str,
@@ -179,10 +179,16 @@ fn a_room_with_gold_by_the_path_tracer_has_its_means() {
     let known = Known {
         technique: "path",
         address: "builtin:cornell-box?sphere=gold",
-        settings: path("all"),
+        settings: path("bounces=1.."),
         samples: 8,
-        means: [0.0; VALUES],
-        errors: [0.0; VALUES],
+        means: [
+            0.150393, 0.055238, 0.014779, 0.111139, 0.090400, 0.016122, 0.101900, 0.037429, 0.010468, 0.035198,
+            0.036769, 0.004871,
+        ],
+        errors: [
+            7.476e-4, 3.159e-4, 6.152e-5, 1.330e-3, 7.528e-4, 1.293e-4, 6.257e-4, 2.613e-4, 4.809e-5, 3.487e-4,
+            2.517e-4, 3.296e-5,
+        ],
     };
     known.check();
 }
@@ -192,10 +198,16 @@ fn a_room_with_a_caustic_by_photon_mapping_has_its_means() {
     let known = Known {
         technique: "photon",
         address: "builtin:cornell-box?sphere=glass",
-        settings: photons("all", 0.05),
+        settings: photons("bounces=1..", 0.05),
         samples: 2,
-        means: [0.0; VALUES],
-        errors: [0.0; VALUES],
+        means: [
+            0.141282, 0.053783, 0.014871, 0.091022, 0.081780, 0.015955, 0.091611, 0.035181, 0.010069, 0.053737,
+            0.051799, 0.009733,
+        ],
+        errors: [
+            1.318e-4, 7.027e-5, 2.084e-5, 3.888e-4, 2.746e-4, 9.046e-5, 1.289e-4, 7.539e-5, 2.279e-5, 3.906e-4,
+            2.740e-4, 8.921e-5,
+        ],
     };
     known.check();
 }

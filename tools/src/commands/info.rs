@@ -193,10 +193,11 @@ impl DeviceInfo {
         let features = FEATURES.map(|name| (name, techniques::offers(caps, name) == Some(true)));
         lines.push(format!("  features     {}", names(&features)));
         lines.push(format!(
-            "  memory       {} heap, {} an allocation, {} a storage buffer",
+            "  memory       {} heap, {} an allocation, {} a storage buffer, {} texels a texel buffer",
             output::bytes(caps.device_heap),
             output::bytes(caps.max_allocation_size),
-            output::bytes(caps.max_storage_buffer_range)
+            output::bytes(caps.max_storage_buffer_range),
+            caps.max_texel_buffer_elements
         ));
         lines.push(format!(
             "  compute      {} invocations a workgroup, {} shared, {} workgroups, {} of push constants",
