@@ -1,5 +1,10 @@
-//! The engine inside a host application: lent devices, several devices at once, several threads, techniques of the host's own.
+//! The engine inside a host application: lent devices, a host's command buffers and buffers, several devices at once, several threads,
+//! techniques and kernels of the host's own.
 
+#[path = "embedding/commands.rs"]
+mod commands;
+#[path = "embedding/own_kernels.rs"]
+mod own_kernels;
 #[path = "embedding/technique.rs"]
 mod technique;
 
@@ -52,8 +57,11 @@ impl Host {
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
             // The layer is always on: it is the witness that nothing of the host's is misused or destroyed.
             let layers = [VALIDATION_LAYER.as_ptr()];
-            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
+            let extensions = [ash::ext::debug_utils::NAME, ash::ext::validation_features::NAME].map(CStr::as_ptr);
+            let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+            let mut checks = vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
             let info = vk::InstanceCreateInfo::default()
+                .push_next(&mut checks)
                 .application_info(&application)
                 .enabled_layer_names(&layers)
                 .enabled_extension_names(&extensions);
