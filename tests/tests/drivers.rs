@@ -52,7 +52,7 @@ fn pictures(
             size: [SIDE as u32; 2],
             spp: samples,
             seed,
-            settings: settings.clone(),
+            settings: settings.clone().into(),
             ..RenderOptions::default()
         };
         let rendered = render(gpu, scene, &options).unwrap_or_else(|error| panic!("{technique}: {error}"));
