@@ -475,7 +475,6 @@ pub(crate) const ROWS: &[Row] = &[
         sources: &[sources::OWEN_1995.whole(), sources::FABIANOWSKI_2011.at("§3.3.3")],
         shaders: &["shaders/transport/random.glsl"],
         tests: &[
-            "engine/src/techniques/mod.rs::every_setting_is_explained",
             "tests/tests/photon/determinism.rs::runs_are_equal_and_seeds_are_not",
             "tests/tests/photon/sphere.rs::reflections_in_a_sphere_are_those_of_the_closed_form",
         ],
