@@ -122,6 +122,28 @@ pub enum Error {
         /// The compiler's words.
         message: String,
     },
+    /// The source of a kernel that came in at run time holds a mistake.
+    #[error("kernel {kernel}: line {line}, column {column}: {message}")]
+    KernelSource {
+        /// The kernel's name.
+        kernel: String,
+        /// From 1; 0 where the mistake has no place.
+        line: u32,
+        /// In bytes, from 1; 0 where the compiler does not say.
+        column: u32,
+        /// What is wrong.
+        message: String,
+    },
+    /// What was given to a kernel that came in at run time is not what its source asks for.
+    #[error("kernel {kernel}: {binding} {cause}")]
+    Binding {
+        /// The kernel's name.
+        kernel: String,
+        /// The binding as the source names it, or as it was given; `push constants` for these.
+        binding: String,
+        /// What is wrong.
+        cause: String,
+    },
     /// A scene file or address holds something wrong.
     #[error("{file}: {at}: {cause}")]
     Scene {

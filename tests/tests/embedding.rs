@@ -1,5 +1,10 @@
-//! The engine inside a host application: lent devices, several devices at once, several threads, techniques of the host's own.
+//! The engine inside a host application: lent devices, a host's command buffers and buffers, several devices at once, several threads,
+//! techniques and kernels of the host's own.
 
+#[path = "embedding/commands.rs"]
+mod commands;
+#[path = "embedding/own_kernels.rs"]
+mod own_kernels;
 #[path = "embedding/technique.rs"]
 mod technique;
 

@@ -20,7 +20,7 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
 use crate::gpu::shaders::sets::IndexSet;
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, Timings};
+use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings};
 use crate::{Error, Result};
 
 /// Most rays of one call.
@@ -129,9 +129,14 @@ pub struct RayTracer {
     settings: TraceSettings,
 }
 
-struct Buffers {
-    rays: Buffer,
-    hits: Buffer,
+/// Rays of a call, what they have met, and where those go on that were stopped.
+#[derive(Debug)]
+pub struct TraceBuffers {
+    count: u32,
+    /// The rays, [`Ray`] each.
+    pub rays: Buffer,
+    /// The hits, [`Hit`] each.
+    pub hits: Buffer,
     resume: Buffer,
     status: Buffer,
     queue: Buffer,
@@ -262,17 +267,10 @@ impl RayTracer {
         if rays.is_empty() {
             return Ok(traced);
         }
-        let count = rays.len() as u32;
-        let buffer = |name, bytes: u64| self.gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
-        let buffers = Buffers {
-            rays: self.gpu.buffer_with("rays", Category::Work, rays)?,
-            hits: buffer("hits", size_of::<Hit>() as u64 * u64::from(count))?,
-            resume: buffer("resume", 4 * u64::from(count))?,
-            status: buffer("trace status", size_of::<TraceStatus>() as u64)?,
-            queue: buffer("trace queue", size_of::<TraceQueue>() as u64)?,
-        };
+        let buffers = self.buffers(rays.len() as u32)?;
+        self.gpu.upload(&buffers.rays, 0, rays)?;
         loop {
-            self.round(&buffers, count, &mut traced)?;
+            self.round(&buffers, &mut traced)?;
             traced.rounds += 1;
             let [status] = self.gpu.read::<TraceStatus>(buffers.status.view(), 1)?[..] else {
                 break;
@@ -308,33 +306,134 @@ impl RayTracer {
         Ok(traced)
     }
 
+    /// Memory for so many rays.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for none or for more than [`MAX_RAYS`], [`Error::LimitExceeded`] when a buffer is larger than the device binds,
+    /// [`Error::OutOfMemory`].
+    pub fn buffers(&self, count: u32) -> Result<TraceBuffers> {
+        let buffer = |name, bytes: u64| self.gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
+        let rays = buffer("rays", size_of::<Ray>() as u64 * u64::from(count))?;
+        let hits = buffer("hits", size_of::<Hit>() as u64 * u64::from(count))?;
+        self.buffers_over(count, &rays, &hits)
+    }
+
+    /// The same over rays and hits of the caller's, such as a host's ([`Gpu::borrow_buffer`]): storage buffers of [`Ray`] and [`Hit`].
+    ///
+    /// # Errors
+    /// As [`RayTracer::buffers`], where one of them is too small, too.
+    pub fn buffers_over(&self, count: u32, rays: &Buffer, hits: &Buffer) -> Result<TraceBuffers> {
+        if count == 0 || count as usize > MAX_RAYS {
+            return Err(Error::setting("rays", count, format!("is not from 1 to {MAX_RAYS}")));
+        }
+        for (buffer, bytes) in [(rays, size_of::<Ray>()), (hits, size_of::<Hit>())] {
+            let value = bytes as u64 * u64::from(count);
+            if buffer.bytes() < value {
+                return Err(Error::LimitExceeded {
+                    name: buffer.name().into(),
+                    value,
+                    limit_name: "size",
+                    limit: buffer.bytes(),
+                });
+            }
+        }
+        let buffer = |name, bytes: u64| self.gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
+        Ok(TraceBuffers {
+            count,
+            rays: rays.clone(),
+            hits: hits.clone(),
+            resume: buffer("resume", 4 * u64::from(count))?,
+            status: buffer("trace status", size_of::<TraceStatus>() as u64)?,
+            queue: buffer("trace queue", size_of::<TraceQueue>() as u64)?,
+        })
+    }
+
+    /// Records the tracing of the rays that are in `buffers`, in `rounds` rounds (at least one): in each a ray takes as many iterations as
+    /// its quota allows, and those that have ended cost little. Passes `trace: begin` and `trace` for each. [`RayTracer::unfinished`] says
+    /// afterwards whether rays are left, whose hits do not count yet; [`RayTracer::record_on`] goes on with them.
+    ///
+    /// Barriers: rays and index must have been made visible to compute shaders. Earlier uses of the buffers by compute shaders are waited for.
+    /// After it hits are visible to compute shaders and copies.
+    ///
+    /// # Errors
+    /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
+    pub fn record(&self, recorder: &mut Recorder, buffers: &TraceBuffers, rounds: u32) -> Result<()> {
+        for round in 0..rounds.max(1) {
+            self.record_round(recorder, buffers, round == 0)?;
+        }
+        Ok(())
+    }
+
+    /// Records one more round, for the rays that [`RayTracer::record`] has left unfinished. Barriers: as there.
+    ///
+    /// # Errors
+    /// As [`RayTracer::record`].
+    pub fn record_on(&self, recorder: &mut Recorder, buffers: &TraceBuffers) -> Result<()> {
+        self.record_round(recorder, buffers, false)
+    }
+
+    /// Rays that their quota stopped in the last round; waits for what was submitted.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn unfinished(&self, buffers: &TraceBuffers) -> Result<u32> {
+        let status = self.gpu.read::<TraceStatus>(buffers.status.view(), 1)?;
+        Ok(status.first().map_or(0, |status| status.unfinished))
+    }
+
+    fn record_round(&self, recorder: &mut Recorder, buffers: &TraceBuffers, is_first: bool) -> Result<()> {
+        self.record_begin(recorder, buffers, is_first, true)?;
+        self.record_dispatches(recorder, buffers, self.dispatches(buffers.count), &mut 0)
+    }
+
+    /// Records the barriers before a round's dispatches, and its counters where it `begins`.
+    fn record_begin(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &TraceBuffers,
+        is_first: bool,
+        begins: bool,
+    ) -> Result<()> {
+        recorder.pass("trace: begin", |pass| {
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
+            if begins {
+                if is_first {
+                    pass.fill(buffers.resume.view(), 0)?;
+                }
+                pass.fill(buffers.status.view(), 0)?;
+                pass.fill(buffers.queue.view(), 0)?;
+            }
+            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+            Ok(())
+        })
+    }
+
+    fn record_dispatches(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &TraceBuffers,
+        dispatches: u32,
+        first: &mut u32,
+    ) -> Result<()> {
+        recorder.pass(TRACE_PASS, |pass| {
+            for _ in 0..dispatches {
+                self.dispatch(pass, buffers, first, buffers.count)?;
+                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER));
+            }
+            Ok(())
+        })
+    }
+
     /// Goes through all rays once, in as many dispatches as that takes.
-    fn round(&self, buffers: &Buffers, count: u32, traced: &mut Traced) -> Result<()> {
-        let mut dispatches = self.dispatches(count);
+    fn round(&self, buffers: &TraceBuffers, traced: &mut Traced) -> Result<()> {
+        let mut dispatches = self.dispatches(buffers.count);
         let mut first = 0;
         let mut begins = true;
         while dispatches > 0 {
             let mut recorder = self.gpu.recorder("trace")?;
-            recorder.pass("trace: begin", |pass| {
-                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
-                if begins {
-                    if traced.rounds == 0 {
-                        pass.fill(buffers.resume.view(), 0)?;
-                    }
-                    pass.fill(buffers.status.view(), 0)?;
-                    pass.fill(buffers.queue.view(), 0)?;
-                }
-                pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
-                Ok(())
-            })?;
+            self.record_begin(&mut recorder, buffers, traced.rounds == 0, begins)?;
             let now = dispatches.min(DISPATCHES_PER_SUBMISSION);
-            recorder.pass(TRACE_PASS, |pass| {
-                for _ in 0..now {
-                    self.dispatch(pass, buffers, &mut first, count)?;
-                    pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER));
-                }
-                Ok(())
-            })?;
+            self.record_dispatches(&mut recorder, buffers, now, &mut first)?;
             let timings = recorder.submit()?.wait()?;
             traced.timings.untimed = timings.untimed;
             traced.timings.passes.extend(timings.passes);
@@ -356,7 +455,7 @@ impl RayTracer {
         }
     }
 
-    fn dispatch(&self, pass: &mut crate::gpu::Pass<'_>, buffers: &Buffers, first: &mut u32, count: u32) -> Result<()> {
+    fn dispatch(&self, pass: &mut crate::gpu::Pass<'_>, buffers: &TraceBuffers, first: &mut u32, count: u32) -> Result<()> {
         let index = IndexSet {
             index_texels: &self.index,
         };

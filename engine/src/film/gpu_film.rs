@@ -11,7 +11,7 @@ use crate::gpu::shaders::constants::{AOV_ALBEDO, AOV_DEPTH, AOV_NORMAL};
 use crate::gpu::shaders::film::display;
 use crate::gpu::shaders::sets::FilmSet;
 use crate::gpu::shaders::types::{FilmAov, FilmPixel};
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu, Timings, rw_compute_to_compute};
+use crate::gpu::{Buffer, BufferDesc, Category, Gpu, Recorder, Timings, rw_compute_to_compute};
 use crate::{Error, Result};
 
 /// Pixels of one band.
@@ -96,6 +96,17 @@ impl GpuFilm {
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn clear(&self) -> Result<()> {
         let mut recorder = self.gpu.recorder("film")?;
+        self.record_clear(&mut recorder)?;
+        recorder.submit()?.wait()?;
+        Ok(())
+    }
+
+    /// Records what forgets all samples: the pass `film: clear`. Earlier uses must have ended; what adds samples wants a barrier from
+    /// [`Access::TRANSFER_WRITE`](crate::gpu::Access::TRANSFER_WRITE) after it.
+    ///
+    /// # Errors
+    /// [`Error::MissingBarrier`] in debug builds.
+    pub fn record_clear(&self, recorder: &mut Recorder) -> Result<()> {
         recorder.pass("film: clear", |pass| {
             for band in &self.bands {
                 pass.fill(band.sums.view(), 0)?;
@@ -104,9 +115,7 @@ impl GpuFilm {
                 }
             }
             Ok(())
-        })?;
-        recorder.submit()?.wait()?;
-        Ok(())
+        })
     }
 
     /// Reads the picture: layers `radiance`, `variance` (of the mean), `samples`, and the AOVs that were asked for; with the number of
@@ -160,13 +169,30 @@ impl GpuFilm {
     /// # Errors
     /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
     pub fn display(&self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        let mut recorder = self.gpu.recorder("display")?;
+        self.record_display(&mut recorder, target, exposure, format)?;
+        recorder.submit()?.wait()?;
+        Ok(())
+    }
+
+    /// Records what [`GpuFilm::display`] does: the pass `film: display`. The film must have been made visible to compute shaders, and earlier
+    /// uses of the target must have ended; after it the target is visible to compute shaders.
+    ///
+    /// # Errors
+    /// As [`GpuFilm::display`]; [`Error::MissingBarrier`] in debug builds.
+    pub fn record_display(
+        &self,
+        recorder: &mut Recorder,
+        target: &Buffer,
+        exposure: f32,
+        format: PixelFormat,
+    ) -> Result<()> {
         let bytes = 4 * u64::from(self.size[0]) * u64::from(self.size[1]);
         if target.bytes() < bytes {
             let cause = format!("has {} bytes; the picture needs {bytes}", target.bytes());
             return Err(Error::setting("target", target.name(), cause));
         }
         let kernel = self.gpu.compute_pipeline::<display::Kernel>(&())?;
-        let mut recorder = self.gpu.recorder("display")?;
         recorder.pass("film: display", |pass| {
             for band in &self.bands {
                 let push = display::Push {
@@ -183,9 +209,7 @@ impl GpuFilm {
                 pass.barrier(&[rw_compute_to_compute(target)]);
             }
             Ok(())
-        })?;
-        recorder.submit()?.wait()?;
-        Ok(())
+        })
     }
 }
 

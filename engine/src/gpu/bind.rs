@@ -39,6 +39,18 @@ fn access(stage: Stage, binding: &BindingInfo) -> Access {
     read | write
 }
 
+/// A place in a descriptor set.
+pub(super) struct Slot<'a> {
+    /// The shader's name, for errors.
+    pub shader: &'a str,
+    /// The binding's.
+    pub name: &'a str,
+    pub binding: u32,
+    pub kind: BindingKind,
+    /// How the shader uses what is there.
+    pub access: Access,
+}
+
 /// Fails when one command would read a buffer by texels and write it: texel fetches may see the memory as it was before, whatever the
 /// shader's own barriers.
 fn check_texels(shaders: &[&'static ShaderInfo], sets: &[&dyn BindingSet<'_>]) -> Result<()> {
@@ -109,7 +121,14 @@ impl Pass<'_> {
                             binding.name, binding.binding
                         ),
                     })?;
-                    self.write_descriptor(shader, raw, binding, *resource)?;
+                    let slot = Slot {
+                        shader: shader.name,
+                        name: binding.name,
+                        binding: binding.binding,
+                        kind: binding.kind,
+                        access: access(shader.stage, binding),
+                    };
+                    self.write_descriptor(raw, &slot, *resource)?;
                 }
             }
             // SAFETY: the set was just allocated with the layout of this pipeline.
@@ -122,21 +141,21 @@ impl Pass<'_> {
         Ok(())
     }
 
-    fn write_descriptor(
+    /// Writes a resource to its place in a set that is not in use yet, and notes the use.
+    pub(super) fn write_descriptor(
         &mut self,
-        shader: &'static ShaderInfo,
         set: vk::DescriptorSet,
-        binding: &BindingInfo,
+        slot: &Slot<'_>,
         resource: BoundResource<'_>,
     ) -> Result<()> {
         let descriptor = vk::WriteDescriptorSet::default()
             .dst_set(set)
-            .dst_binding(binding.binding)
-            .descriptor_type(descriptor_type(binding.kind));
+            .dst_binding(slot.binding)
+            .descriptor_type(descriptor_type(slot.kind));
         let inner = Arc::clone(&self.recorder.gpu.inner);
-        match (binding.kind, resource) {
+        match (slot.kind, resource) {
             (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
-                let uniform = binding.kind == BindingKind::UniformBuffer;
+                let uniform = slot.kind == BindingKind::UniformBuffer;
                 view.check(if uniform {
                     inner.caps.uniform_buffer_alignment
                 } else {
@@ -150,11 +169,15 @@ impl Pass<'_> {
                         limit: inner.caps.max_uniform_buffer_range,
                     });
                 }
-                self.recorder
-                    .touch(self.name, view.buffer, access(shader.stage, binding))?;
+                view.check_usage(if uniform {
+                    vk::BufferUsageFlags::UNIFORM_BUFFER
+                } else {
+                    vk::BufferUsageFlags::STORAGE_BUFFER
+                })?;
+                self.recorder.touch(self.name, view.buffer, slot.access)?;
                 let raw = [vk::DescriptorBufferInfo {
                     buffer: view.buffer.raw(),
-                    offset: view.offset,
+                    offset: view.raw_offset(),
                     range: view.bytes,
                 }];
                 // SAFETY: set and buffer are alive, and the set is not in use yet.
@@ -166,8 +189,7 @@ impl Pass<'_> {
             }
             (BindingKind::TexelBuffer, BoundResource::Texels(view)) => {
                 self.recorder.keep(&view.inner);
-                self.recorder
-                    .touch(self.name, view.buffer(), access(shader.stage, binding))?;
+                self.recorder.touch(self.name, view.buffer(), slot.access)?;
                 let raw = [view.raw()];
                 // SAFETY: as above.
                 unsafe {
@@ -195,9 +217,9 @@ impl Pass<'_> {
                 unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
             }
             _ => {
-                let message = format!("binding {} is not a {:?}", binding.name, binding.kind);
+                let message = format!("binding {} is not a {:?}", slot.name, slot.kind);
                 return Err(Error::Shader {
-                    name: shader.name.into(),
+                    name: slot.shader.into(),
                     message,
                 });
             }

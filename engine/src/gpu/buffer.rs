@@ -106,15 +106,28 @@ impl std::fmt::Debug for Buffer {
 }
 
 pub(super) struct BufferInner {
-    gpu: Arc<Inner>,
+    pub gpu: Arc<Inner>,
     pub raw: vk::Buffer,
+    /// Where it begins in `raw`: 0 but for a host's.
+    pub base: u64,
     pub id: u64,
     pub name: String,
     pub bytes: u64,
-    allocated: u64,
-    category: Category,
-    /// `None` only while dropping.
-    allocation: Option<Allocation>,
+    pub usage: vk::BufferUsageFlags,
+    pub memory: Memory,
+}
+
+/// Whose memory a buffer is in.
+pub(super) enum Memory {
+    /// The engine's.
+    Own {
+        category: Category,
+        bytes: u64,
+        /// `None` only while it is made or dropped.
+        allocation: Option<Allocation>,
+    },
+    /// A host's, which also owns the handle.
+    Host,
 }
 
 impl Gpu {
@@ -156,12 +169,16 @@ impl Gpu {
         let mut inner = BufferInner {
             gpu: Arc::clone(gpu),
             raw,
+            base: 0,
             id: gpu.next_id(),
             name: desc.name.into(),
             bytes,
-            allocated: requirements.size,
-            category: desc.category,
-            allocation: None,
+            usage: desc.usage,
+            memory: Memory::Own {
+                category: desc.category,
+                bytes: requirements.size,
+                allocation: None,
+            },
         };
         let allocation = gpu
             .memory
@@ -171,7 +188,11 @@ impl Gpu {
             gpu.device
                 .bind_buffer_memory(raw, allocation.memory(), allocation.offset())
         };
-        inner.allocation = Some(allocation);
+        inner.memory = Memory::Own {
+            category: desc.category,
+            bytes: requirements.size,
+            allocation: Some(allocation),
+        };
         bound.map_err(|result| gpu.error("vkBindBufferMemory", result))?;
         gpu.name(raw, desc.name);
         Ok(Buffer { inner: Arc::new(inner) })
@@ -179,7 +200,7 @@ impl Gpu {
 }
 
 impl Buffer {
-    /// Its size in bytes, as allocated (rounded up to 4, at least 16).
+    /// Its size in bytes: as allocated (rounded up to 4, at least 16), or as a host lent it.
     pub fn bytes(&self) -> u64 {
         self.inner.bytes
     }
@@ -189,9 +210,14 @@ impl Buffer {
         &self.inner.name
     }
 
-    /// The Vulkan handle.
+    /// The Vulkan handle. A buffer that a host lent may begin further on in it: [`Buffer::raw_offset`].
     pub fn raw(&self) -> vk::Buffer {
         self.inner.raw
+    }
+
+    /// Where it begins in [`Buffer::raw`], in bytes; 0 for the engine's own.
+    pub fn raw_offset(&self) -> u64 {
+        self.inner.base
     }
 
     /// All of it.
@@ -247,7 +273,10 @@ impl Buffer {
         if offset.saturating_add(bytes) > self.inner.bytes {
             return Err(error("size", self.inner.bytes));
         }
-        let pointer = self.inner.allocation.as_ref().and_then(Allocation::mapped_ptr);
+        let pointer = match &self.inner.memory {
+            Memory::Own { allocation, .. } => allocation.as_ref().and_then(Allocation::mapped_ptr),
+            Memory::Host => None,
+        };
         let pointer = pointer.ok_or_else(|| error("mapped size", 0))?;
         // SAFETY: the offset lies inside the mapping.
         Ok(unsafe { pointer.as_ptr().cast::<u8>().add(offset as usize) })
@@ -256,10 +285,18 @@ impl Buffer {
 
 impl Drop for BufferInner {
     fn drop(&mut self) {
+        let Memory::Own {
+            category,
+            bytes,
+            allocation,
+        } = &mut self.memory
+        else {
+            return;
+        };
         // SAFETY: the last owner is gone, and submissions own what they use.
         unsafe { self.gpu.device.destroy_buffer(self.raw, None) };
-        if let Some(allocation) = self.allocation.take() {
-            self.gpu.memory.free(self.category, self.allocated, allocation);
+        if let Some(allocation) = allocation.take() {
+            self.gpu.memory.free(*category, *bytes, allocation);
         }
     }
 }
@@ -276,6 +313,20 @@ pub struct BufferView<'a> {
 }
 
 impl BufferView<'_> {
+    /// Where it begins in the Vulkan buffer.
+    pub(super) fn raw_offset(&self) -> u64 {
+        self.buffer.inner.base + self.offset
+    }
+
+    /// Fails when the buffer was not made, or not lent, for a use.
+    pub(super) fn check_usage(&self, usage: vk::BufferUsageFlags) -> Result<()> {
+        if self.buffer.inner.usage.contains(usage) {
+            return Ok(());
+        }
+        let cause = format!("is used as {usage:?}, for which it was not made");
+        Err(Error::setting("buffer", self.buffer.name(), cause))
+    }
+
     /// Fails when the range does not lie in the buffer or does not begin at a multiple of `alignment`.
     pub(super) fn check(&self, alignment: u64) -> Result<()> {
         let error = |value, limit_name, limit| Error::LimitExceeded {
@@ -288,8 +339,9 @@ impl BufferView<'_> {
         if end > self.buffer.bytes() {
             return Err(error(end, "size", self.buffer.bytes()));
         }
-        if !self.offset.is_multiple_of(alignment) {
-            return Err(error(self.offset, "offset alignment", alignment));
+        let offset = self.raw_offset();
+        if !offset.is_multiple_of(alignment) {
+            return Err(error(offset, "offset alignment", alignment));
         }
         Ok(())
     }

@@ -70,6 +70,8 @@ pub struct Caps {
     pub max_storage_buffer_range: u64,
     /// `maxTexelBufferElements`, but no more than kernels can number: they index texels by `int`.
     pub max_texel_buffer_elements: u64,
+    /// `minTexelBufferOffsetAlignment`, bytes.
+    pub texel_buffer_alignment: u64,
     /// `minStorageBufferOffsetAlignment`, bytes.
     pub storage_buffer_alignment: u64,
     /// `maxUniformBufferRange`, bytes.
@@ -82,6 +84,8 @@ pub struct Caps {
     pub device_heap: u64,
     /// `maxComputeSharedMemorySize`, bytes.
     pub max_shared_memory: u32,
+    /// `maxComputeWorkGroupSize`.
+    pub max_workgroup_size: [u32; 3],
     /// `maxComputeWorkGroupInvocations`.
     pub max_workgroup_invocations: u32,
     /// `maxComputeWorkGroupCount[0]`.
@@ -320,6 +324,7 @@ impl Caps {
             descriptors: DescriptorLimits::of(&limits),
             max_storage_buffer_range: u64::from(limits.max_storage_buffer_range),
             max_texel_buffer_elements: indexable_texels(limits.max_texel_buffer_elements),
+            texel_buffer_alignment: limits.min_texel_buffer_offset_alignment,
             storage_buffer_alignment: limits.min_storage_buffer_offset_alignment,
             max_uniform_buffer_range: u64::from(limits.max_uniform_buffer_range),
             uniform_buffer_alignment: limits.min_uniform_buffer_offset_alignment,
@@ -331,6 +336,7 @@ impl Caps {
                 .max()
                 .unwrap_or(0),
             max_shared_memory: limits.max_compute_shared_memory_size,
+            max_workgroup_size: limits.max_compute_work_group_size,
             max_workgroup_invocations: limits.max_compute_work_group_invocations,
             max_workgroups: limits.max_compute_work_group_count[0],
             max_push_constants: limits.max_push_constants_size,

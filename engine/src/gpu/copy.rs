@@ -15,6 +15,7 @@ impl Pass<'_> {
     /// [`Error::LimitExceeded`] for a part that is not in the buffer, [`Error::MissingBarrier`] in debug builds.
     pub fn fill(&mut self, view: BufferView<'_>, word: u32) -> Result<()> {
         view.check(4)?;
+        view.check_usage(vk::BufferUsageFlags::TRANSFER_DST)?;
         if view.bytes == 0 {
             return Ok(());
         }
@@ -25,7 +26,7 @@ impl Pass<'_> {
             self.recorder.gpu.inner.device.cmd_fill_buffer(
                 self.command_buffer,
                 view.buffer.raw(),
-                view.offset,
+                view.raw_offset(),
                 view.bytes,
                 word,
             );
@@ -49,6 +50,7 @@ impl Pass<'_> {
             });
         }
         view.check(4)?;
+        view.check_usage(vk::BufferUsageFlags::TRANSFER_DST)?;
         if bytes.is_empty() {
             return Ok(());
         }
@@ -60,7 +62,7 @@ impl Pass<'_> {
                 .gpu
                 .inner
                 .device
-                .cmd_update_buffer(self.command_buffer, view.buffer.raw(), view.offset, bytes)
+                .cmd_update_buffer(self.command_buffer, view.buffer.raw(), view.raw_offset(), bytes)
         };
         Ok(())
     }
@@ -80,6 +82,8 @@ impl Pass<'_> {
         }
         from.check(1)?;
         to.check(1)?;
+        from.check_usage(vk::BufferUsageFlags::TRANSFER_SRC)?;
+        to.check_usage(vk::BufferUsageFlags::TRANSFER_DST)?;
         if from.bytes == 0 {
             return Ok(());
         }
@@ -87,8 +91,8 @@ impl Pass<'_> {
         self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
         self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
         let region = vk::BufferCopy {
-            src_offset: from.offset,
-            dst_offset: to.offset,
+            src_offset: from.raw_offset(),
+            dst_offset: to.raw_offset(),
             size: from.bytes,
         };
         // SAFETY: both ranges lie in their buffers, which are kept alive.
@@ -109,6 +113,7 @@ impl Pass<'_> {
     /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
     pub fn copy_image_to_buffer(&mut self, from: &Image, to: BufferView<'_>) -> Result<()> {
         image_rows(from, to)?;
+        to.check_usage(vk::BufferUsageFlags::TRANSFER_DST)?;
         self.recorder.next_command();
         self.recorder.keep(&from.inner);
         self.recorder.touch(self.name, to.buffer, Access::TRANSFER_WRITE)?;
@@ -120,7 +125,7 @@ impl Pass<'_> {
                 from.raw(),
                 layout,
                 to.buffer.raw(),
-                &[whole_image(from, to.offset)],
+                &[whole_image(from, to.raw_offset())],
             );
         }
         Ok(())
@@ -132,6 +137,7 @@ impl Pass<'_> {
     /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
     pub fn copy_buffer_to_image(&mut self, from: BufferView<'_>, to: &Image) -> Result<()> {
         image_rows(to, from)?;
+        from.check_usage(vk::BufferUsageFlags::TRANSFER_SRC)?;
         self.recorder.next_command();
         self.recorder.keep(&to.inner);
         self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
@@ -143,7 +149,7 @@ impl Pass<'_> {
                 from.buffer.raw(),
                 to.raw(),
                 layout,
-                &[whole_image(to, from.offset)],
+                &[whole_image(to, from.raw_offset())],
             );
         }
         Ok(())

@@ -46,6 +46,72 @@ pub(super) fn compile(info: &ShaderInfo, source: &Path, includes: &Path, purpose
     }
 }
 
+/// Compiles a compute shader given as text.
+///
+/// # Errors
+/// [`Error::Shader`] with the compiler's words, [`Error::Io`] when there is no compiler.
+#[cfg(not(feature = "shaderc"))]
+pub(super) fn compile_text(name: &str, text: &str, purpose: Purpose) -> Result<Vec<u8>> {
+    use std::io::Write;
+    use std::process::{Command, Stdio};
+
+    let program = std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
+    let failed = |error| Error::io(&program, error);
+    let mut child = Command::new(&program)
+        .args(["-Werror", "--target-env=vulkan1.1", "--target-spv=spv1.3", "-fshader-stage=compute"])
+        .arg(match purpose {
+            Purpose::Reflection => "-O0",
+            Purpose::Execution => "-O",
+        })
+        .args(["-", "-o", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(failed)?;
+    // The compiler reads all of its input before it writes. One that ends early says why on its error stream.
+    if let Some(mut input) = child.stdin.take() {
+        let _ = input.write_all(text.as_bytes());
+    }
+    let output = child.wait_with_output().map_err(failed)?;
+    if output.status.success() {
+        return Ok(output.stdout);
+    }
+    Err(Error::Shader {
+        name: name.into(),
+        message: String::from_utf8_lossy(&output.stderr).trim().to_owned(),
+    })
+}
+
+/// Compiles a compute shader given as text.
+///
+/// # Errors
+/// [`Error::Shader`] with the compiler's words.
+#[cfg(feature = "shaderc")]
+pub(super) fn compile_text(name: &str, text: &str, purpose: Purpose) -> Result<Vec<u8>> {
+    let wrong = |message: String| Error::Shader {
+        name: name.into(),
+        message,
+    };
+    if text.contains('\0') || name.contains('\0') {
+        return Err(wrong("holds a NUL".into()));
+    }
+    let failed = |error: shaderc::Error| wrong(error.to_string());
+    let compiler = shaderc::Compiler::new().map_err(failed)?;
+    let mut options = shaderc::CompileOptions::new().map_err(failed)?;
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_1 as u32);
+    options.set_target_spirv(shaderc::SpirvVersion::V1_3);
+    options.set_warnings_as_errors();
+    options.set_optimization_level(match purpose {
+        Purpose::Reflection => shaderc::OptimizationLevel::Zero,
+        Purpose::Execution => shaderc::OptimizationLevel::Performance,
+    });
+    compiler
+        .compile_into_spirv(text, shaderc::ShaderKind::Compute, name, "main", Some(&options))
+        .map(|module| module.as_binary_u8().to_vec())
+        .map_err(failed)
+}
+
 /// Compiles a source file that has taken the place of the one `info` came from.
 ///
 /// # Errors

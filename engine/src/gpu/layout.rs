@@ -25,12 +25,16 @@ pub(super) struct PipelineObjects {
 impl PipelineObjects {
     /// The layouts (with empty sets in gaps) for the shaders of one pipeline, whose attachments count as resources of the fragment stage.
     pub fn new(gpu: &Arc<Inner>, shaders: &[&'static ShaderInfo], attachments: u32) -> Result<Self> {
-        let wanted = Wanted::by(shaders, attachments);
+        Self::of(gpu, &LayoutDesc::of(shaders, attachments))
+    }
+
+    /// The layouts (with empty sets in gaps).
+    pub fn of(gpu: &Arc<Inner>, desc: &LayoutDesc<'_>) -> Result<Self> {
+        let wanted = Wanted::by(desc);
         if let Some((limit, wanted, offered)) = wanted.excess(&gpu.caps.descriptors, gpu.caps.max_push_constants) {
-            let names: Vec<_> = shaders.iter().map(|shader| shader.name).collect();
             return Err(Error::MissingFeature {
                 feature: format!("{limit} >= {wanted}"),
-                needed_by: format!("the pipeline of {}", names.join(" and ")),
+                needed_by: format!("the pipeline of {}", desc.names.join(" and ")),
                 device: gpu.caps.device.clone(),
                 instead: format!("it offers {offered}; choose another device"),
             });
@@ -41,19 +45,19 @@ impl PipelineObjects {
             layout: vk::PipelineLayout::null(),
             sets: Vec::new(),
         };
-        objects.make(shaders)?;
+        objects.make(desc)?;
         Ok(objects)
     }
 
-    fn make(&mut self, shaders: &[&'static ShaderInfo]) -> Result<()> {
-        let (gpu, name) = (&self.gpu, shaders[0].name);
-        let stages = shaders.iter().fold(vk::ShaderStageFlags::empty(), |all, shader| {
-            all | stage_flags(shader.stage)
-        });
-        let mut bindings: BTreeMap<(u32, u32), BindingKind> = BTreeMap::new();
-        for binding in shaders.iter().flat_map(|shader| shader.used_bindings()) {
-            bindings.insert((binding.set, binding.binding), binding.kind);
-        }
+    fn make(&mut self, desc: &LayoutDesc<'_>) -> Result<()> {
+        let LayoutDesc {
+            names,
+            stages,
+            bindings,
+            push_bytes,
+            ..
+        } = desc;
+        let (gpu, name) = (&self.gpu, names.first().copied().unwrap_or_default());
         for set in 0..bindings.keys().map(|(set, _)| set + 1).max().unwrap_or(0) {
             let list: Vec<_> = bindings
                 .range((set, 0)..=(set, u32::MAX))
@@ -62,7 +66,7 @@ impl PipelineObjects {
                         .binding(*binding)
                         .descriptor_type(descriptor_type(*kind))
                         .descriptor_count(1)
-                        .stage_flags(stages)
+                        .stage_flags(*stages)
                 })
                 .collect();
             let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&list);
@@ -72,14 +76,9 @@ impl PipelineObjects {
             gpu.name(layout, &format!("{name} set {set}"));
             self.sets.push(layout);
         }
-        let push_bytes = shaders
-            .iter()
-            .map(|shader| shader.push_constant_bytes)
-            .max()
-            .unwrap_or(0);
-        let ranges = [vk::PushConstantRange::default().stage_flags(stages).size(push_bytes)];
+        let ranges = [vk::PushConstantRange::default().stage_flags(*stages).size(*push_bytes)];
         let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&self.sets);
-        if push_bytes > 0 {
+        if *push_bytes > 0 {
             info = info.push_constant_ranges(&ranges);
         }
         // SAFETY: plain creation from live layouts.
@@ -109,6 +108,37 @@ impl Drop for PipelineObjects {
     }
 }
 
+/// What a pipeline layout is made of.
+pub(super) struct LayoutDesc<'a> {
+    /// Of the shaders.
+    pub names: Vec<&'a str>,
+    pub stages: vk::ShaderStageFlags,
+    /// By set and number.
+    pub bindings: BTreeMap<(u32, u32), BindingKind>,
+    pub push_bytes: u32,
+    /// They count as resources of the fragment stage.
+    pub attachments: u32,
+}
+
+impl<'a> LayoutDesc<'a> {
+    /// For the shaders of one pipeline.
+    fn of(shaders: &[&'a ShaderInfo], attachments: u32) -> Self {
+        Self {
+            names: shaders.iter().map(|shader| shader.name).collect(),
+            stages: shaders.iter().fold(vk::ShaderStageFlags::empty(), |all, shader| {
+                all | stage_flags(shader.stage)
+            }),
+            bindings: shaders
+                .iter()
+                .flat_map(|shader| shader.used_bindings())
+                .map(|binding| ((binding.set, binding.binding), binding.kind))
+                .collect(),
+            push_bytes: shaders.iter().map(|s| s.push_constant_bytes).max().unwrap_or(0),
+            attachments,
+        }
+    }
+}
+
 /// What the layout of one pipeline takes. Every binding is visible to all stages of the pipeline, so that one count holds for each stage
 /// and for the whole.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -125,12 +155,8 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn by(shaders: &[&ShaderInfo], attachments: u32) -> Self {
-        let kinds: BTreeMap<_, _> = shaders
-            .iter()
-            .flat_map(|shader| shader.used_bindings())
-            .map(|binding| ((binding.set, binding.binding), binding.kind))
-            .collect();
+    fn by(desc: &LayoutDesc<'_>) -> Self {
+        let kinds = &desc.bindings;
         let count = |of: &[BindingKind]| kinds.values().filter(|kind| of.contains(kind)).count() as u32;
         Self {
             sets: kinds.keys().map(|(set, _)| set + 1).max().unwrap_or(0),
@@ -139,8 +165,8 @@ impl Wanted {
             storage_images: count(&[BindingKind::StorageImage]),
             sampled_images: count(&[BindingKind::SampledImage, BindingKind::TexelBuffer]),
             samplers: count(&[BindingKind::SampledImage]),
-            resources: kinds.len() as u32 + attachments,
-            push_bytes: shaders.iter().map(|s| s.push_constant_bytes).max().unwrap_or(0),
+            resources: kinds.len() as u32 + desc.attachments,
+            push_bytes: desc.push_bytes,
         }
     }
 
@@ -328,14 +354,14 @@ mod tests {
             resources: 5 + 2,
             push_bytes: 12,
         };
-        assert_eq!(Wanted::by(&[&FIRST, &SECOND], 2), expected);
+        assert_eq!(Wanted::by(&LayoutDesc::of(&[&FIRST, &SECOND], 2)), expected);
     }
 
     type Field = fn(&mut DescriptorLimits) -> &mut u32;
 
     #[test]
     fn each_limit_is_reached_and_passed() {
-        let wanted = Wanted::by(&[&FIRST, &SECOND], 2);
+        let wanted = Wanted::by(&LayoutDesc::of(&[&FIRST, &SECOND], 2));
         let exact = DescriptorLimits {
             bound_sets: 3,
             per_stage_storage_buffers: 1,

@@ -8,6 +8,7 @@
 
 mod barrier;
 mod bind;
+mod borrow;
 mod buffer;
 mod caps;
 mod copy;
@@ -28,8 +29,11 @@ mod layout;
 mod marker;
 mod memory;
 mod options;
+#[cfg(any(feature = "wgsl", feature = "hot-reload"))]
+mod own_kernel;
 mod pipeline;
 mod pipeline_cache;
+mod recorded;
 pub(crate) mod recorder;
 #[cfg(feature = "hot-reload")]
 #[path = "../../build/reflect.rs"]
@@ -49,6 +53,7 @@ pub use barrier::{
     Access, BufferBarrier, ImageBarrier, compute_to_indirect, compute_to_transfer, rw_compute_to_compute,
     transfer_to_compute,
 };
+pub use borrow::{BorrowDesc, BorrowedRecorder, HostBuffer};
 pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, DescriptorLimits, DeviceKind, SOFTWARE_LOOP_CAP, SubgroupOperations};
 pub use device::{Gpu, QueueGuard};
@@ -61,7 +66,10 @@ pub use image_part::ImagePart;
 pub use instance::{DeviceSummary, VALIDATION_LAYER, ValidationLog, ValidationMessage};
 pub use memory::{AllocationInfo, Category, MemoryReport};
 pub use options::{DeviceSelection, GpuOptions, Lesser, Validation};
+#[cfg(any(feature = "wgsl", feature = "hot-reload"))]
+pub use own_kernel::{OwnBinding, OwnKernel, OwnResource};
 pub use pipeline::{ComputePipeline, PipelineInfo};
+pub use recorded::Recorded;
 pub use recorder::{Pass, Recorder};
 pub use rendering::{Area, ClearColor, ColorTarget, DepthTarget, Render, Targets};
 pub use submission::Submission;

@@ -128,6 +128,46 @@ impl<K> ComputePipeline<K> {
     }
 }
 
+/// Fails for a workgroup of more invocations than the device has.
+pub(super) fn check_workgroup(gpu: &Inner, name: &str, local_size: [u32; 3]) -> Result<()> {
+    let most = gpu.caps.max_workgroup_invocations;
+    let invocations = local_size.iter().fold(1u32, |all, side| all.saturating_mul(*side));
+    if invocations <= most {
+        return Ok(());
+    }
+    Err(Error::MissingFeature {
+        feature: format!("maxComputeWorkGroupInvocations >= {invocations}"),
+        needed_by: name.into(),
+        device: gpu.caps.device.clone(),
+        instead: format!("choose a workgroup of at most {most}"),
+    })
+}
+
+impl PipelineObjects {
+    /// Makes the compute pipeline of a stage.
+    ///
+    /// # Safety
+    /// The stage's module is alive, and the layout has what it uses.
+    pub(super) unsafe fn make_compute(
+        &mut self,
+        gpu: &Inner,
+        stage: vk::PipelineShaderStageCreateInfo<'_>,
+        name: &str,
+    ) -> Result<()> {
+        let create = vk::ComputePipelineCreateInfo::default()
+            .stage(stage)
+            .layout(self.layout);
+        // SAFETY: the caller's; the layout is alive.
+        let made = unsafe {
+            gpu.device
+                .create_compute_pipelines(gpu.pipeline_cache.raw, &[create], None)
+        };
+        let made = made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, name, 0))?;
+        self.set_pipeline(made[0], name);
+        Ok(())
+    }
+}
+
 impl PipelineInner {
     /// The pipeline of a module with the interface `info`.
     fn compute(gpu: &Arc<Inner>, info: &'static ShaderInfo, spirv: &[u8], spec: Vec<(u32, u32)>) -> Result<Self> {
@@ -136,15 +176,7 @@ impl PipelineInner {
             LocalSize::Fixed(size) => size,
             LocalSize::Spec(wanted) => spec.iter().find(|(id, _)| *id == wanted).map_or(1, |(_, value)| *value),
         });
-        let invocations = local_size.iter().product::<u32>();
-        if invocations > gpu.caps.max_workgroup_invocations {
-            return Err(Error::MissingFeature {
-                feature: format!("maxComputeWorkGroupInvocations >= {invocations}"),
-                needed_by: info.name.into(),
-                device: gpu.caps.device.clone(),
-                instead: format!("choose a workgroup of at most {}", gpu.caps.max_workgroup_invocations),
-            });
-        }
+        check_workgroup(gpu, info.name, local_size)?;
         let mut objects = PipelineObjects::new(gpu, &[info], 0)?;
         let module = ShaderModule::new(gpu, info.name, spirv)?;
         let (entries, data) = specialization_data(&spec);
@@ -163,16 +195,8 @@ impl PipelineInner {
             .module(module.raw)
             .name(c"main")
             .specialization_info(&specialization);
-        let create = vk::ComputePipelineCreateInfo::default()
-            .stage(stage)
-            .layout(objects.layout);
-        // SAFETY: module and layout are alive and match, since both come from the same reflection.
-        let made = unsafe {
-            gpu.device
-                .create_compute_pipelines(gpu.pipeline_cache.raw, &[create], None)
-        };
-        let made = made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, info.name, 0))?;
-        objects.set_pipeline(made[0], info.name);
+        // SAFETY: module and layout match, since both come from the same reflection.
+        unsafe { objects.make_compute(gpu, stage, info.name) }?;
         Ok(Self {
             objects,
             info,

@@ -14,7 +14,8 @@ use super::interface::{BindingSet, ComputeShader, PushConstants};
 use super::marker::BEGUN;
 use super::memory::Category;
 use super::pipeline::ComputePipeline;
-use super::resources::{FrameResources, Lease};
+use super::recorded::Recorded;
+use super::resources::FrameResources;
 use super::submission::{self, Submission};
 use super::tracker::Tracker;
 use crate::card::{Role, Row, sources};
@@ -26,7 +27,7 @@ pub(super) const MAX_PASSES: usize = 1024;
 /// Something that a command buffer uses, kept alive until the device is done.
 pub(super) type Kept = BTreeMap<usize, Arc<dyn Any + Send + Sync>>;
 
-/// One command buffer under construction.
+/// One command buffer under construction: the engine's own, or a host's ([`Recorder::borrow`]).
 ///
 /// How much work one submission may hold is up to its author: see [`Timings`](super::Timings).
 ///
@@ -34,17 +35,13 @@ pub(super) type Kept = BTreeMap<usize, Arc<dyn Any + Send + Sync>>;
 /// every barrier is the author's; debug builds check that none is missing.
 pub struct Recorder {
     pub(super) gpu: Gpu,
-    name: String,
-    /// Goes back before what its commands use does.
-    resources: Lease,
-    markers: Option<Buffer>,
-    passes: Vec<String>,
-    /// Barrier commands of each pass.
-    barriers: Vec<u32>,
-    kept: Kept,
-    tracker: Option<Tracker>,
-    /// The first pass whose work is counted.
-    counted_from: Option<usize>,
+    pub(super) name: String,
+    /// That of the resources, or a host's.
+    pub(super) command_buffer: vk::CommandBuffer,
+    pub(super) is_borrowed: bool,
+    pub(super) recorded: Recorded,
+    pub(super) markers: Option<Buffer>,
+    pub(super) tracker: Option<Tracker>,
 }
 
 /// One pass: what is recorded between two timestamps.
@@ -75,16 +72,15 @@ impl Gpu {
         if let Some(markers) = &markers {
             markers.write(0, &[0u32; MAX_PASSES])?;
         }
+        let recorded = Recorded::new(self, true)?;
         let recorder = Recorder {
             gpu: self.clone(),
             name: name.into(),
-            resources: Lease::take(self)?,
+            command_buffer: recorded.resources.command_buffer,
+            is_borrowed: false,
+            recorded,
             markers,
-            passes: Vec::new(),
-            barriers: Vec::new(),
-            kept: Kept::new(),
             tracker: cfg!(debug_assertions).then(Tracker::default),
-            counted_from: None,
         };
         recorder.begin()?;
         Ok(recorder)
@@ -95,7 +91,8 @@ impl Recorder {
     /// Counts the shader invocations and primitives of every pass from here on, where the device can.
     pub fn count_invocations(&mut self) {
         if self.gpu.caps().pipeline_statistics {
-            self.counted_from.get_or_insert(self.passes.len());
+            let passes = self.recorded.passes.len();
+            self.recorded.counted_from.get_or_insert(passes);
         }
     }
 
@@ -104,7 +101,7 @@ impl Recorder {
     /// # Errors
     /// Whatever `record` returns; [`Error::LimitExceeded`] past 1024 passes.
     pub fn pass<R>(&mut self, name: &str, record: impl FnOnce(&mut Pass<'_>) -> Result<R>) -> Result<R> {
-        let index = self.passes.len();
+        let index = self.recorded.passes.len();
         if index == MAX_PASSES {
             return Err(Error::LimitExceeded {
                 name: self.name.clone(),
@@ -113,16 +110,13 @@ impl Recorder {
                 limit: MAX_PASSES as u64,
             });
         }
-        self.passes.push(name.into());
-        self.barriers.push(0);
+        self.recorded.passes.push(name.into());
+        self.recorded.barriers.push(0);
         let inner = Arc::clone(&self.gpu.inner);
-        let FrameResources {
-            command_buffer,
-            statistics,
-            ..
-        } = *self.resources;
-        let (device, counted) = (&inner.device, self.counted_from.is_some());
-        // SAFETY: the command buffer is recording, and the indices lie inside the pools, which `begin` has reset.
+        let command_buffer = self.command_buffer;
+        let statistics = self.recorded.resources.statistics;
+        let (device, counted) = (&inner.device, self.recorded.counted_from.is_some());
+        // SAFETY: the command buffer is recording, and the indices lie inside the pools, which were reset.
         unsafe {
             if let Some(debug) = &inner.debug {
                 let label = std::ffi::CString::new(name).unwrap_or_default();
@@ -163,12 +157,9 @@ impl Recorder {
     /// # Safety
     /// The command buffer is recording, outside of a rendering, and the index is one of the pool's, reset and not written yet.
     unsafe fn write_timestamp(&self, index: u32) {
-        let FrameResources {
-            command_buffer,
-            timestamps,
-            ..
-        } = *self.resources;
-        if timestamps == vk::QueryPool::null() {
+        let command_buffer = self.command_buffer;
+        let timestamps = self.recorded.resources.timestamps;
+        if timestamps == vk::QueryPool::null() || !self.recorded.is_timed {
             return;
         }
         let device = &self.gpu.inner.device;
@@ -185,7 +176,7 @@ impl Recorder {
     /// Ends the command buffer and hands it to the queue.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`]; [`Error::Setting`] for a host's command buffer, which the host submits.
     pub fn submit(self) -> Result<Submission> {
         self.submit_with(&[], &[])
     }
@@ -197,7 +188,14 @@ impl Recorder {
     pub fn submit_with(self, wait: &[vk::Semaphore], signal: &[vk::Semaphore]) -> Result<Submission> {
         let inner = Arc::clone(&self.gpu.inner);
         inner.check_alive()?;
-        let command_buffer = self.resources.command_buffer;
+        if self.is_borrowed {
+            return Err(Error::setting(
+                "recorder",
+                self.name,
+                "records into a host's command buffer, which the host submits",
+            ));
+        }
+        let command_buffer = self.command_buffer;
         let host = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
@@ -216,7 +214,7 @@ impl Recorder {
         let mut queue = inner.lock_queue();
         let value = queue.last_value + 1;
         if let Some(markers) = &self.markers {
-            inner.in_flight().begin(value, markers.clone(), self.passes.clone());
+            inner.in_flight().begin(value, markers.clone(), self.recorded.passes.clone());
         }
         // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
         let submitted = unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) };
@@ -233,55 +231,53 @@ impl Recorder {
             gpu: self.gpu,
             name: self.name,
             value,
-            resources: self.resources,
-            passes: self.passes,
-            barriers: self.barriers,
-            _kept: self.kept,
-            counted_from: self.counted_from,
+            recorded: self.recorded,
             finished: false,
         })
     }
 
     fn begin(&self) -> Result<()> {
         let inner = &self.gpu.inner;
-        let resources = &self.resources;
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the command buffer is fresh or reset.
+        unsafe {
+            inner
+                .device
+                .begin_command_buffer(self.command_buffer, &info)
+                .map_err(|r| inner.error("vkBeginCommandBuffer", r))?;
+            self.barrier_over_everything();
+        }
+        Ok(())
+    }
+
+    /// All commands before, of earlier submissions, too, then all that follow.
+    ///
+    /// # Safety
+    /// The command buffer is recording, outside of a rendering.
+    pub(super) unsafe fn barrier_over_everything(&self) {
         let all = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
             .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
-        // SAFETY: the command buffer is fresh or reset, the pools are idle, and hostQueryReset is enabled.
+        let info = vk::DependencyInfo::default().memory_barriers(&all);
+        // SAFETY: the caller's.
         unsafe {
-            if resources.timestamps != vk::QueryPool::null() {
-                inner
-                    .device
-                    .reset_query_pool(resources.timestamps, 0, 2 * MAX_PASSES as u32);
-            }
-            if resources.statistics != vk::QueryPool::null() {
-                inner
-                    .device
-                    .reset_query_pool(resources.statistics, 0, MAX_PASSES as u32);
-            }
-            inner
+            self.gpu
+                .inner
                 .device
-                .begin_command_buffer(resources.command_buffer, &info)
-                .map_err(|r| inner.error("vkBeginCommandBuffer", r))?;
-            inner.device.cmd_pipeline_barrier2(
-                resources.command_buffer,
-                &vk::DependencyInfo::default().memory_barriers(&all),
-            );
-        }
-        Ok(())
+                .cmd_pipeline_barrier2(self.command_buffer, &info)
+        };
     }
 
     pub(super) fn resources(&mut self) -> &mut FrameResources {
-        &mut self.resources
+        &mut self.recorded.resources
     }
 
     pub(super) fn keep<T: Any + Send + Sync>(&mut self, item: &Arc<T>) {
         let key = Arc::as_ptr(item).cast::<()>() as usize;
-        self.kept
+        self.recorded
+            .kept
             .entry(key)
             .or_insert_with(|| Arc::clone(item) as Arc<dyn Any + Send + Sync>);
     }
@@ -339,15 +335,7 @@ impl Pass<'_> {
         push: &K::Push,
         groups: [u32; 3],
     ) -> Result<()> {
-        let limit = self.recorder.gpu.caps().max_workgroups;
-        if let Some(count) = groups.iter().find(|count| **count > limit) {
-            return Err(Error::LimitExceeded {
-                name: pipeline.inner.info.name.into(),
-                value: u64::from(*count),
-                limit_name: "maxComputeWorkGroupCount",
-                limit: u64::from(limit),
-            });
-        }
+        self.check_groups(pipeline.inner.info.name, groups)?;
         self.recorder.next_command();
         self.bind(pipeline, sets, push)?;
         let [x, y, z] = groups;
@@ -375,6 +363,7 @@ impl Pass<'_> {
     ) -> Result<()> {
         let words = BufferView { bytes: 12, ..arguments };
         words.check(4)?;
+        words.check_usage(vk::BufferUsageFlags::INDIRECT_BUFFER)?;
         self.recorder.next_command();
         self.recorder
             .touch(self.name, arguments.buffer, Access::INDIRECT_READ)?;
@@ -384,7 +373,7 @@ impl Pass<'_> {
             self.recorder.gpu.inner.device.cmd_dispatch_indirect(
                 self.command_buffer,
                 arguments.buffer.raw(),
-                arguments.offset,
+                arguments.raw_offset(),
             );
         }
         Ok(())
@@ -401,7 +390,8 @@ impl Pass<'_> {
                 }
                 vk::BufferMemoryBarrier2::default()
                     .buffer(barrier.buffer.raw())
-                    .size(vk::WHOLE_SIZE)
+                    .offset(barrier.buffer.raw_offset())
+                    .size(barrier.buffer.bytes())
                     .src_stage_mask(from.stages())
                     .src_access_mask(from.writes().kinds())
                     .dst_stage_mask(to.stages())
@@ -461,6 +451,20 @@ impl Pass<'_> {
         self.command_buffer
     }
 
+    /// Fails for more workgroups than the device dispatches.
+    pub(super) fn check_groups(&self, shader: &str, groups: [u32; 3]) -> Result<()> {
+        let limit = self.recorder.gpu.caps().max_workgroups;
+        match groups.iter().find(|count| **count > limit) {
+            None => Ok(()),
+            Some(count) => Err(Error::LimitExceeded {
+                name: shader.into(),
+                value: u64::from(*count),
+                limit_name: "maxComputeWorkGroupCount",
+                limit: u64::from(limit),
+            }),
+        }
+    }
+
     /// The uses that the device has stages for.
     fn usable(&self, from: Access, to: Access) -> (Access, Access) {
         let caps = self.recorder.gpu.caps();
@@ -468,7 +472,7 @@ impl Pass<'_> {
     }
 
     fn pipeline_barrier(&mut self, info: &vk::DependencyInfo<'_>) {
-        if let Some(count) = self.recorder.barriers.last_mut() {
+        if let Some(count) = self.recorder.recorded.barriers.last_mut() {
             *count += 1;
         }
         // SAFETY: the command buffer is recording, outside of rendering.

@@ -287,13 +287,14 @@ impl Render<'_, '_> {
             ..arguments
         };
         words.check(4)?;
+        words.check_usage(vk::BufferUsageFlags::INDIRECT_BUFFER)?;
         let pass = &mut *self.pass;
         pass.recorder.next_command();
         pass.recorder
             .touch(pass.name, arguments.buffer, Access::INDIRECT_READ)?;
         self.bind(pipeline, sets, push)?;
         let device = &self.pass.recorder.gpu.inner.device;
-        let (buffer, offset) = (arguments.buffer.raw(), arguments.offset);
+        let (buffer, offset) = (arguments.buffer.raw(), arguments.raw_offset());
         // SAFETY: as in `draw`; the arguments are kept alive.
         unsafe { device.cmd_draw_indirect(self.pass.command_buffer, buffer, offset, 1, bytes as u32) };
         Ok(())

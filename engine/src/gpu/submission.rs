@@ -1,15 +1,13 @@
 //! Work that the queue has taken, and waiting for it.
 
-use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use ash::vk;
 
 use super::device::{Gpu, Inner};
 use super::options::Validation;
-use super::recorder::Kept;
-use super::resources::{COUNTS_OF_DRAWS, Lease};
-use super::timing::{Drawn, PassTiming, Timings, elapsed};
+use super::recorded::Recorded;
+use super::timing::Timings;
 use crate::{Error, Result};
 
 /// How long one call to the driver waits, so that a host thread never blocks for good.
@@ -20,14 +18,7 @@ pub struct Submission {
     pub(super) gpu: Gpu,
     pub(super) name: String,
     pub(super) value: u64,
-    /// Goes back before what its commands use does.
-    pub(super) resources: Lease,
-    pub(super) passes: Vec<String>,
-    /// Barrier commands of each pass.
-    pub(super) barriers: Vec<u32>,
-    pub(super) _kept: Kept,
-    /// The first pass whose invocations were counted.
-    pub(super) counted_from: Option<usize>,
+    pub(super) recorded: Recorded,
     /// The device is known to have finished.
     pub(super) finished: bool,
 }
@@ -90,74 +81,9 @@ impl Submission {
 
     fn finish(mut self) -> Timings {
         self.finished = true;
-        let inner = &self.gpu.inner;
-        inner.in_flight().end(self.value, true);
-        let count = self.passes.len();
-        let timestamps: Option<Vec<u64>> = read(inner, self.resources.timestamps, 0..2 * count);
-        // Queries of passes before the first counted one never began, and to read one would give nothing at all.
-        let counted_from = self.counted_from.unwrap_or(count);
-        let counted = read_counts(inner, self.resources.statistics, counted_from..count);
-        let (period, valid_bits) = (f64::from(inner.caps.timestamp_period), inner.caps.timestamp_valid_bits);
-        let nanoseconds = |index: usize| {
-            let ticks = timestamps.as_ref()?;
-            Some((elapsed(ticks[2 * index], ticks[2 * index + 1], valid_bits) as f64 * period) as u64)
-        };
-        let passes = self.passes.iter().zip(&self.barriers).enumerate();
-        let passes = passes.map(|(index, (name, barriers))| {
-            let counts = index.checked_sub(counted_from).and_then(|place| counted.get(place));
-            PassTiming {
-                name: name.clone(),
-                nanoseconds: nanoseconds(index),
-                barriers: *barriers,
-                invocations: counts.map(|(_, invocations)| *invocations),
-                drawn: counts.and_then(|(drawn, _)| *drawn),
-            }
-        });
-        Timings {
-            passes: passes.collect(),
-            untimed: match &timestamps {
-                Some(_) => None,
-                None if valid_bits == 0 => Some("the device's queue has no timestamps"),
-                None if count == 0 => Some("there is no pass"),
-                None => Some("the driver did not give the timestamps"),
-            },
-        }
+        self.gpu.inner.in_flight().end(self.value, true);
+        self.recorded.timings()
     }
-}
-
-/// Results of queries, `T` each; `None` without any.
-fn read<T: Copy + Default>(inner: &Inner, pool: vk::QueryPool, queries: Range<usize>) -> Option<Vec<T>> {
-    if pool == vk::QueryPool::null() || queries.is_empty() {
-        return None;
-    }
-    let mut values = vec![T::default(); queries.len()];
-    let flags = vk::QueryResultFlags::TYPE_64;
-    // SAFETY: the queries were written by the submission that has just finished, and `T` holds the numbers of one.
-    unsafe {
-        inner
-            .device
-            .get_query_pool_results(pool, queries.start as u32, &mut values, flags)
-    }
-    .ok()?;
-    Some(values)
-}
-
-/// What draws and compute shaders of passes did; none without counts.
-fn read_counts(inner: &Inner, pool: vk::QueryPool, queries: Range<usize>) -> Vec<(Option<Drawn>, u64)> {
-    if !inner.caps.graphics {
-        let counts: Option<Vec<u64>> = read(inner, pool, queries);
-        return counts.unwrap_or_default().into_iter().map(|n| (None, n)).collect();
-    }
-    let counts: Option<Vec<[u64; COUNTS_OF_DRAWS + 1]>> = read(inner, pool, queries);
-    let sort = |[vertices, primitives, fragments, invocations]: [u64; COUNTS_OF_DRAWS + 1]| {
-        let drawn = Drawn {
-            vertices,
-            primitives,
-            fragments,
-        };
-        (Some(drawn), invocations)
-    };
-    counts.unwrap_or_default().into_iter().map(sort).collect()
 }
 
 /// Hands a command buffer to the queue: it waits for `wait`, then signals `signal` and raises the timeline to `value`.

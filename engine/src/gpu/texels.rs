@@ -94,11 +94,45 @@ impl Gpu {
             category,
             usage: usage | vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST,
         })?;
+        self.make_texel_view(name, &buffer, format, vk::WHOLE_SIZE)
+    }
+
+    /// A view of all whole texels of a buffer that was made with `UNIFORM_TEXEL_BUFFER` (and `STORAGE_BUFFER` where kernels write it): of a
+    /// host's ([`Gpu::borrow_buffer`]), to be used where kernels take texels.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a buffer that was made for other uses, one without room for a texel, or a format that has no texels of whole
+    /// bytes; [`Error::LimitExceeded`] past `maxTexelBufferElements`, or for one that does not begin at a multiple of
+    /// `minTexelBufferOffsetAlignment` (256 always is).
+    pub fn texel_view_of(&self, buffer: &Buffer, format: vk::Format) -> Result<TexelView> {
+        let view = buffer.view();
+        view.check_usage(vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER)?;
+        view.check(self.caps().texel_buffer_alignment)?;
+        let texel = texel_bytes(format).unwrap_or(0);
+        let texels = buffer.bytes().checked_div(texel).unwrap_or(0);
+        if texels == 0 {
+            let cause = format!("has no texels in the buffer {:?}", buffer.name());
+            return Err(Error::setting("format", format!("{format:?}"), cause));
+        }
+        let limit = self.caps().max_texel_buffer_elements;
+        if texels > limit {
+            return Err(Error::LimitExceeded {
+                name: buffer.name().into(),
+                value: texels,
+                limit_name: "maxTexelBufferElements",
+                limit,
+            });
+        }
+        self.make_texel_view(buffer.name(), buffer, format, texels * texel)
+    }
+
+    fn make_texel_view(&self, name: &str, buffer: &Buffer, format: vk::Format, range: u64) -> Result<TexelView> {
         let gpu = &self.inner;
         let info = vk::BufferViewCreateInfo::default()
             .buffer(buffer.raw())
+            .offset(buffer.raw_offset())
             .format(format)
-            .range(vk::WHOLE_SIZE);
+            .range(range);
         // SAFETY: the buffer is alive, and kept so by the view; destroyed in `TexelViewInner::drop`.
         let raw = unsafe { gpu.device.create_buffer_view(&info, None) }
             .map_err(|result| gpu.error("vkCreateBufferView", result))?;
@@ -107,7 +141,7 @@ impl Gpu {
             inner: Arc::new(TexelViewInner {
                 gpu: Arc::clone(gpu),
                 raw,
-                buffer,
+                buffer: buffer.clone(),
             }),
         })
     }

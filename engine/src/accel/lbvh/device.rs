@@ -17,10 +17,11 @@ use crate::accel::stages::Stopwatch;
 use crate::accel::{BuildStages, IndexStatistics, RayIndex};
 use crate::gpu::shaders::accel::{
     lbvh_boxes, lbvh_climb, lbvh_codes, lbvh_emit, lbvh_grid, lbvh_hierarchy, lbvh_refit, lbvh_refit_triangles,
+    lbvh_retry,
 };
 use crate::gpu::shaders::constants::{LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE};
 use crate::gpu::shaders::types::LbvhState;
-use crate::gpu::{Access, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings};
+use crate::gpu::{Access, Buffer, ComputePipeline, DeviceKind, Gpu, Recorder, TexelView, Timings};
 use crate::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, Scan, ScanBuffers, ScanOptions, SortBuffers};
 use crate::{Error, Result};
 use glam::Vec3;
@@ -52,6 +53,7 @@ pub struct LbvhBuilder {
     run: u32,
     hierarchy: ComputePipeline<lbvh_hierarchy::Kernel>,
     climb: ComputePipeline<lbvh_climb::Kernel>,
+    retry: ComputePipeline<lbvh_retry::Kernel>,
     ranks: Scan,
     emit: ComputePipeline<lbvh_emit::Kernel>,
     refit_triangles: ComputePipeline<lbvh_refit_triangles::Kernel>,
@@ -109,6 +111,7 @@ impl LbvhBuilder {
                 lbvh_run: run,
             })?,
             climb: gpu.compute_pipeline(&lbvh_climb::Spec { lbvh_fences })?,
+            retry: gpu.compute_pipeline(&Default::default())?,
             ranks: Scan::new(gpu, ScanOptions::default())?,
             emit: gpu.compute_pipeline(&Default::default())?,
             refit_triangles: gpu.compute_pipeline(&Default::default())?,
@@ -130,6 +133,29 @@ impl LbvhBuilder {
         LbvhBuffers::new(&self.gpu, &self.sort, &self.ranks, self.run, count)
     }
 
+    /// As [`LbvhBuilder::buffers`], over triangles of the caller's, such as a host's ([`Gpu::borrow_buffer`]): 36 bytes a triangle in
+    /// `corners`, 4 in `indices`, storage buffers both.
+    ///
+    /// # Errors
+    /// As [`LbvhBuilder::buffers`]; [`Error::LimitExceeded`](crate::Error::LimitExceeded) for one that is too small.
+    pub fn buffers_over(&self, count: u32, corners: &Buffer, indices: &Buffer) -> Result<LbvhBuffers> {
+        for (buffer, bytes) in [(corners, 36), (indices, 4)] {
+            let wanted = bytes * u64::from(count);
+            if buffer.bytes() < wanted {
+                return Err(Error::LimitExceeded {
+                    name: buffer.name().into(),
+                    value: wanted,
+                    limit_name: "size",
+                    limit: buffer.bytes(),
+                });
+            }
+        }
+        let mut buffers = self.buffers(count)?;
+        buffers.corners = corners.clone();
+        buffers.indices = indices.clone();
+        Ok(buffers)
+    }
+
     /// Records a build of the triangles in `corners`, named by `indices`: both must be filled and visible to compute shaders. Other uses of
     /// these buffers by compute shaders may come before it without a barrier.
     ///
@@ -140,6 +166,57 @@ impl LbvhBuilder {
     /// # Errors
     /// As [`Pass::dispatch`](crate::gpu::Pass::dispatch).
     pub fn record(&self, recorder: &mut Recorder, buffers: &LbvhBuffers) -> Result<()> {
+        self.record_order(recorder, buffers)?;
+        self.record_tree(recorder, buffers, 0)
+    }
+
+    /// As [`LbvhBuilder::record`], of which rays can traverse whatever tree comes out: where it is too deep, the device makes it again
+    /// without the lowest [`LbvhBuilder::bits_too_many`] bits of the codes, and the host has nothing to ask. So a build and what traverses
+    /// it go into one submission. [`LbvhBuilder::build`] takes away as few bits as suffice, so that its tree may be better then; where the
+    /// first tree is not too deep, which is the common case, the trees are the same.
+    ///
+    /// Besides the passes of [`LbvhBuilder::record`], where there are bits too many: `lbvh: retry`, and another `lbvh: hierarchy` and
+    /// `lbvh: climb`, of no workgroups unless the first tree is too deep.
+    ///
+    /// # Errors
+    /// As [`LbvhBuilder::record`].
+    pub fn record_traversable(&self, recorder: &mut Recorder, buffers: &LbvhBuffers) -> Result<()> {
+        self.record_order(recorder, buffers)?;
+        self.record_hierarchy(recorder, buffers, 0, None)?;
+        let skipped = self.bits_too_many(buffers.count);
+        if skipped > 0 {
+            recorder.pass("lbvh: retry", |pass| {
+                let [hierarchy_groups, climb_groups] = self.tree_groups(buffers.count);
+                let push = lbvh_retry::Push {
+                    hierarchy_groups,
+                    climb_groups,
+                    most_depth: MAX_DEPTH,
+                };
+                pass.memory_barrier(Access::INDIRECT_READ, Access::COMPUTE);
+                let set = lbvh_retry::Set0 {
+                    lbvh_state_block: buffers.state.view(),
+                    lbvh_arguments: buffers.arguments.view(),
+                };
+                pass.dispatch(&self.retry, &[&set], &push, [1, 1, 1])?;
+                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::INDIRECT_READ));
+                Ok(())
+            })?;
+            self.record_hierarchy(recorder, buffers, skipped, Some(&buffers.arguments))?;
+        }
+        self.record_layout(recorder, buffers)
+    }
+
+    /// The bits of a code that must be left out so that no tree of so many triangles is too deep for rays, whatever they are; 0 where none
+    /// can be. A way has a node a bit, and below them ⌈log₂ n⌉ where codes are equal.
+    pub fn bits_too_many(&self, count: u32) -> u32 {
+        let equal_codes = count.max(1).next_power_of_two().ilog2();
+        (self.settings.code_bits + equal_codes)
+            .saturating_sub(MAX_DEPTH)
+            .min(self.settings.code_bits)
+    }
+
+    /// Records the stages up to the sort.
+    fn record_order(&self, recorder: &mut Recorder, buffers: &LbvhBuffers) -> Result<()> {
         let count = buffers.count;
         recorder.pass("lbvh: boxes", |pass| {
             let state = LbvhState {
@@ -186,8 +263,7 @@ impl LbvhBuilder {
                 .record(pass, &sides, Count::Host(count), &buffers.sort_scratch)?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
             Ok(())
-        })?;
-        self.record_tree(recorder, buffers, 0)
+        })
     }
 
     /// After a build whose tree is too deep: records its stages behind the sort once more, from the codes that stand in `buffers`, without
@@ -206,9 +282,28 @@ impl LbvhBuilder {
 
     /// Records the stages after the sort, without the lowest `skipped` bits of the codes.
     fn record_tree(&self, recorder: &mut Recorder, buffers: &LbvhBuffers, skipped: u32) -> Result<()> {
+        self.record_hierarchy(recorder, buffers, skipped, None)?;
+        self.record_layout(recorder, buffers)
+    }
+
+    /// Workgroups of `lbvh_hierarchy` and of `lbvh_climb`.
+    fn tree_groups(&self, count: u32) -> [u32; 2] {
+        let runs = count.div_ceil(self.run);
+        [self.hierarchy.groups_for(runs), self.climb.groups_for(runs)]
+    }
+
+    /// Records the making of the tree; the workgroups of both passes come from `arguments` where there are any.
+    fn record_hierarchy(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &LbvhBuffers,
+        skipped: u32,
+        arguments: Option<&Buffer>,
+    ) -> Result<()> {
         let count = buffers.count;
         let side = self.sort.result_side(count);
         let runs = count.div_ceil(self.run);
+        let [hierarchy_groups, climb_groups] = self.tree_groups(count);
         recorder.pass("lbvh: hierarchy", |pass| {
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
             pass.fill(buffers.arrival_counters.view(), 0)?;
@@ -228,7 +323,10 @@ impl LbvhBuilder {
                 skipped,
                 leaf_size: self.settings.leaf_size,
             };
-            pass.dispatch(&self.hierarchy, &[&set], &push, [self.hierarchy.groups_for(runs), 1, 1])?;
+            match arguments {
+                None => pass.dispatch(&self.hierarchy, &[&set], &push, [hierarchy_groups, 1, 1])?,
+                Some(words) => pass.dispatch_indirect(&self.hierarchy, &[&set], &push, words.slice(0, 12))?,
+            }
             pass.memory_barrier(Access::COMPUTE.union(Access::TRANSFER_WRITE), Access::COMPUTE);
             Ok(())
         })?;
@@ -247,11 +345,19 @@ impl LbvhBuilder {
                 skipped,
                 leaf_size: self.settings.leaf_size,
             };
-            let groups = [self.climb.groups_for(runs), 1, 1];
-            pass.dispatch(&self.climb, &[&set], &push, groups)?;
+            match arguments {
+                None => pass.dispatch(&self.climb, &[&set], &push, [climb_groups, 1, 1])?,
+                Some(words) => pass.dispatch_indirect(&self.climb, &[&set], &push, words.slice(12, 12))?,
+            }
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             Ok(())
-        })?;
+        })
+    }
+
+    /// Records the stages after the tree.
+    fn record_layout(&self, recorder: &mut Recorder, buffers: &LbvhBuffers) -> Result<()> {
+        let count = buffers.count;
+        let side = self.sort.result_side(count);
         recorder.pass("lbvh: ranks", |pass| {
             let words = ScanBuffers {
                 input: buffers.retained.buffer().view(),

@@ -28,6 +28,8 @@ pub struct LbvhBuffers {
     pub(super) summaries: Buffer,
     pub(super) pending: Buffer,
     pub(super) arrival_counters: Buffer,
+    /// Of the dispatches that make a tree again: three words each.
+    pub(super) arguments: Buffer,
     pub(super) retained: TexelView,
     pub(super) ranks: TexelView,
     pub(super) scan_scratch: Buffer,
@@ -58,6 +60,7 @@ impl LbvhBuffers {
             summaries: buffer("lbvh summaries", 24 * inner)?,
             pending: buffer("lbvh pending", 4 * runs * u64::from(1 + run))?,
             arrival_counters: buffer("lbvh arrival counters", 4 * inner)?,
+            arguments: buffer("lbvh arguments", 24)?,
             retained: words("lbvh retained", inner)?,
             ranks: words("lbvh ranks", inner)?,
             scan_scratch: buffer("lbvh scan", ranks.scratch_bytes(count))?,
@@ -75,6 +78,7 @@ impl LbvhBuffers {
             &self.summaries,
             &self.pending,
             &self.arrival_counters,
+            &self.arguments,
             &self.scan_scratch,
         ];
         let texels = texels.into_iter().chain(&self.keys).chain(&self.order);
