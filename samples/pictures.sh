@@ -8,7 +8,8 @@ out=samples/pictures
 "$samples/hello_triangle_offscreen" "$out/hello_triangle_offscreen.png"
 "$samples/sort_on_the_gpu" "$out/sort_on_the_gpu.png"
 "$samples/embed_headless" "$out/embed_headless.png" --size 240x180 --spp 256
-"$samples/embed_host_device" "$out/embed_host_device.png" --size 180x180 --spp 256
+"$samples/embed_host_device" "$out/embed_host_device.png" --size 180x172 --samples 4
+"$samples/own_kernel" "$out/own_kernel.png" --size 180x180 --spp 256
 beside=$(mktemp -d)
 trap 'rm -r "$beside"' EXIT
 "$samples/render_gltf" --output "$beside/render_gltf.png" --size 240x180 --spp 256

@@ -129,11 +129,39 @@ fn embed_headless_renders_its_balls() {
 }
 
 #[test]
-fn embed_host_device_renders_the_cornell_box() {
-    let options = ["--size", "64x64", "--spp", "8"];
+fn embed_host_device_shows_the_cornell_box_over_sorted_greys() {
+    let options = ["--size", "64x64", "--samples", "2"];
     let picture = picture_of(env!("CARGO_BIN_EXE_embed_host_device"), &options);
+    assert_eq!(picture.dimensions(), (64, 72));
+    let shown = image::imageops::crop_imm(&picture, 0, 0, 64, 64).to_image();
+    assert_cornell_box(&shown);
+    let greys: Vec<u8> = (64..72)
+        .flat_map(|y| (0..64).map(move |x| (x, y)))
+        .map(|(x, y)| picture.get_pixel(x, y).0[0])
+        .collect();
+    assert!(greys.is_sorted() && greys[0] < 10 && greys[511] > 245, "{greys:?}");
+}
+
+#[test]
+fn own_kernel_draws_edges_and_darkens_corners() {
+    let options = ["--size", "64x64", "--spp", "8"];
+    let picture = picture_of(env!("CARGO_BIN_EXE_own_kernel"), &options);
     assert_eq!(picture.dimensions(), (64, 64));
-    assert_cornell_box(&picture);
+    // The lamp is as bright as before, and its edge is ink.
+    let lamp = mean(&picture, [0.48, 0.52], [0.13, 0.155]);
+    assert!(lamp[0] > 150.0, "lamp {lamp:?}");
+    let inked = picture.pixels().filter(|pixel| pixel.0[2] > 2 * pixel.0[0].max(pixel.0[1]).max(10)).count();
+    assert!(inked > 20, "{inked} pixels of ink");
+    // A mistake is an error with its line, before anything is rendered.
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("kernel.wgsl");
+    std::fs::write(&source, "@compute @workgroup_size(1)\nfn main() {\n    missing();\n}\n").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_own_kernel"))
+        .args(["--source", source.to_str().unwrap()])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && text.contains("line 3, column 5"), "{text}");
 }
 
 #[test]

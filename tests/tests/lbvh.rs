@@ -141,6 +141,56 @@ fn trees_that_are_too_deep_are_made_again_as_the_hosts() {
 }
 
 #[test]
+fn builds_that_the_device_corrects_are_traversable_and_else_the_hosts() {
+    with_gpu(|gpu| {
+        let mut random = Random(73);
+        for code_bits in [30, 63] {
+            let settings = fast(code_bits, 4);
+            let builder = LbvhBuilder::new(gpu, &settings).unwrap();
+            let deep = ladder(10_000, code_bits as i32 / 3);
+            // Bits above the 14 levels of equal codes.
+            assert_eq!(builder.bits_too_many(deep.len() as u32), code_bits + 14 - MAX_DEPTH);
+            assert_eq!(builder.bits_too_many(4), (code_bits + 2).saturating_sub(MAX_DEPTH));
+            for (triangles, is_deep) in [(deep, true), (soup(&mut random, 1000, 0.3), false)] {
+                let count = triangles.len() as u32;
+                let skipped = if is_deep { builder.bits_too_many(count) } else { 0 };
+                let filled = || {
+                    let buffers = builder.buffers(count).unwrap();
+                    gpu.upload(&buffers.corners, 0, &triangles).unwrap();
+                    gpu.upload(&buffers.indices, 0, &(0..count).collect::<Vec<_>>()).unwrap();
+                    buffers
+                };
+                let read = |buffers: &clerestory::accel::lbvh::LbvhBuffers| -> Vec<[u32; 4]> {
+                    let view = buffers.quarters.buffer().view();
+                    // The root says where the triangles begin.
+                    let root: Vec<[u32; 4]> = gpu.read(view, 4).unwrap();
+                    gpu.read(view, (root[3][3] + 3 * count) as usize).unwrap()
+                };
+                let (corrected, plain) = (filled(), filled());
+                let mut recorder = gpu.recorder("corrected").unwrap();
+                // Twice, as in two frames of one recording.
+                builder.record_traversable(&mut recorder, &corrected).unwrap();
+                builder.record_traversable(&mut recorder, &corrected).unwrap();
+                recorder.submit().unwrap().wait().unwrap();
+                assert_eq!(builder.bits_to_skip(&corrected, 0).unwrap(), None);
+                let mut recorder = gpu.recorder("plain").unwrap();
+                builder.record(&mut recorder, &plain).unwrap();
+                recorder.submit().unwrap().wait().unwrap();
+                assert_eq!(builder.bits_to_skip(&plain, 0).unwrap().is_some(), is_deep);
+                if is_deep {
+                    let mut recorder = gpu.recorder("shallower").unwrap();
+                    builder.record_shallower(&mut recorder, &plain, skipped).unwrap();
+                    recorder.submit().unwrap().wait().unwrap();
+                } else {
+                    assert!(read(&plain) == build(&triangles, &settings).unwrap().texels());
+                }
+                assert!(read(&corrected) == read(&plain), "{code_bits} {is_deep}");
+            }
+        }
+    });
+}
+
+#[test]
 fn a_million_identical_centres_give_the_hosts_tree() {
     with_gpu(|gpu| {
         let settings = fast(30, 4);

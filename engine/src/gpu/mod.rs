@@ -1,7 +1,7 @@
 //! Floor 1: Vulkan, thin. Everything a kernel needs and nothing that decides for it.
 //!
 //! A [`Gpu`] is a device with one queue. Work is recorded by hand into a [`Recorder`], pass by pass, with explicit barriers, and submitted
-//! on a timeline. All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].
+//! on a timeline, or into a host's command buffer, which the host submits ([`Recorder::borrow`]). All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].
 //!
 //! `unsafe` lives in this folder and at the FFI edge only.
 #![expect(unsafe_code, reason = "Vulkan is called here")]

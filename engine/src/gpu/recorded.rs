@@ -53,8 +53,8 @@ impl Recorded {
         })
     }
 
-    /// The passes with their times and counts, as far as the device is done: it does not wait, and says in
-    /// [`Timings::untimed`](Timings::untimed) why there are none.
+    /// The passes with their times and counts, as far as the device is done: it does not wait, and says in [`Timings::untimed`] why there
+    /// are none.
     pub fn timings(&self) -> Timings {
         let inner = &self.gpu.inner;
         let count = self.passes.len();

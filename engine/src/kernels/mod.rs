@@ -1,7 +1,8 @@
 //! Floor 2: building blocks over buffers, usable alone.
 //!
 //! Every kernel has one shape. It is made once for a device; it says how much scratch memory a number of elements needs; and it records
-//! into a [`Pass`](crate::gpu::Pass) of the caller's command buffer, which also names and times it. What is read must be visible to compute
+//! into a [`Pass`](crate::gpu::Pass) of the caller's command buffer (a host's own by [`Recorder::borrow`](crate::gpu::Recorder::borrow)), which
+//! also names and times it. What is read must be visible to compute
 //! shaders before, and what is written wants a barrier after; each kernel says which accesses. Between its own stages a kernel records its
 //! barriers itself. The number of elements is known to the host, or read from a buffer ([`Count`]).
 //!
