@@ -150,7 +150,10 @@ fn own_kernel_draws_edges_and_darkens_corners() {
     // The lamp is as bright as before, and its edge is ink.
     let lamp = mean(&picture, [0.48, 0.52], [0.13, 0.155]);
     assert!(lamp[0] > 150.0, "lamp {lamp:?}");
-    let inked = picture.pixels().filter(|pixel| pixel.0[2] > 2 * pixel.0[0].max(pixel.0[1]).max(10)).count();
+    let inked = picture
+        .pixels()
+        .filter(|pixel| pixel.0[2] > 2 * pixel.0[0].max(pixel.0[1]).max(10))
+        .count();
     assert!(inked > 20, "{inked} pixels of ink");
     // A mistake is an error with its line, before anything is rendered.
     let folder = tempfile::tempdir().unwrap();

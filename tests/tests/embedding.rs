@@ -57,8 +57,11 @@ impl Host {
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
             // The layer is always on: it is the witness that nothing of the host's is misused or destroyed.
             let layers = [VALIDATION_LAYER.as_ptr()];
-            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
+            let extensions = [ash::ext::debug_utils::NAME, ash::ext::validation_features::NAME].map(CStr::as_ptr);
+            let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+            let mut checks = vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
             let info = vk::InstanceCreateInfo::default()
+                .push_next(&mut checks)
                 .application_info(&application)
                 .enabled_layer_names(&layers)
                 .enabled_extension_names(&extensions);

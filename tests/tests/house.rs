@@ -139,6 +139,59 @@ fn uses_are_found_in_all_their_forms() {
     assert_eq!(floors_included("#include \"film/a.glsl\"\n").len(), 1);
 }
 
+/// What methods named `record` must not do, since a host's command buffer may be what they record into: submit, wait, move data by the
+/// host, allocate.
+const NOT_WHILE_RECORDING: [&str; 10] = [
+    ".submit(",
+    ".submit_with(",
+    ".wait(",
+    ".wait_for(",
+    ".recorder(",
+    "gpu.read(",
+    "gpu.read::",
+    "gpu.upload(",
+    "gpu.buffer(",
+    ".buffer_with(",
+];
+
+/// The bodies of functions named `record` or `record_…`, formatted as rustfmt does, with their names.
+fn recording(source: &str) -> Vec<(String, String)> {
+    let lines: Vec<&str> = source.lines().collect();
+    let named = |line: &str| {
+        let (_, after) = line.split_once("fn record")?;
+        let name: String = after.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        let is_one = (name.is_empty() || name.starts_with('_')) && !line.trim_start().starts_with("//");
+        is_one.then(|| format!("record{name}"))
+    };
+    let begins = lines.iter().enumerate();
+    let found = begins.filter_map(|(at, line)| Some((at, named(line)?)));
+    found
+        .map(|(at, name)| {
+            let indent = lines[at].len() - lines[at].trim_start().len();
+            let end = format!("{}}}", " ".repeat(indent));
+            let body: Vec<&str> = lines[at..].iter().copied().take_while(|line| **line != *end).collect();
+            (name, body.join("\n"))
+        })
+        .collect()
+}
+
+#[test]
+fn what_records_neither_submits_nor_waits_nor_allocates() {
+    let mut count = 0;
+    for path in files(&repository().join("engine/src"), &["rs"]) {
+        let source = std::fs::read_to_string(&path).expect("source");
+        for (name, body) in recording(&source) {
+            count += 1;
+            for call in NOT_WHILE_RECORDING {
+                assert!(!body.contains(call), "{}: {name} calls {call}", path.display());
+            }
+        }
+    }
+    assert!(count > 50, "{count} functions");
+    let bad = "impl A {\n    pub fn record(&self) {\n        x.submit();\n    }\n}\n";
+    assert!(recording(bad)[0].1.contains(NOT_WHILE_RECORDING[0]));
+}
+
 /// Whether the text between back-quotes is meant as a file or folder of the repository.
 fn is_path(text: &str) -> bool {
     const FOLDERS: [&str; 8] = [

@@ -157,7 +157,8 @@ fn builds_that_the_device_corrects_are_traversable_and_else_the_hosts() {
                 let filled = || {
                     let buffers = builder.buffers(count).unwrap();
                     gpu.upload(&buffers.corners, 0, &triangles).unwrap();
-                    gpu.upload(&buffers.indices, 0, &(0..count).collect::<Vec<_>>()).unwrap();
+                    gpu.upload(&buffers.indices, 0, &(0..count).collect::<Vec<_>>())
+                        .unwrap();
                     buffers
                 };
                 let read = |buffers: &clerestory::accel::lbvh::LbvhBuffers| -> Vec<[u32; 4]> {

@@ -455,7 +455,13 @@ impl RayTracer {
         }
     }
 
-    fn dispatch(&self, pass: &mut crate::gpu::Pass<'_>, buffers: &TraceBuffers, first: &mut u32, count: u32) -> Result<()> {
+    fn dispatch(
+        &self,
+        pass: &mut crate::gpu::Pass<'_>,
+        buffers: &TraceBuffers,
+        first: &mut u32,
+        count: u32,
+    ) -> Result<()> {
         let index = IndexSet {
             index_texels: &self.index,
         };

@@ -58,11 +58,12 @@ impl Pass<'_> {
         self.recorder.touch(self.name, view.buffer, Access::TRANSFER_WRITE)?;
         // SAFETY: size and alignment were checked; the buffer is kept alive.
         unsafe {
-            self.recorder
-                .gpu
-                .inner
-                .device
-                .cmd_update_buffer(self.command_buffer, view.buffer.raw(), view.raw_offset(), bytes)
+            self.recorder.gpu.inner.device.cmd_update_buffer(
+                self.command_buffer,
+                view.buffer.raw(),
+                view.raw_offset(),
+                bytes,
+            )
         };
         Ok(())
     }

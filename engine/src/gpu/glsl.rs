@@ -58,7 +58,12 @@ pub(super) fn compile_text(name: &str, text: &str, purpose: Purpose) -> Result<V
     let program = std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
     let failed = |error| Error::io(&program, error);
     let mut child = Command::new(&program)
-        .args(["-Werror", "--target-env=vulkan1.1", "--target-spv=spv1.3", "-fshader-stage=compute"])
+        .args([
+            "-Werror",
+            "--target-env=vulkan1.1",
+            "--target-spv=spv1.3",
+            "-fshader-stage=compute",
+        ])
         .arg(match purpose {
             Purpose::Reflection => "-O0",
             Purpose::Execution => "-O",

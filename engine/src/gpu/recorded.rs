@@ -126,4 +126,3 @@ fn read_counts(inner: &Inner, pool: vk::QueryPool, queries: Range<usize>) -> Vec
     };
     counts.unwrap_or_default().into_iter().map(sort).collect()
 }
-

@@ -214,7 +214,9 @@ impl Recorder {
         let mut queue = inner.lock_queue();
         let value = queue.last_value + 1;
         if let Some(markers) = &self.markers {
-            inner.in_flight().begin(value, markers.clone(), self.recorded.passes.clone());
+            inner
+                .in_flight()
+                .begin(value, markers.clone(), self.recorded.passes.clone());
         }
         // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
         let submitted = unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) };
@@ -262,12 +264,7 @@ impl Recorder {
             .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
         let info = vk::DependencyInfo::default().memory_barriers(&all);
         // SAFETY: the caller's.
-        unsafe {
-            self.gpu
-                .inner
-                .device
-                .cmd_pipeline_barrier2(self.command_buffer, &info)
-        };
+        unsafe { self.gpu.inner.device.cmd_pipeline_barrier2(self.command_buffer, &info) };
     }
 
     pub(super) fn resources(&mut self) -> &mut FrameResources {

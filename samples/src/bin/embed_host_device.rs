@@ -21,7 +21,7 @@ use clerestory::techniques::preview::{Preview, PreviewDesc, PreviewPart, Preview
 use clerestory::transport::GpuScene;
 use clerestory::{Error, Result, scene};
 use clerestory_samples::arguments::Arguments;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Rows of the strip of sorted greys below the picture.
 const STRIP: u32 = 8;
@@ -52,7 +52,9 @@ fn sample(path: &Path, arguments: &Arguments) -> Result<()> {
 fn lit_box() -> Result<(Scene, Vec<LightKind>)> {
     let scene = scene::load("builtin:cornell-box")?;
     let bounds = scene::SceneProfile::of(&scene).bounds;
-    let [lower, upper] = bounds.unwrap_or_default().map(Vec3::from_array);
+    let [lower, upper] = bounds
+        .unwrap_or_default()
+        .map(|corner| DVec3::from_array(corner).as_vec3());
     let size = upper - lower;
     let lamp = LightKind::Point {
         position: lower.midpoint(upper) + 0.35 * size * Vec3::Y,
@@ -102,7 +104,11 @@ impl Host {
             let queue_family = instance
                 .get_physical_device_queue_family_properties(physical_device)
                 .iter()
-                .position(|family| family.queue_flags.contains(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS))
+                .position(|family| {
+                    family
+                        .queue_flags
+                        .contains(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS)
+                })
                 .ok_or_else(none)? as u32;
             let queues = [vk::DeviceQueueCreateInfo::default()
                 .queue_family_index(queue_family)
@@ -161,7 +167,11 @@ impl Host {
         let grey = |word: u32| 0xFF00_0000 | (word & 0xFF) * 0x01_0101;
         own.write(&greys, numbers().take(count as usize).map(grey))?;
         let places: Vec<u32> = numbers().take(3 * TRIANGLES as usize).collect();
-        let triangle = |place: &[u32]| (0..9).map(|i| place[i % 3] % 1000 * 8 + SHAPE[i / 3][i % 3]).collect::<Vec<_>>();
+        let triangle = |place: &[u32]| {
+            (0..9)
+                .map(|i| place[i % 3] % 1000 * 8 + SHAPE[i / 3][i % 3])
+                .collect::<Vec<_>>()
+        };
         let millimetres = places.chunks_exact(3).flat_map(triangle);
         own.write(&corners, millimetres.map(|length| (length as f32 * 1e-3).to_bits()))?;
         own.write(&names, 0..TRIANGLES)?;
@@ -224,12 +234,18 @@ impl Host {
             background: true,
             probe: None,
         };
-        let camera = scene.cameras.first().ok_or_else(|| Error::scene(&scene.source, "cameras", "are none"))?;
+        let camera = scene
+            .cameras
+            .first()
+            .ok_or_else(|| Error::scene(&scene.source, "cameras", "are none"))?;
         preview.record_lights(&mut recorder, &surfaces, &lights)?;
         preview.record(&mut recorder, &on_device, &surfaces, camera, &[everything])?;
         preview.record_display(&mut recorder, &picture, scene.defaults.exposure, false)?;
         let recorded = recorder.finish();
-        self.barrier(commands, vk::AccessFlags2::TRANSFER_READ | vk::AccessFlags2::TRANSFER_WRITE);
+        self.barrier(
+            commands,
+            vk::AccessFlags2::TRANSFER_READ | vk::AccessFlags2::TRANSFER_WRITE,
+        );
         self.copy(commands, (&sides[side], 0), (&picture, shown_bytes), strip_bytes);
         self.copy(commands, (hierarchy.quarters.buffer(), 0), (&root, 0), 64);
         self.barrier(commands, vk::AccessFlags2::HOST_READ);
@@ -241,10 +257,20 @@ impl Host {
 
         let timings = recorded.timings();
         for pass in &timings.passes {
-            println!("{:24} {:8.3} ms", pass.name, pass.nanoseconds.unwrap_or(0) as f64 * 1e-6);
+            println!(
+                "{:24} {:8.3} ms",
+                pass.name,
+                pass.nanoseconds.unwrap_or(0) as f64 * 1e-6
+            );
         }
         let boxes: Vec<f32> = own.read(&root)?.into_iter().map(f32::from_bits).collect();
-        println!("the hierarchy's halves: {:?} to {:?}, {:?} to {:?}", &boxes[..3], &boxes[3..6], &boxes[6..9], &boxes[9..12]);
+        println!(
+            "the hierarchy's halves: {:?} to {:?}, {:?} to {:?}",
+            &boxes[..3],
+            &boxes[3..6],
+            &boxes[6..9],
+            &boxes[9..12]
+        );
         let words = own.read(&picture)?;
         Ok(words.into_iter().flat_map(u32::to_le_bytes).collect())
     }
@@ -252,7 +278,11 @@ impl Host {
     /// A barrier of the host's own: everything before, then its copies or its reads.
     fn barrier(&self, commands: vk::CommandBuffer, to: vk::AccessFlags2) {
         let reads = to == vk::AccessFlags2::HOST_READ;
-        let stage = if reads { vk::PipelineStageFlags2::HOST } else { vk::PipelineStageFlags2::ALL_TRANSFER };
+        let stage = if reads {
+            vk::PipelineStageFlags2::HOST
+        } else {
+            vk::PipelineStageFlags2::ALL_TRANSFER
+        };
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
@@ -352,7 +382,9 @@ impl<'a> HostBuffers<'a> {
             let info = vk::MemoryAllocateInfo::default()
                 .allocation_size(wanted.size)
                 .memory_type_index(kind);
-            let memory = device.allocate_memory(&info, None).map_err(failed("vkAllocateMemory"))?;
+            let memory = device
+                .allocate_memory(&info, None)
+                .map_err(failed("vkAllocateMemory"))?;
             if let Some(last) = self.made.last_mut() {
                 last.1 = memory;
             }
@@ -378,14 +410,19 @@ impl<'a> HostBuffers<'a> {
             let words = device
                 .map_memory(*memory, 0, buffer.bytes(), vk::MemoryMapFlags::empty())
                 .map_err(failed("vkMapMemory"))?;
-            with(std::slice::from_raw_parts_mut(words.cast(), buffer.bytes() as usize / 4));
+            with(std::slice::from_raw_parts_mut(
+                words.cast(),
+                buffer.bytes() as usize / 4,
+            ));
             device.unmap_memory(*memory);
         }
         Ok(())
     }
 
     fn write(&self, buffer: &Buffer, words: impl Iterator<Item = u32>) -> Result<()> {
-        self.mapped(buffer, |room| room.iter_mut().zip(words).for_each(|(to, word)| *to = word))
+        self.mapped(buffer, |room| {
+            room.iter_mut().zip(words).for_each(|(to, word)| *to = word)
+        })
     }
 
     fn read(&self, buffer: &Buffer) -> Result<Vec<u32>> {

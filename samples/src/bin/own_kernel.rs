@@ -46,7 +46,10 @@ fn sample(path: &Path, arguments: &Arguments) -> Result<()> {
     let kernel = OwnKernel::wgsl(&gpu, "ink", &source)?;
     for binding in kernel.bindings() {
         let does = if binding.writes { "writes" } else { "reads" };
-        println!("the kernel {does} {} (at least {} bytes)", binding.name, binding.least_bytes);
+        println!(
+            "the kernel {does} {} (at least {} bytes)",
+            binding.name, binding.least_bytes
+        );
     }
 
     let scene = scene::load("builtin:cornell-box?sphere=gold")?;

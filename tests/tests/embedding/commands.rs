@@ -16,7 +16,7 @@ use clerestory::{Error, Result};
 use clerestory_tests::random::Random;
 use clerestory_tests::shaders::out_of_bounds;
 use clerestory_tests::with_gpu;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::Host;
 
@@ -188,7 +188,7 @@ fn scene() -> Scene {
     let [lower, upper] = SceneProfile::of(&scene)
         .bounds
         .unwrap()
-        .map(Vec3::from_array);
+        .map(|corner| DVec3::from_array(corner).as_vec3());
     let position = lower.midpoint(upper) + 0.3 * (upper - lower) * Vec3::Y;
     scene.add_light(
         "lamp",
@@ -275,7 +275,7 @@ fn a_frame_of_a_host(gpu: &Gpu, opening_barrier: bool) {
     let hierarchy = builder.buffers_over(count, &corners, &indices).unwrap();
     let lent_rays = own.lend("rays", 32 * u64::from(ray_count), STORAGE);
     let lent_hits = own.lend("hits", 16 * u64::from(ray_count), STORAGE);
-    let trace = TraceSettings::default();
+    let trace = TraceSettings::ray_per_thread();
     let tracer = RayTracer::with_texels(gpu, hierarchy.quarters.clone(), DeviceTraversal::Bvh2, &trace).unwrap();
     let traced = tracer.buffers_over(ray_count, &lent_rays, &lent_hits).unwrap();
     let mut preview = preview(gpu, &on_device);
@@ -292,8 +292,16 @@ fn a_frame_of_a_host(gpu: &Gpu, opening_barrier: bool) {
     let side = sort.result_side(key_count);
     let copies = [
         (sides[side].buffer().clone(), room_for(gpu, key_bytes), key_bytes),
-        (hierarchy.quarters.buffer().clone(), room_for(gpu, quarter_bytes), quarter_bytes),
-        (lent_hits, room_for(gpu, 16 * u64::from(ray_count)), 16 * u64::from(ray_count)),
+        (
+            hierarchy.quarters.buffer().clone(),
+            room_for(gpu, quarter_bytes),
+            quarter_bytes,
+        ),
+        (
+            lent_hits,
+            room_for(gpu, 16 * u64::from(ray_count)),
+            16 * u64::from(ray_count),
+        ),
         (picture.clone(), room_for(gpu, picture_bytes), picture_bytes),
     ];
 
@@ -333,7 +341,14 @@ fn a_frame_of_a_host(gpu: &Gpu, opening_barrier: bool) {
     let timings = recorded.timings();
     drop(recorded);
 
-    for pass in ["sort", "lbvh: emit", "trace", "raster: surfaces", "preview: shade", "preview: display"] {
+    for pass in [
+        "sort",
+        "lbvh: emit",
+        "trace",
+        "raster: surfaces",
+        "preview: shade",
+        "preview: display",
+    ] {
         assert!(timings.count(pass) > 0, "{pass} of {timings:?}");
     }
     assert!(timings.untimed.is_none() && timings.seconds() > 0.0);
@@ -430,9 +445,15 @@ fn a_borrowed_recorder_checks_barriers_and_is_not_submitted() {
         if cfg!(debug_assertions) {
             // Neither the engine's own uses nor the host's that it is told of miss a barrier.
             let missed = write(&mut recorder, gpu, &words, 1, 2);
-            assert!(matches!(&missed, Err(Error::MissingBarrier { buffer, .. }) if buffer == "words"), "{missed:?}");
+            assert!(
+                matches!(&missed, Err(Error::MissingBarrier { buffer, .. }) if buffer == "words"),
+                "{missed:?}"
+            );
             let missed = recorder.note_use("host's copy", &words, Access::TRANSFER_READ);
-            assert!(matches!(&missed, Err(Error::MissingBarrier { pass, .. }) if pass == "host's copy"), "{missed:?}");
+            assert!(
+                matches!(&missed, Err(Error::MissingBarrier { pass, .. }) if pass == "host's copy"),
+                "{missed:?}"
+            );
         }
         recorder.note_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER));
         recorder.note_use("host's copy", &words, Access::TRANSFER_READ).unwrap();
@@ -446,8 +467,8 @@ fn a_borrowed_recorder_checks_barriers_and_is_not_submitted() {
         let taken = std::mem::replace(&mut *recorder, gpu.recorder("another").unwrap());
         let refused = taken.submit();
         assert!(matches!(refused.err(), Some(Error::Setting { name, .. }) if name == "recorder"));
+        // The command buffer has lost what it used, and goes with its pool.
         drop(recorder);
-        own.end();
     });
 }
 
@@ -458,7 +479,10 @@ fn what_a_host_lent_is_checked() {
         let words = own.lend("words", 64, STORAGE);
         let raw = words.raw();
         assert_eq!((words.bytes(), words.raw_offset()), (64, OFFSET));
-        assert!(matches!(words.write(0, &[1u32]), Err(Error::LimitExceeded { .. })), "it is not mapped");
+        assert!(
+            matches!(words.write(0, &[1u32]), Err(Error::LimitExceeded { .. })),
+            "it is not mapped"
+        );
         let lent = |offset, bytes| HostBuffer {
             name: "odd",
             raw,
@@ -470,7 +494,10 @@ fn what_a_host_lent_is_checked() {
             #[expect(unsafe_code, reason = "a host that speaks to Vulkan itself")]
             // SAFETY: the handle is alive; parts that are refused are not used.
             let refused = unsafe { gpu.borrow_buffer(&lent(offset, bytes)) };
-            assert!(matches!(&refused, Err(Error::Setting { name, .. }) if name == wrong), "{refused:?}");
+            assert!(
+                matches!(&refused, Err(Error::Setting { name, .. }) if name == wrong),
+                "{refused:?}"
+            );
         }
         // Storage bindings want an alignment that this part does not have, fills and copies a use that it was not lent for.
         #[expect(unsafe_code, reason = "a host that speaks to Vulkan itself")]
@@ -478,19 +505,41 @@ fn what_a_host_lent_is_checked() {
         let part = unsafe { gpu.borrow_buffer(&lent(OFFSET + 4, 32)) }.unwrap();
         let mut recorder = gpu.recorder("refused").unwrap();
         let refused = recorder.pass("fill", |pass| pass.fill(part.view(), 0));
-        assert!(matches!(&refused, Err(Error::Setting { value, .. }) if value == "odd"), "{refused:?}");
+        assert!(
+            matches!(&refused, Err(Error::Setting { value, .. }) if value == "odd"),
+            "{refused:?}"
+        );
         if gpu.caps().storage_buffer_alignment > 4 {
             let refused = write(&mut recorder, gpu, &part, 0, 0);
-            assert!(matches!(&refused, Err(Error::LimitExceeded { limit_name, .. }) if *limit_name == "offset alignment"), "{refused:?}");
+            assert!(
+                matches!(&refused, Err(Error::LimitExceeded { limit_name, .. }) if *limit_name == "offset alignment"),
+                "{refused:?}"
+            );
         }
         let refused = gpu.texel_view_of(&words, vk::Format::R32_UINT);
-        assert!(matches!(&refused, Err(Error::Setting { name, .. }) if name == "buffer"), "{refused:?}");
+        assert!(
+            matches!(&refused, Err(Error::Setting { name, .. }) if name == "buffer"),
+            "{refused:?}"
+        );
         let texels = own.lend("texels", 64, TEXELS);
         let refused = gpu.texel_view_of(&texels, vk::Format::BC1_RGB_UNORM_BLOCK);
-        assert!(matches!(&refused, Err(Error::Setting { name, .. }) if name == "format"), "{refused:?}");
+        assert!(
+            matches!(&refused, Err(Error::Setting { name, .. }) if name == "format"),
+            "{refused:?}"
+        );
         let builder = LbvhBuilder::new(gpu, &LbvhSettings::default()).unwrap();
         let refused = builder.buffers_over(2, &words, &words);
-        assert!(matches!(&refused, Err(Error::LimitExceeded { value: 72, limit: 64, .. })), "{refused:?}");
+        assert!(
+            matches!(
+                &refused,
+                Err(Error::LimitExceeded {
+                    value: 72,
+                    limit: 64,
+                    ..
+                })
+            ),
+            "{refused:?}"
+        );
         drop(recorder);
         drop((words, part, texels));
     });

@@ -41,7 +41,17 @@ fn a_kernel_in_wgsl_is_its_twin() {
         let found: Vec<_> = kernel
             .bindings()
             .iter()
-            .map(|b| (b.name.as_str(), b.set, b.binding, b.kind, b.writes, b.least_bytes, b.used))
+            .map(|b| {
+                (
+                    b.name.as_str(),
+                    b.set,
+                    b.binding,
+                    b.kind,
+                    b.writes,
+                    b.least_bytes,
+                    b.used,
+                )
+            })
             .collect();
         let (storage, uniform_buffer) = (BindingKind::StorageBuffer, BindingKind::UniformBuffer);
         let expected = [
@@ -67,7 +77,12 @@ fn a_kernel_in_wgsl_is_its_twin() {
                     ("never", never.view().into()),
                 ];
                 let push = [7u32, COUNT];
-                pass.dispatch_own(&kernel, &given, bytemuck::cast_slice(&push), kernel.groups_for([1024, 1, 1]))
+                pass.dispatch_own(
+                    &kernel,
+                    &given,
+                    bytemuck::cast_slice(&push),
+                    kernel.groups_for([1024, 1, 1]),
+                )
             })
             .unwrap();
         recorder.submit().unwrap().wait().unwrap();
@@ -136,7 +151,10 @@ fn mistakes_in_wgsl_have_their_place() {
     with_gpu(|gpu| {
         let unknown = "@compute @workgroup_size(1)\nfn main() {\n    let a = 1u;\n    let b = a + missing;\n}";
         let (line, column, words) = mistake(gpu, unknown);
-        assert!((line, column) == (4, 17) && words.contains("missing"), "{line}:{column} {words}");
+        assert!(
+            (line, column) == (4, 17) && words.contains("missing"),
+            "{line}:{column} {words}"
+        );
         let syntax = "@compute @workgroup_size(1)\nfn main() {\n    let a = ;\n}";
         let (line, column, words) = mistake(gpu, syntax);
         assert!((line, column) == (3, 13), "{line}:{column} {words}");
@@ -154,17 +172,30 @@ fn mistakes_in_wgsl_have_their_place() {
         assert!(words.contains("a, b"), "{words}");
         let half = "enable f16;\n@group(0) @binding(0) var<storage, read_write> h: array<f16>;\n@compute @workgroup_size(1) fn main() { h[0] = 1.0h; }";
         let (.., words) = mistake(gpu, half);
-        assert!(words.to_lowercase().contains("float16") || words.contains("f16"), "{words}");
+        assert!(
+            words.to_lowercase().contains("float16") || words.contains("f16"),
+            "{words}"
+        );
 
         let texture = "@group(0) @binding(0) var picture: texture_2d<f32>;\n@compute @workgroup_size(1) fn main() { let a = textureLoad(picture, vec2u(0), 0); }";
         let refused = OwnKernel::wgsl(gpu, "texture", texture);
-        assert!(matches!(&refused, Err(Error::Binding { binding, .. }) if binding == "picture"), "{refused:?}");
+        assert!(
+            matches!(&refused, Err(Error::Binding { binding, .. }) if binding == "picture"),
+            "{refused:?}"
+        );
         let large = "@compute @workgroup_size(4096, 4096) fn main() {}";
         let refused = OwnKernel::wgsl(gpu, "large", large);
-        assert!(matches!(&refused, Err(Error::MissingFeature { .. } | Error::KernelSource { .. })), "{refused:?}");
-        let memory = "var<workgroup> words: array<u32, 1000000>;\n@compute @workgroup_size(1) fn main() { words[0] = 1u; }";
+        assert!(
+            matches!(&refused, Err(Error::MissingFeature { .. } | Error::KernelSource { .. })),
+            "{refused:?}"
+        );
+        let memory =
+            "var<workgroup> words: array<u32, 1000000>;\n@compute @workgroup_size(1) fn main() { words[0] = 1u; }";
         let refused = OwnKernel::wgsl(gpu, "memory", memory);
-        assert!(matches!(&refused, Err(Error::MissingFeature { feature, .. }) if feature.contains("SharedMemory")), "{refused:?}");
+        assert!(
+            matches!(&refused, Err(Error::MissingFeature { feature, .. }) if feature.contains("SharedMemory")),
+            "{refused:?}"
+        );
     });
 }
 
@@ -191,24 +222,80 @@ fn what_a_dispatch_is_given_is_checked_by_name() {
             recorder.pass("own", |pass| pass.dispatch_own(&kernel, given, push, [1, 1, 1]))
         };
         let with = |name: &'static str, resource| {
-            good.map(|(known, good)| if known == name { (known, resource) } else { (known, good) })
+            good.map(|(known, good)| {
+                if known == name {
+                    (known, resource)
+                } else {
+                    (known, good)
+                }
+            })
         };
         let misplaced = input.slice(4, 64);
         let mut cases: Vec<(&str, &str, Vec<(&str, OwnResource<'_>)>, &[u8])> = vec![
             ("never", "was not given", good[..3].to_vec(), push),
-            ("result", "is not declared; the source has numbers, results, shift, never", [&good[..], &[("result", output.view().into())]].concat(), push),
+            (
+                "result",
+                "is not declared; the source has numbers, results, shift, never",
+                [&good[..], &[("result", output.view().into())]].concat(),
+                push,
+            ),
             ("numbers", "is given twice", [&good[..], &good[..1]].concat(), push),
-            ("results", "a storage buffer that the kernel writes, and was given to be read only", with("results", OwnResource::ReadOnly(output.view())).to_vec(), push),
-            ("numbers", "a storage buffer that the kernel reads, and was given texels", with("numbers", (&texels).into()).to_vec(), push),
-            ("shift", "a uniform buffer, and was given texels", with("shift", (&texels).into()).to_vec(), push),
-            ("never", "takes at least 32 bytes, and was given 16 of \"never\"", with("never", never.slice(0, 16).into()).to_vec(), push),
-            ("never", "cannot be bound", with("never", never.slice(0, 64).into()).to_vec(), push),
-            ("shift", "cannot be bound", with("shift", input.slice(0, 16).into()).to_vec(), push),
-            ("results", "is written, and lies over what was given as numbers", with("results", input.view().into()).to_vec(), push),
-            ("push constants", "are 8 bytes, and 4 were given", good.to_vec(), &push[..4]),
+            (
+                "results",
+                "a storage buffer that the kernel writes, and was given to be read only",
+                with("results", OwnResource::ReadOnly(output.view())).to_vec(),
+                push,
+            ),
+            (
+                "numbers",
+                "a storage buffer that the kernel reads, and was given texels",
+                with("numbers", (&texels).into()).to_vec(),
+                push,
+            ),
+            (
+                "shift",
+                "a uniform buffer, and was given texels",
+                with("shift", (&texels).into()).to_vec(),
+                push,
+            ),
+            (
+                "never",
+                "takes at least 32 bytes, and was given 16 of \"never\"",
+                with("never", never.slice(0, 16).into()).to_vec(),
+                push,
+            ),
+            (
+                "never",
+                "cannot be bound",
+                with("never", never.slice(0, 64).into()).to_vec(),
+                push,
+            ),
+            (
+                "shift",
+                "cannot be bound",
+                with("shift", input.slice(0, 16).into()).to_vec(),
+                push,
+            ),
+            (
+                "results",
+                "is written, and lies over what was given as numbers",
+                with("results", input.view().into()).to_vec(),
+                push,
+            ),
+            (
+                "push constants",
+                "are 8 bytes, and 4 were given",
+                good.to_vec(),
+                &push[..4],
+            ),
         ];
         if gpu.caps().storage_buffer_alignment > 4 {
-            cases.push(("numbers", "offset alignment", with("numbers", misplaced.into()).to_vec(), push));
+            cases.push((
+                "numbers",
+                "offset alignment",
+                with("numbers", misplaced.into()).to_vec(),
+                push,
+            ));
         }
         for (name, words, given, push) in cases {
             match try_with(&given, push) {
@@ -222,7 +309,10 @@ fn what_a_dispatch_is_given_is_checked_by_name() {
         try_with(&good, push).unwrap();
         if cfg!(debug_assertions) {
             let missed = try_with(&good, push);
-            assert!(matches!(&missed, Err(Error::MissingBarrier { buffer, .. }) if buffer == "results"), "{missed:?}");
+            assert!(
+                matches!(&missed, Err(Error::MissingBarrier { buffer, .. }) if buffer == "results"),
+                "{missed:?}"
+            );
         }
         recorder
             .pass("again", |pass| {
@@ -263,7 +353,10 @@ fn a_kernel_in_glsl_goes_by_the_same_rules() {
                 let given = [("numbers", (&numbers).into()), ("results", output.view().into())];
                 let swapped = [("numbers", numbers.buffer().view().into()), given[1]];
                 let refused = pass.dispatch_own(&kernel, &swapped, &push, [1, 1, 1]);
-                assert!(matches!(&refused, Err(Error::Binding { binding, .. }) if binding == "numbers"), "{refused:?}");
+                assert!(
+                    matches!(&refused, Err(Error::Binding { binding, .. }) if binding == "numbers"),
+                    "{refused:?}"
+                );
                 pass.dispatch_own(&kernel, &given, &push, [1, 1, 1])
             })
             .unwrap();

@@ -28,7 +28,10 @@ pub(super) fn translate(name: &str, source: &str) -> Result<Module> {
     let bindings = interface.bindings.iter().map(|binding| {
         let (kind, reads, writes, least_bytes) = match &binding.resource {
             Resource::Storage { reads, writes, block } => {
-                let least = block.members.iter().map(|member| member.offset + least_of(&member.kind));
+                let least = block
+                    .members
+                    .iter()
+                    .map(|member| member.offset + least_of(&member.kind));
                 (BindingKind::StorageBuffer, *reads, *writes, least.max().unwrap_or(0))
             }
             Resource::Uniform { block } => (BindingKind::UniformBuffer, true, false, block.size()),
@@ -55,7 +58,10 @@ pub(super) fn translate(name: &str, source: &str) -> Result<Module> {
     Ok(Module {
         entry: "main".into(),
         bindings: bindings.collect::<Result<_>>()?,
-        push_bytes: interface.push.as_ref().map_or(0, |push| push.size().next_multiple_of(4)),
+        push_bytes: interface
+            .push
+            .as_ref()
+            .map_or(0, |push| push.size().next_multiple_of(4)),
         local_size,
         // Drivers refuse what is too much; the reflection does not say.
         shared_bytes: 0,

@@ -161,7 +161,11 @@ impl OwnBinding {
             return Access::COMPUTE_UNIFORM_READ;
         }
         let read = if self.reads { Access::COMPUTE_READ } else { Access::NONE };
-        let write = if self.writes { Access::COMPUTE_WRITE } else { Access::NONE };
+        let write = if self.writes {
+            Access::COMPUTE_WRITE
+        } else {
+            Access::NONE
+        };
         read | write
     }
 }
@@ -323,14 +327,8 @@ impl OwnKernel {
         let (usage, alignment) = match binding.kind {
             // The view was checked when it was made.
             BindingKind::TexelBuffer => return Ok(()),
-            BindingKind::UniformBuffer => (
-                vk::BufferUsageFlags::UNIFORM_BUFFER,
-                gpu.caps.uniform_buffer_alignment,
-            ),
-            _ => (
-                vk::BufferUsageFlags::STORAGE_BUFFER,
-                gpu.caps.storage_buffer_alignment,
-            ),
+            BindingKind::UniformBuffer => (vk::BufferUsageFlags::UNIFORM_BUFFER, gpu.caps.uniform_buffer_alignment),
+            _ => (vk::BufferUsageFlags::STORAGE_BUFFER, gpu.caps.storage_buffer_alignment),
         };
         let placed = view.check(alignment).and_then(|()| view.check_usage(usage));
         let limit = gpu.caps.max_uniform_buffer_range;
@@ -368,7 +366,10 @@ fn check_limits(gpu: &Inner, name: &str, module: &Module) -> Result<()> {
     let most = gpu.caps.max_shared_memory;
     if module.shared_bytes > u64::from(most) {
         let feature = format!("maxComputeSharedMemorySize >= {}", module.shared_bytes);
-        return Err(lacks(feature, format!("use at most {most} bytes of workgroup variables")));
+        return Err(lacks(
+            feature,
+            format!("use at most {most} bytes of workgroup variables"),
+        ));
     }
     Ok(())
 }

@@ -23,17 +23,44 @@ fn words(error: &dyn std::error::Error) -> String {
     text
 }
 
+fn has_subgroups(caps: &Caps) -> bool {
+    let has = &caps.subgroup;
+    has.basic && has.vote && has.arithmetic && has.ballot && has.shuffle
+}
+
+/// What modules may ask of a device: nothing that was not enabled.
+fn module_capabilities(caps: &Caps) -> naga::FastHashSet<spv::Capability> {
+    use spv::Capability as C;
+    let subgroups = [
+        C::GroupNonUniform,
+        C::GroupNonUniformVote,
+        C::GroupNonUniformArithmetic,
+        C::GroupNonUniformBallot,
+        C::GroupNonUniformShuffle,
+    ];
+    let all = [
+        (true, &[C::Shader, C::Matrix][..]),
+        (caps.float64, &[C::Float64]),
+        (caps.int64, &[C::Int64]),
+        (has_subgroups(caps), &subgroups),
+    ];
+    all.into_iter()
+        .filter(|(has, _)| *has)
+        .flat_map(|(_, some)| some.iter().copied())
+        .collect()
+}
+
 /// What sources may use of a device.
 fn capabilities(caps: &Caps) -> Capabilities {
-    let subgroup = &caps.subgroup;
-    let has_subgroups =
-        subgroup.basic && subgroup.vote && subgroup.arithmetic && subgroup.ballot && subgroup.shuffle;
     let of = |has: bool, capability| if has { capability } else { Capabilities::empty() };
     Capabilities::IMMEDIATES
         | Capabilities::SHADER_FLOAT16_IN_FLOAT32
         | of(caps.float64, Capabilities::FLOAT64)
         | of(caps.int64, Capabilities::SHADER_INT64)
-        | of(has_subgroups, Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER)
+        | of(
+            has_subgroups(caps),
+            Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER,
+        )
 }
 
 /// The module of a source, for a device.
@@ -61,7 +88,11 @@ pub(super) fn translate(name: &str, source: &str, caps: &Caps) -> Result<Module>
         .collect();
     let [entry] = compute[..] else {
         let names: Vec<_> = compute.iter().map(|entry| entry.name.as_str()).collect();
-        let message = format!("a kernel has one compute entry point, and there are {}: {}", names.len(), names.join(", "));
+        let message = format!(
+            "a kernel has one compute entry point, and there are {}: {}",
+            names.len(),
+            names.join(", ")
+        );
         return Err(mistake(None, message));
     };
     let entry = entry.name.clone();
@@ -76,6 +107,7 @@ pub(super) fn translate(name: &str, source: &str, caps: &Caps) -> Result<Module>
         lang_version: (1, 3),
         flags: spv::WriterFlags::DEBUG,
         fake_missing_bindings: false,
+        capabilities: Some(module_capabilities(caps)),
         bounds_check_policies: BoundsCheckPolicies {
             index: BoundsCheckPolicy::ReadZeroSkipWrite,
             buffer: BoundsCheckPolicy::ReadZeroSkipWrite,
@@ -90,7 +122,11 @@ pub(super) fn translate(name: &str, source: &str, caps: &Caps) -> Result<Module>
     };
     let words_of_module =
         spv::write_vec(&module, &info, &options, Some(&pipeline)).map_err(|error| mistake(None, words(&error)))?;
-    let place = module.entry_points.iter().position(|point| point.name == entry).unwrap_or(0);
+    let place = module
+        .entry_points
+        .iter()
+        .position(|point| point.name == entry)
+        .unwrap_or(0);
     let uses = info.get_entry_point(place);
     let is_used = |(handle, _): &(naga::Handle<naga::GlobalVariable>, _)| !uses[*handle].is_empty();
     let live: BTreeSet<(u32, u32)> = module
@@ -100,7 +136,11 @@ pub(super) fn translate(name: &str, source: &str, caps: &Caps) -> Result<Module>
         .filter_map(|(_, variable)| variable.binding.map(|at| (at.group, at.binding)))
         .collect();
     // Sizes of arrays may rest on overrides, so those of the processed module count where it still has the binding.
-    let sizes: BTreeMap<_, _> = used.bindings.iter().map(|b| ((b.set, b.binding), b.least_bytes)).collect();
+    let sizes: BTreeMap<_, _> = used
+        .bindings
+        .iter()
+        .map(|b| ((b.set, b.binding), b.least_bytes))
+        .collect();
     let bindings = whole.bindings.into_iter().map(|mut binding| {
         let at = (binding.set, binding.binding);
         binding.used = live.contains(&at);
