@@ -10,6 +10,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings};
+use clerestory::film::PixelFormat;
 use clerestory::gpu::ash::{self, vk};
 use clerestory::gpu::{
     BorrowDesc, Buffer, BufferDesc, Category, EnabledFeatures, Gpu, GpuOptions, HostBuffer, HostDevice, Recorder,
@@ -240,7 +241,7 @@ impl Host {
             .ok_or_else(|| Error::scene(&scene.source, "cameras", "are none"))?;
         preview.record_lights(&mut recorder, &surfaces, &lights)?;
         preview.record(&mut recorder, &on_device, &surfaces, camera, &[everything])?;
-        preview.record_display(&mut recorder, &picture, scene.defaults.exposure, false)?;
+        preview.record_display(&mut recorder, &picture, scene.defaults.exposure, PixelFormat::Rgba8)?;
         let recorded = recorder.finish();
         self.barrier(
             commands,

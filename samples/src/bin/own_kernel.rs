@@ -7,6 +7,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
+use clerestory::film::PixelFormat;
 use clerestory::gpu::{Access, BufferDesc, Category, Gpu, GpuOptions, OwnKernel, OwnResource};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Error, Result, scene};
@@ -59,7 +60,7 @@ fn sample(path: &Path, arguments: &Arguments) -> Result<()> {
     let bytes = 4 * u64::from(width) * u64::from(height);
     let buffer = |name| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Film));
     let (pixels, result) = (buffer("displayed picture")?, buffer("picture in ink")?);
-    rendering.display(&pixels, scene.defaults.exposure, false)?;
+    rendering.display(&pixels, scene.defaults.exposure, PixelFormat::Rgba8)?;
 
     let mut recorder = gpu.recorder("own kernel")?;
     recorder.pass("ink", |pass| {

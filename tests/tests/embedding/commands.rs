@@ -3,6 +3,7 @@
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, build};
 use clerestory::accel::trace::{RayTracer, TraceSettings};
 use clerestory::accel::{DeviceTraversal, Hit, Ray, RayIndex};
+use clerestory::film::PixelFormat;
 use clerestory::gpu::ash::{self, vk};
 use clerestory::gpu::{
     Access, BorrowDesc, Buffer, BufferDesc, Category, EnabledFeatures, Gpu, HostBuffer, Recorder, rw_compute_to_compute,
@@ -228,7 +229,7 @@ fn record_preview(recorder: &mut Recorder, preview: &mut Preview, scene: &Scene,
     preview
         .record(recorder, on_device, &surfaces, &scene.cameras[0], &[part])
         .unwrap();
-    preview.record_display(recorder, to, 0.0, false).unwrap();
+    preview.record_display(recorder, to, 0.0, PixelFormat::Rgba8).unwrap();
 }
 
 /// Sort, build, rays through what was built, and preview, between the host's copies in and out, in one submission.
