@@ -44,6 +44,11 @@ unsafe extern "system" fn on_message(
     let (data, messages) = unsafe { (&*data, &*user.cast::<Mutex<Vec<String>>>()) };
     // SAFETY: the text is NUL-terminated.
     let text = unsafe { CStr::from_ptr(data.p_message) };
+    // Older layers warn of outputs that are discarded; the engine's own log leaves that out, too.
+    let discarded = "of type `VK_FORMAT_UNDEFINED` does not match fragment shader output type";
+    if text.to_string_lossy().contains(discarded) {
+        return vk::FALSE;
+    }
     messages.lock().unwrap().push(text.to_string_lossy().into_owned());
     vk::FALSE
 }

@@ -106,7 +106,8 @@ pub(super) fn translate(name: &str, source: &str, caps: &Caps) -> Result<Module>
     let options = spv::Options {
         lang_version: (1, 3),
         flags: spv::WriterFlags::DEBUG,
-        fake_missing_bindings: false,
+        // Sets and numbers are those of the source.
+        fake_missing_bindings: true,
         capabilities: Some(module_capabilities(caps)),
         bounds_check_policies: BoundsCheckPolicies {
             index: BoundsCheckPolicy::ReadZeroSkipWrite,
