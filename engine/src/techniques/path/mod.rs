@@ -313,7 +313,7 @@ pub(crate) const ROWS: &[Row] = &[
             sources::KAJIYA_1986.whole(),
             sources::VEACH_1997.at("chapters 9 and 10"),
         ],
-        shaders: &["shaders/transport/path_shade.comp"],
+        shaders: &["shaders/techniques/path/path_shade.comp"],
         bias: Some(Bias::Unbiased),
         tests: &[
             "engine/src/transport/lights.rs::heuristics_sum_to_one",
@@ -332,8 +332,8 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Blending by chance costs noise.",
         sources: &[sources::ENDERTON_2010.whole()],
         shaders: &[
-            "shaders/transport/path_extend_alpha.comp",
-            "shaders/transport/path_shadow_alpha.comp",
+            "shaders/walk/extend.comp",
+            "shaders/walk/shadow.comp",
         ],
         bias: Some(Bias::Unbiased),
         tests: &[
@@ -351,7 +351,7 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("BG-3"),
         limits: "Solids of one absorption whose surfaces neither cross nor coincide.",
         sources: &[sources::KHRONOS_MATERIALS_VOLUME.at("law of Beer and Lambert")],
-        shaders: &["shaders/transport/path_shade.comp"],
+        shaders: &["shaders/techniques/path/path_shade.comp"],
         tests: &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
         experiment: "clerestory report absorption",
         ..Row::of(file!())
