@@ -15,7 +15,7 @@
 //! ```
 //!
 //! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`kernels`] (sort, scan
-//! and the like), [`scene`] and [`film`], [`accel`] (spatial indexes) and [`maps`] (maps of directions), [`raster`] (rasterization), [`transport`] (what light does), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] gathers the rows ([`card`]) that say where each
+//! and the like), [`scene`] and [`film`], [`accel`] (spatial indexes) and [`maps`] (maps of directions), [`raster`] (rasterization), [`transport`] (what light does), [`walk`] (its ways through a scene, ray by ray), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] gathers the rows ([`card`]) that say where each
 //! published method lives.
 
 pub mod accel;
@@ -35,6 +35,7 @@ pub mod settings;
 pub mod srgb;
 pub mod techniques;
 pub mod transport;
+pub mod walk;
 
 #[cfg(test)]
 mod test_chi_square;

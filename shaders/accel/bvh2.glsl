@@ -7,7 +7,7 @@
 // A ray that its quota stops returns the word of the node to go on with; call again with it and the same hit. The quota must exceed
 // BVH2_MAX_DEPTH; leaves on the stack may add (BVH2_MAX_DEPTH + 1) × leaf size iterations to it.
 //
-// With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
+// With CLERESTORY_CANDIDATE_FILTER defined, as a constant that says whether there is a filter, the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);
 #ifndef CLERESTORY_ACCEL_BVH2_GLSL
 #define CLERESTORY_ACCEL_BVH2_GLSL
@@ -30,13 +30,13 @@ const uint BVH2_MAX_DEPTH = 32u;
     Hit awaited; \
     do { \
         awaiting = false;
-#define BVH2_GOES_ON !awaiting && BVH2_UNFINISHED
+#define BVH2_GOES_ON !(CLERESTORY_CANDIDATE_FILTER && awaiting) && BVH2_UNFINISHED
 #define BVH2_END_CANDIDATES \
-        if (awaiting && accept_candidate(awaited.triangle, awaited.barycentrics)) { \
+        if (CLERESTORY_CANDIDATE_FILTER && awaiting && accept_candidate(awaited.triangle, awaited.barycentrics)) { \
             hit = awaited; \
             word = any_hit ? INDEX_FINISHED : word; \
         } \
-    } while (BVH2_UNFINISHED);
+    } while (CLERESTORY_CANDIDATE_FILTER && BVH2_UNFINISHED);
 #else
 #define BVH2_BEGIN_CANDIDATES
 #define BVH2_GOES_ON BVH2_UNFINISHED
@@ -118,13 +118,16 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
                 if (better) {
                     Hit found = Hit(candidate.t, candidate.barycentrics, triangle);
 #ifdef CLERESTORY_CANDIDATE_FILTER
-                    awaiting = true;
-                    awaited = found;
-#else
-                    hit = found;
-                    top = any_hit ? 0u : top;
-                    pop = pop || any_hit;
+                    if (CLERESTORY_CANDIDATE_FILTER) {
+                        awaiting = true;
+                        awaited = found;
+                    } else
 #endif
+                    {
+                        hit = found;
+                        top = any_hit ? 0u : top;
+                        pop = pop || any_hit;
+                    }
                 }
             }
             INDEX_COUNT_ONE(triangles)

@@ -10,7 +10,7 @@
 // KD_POSTPONES, where a leaf waits for the next, KD_PAIR_ITERATIONS instead and the triangles of two leaves; one round may follow it where one leaf is
 // left, another where a leaf waits, and each candidate that is asked about is a round of its own.
 //
-// With CLERESTORY_CANDIDATE_FILTER defined the includer provides, before this file, a pure
+// With CLERESTORY_CANDIDATE_FILTER defined, as a constant that says whether there is a filter, the includer provides, before this file, a pure
 //   bool accept_candidate(uint triangle, vec2 barycentrics);
 //
 // With KD_VOTES defined, by includers that cache, subgroups decide together when leaves are tested; what rays visit then depends on their
@@ -343,13 +343,16 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
                         && (candidate.t < hit.t || q2.y < hit.triangle)) {
                         awaited = Hit(candidate.t, candidate.barycentrics, q2.y);
 #ifdef CLERESTORY_CANDIDATE_FILTER
-                        awaiting = true;
-                        more = false;
-#else
-                        hit = awaited;
-                        done = any_hit;
-                        more = more && !any_hit;
+                        if (CLERESTORY_CANDIDATE_FILTER) {
+                            awaiting = true;
+                            more = false;
+                        } else
 #endif
+                        {
+                            hit = awaited;
+                            done = any_hit;
+                            more = more && !any_hit;
+                        }
                     }
                 } while (more);
             }
@@ -360,7 +363,7 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         }
 #ifdef CLERESTORY_CANDIDATE_FILTER
         // Outside of the loop, where lanes wait for each other with their candidates.
-        if (awaiting && accept_candidate(awaited.triangle, awaited.barycentrics)) {
+        if (CLERESTORY_CANDIDATE_FILTER && awaiting && accept_candidate(awaited.triangle, awaited.barycentrics)) {
             hit = awaited;
             done = any_hit;
         }

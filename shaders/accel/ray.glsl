@@ -19,6 +19,8 @@ const uint NO_HIT = 0xFFFFFFFFu;
 const float MAX_DIRECTION = 268435456.0;
 const float MIN_DIRECTION = 1.0 / MAX_DIRECTION;
 const float MAX_COORDINATE = 1073741824.0;
+// A distance beyond every scene: coordinates are below 2^30 m.
+const float FAR_AWAY = 3.0e38;
 
 Hit no_hit(float t_max) {
     return Hit(t_max, vec2(0.0), NO_HIT);

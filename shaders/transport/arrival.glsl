@@ -1,10 +1,10 @@
 // Where a path has arrived, of light or of the eye: the surface there, how it scatters, on which side and in which body the way was, and
-// the frame that the path is scattered in. Expects the constants of path_features.glsl.
+// the frame that the path is scattered in. Expects the constants of transport/features.glsl.
 #ifndef CLERESTORY_TRANSPORT_ARRIVAL_GLSL
 #define CLERESTORY_TRANSPORT_ARRIVAL_GLSL
 
 #include "scene/bindings.glsl"
-#include "transport/path_buffers.glsl"
+#include "transport/bodies.glsl"
 #include "transport/surface.glsl"
 
 struct Arrival {

@@ -1,5 +1,5 @@
 // What materials read of a mesh's vertices, as specialization constants; the kernels that look at alpha alone need no others. Their ids
-// are two of those of path_features.glsl.
+// are two of those of transport/features.glsl.
 #ifndef CLERESTORY_TRANSPORT_ATTRIBUTE_FEATURES_GLSL
 #define CLERESTORY_TRANSPORT_ATTRIBUTE_FEATURES_GLSL
 

@@ -1,14 +1,13 @@
 // Direct light: choosing a light by its power, a point or direction on it, and the densities that multiple importance sampling needs.
 //
 // One draw chooses the light, stratified through the cumulative table; triangles are sampled uniformly by area, the environment by its
-// luminance. BG-2, BG-3. Expects the constants of path_features.glsl.
+// luminance. BG-2, BG-3. Expects the constants of transport/features.glsl.
 #ifndef CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
 #define CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
 
 #include "scene/bindings.glsl"
 #include "transport/environment.glsl"
 #include "transport/lights.glsl"
-#include "transport/path_dimensions.glsl"
 #include "transport/surface.glsl"
 
 struct LightSample {

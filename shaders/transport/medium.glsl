@@ -9,7 +9,7 @@
 #ifndef CLERESTORY_TRANSPORT_MEDIUM_GLSL
 #define CLERESTORY_TRANSPORT_MEDIUM_GLSL
 
-#include "transport/path_dimensions.glsl"
+#include "accel/ray.glsl"
 
 // Optical depths beyond this leave nothing in f32.
 const float EXPONENT_MAX = 80.0;

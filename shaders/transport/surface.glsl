@@ -1,7 +1,7 @@
 // What a path meets: position, normals and material parameters at a hit.
 //
 // Opaque and thin surfaces are the same from both sides; only emission knows a front (the side from which vertices run counter-clockwise).
-// Expects the constants of path_features.glsl.
+// Expects the constants of transport/features.glsl.
 #ifndef CLERESTORY_TRANSPORT_SURFACE_GLSL
 #define CLERESTORY_TRANSPORT_SURFACE_GLSL
 

@@ -7,6 +7,8 @@ mod commands;
 mod own_kernels;
 #[path = "embedding/technique.rs"]
 mod technique;
+#[path = "embedding/walk.rs"]
+mod walk;
 
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;

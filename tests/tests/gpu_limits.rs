@@ -3,11 +3,12 @@
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::interface::{BindingInfo, BindingKind};
-use clerestory::gpu::shaders::transport::path_compact_count;
+use clerestory::gpu::shaders::walk::compact_count;
 use clerestory::gpu::{
     Access, BufferDesc, Category, DescriptorLimits, Gpu, GpuOptions, ImageDesc, Lesser, Pass, Timings,
 };
 use clerestory::render::{RenderOptions, render};
+use clerestory::techniques;
 use clerestory_tests::shaders::{layout_probe, out_of_bounds, uniform_probe};
 use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
 
@@ -272,11 +273,73 @@ fn the_path_tracer_says_what_a_device_of_the_least_limits_lacks() {
         Ok(_) => panic!("the path tracer has more than four storage buffers"),
     }
     assert_no_messages(&gpu);
+    // The same is known beforehand, by the kernels' interfaces.
+    let card = techniques::by_id("path").unwrap();
+    let lacks = techniques::lacks(gpu.caps(), card);
+    assert_eq!(lacks.len(), 1, "{lacks:?}");
+    assert!(
+        lacks[0].what.starts_with("maxPerStageDescriptorStorageBuffers >= "),
+        "{lacks:?}"
+    );
+    assert_eq!(lacks[0].offered, Some(4));
+    let names = &lacks[0].kernels;
+    assert!(
+        names.contains(&"techniques/path/path_shade.comp") && !names.contains(&"film/display.comp"),
+        "{names:?}"
+    );
+}
+
+#[test]
+fn four_descriptor_sets_are_enough_for_every_technique() {
+    let descriptors = DescriptorLimits {
+        bound_sets: 4,
+        ..gpu_with(&GpuOptions::default()).caps().descriptors
+    };
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            descriptors: Some(descriptors),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    for technique in techniques::all() {
+        assert!(!technique.kernels.is_empty(), "{}", technique.id);
+        assert_eq!(techniques::lacks(gpu.caps(), technique), [], "{}", technique.id);
+        let scene = clerestory::scene::load("builtin:cornell-box").unwrap();
+        let options = RenderOptions {
+            technique: Some(technique.id.into()),
+            size: [8, 8],
+            spp: 1,
+            ..RenderOptions::default()
+        };
+        let rendered = render(&gpu, &scene, &options).unwrap();
+        // And nothing is made that was not asked about.
+        for pipeline in &rendered.report.pipelines {
+            let known = technique.kernels.iter().any(|kernel| kernel.name == pipeline.shader);
+            assert!(known, "{} makes {}", technique.id, pipeline.shader);
+        }
+    }
+    // One less is found before anything is made.
+    let fewer = DescriptorLimits {
+        bound_sets: 3,
+        ..descriptors
+    };
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            descriptors: Some(fewer),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    let lacks = techniques::lacks(gpu.caps(), techniques::by_id("path").unwrap());
+    let what: Vec<_> = lacks.iter().map(|lack| lack.what.as_str()).collect();
+    assert_eq!(what, ["maxBoundDescriptorSets >= 4"]);
+    assert!(lacks[0].kernels.contains(&"walk/shadow.comp"), "{lacks:?}");
 }
 
 #[test]
 fn a_pipeline_takes_of_the_limits_what_its_shader_uses() {
-    let info = &path_compact_count::INFO;
+    let info = &compact_count::INFO;
     let count = |bindings: &mut dyn Iterator<Item = &BindingInfo>, kind| {
         bindings.filter(|binding| binding.kind == kind).count() as u32
     };
@@ -301,11 +364,11 @@ fn a_pipeline_takes_of_the_limits_what_its_shader_uses() {
         })
     };
     let gpu = with(used(storage));
-    gpu.compute_pipeline::<path_compact_count::Kernel>(&Default::default())
+    gpu.compute_pipeline::<compact_count::Kernel>(&Default::default())
         .unwrap();
     assert_no_messages(&gpu);
     let error = with(used(storage) - 1)
-        .compute_pipeline::<path_compact_count::Kernel>(&Default::default())
+        .compute_pipeline::<compact_count::Kernel>(&Default::default())
         .unwrap_err();
     assert!(matches!(error, Error::MissingFeature { .. }), "{error}");
 }

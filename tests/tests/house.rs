@@ -30,7 +30,7 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
 }
 
 /// The floors from below; those of one line stand side by side and do not know each other.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
     // What rows say, beside the floors: every one uses it, and it none of them.
     &["card"],
     &["gpu"],
@@ -38,6 +38,7 @@ const FLOORS: [&[&str]; 9] = [
     &["accel", "maps"],
     &["raster"],
     &["transport"],
+    &["walk"],
     &["techniques"],
     &["render"],
     &["plan"],

@@ -2,8 +2,8 @@
 
 use clerestory::film::{GpuFilm, NonFiniteSamples};
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::sets::PathBuffers;
-use clerestory::gpu::shaders::transport::path_resolve;
+use clerestory::gpu::shaders::sets::{PathAovSet, WaveSet};
+use clerestory::gpu::shaders::techniques::path::path_resolve;
 use clerestory::gpu::shaders::types::GatheredLight;
 use clerestory::gpu::{Access, Category};
 use clerestory_tests::with_gpu;
@@ -31,25 +31,32 @@ fn they_are_counted_by_kind_and_left_out() {
         let texels = gpu
             .storage_texels("none", Category::Work, vk::Format::R32_UINT, 1)
             .unwrap();
-        let paths = PathBuffers {
-            status: gathered.view(),
-            path_queue_in: &texels,
-            path_queue_out: gathered.view(),
-            path_states_in: &texels,
-            path_states_out: gathered.view(),
-            path_gathered: gathered.view(),
-            path_hits_in: &texels,
-            path_hits_out: gathered.view(),
-            path_shadow_rays_in: &texels,
-            path_shadow_rays_out: gathered.view(),
-            path_shadow_queue_in: &texels,
-            path_shadow_queue_out: gathered.view(),
-            path_flags_in: &texels,
-            path_flags_out: gathered.view(),
-            path_resume: gathered.view(),
-            path_chunks: gathered.view(),
-            path_aovs: gathered.view(),
+        let none = gathered.view();
+        let wave = WaveSet {
+            status: none,
+            walk_queue_in: &texels,
+            walk_queue_out: none,
+            walk_states_in: &texels,
+            walk_states_out: none,
+            walk_gathered: gathered.view(),
+            walk_hits_in: &texels,
+            walk_hits_out: none,
+            walk_waiting_in: &texels,
+            walk_waiting_out: none,
+            walk_waiting_queue_in: &texels,
+            walk_waiting_queue_out: none,
+            walk_flags_in: &texels,
+            walk_flags_out: none,
+            walk_resume: none,
+            walk_chunks: none,
+            walk_medium_states: none,
+            walk_medium_events: none,
+            walk_shadow_starts: none,
+            walk_airlight_rays: none,
+            walk_shadow_states: none,
+            medium_counters: none,
         };
+        let aovs = PathAovSet { path_aovs: none };
         let spec = path_resolve::Spec { write_aovs: false };
         let kernel = gpu.compute_pipeline::<path_resolve::Kernel>(&spec).unwrap();
         let push = path_resolve::Push {
@@ -60,7 +67,7 @@ fn they_are_counted_by_kind_and_left_out() {
         let mut recorder = gpu.recorder("resolve").unwrap();
         recorder
             .pass("resolve", |pass| {
-                pass.dispatch(&kernel, &[&paths, &film.bands()[0].set()], &push, [1, 1, 1])?;
+                pass.dispatch(&kernel, &[&wave, &aovs, &film.bands()[0].set()], &push, [1, 1, 1])?;
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
                 Ok(())
             })

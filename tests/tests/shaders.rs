@@ -27,14 +27,14 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Texel buffers.
     ("twin_texture.comp", "SampledBuffer"),
     ("scene/records.comp", "SampledBuffer"),
-    ("transport/path_camera.comp", "SampledBuffer"),
-    ("transport/path_shade.comp", "SampledBuffer"),
+    ("techniques/path/path_camera.comp", "SampledBuffer"),
+    ("techniques/path/path_shade.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_queue_blocks.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_queue_flags.comp", "SampledBuffer"),
-    ("transport/path_compact_count.comp", "SampledBuffer"),
-    ("transport/path_compact_scan.comp", "SampledBuffer"),
-    ("transport/path_compact_scatter.comp", "SampledBuffer"),
-    ("transport/path_resolve.comp", "SampledBuffer"),
+    ("walk/compact_count.comp", "SampledBuffer"),
+    ("walk/compact_scan.comp", "SampledBuffer"),
+    ("walk/compact_scatter.comp", "SampledBuffer"),
+    ("techniques/path/path_resolve.comp", "SampledBuffer"),
     ("kernels/radix_count_serial.comp", "SampledBuffer"),
     ("kernels/radix_scatter_serial.comp", "SampledBuffer"),
     ("accel/lbvh_codes.comp", "SampledBuffer"),
@@ -48,15 +48,9 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("techniques/photon_mapping/photon_gather_packet.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_scatter.comp", "SampledBuffer"),
     ("accel/trace_rays.comp", "SampledBuffer"),
-    ("transport/path_extend.comp", "SampledBuffer"),
-    ("transport/path_extend_alpha.comp", "SampledBuffer"),
-    ("transport/path_shadow.comp", "SampledBuffer"),
-    ("transport/path_shadow_alpha.comp", "SampledBuffer"),
-    ("transport/path_medium.comp", "SampledBuffer"),
-    ("transport/path_extend_media.comp", "SampledBuffer"),
-    ("transport/path_extend_media_alpha.comp", "SampledBuffer"),
-    ("transport/path_shadow_media.comp", "SampledBuffer"),
-    ("transport/path_shadow_media_alpha.comp", "SampledBuffer"),
+    ("walk/extend.comp", "SampledBuffer"),
+    ("walk/shadow.comp", "SampledBuffer"),
+    ("techniques/path/path_medium.comp", "SampledBuffer"),
     ("techniques/preview/preview_shade.comp", "SampledBuffer"),
     ("raster/splat_points.comp", "SpecConstantOp"),
     // Two numbers right behind one, of three words in all.
@@ -79,6 +73,8 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("layer.geom", "UnsupportedExecutionModel"),
     ("layer.vert", "ShaderViewportIndexLayerEXT"),
     ("view.vert", "ViewIndex"),
+    ("walk_ambient.comp", "SampledBuffer"),
+    ("walk_start.comp", "SampledBuffer"),
     // A reference that naga does not follow.
     ("cube_probe.comp", "InvalidId"),
     // Comparisons of specialization constants.
@@ -210,24 +206,24 @@ fn spirv_val_would_find_a_fault() {
 
 #[test]
 fn unused_bindings_are_told_from_used_ones() {
-    let shade = shaders::transport::path_shade::INFO.bindings;
+    let shade = shaders::techniques::path::path_shade::INFO.bindings;
     let used = |name: &str| {
         shade
             .iter()
             .find(|binding| binding.name == name)
             .map(|binding| binding.used)
     };
-    assert_eq!(used("path_states_in"), Some(true));
-    assert_eq!(used("path_states_out"), Some(true));
+    assert_eq!(used("walk_states_in"), Some(true));
+    assert_eq!(used("walk_states_out"), Some(true));
     // It chooses its shadow rays itself, and leaves their queue to the compaction.
-    assert_eq!(used("path_shadow_queue_in"), Some(false));
-    assert_eq!(used("path_shadow_queue_out"), Some(false));
-    assert_eq!(used("path_chunks"), Some(false));
+    assert_eq!(used("walk_waiting_queue_in"), Some(false));
+    assert_eq!(used("walk_waiting_queue_out"), Some(false));
+    assert_eq!(used("walk_chunks"), Some(false));
 }
 
-/// Buffers that are two, one read and one written, and change places: those of the path tracer with every bounce, those of the radix sort with
+/// Buffers that are two, one read and one written, and change places: those of walks with every bounce, those of the radix sort with
 /// every digit. What both would be for one dispatch is checked when it is recorded.
-const IN_TURNS: [&str; 4] = ["path_queue", "path_states", "radix_keys", "radix_values"];
+const IN_TURNS: [&str; 4] = ["walk_queue", "walk_states", "radix_keys", "radix_values"];
 
 #[test]
 fn no_kernel_reads_by_texels_what_it_writes() {
@@ -248,10 +244,26 @@ fn no_kernel_reads_by_texels_what_it_writes() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
-    let of_paths =
-        ["flags", "hits", "queue", "shadow_queue", "shadow_rays", "states"].map(|name| format!("path_{name}"));
+    let of_walks = ["flags", "hits", "queue", "states", "waiting", "waiting_queue"].map(|name| format!("walk_{name}"));
     let of_sorts = ["keys", "values"].map(|name| format!("radix_{name}"));
-    let of_photons = ["deposits"].map(|name| format!("photon_{name}"));
-    let known = of_paths.iter().chain(&of_photons).chain(&of_sorts);
+    let known = of_sorts.iter().chain(&of_walks);
     assert!(stems.iter().eq(known), "{stems:?}");
+}
+
+/// `maxBoundDescriptorSets` of every device.
+const BOUND_SETS: u32 = 4;
+
+#[test]
+fn no_module_has_more_descriptor_sets_than_every_device_binds() {
+    for shader in all() {
+        for binding in shader.bindings {
+            assert!(
+                binding.set < BOUND_SETS,
+                "{}: {} is in set {}",
+                shader.name,
+                binding.name,
+                binding.set
+            );
+        }
+    }
 }

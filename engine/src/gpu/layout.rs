@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::caps::DescriptorLimits;
+use super::caps::{Caps, DescriptorLimits};
 use super::device::Inner;
-use super::interface::{BindingKind, ShaderInfo, Stage};
+use super::interface::{BindingKind, LocalSize, ShaderInfo, Stage};
 use crate::{Error, Result};
 
 /// A pipeline layout with its descriptor set layouts, and the pipeline made with it. Destroyed together.
@@ -31,9 +31,10 @@ impl PipelineObjects {
     /// The layouts (with empty sets in gaps).
     pub fn of(gpu: &Arc<Inner>, desc: &LayoutDesc<'_>) -> Result<Self> {
         let wanted = Wanted::by(desc);
-        if let Some((limit, wanted, offered)) = wanted.excess(&gpu.caps.descriptors, gpu.caps.max_push_constants) {
+        let exceeded = wanted.excess(&gpu.caps.descriptors, gpu.caps.max_push_constants).next();
+        if let Some(ExceededLimit { name, wanted, offered }) = exceeded {
             return Err(Error::MissingFeature {
-                feature: format!("{limit} >= {wanted}"),
+                feature: format!("{name} >= {wanted}"),
                 needed_by: format!("the pipeline of {}", desc.names.join(" and ")),
                 device: gpu.caps.device.clone(),
                 instead: format!("it offers {offered}; choose another device"),
@@ -139,6 +140,36 @@ impl<'a> LayoutDesc<'a> {
     }
 }
 
+/// A limit of a device that a pipeline passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ExceededLimit {
+    /// Its Vulkan name.
+    pub name: &'static str,
+    /// What the pipeline takes.
+    pub wanted: u32,
+    /// What the device has.
+    pub offered: u32,
+}
+
+impl Caps {
+    /// The limits that a pipeline of this shader alone would pass, by its interface: descriptors, push constants, and the size of a workgroup where
+    /// the shader says it.
+    pub fn exceeded_by(&self, shader: &ShaderInfo) -> Vec<ExceededLimit> {
+        let sizes = shader.local_size.map(|size| match size {
+            LocalSize::Fixed(size) => size,
+            LocalSize::Spec(_) => 1,
+        });
+        let invocations = ExceededLimit {
+            name: "maxComputeWorkGroupInvocations",
+            wanted: sizes.iter().product(),
+            offered: self.max_workgroup_invocations,
+        };
+        let exceeded = Wanted::by(&LayoutDesc::of(&[shader], 0)).excess(&self.descriptors, self.max_push_constants);
+        let too_large = Some(invocations).filter(|limit| limit.wanted > limit.offered);
+        exceeded.chain(too_large).collect()
+    }
+}
+
 /// What the layout of one pipeline takes. Every binding is visible to all stages of the pipeline, so that one count holds for each stage
 /// and for the whole.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -170,8 +201,12 @@ impl Wanted {
         }
     }
 
-    /// The first limit that does not suffice, with what is wanted and what is offered.
-    fn excess(&self, offered: &DescriptorLimits, max_push_constants: u32) -> Option<(&'static str, u32, u32)> {
+    /// The limits that do not suffice.
+    fn excess(
+        &self,
+        offered: &DescriptorLimits,
+        max_push_constants: u32,
+    ) -> impl Iterator<Item = ExceededLimit> + use<> {
         let stage = [
             ("maxBoundDescriptorSets", self.sets, offered.bound_sets),
             ("maxPushConstantsSize", self.push_bytes, max_push_constants),
@@ -223,7 +258,10 @@ impl Wanted {
             ),
             ("maxDescriptorSetSamplers", self.samplers, offered.per_pipeline_samplers),
         ];
-        stage.into_iter().find(|(_, wanted, offered)| wanted > offered)
+        let limits = stage
+            .into_iter()
+            .map(|(name, wanted, offered)| ExceededLimit { name, wanted, offered });
+        limits.filter(|limit| limit.wanted > limit.offered)
     }
 }
 
@@ -292,7 +330,7 @@ pub(super) fn specialization_data(values: &[(u32, u32)]) -> (Vec<vk::Specializat
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::interface::{BindingInfo, LocalSize};
+    use crate::gpu::interface::BindingInfo;
 
     const fn binding(set: u32, binding: u32, kind: BindingKind) -> BindingInfo {
         BindingInfo {
@@ -376,8 +414,13 @@ mod tests {
             per_pipeline_sampled_images: 2,
             per_pipeline_samplers: 1,
         };
-        assert_eq!(wanted.excess(&exact, 12), None);
-        assert_eq!(wanted.excess(&exact, 11), Some(("maxPushConstantsSize", 12, 11)));
+        assert_eq!(wanted.excess(&exact, 12).next(), None);
+        let push = ExceededLimit {
+            name: "maxPushConstantsSize",
+            wanted: 12,
+            offered: 11,
+        };
+        assert_eq!(wanted.excess(&exact, 11).next(), Some(push));
         let less: [(&str, Field); 12] = [
             ("maxBoundDescriptorSets", |l| &mut l.bound_sets),
             ("maxPerStageDescriptorStorageBuffers", |l| {
@@ -407,8 +450,9 @@ mod tests {
         for (name, limit) in less {
             let mut short = exact;
             *limit(&mut short) -= 1;
-            let (found, wanted, offered) = wanted.excess(&short, 12).unwrap_or_default();
-            assert_eq!((found, wanted), (name, offered + 1));
+            let found: Vec<_> = wanted.excess(&short, 12).collect();
+            assert_eq!(found.len(), 1, "{found:?}");
+            assert_eq!((found[0].name, found[0].wanted), (name, found[0].offered + 1));
         }
     }
 }

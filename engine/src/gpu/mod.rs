@@ -64,6 +64,7 @@ pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
 pub use image_part::ImagePart;
 pub use instance::{DeviceSummary, VALIDATION_LAYER, ValidationLog, ValidationMessage};
+pub use layout::ExceededLimit;
 pub use memory::{AllocationInfo, Category, MemoryReport};
 pub use options::{DeviceSelection, GpuOptions, Lesser, Validation};
 #[cfg(any(feature = "wgsl", feature = "hot-reload"))]

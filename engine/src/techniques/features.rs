@@ -1,6 +1,8 @@
 //! Device features by the names that techniques ask for them.
 
-use crate::gpu::Caps;
+use std::collections::BTreeMap;
+
+use crate::gpu::{Caps, ExceededLimit};
 use crate::{Error, Result};
 
 use super::Card;
@@ -32,6 +34,47 @@ const FEATURES: [Feature; 16] = [
 pub fn offers(caps: &Caps, feature: &str) -> Option<bool> {
     let (_, has) = FEATURES.iter().find(|(name, _)| *name == feature)?;
     Some(has(caps))
+}
+
+/// Something that a technique needs and a device does not have.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Lack {
+    /// A feature by its Vulkan name, or a limit with the least value that would do: `maxBoundDescriptorSets >= 5`.
+    pub what: String,
+    /// The limit's value; `None` of features.
+    pub offered: Option<u32>,
+    /// Kernels that want more than it; none of features.
+    pub kernels: Vec<&'static str>,
+}
+
+/// Everything that a device lacks of what a technique needs: the features that it names, and limits by the interfaces of its kernels. A scene that needs
+/// fewer kernels may be rendered in spite of a limit.
+pub fn lacks(caps: &Caps, technique: &Card) -> Vec<Lack> {
+    let features = technique
+        .needs
+        .iter()
+        .filter(|feature| offers(caps, feature) != Some(true));
+    let mut all: Vec<Lack> = features
+        .map(|feature| Lack {
+            what: (*feature).to_owned(),
+            offered: None,
+            kernels: Vec::new(),
+        })
+        .collect();
+    let mut limits: BTreeMap<&str, (ExceededLimit, Vec<&str>)> = BTreeMap::new();
+    for shader in technique.kernels {
+        for exceeded in caps.exceeded_by(shader) {
+            let (worst, names) = limits.entry(exceeded.name).or_insert((exceeded, Vec::new()));
+            worst.wanted = worst.wanted.max(exceeded.wanted);
+            names.push(shader.name);
+        }
+    }
+    all.extend(limits.into_values().map(|(limit, kernels)| Lack {
+        what: format!("{} >= {}", limit.name, limit.wanted),
+        offered: Some(limit.offered),
+        kernels,
+    }));
+    all
 }
 
 /// Refuses a device that lacks what the technique needs.

@@ -20,6 +20,7 @@ mod features;
 pub mod path;
 pub mod photon_mapping;
 pub mod preview;
+mod skipped;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,6 +28,7 @@ use std::sync::Arc;
 use crate::card::Row;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
+use crate::gpu::interface::ShaderInfo;
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::{Settings, SettingsDecl};
@@ -34,7 +36,7 @@ use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
 pub use crate::card::Bias;
-pub use features::offers;
+pub use features::{Lack, lacks, offers};
 pub use path::{PathTracer, PathTracerSettings};
 
 /// A technique as the catalogue knows it.
@@ -50,6 +52,9 @@ pub struct Card {
     pub bias: Bias,
     /// Device features beyond the baseline, by the Vulkan names that [`offers`] knows.
     pub needs: &'static [&'static str],
+    /// Kernels that a picture may take, of whatever scene, with default settings; [`lacks`] tells from their interfaces which limits of a device are too
+    /// low. The list may be empty: what is missing is then found when a pipeline is made.
+    pub kernels: &'static [&'static ShaderInfo],
     /// The light paths of its picture with default settings; a setting `path_set` may restrict them to a part.
     pub path_set: PathSet,
     /// Why it cannot model a scene; empty when it can.

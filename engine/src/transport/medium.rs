@@ -193,7 +193,7 @@ pub(crate) const ROWS: &[Row] = &[
             sources::MILLER_2019.whole(),
         ],
         shaders: &[
-            "shaders/transport/path_medium.comp",
+            "shaders/techniques/path/path_medium.comp",
             "shaders/transport/media_tracking.glsl",
         ],
         bias: Some(Bias::Unbiased),

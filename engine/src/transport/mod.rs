@@ -17,10 +17,12 @@ pub mod phase;
 pub mod phong;
 pub mod random;
 pub mod shading_normal;
+mod surface_spec;
 pub mod warp;
 
 pub use gpu_scene::GpuScene;
 pub use path_set::PathSet;
+pub use surface_spec::surface_spec;
 
 #[cfg(test)]
 pub(crate) mod testing;

@@ -14,16 +14,16 @@ layout(push_constant, scalar) uniform Push {
 
 void main() {
     uint place = gl_GlobalInvocationID.x;
-    if (status.stalled != STALLED_NOT || place >= status.shadow_count) {
+    if (status.stalled != STALLED_NOT || place >= status.waiting_count) {
         return;
     }
     // The scan has counted this bounce already.
-    uint record = push.first + (status.shadow_rays[0] - status.shadow_count) + place;
+    uint record = push.first + (status.waited[0] - status.waiting_count) + place;
     if (record >= push.capacity) {
         return;
     }
-    uint source = PHOTON_QUARTERS * texelFetch(path_shadow_queue_in, int(place)).x;
+    uint source = PHOTON_QUARTERS * texelFetch(walk_waiting_queue_in, int(place)).x;
     for (uint i = 0u; i < PHOTON_QUARTERS; ++i) {
-        photon_records[PHOTON_QUARTERS * record + i] = texelFetch(photon_deposits_in, int(source + i));
+        photon_records[PHOTON_QUARTERS * record + i] = texelFetch(walk_waiting_in, int(source + i));
     }
 }

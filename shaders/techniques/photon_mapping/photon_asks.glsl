@@ -2,9 +2,10 @@
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_ASKS_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_ASKS_GLSL
 
-#include "transport/path_features.glsl"
+#include "transport/features.glsl"
 #include "transport/arrival.glsl"
 #include "transport/path_set.glsl"
+#include "walk/wave.glsl"
 
 layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
 
@@ -16,11 +17,11 @@ struct AskSettings {
 };
 
 // How often the path has been scattered, and the state of its automaton.
-uint asking_bounce(PathState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
-uint asking_state(PathState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }
+uint asking_bounce(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
+uint asking_state(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }
 
 // Whether the path at a place asks; where it has arrived, if so.
-bool asks_map(AskSettings ask, PathState path, uint place, out Arrival arrival) {
+bool asks_map(AskSettings ask, WalkState path, uint place, out Arrival arrival) {
     Hit hit = load_hit(place);
     if ((ask.states >> asking_state(path) & 1u) == 0u || hit.triangle == NO_HIT) {
         return false;

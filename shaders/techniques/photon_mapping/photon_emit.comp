@@ -10,23 +10,21 @@
 
 layout(local_size_x = 64) in;
 
-#include "transport/path_features.glsl"
+#include "transport/features.glsl"
 #include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_wave.glsl"
+#include "transport/bodies.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/path_set.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
-    uint first_pixel;   // number of the pass
+    float radius;  // of the scene's bounding sphere
     vec3 scene_upper;
-    uint first_sample;  // first photon of the wave, within the pass
-    uint sample_count;  // photons of the wave
-    uint seed;
-    float radius;       // of the scene's bounding sphere
+    WalkKey key;   // the sequence is the pass, places in it photons
 } push;
 
-#include "transport/path_draws.glsl"
+#include "walk/draws.glsl"
 
 struct Emission {
     vec3 origin;
@@ -36,7 +34,7 @@ struct Emission {
 };
 
 vec2 emission_sample(uint slot, uint dimension) {
-    Sampler s = path_sampler(slot, dimension);
+    Sampler s = walk_sampler(slot, dimension);
     return sample_2d(s);
 }
 
@@ -119,14 +117,14 @@ Emission emit(uint slot, out float probability) {
 
 void main() {
     uint slot = gl_GlobalInvocationID.x;
-    if (slot >= push.sample_count) {
+    if (slot >= push.key.indices) {
         return;
     }
     float probability;
     Emission e = emit(slot, probability);
     uint bounce = path_set_joined(0u, PHOTON_UNDIFFUSED);
-    path_states_out[slot] = PathState(e.origin, 0.0, normalize(e.direction), bounce, e.flux, 1.0);
-    path_gathered[slot] = GatheredLight(vec3(0.0), OUTSIDE);
+    walk_states_out[slot] = WalkState(e.origin, 0.0, normalize(e.direction), bounce, e.flux, 1.0);
+    walk_gathered[slot] = GatheredLight(vec3(0.0), OUTSIDE);
     if (HAS_DIFFERENTIALS) {
         // Only so many photons are of this light.
         photon_differentials[slot] = roulette_differentials(e.differentials, probability);

@@ -1,4 +1,4 @@
-// What photons need beside what paths do (path_features.glsl), as specialization constants.
+// What photons need beside what surfaces do (transport/features.glsl), as specialization constants.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_FEATURES_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_FEATURES_GLSL
 

@@ -21,7 +21,7 @@ layout(constant_id = 43) const bool LINEAR = false;        // goes through recor
 layout(constant_id = 45) const bool NEAREST = false;       // one kernel about the point, up to its `neighbors`-th photon
 layout(constant_id = 46) const uint QUEUE = QUEUE_SLOTS;
 
-// Stands in path_resume for a query that its quota stopped.
+// Stands in walk_resume for a query that its quota stopped.
 const uint GATHER_STOPPED = 0xFFFFFFFEu;
 // Photons count where their surface's normal is less than 60 degrees from that of the point: not through thin walls nor around corners.
 const float PHOTON_NORMAL_COS_MIN = 0.5;
@@ -173,7 +173,7 @@ bool find_nearest(float radius) {
 
 // Prepares the query of a place; false where nothing is gathered. The throughput is that at the point.
 bool begin_gather(uint slot, uint place, out vec3 throughput) {
-    PathState path = load_path(slot);
+    WalkState path = load_walk(slot);
     throughput = path.throughput;
     Arrival a;
     if (!asks_map(push.ask, path, place, a)) {
@@ -181,7 +181,7 @@ bool begin_gather(uint slot, uint place, out vec3 throughput) {
     }
     gather.bounce = asking_bounce(path);
     if (HAS_ABSORPTION) {
-        throughput = absorbed(throughput, arrival_interior(a, path_gathered[slot].interior), a.distance);
+        throughput = absorbed(throughput, arrival_interior(a, walk_gathered[slot].interior), a.distance);
     }
     gather.bsdf = a.bsdf;
     gather.position = a.surface.point.position;
@@ -213,7 +213,7 @@ void main() {
     if (QUEUE != QUEUE_SLOTS) {
         place = queued_place(QUEUE, place);
     }
-    if (!wave_has_arrived() || place >= status.active_count || (LINEAR && path_resume[place] != GATHER_STOPPED)) {
+    if (!wave_has_arrived() || place >= status.active_count || (LINEAR && walk_resume[place] != GATHER_STOPPED)) {
         return;
     }
     uint slot = load_slot(place);
@@ -222,7 +222,7 @@ void main() {
         return;
     }
     if (!gather_photons()) {
-        path_resume[place] = GATHER_STOPPED;
+        walk_resume[place] = GATHER_STOPPED;
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_ARRIVAL);
         return;
@@ -240,7 +240,7 @@ void main() {
     if (atomicAdd(gather_counters.photons[0], gathered_photons) > 0xFFFFFFFFu - gathered_photons) {
         atomicAdd(gather_counters.photons[1], 1u);
     }
-    path_gathered[slot].radiance += throughput * gathered * push.scale;
+    walk_gathered[slot].radiance += throughput * gathered * push.scale;
 }
 
 #endif

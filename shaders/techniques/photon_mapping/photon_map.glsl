@@ -1,16 +1,16 @@
-// The photon map as queries read it (descriptor set 6): compact sibling pairs, and records leaf by leaf.
+// The photon map as queries read it (descriptor set 1): compact sibling pairs, and records leaf by leaf.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_MAP_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_MAP_GLSL
 
 #include "techniques/photon_mapping/kernel.glsl"
 #include "techniques/photon_mapping/photon_history.glsl"
 
-// descriptor set 6: PhotonMapSet
+// descriptor set 1: PhotonMapSet
 
-layout(set = 6, binding = 0) uniform utextureBuffer photon_pairs;
-layout(set = 6, binding = 1) uniform utextureBuffer photon_map_records;
+layout(set = 1, binding = 0) uniform utextureBuffer photon_pairs;
+layout(set = 1, binding = 1) uniform utextureBuffer photon_map_records;
 
-layout(set = 6, binding = 2, scalar) restrict buffer GatherCounters {
+layout(set = 1, binding = 2, scalar) restrict buffer GatherCounters {
     uint queries;
     uint photons[2];  // kernels that held a point: 64 bits, the low word first
 } gather_counters;

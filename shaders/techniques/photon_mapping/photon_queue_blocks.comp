@@ -14,7 +14,7 @@ layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push { AskSettings ask; } push;
 
-shared uint collected[QUEUE_BUFFER_BLOCKS * PATH_GROUP];
+shared uint collected[QUEUE_BUFFER_BLOCKS * WALK_GROUP];
 
 // Appends so many places from `first` on in blocks of `width`.
 void append_blocks(uint first, uint places, uint width) {
@@ -22,7 +22,7 @@ void append_blocks(uint first, uint places, uint width) {
     uint base = 0u;
     if (subgroupElect()) {
         base = atomicAdd(gather_head.count, blocks);
-        atomicMax(gather_head.groups[0], ((base + blocks) * width + PATH_GROUP - 1u) / PATH_GROUP);
+        atomicMax(gather_head.groups[0], ((base + blocks) * width + WALK_GROUP - 1u) / WALK_GROUP);
         gather_head.block_size = width;
         for (uint block = 0u; block < blocks; ++block) {
             gather_blocks[base + block] = min(places - block * width, width);
@@ -35,7 +35,7 @@ void append_blocks(uint first, uint places, uint width) {
 }
 
 void main() {
-    uint width = PATH_GROUP / gl_NumSubgroups;
+    uint width = WALK_GROUP / gl_NumSubgroups;
     uint first = gl_SubgroupID * QUEUE_BUFFER_BLOCKS * width;
     uint begin = (gl_WorkGroupID.x * gl_NumSubgroups + gl_SubgroupID) * COMPACT_CHUNK * width;
     uint count = wave_has_arrived() ? status.active_count : 0u;
@@ -45,7 +45,7 @@ void main() {
         bool asks = false;
         if (place < count) {
             Arrival arrival;
-            asks = asks_map(push.ask, load_path(load_slot(place)), place, arrival);
+            asks = asks_map(push.ask, load_walk(load_slot(place)), place, arrival);
         }
         uvec4 asking = subgroupBallot(asks);
         if (asks) {

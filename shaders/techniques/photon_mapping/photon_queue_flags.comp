@@ -16,7 +16,7 @@ void main() {
         return;
     }
     Arrival arrival;
-    gather_flags[place] = uint(asks_map(push.ask, load_path(load_slot(place)), place, arrival));
+    gather_flags[place] = uint(asks_map(push.ask, load_walk(load_slot(place)), place, arrival));
     if (place == 0u) {
         gather_flag_count[0] = status.active_count;
     }

@@ -11,7 +11,7 @@
 
 layout(local_size_x = 64) in;
 
-#include "transport/path_features.glsl"
+#include "transport/features.glsl"
 #include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_wave.glsl"
 #include "transport/arrival.glsl"
@@ -20,18 +20,15 @@ layout(local_size_x = 64) in;
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
-    uint first_pixel;    // number of the pass
+    uint last_bounce;    // greatest number of scatterings before a hit that is stored
     vec3 scene_upper;
-    uint first_sample;   // first photon of the wave, within the pass
-    uint sample_count;   // photons of the wave
-    uint seed;
-    uint first_deposit;  // least number of scatterings before a hit that is stored
-    uint last_bounce;    // greatest
+    uint first_deposit;  // least
+    WalkKey key;         // the sequence is the pass, places in it photons
     float flux_scale;    // of fluxes as they are stored
     KernelSettings kernel;
 } push;
 
-#include "transport/path_draws.glsl"
+#include "walk/draws.glsl"
 
 // Least axis of a kernel, in errors of its position: far from the origin positions lie on a grid, which a kernel must not fall through.
 const float KERNEL_RESOLUTION = 4.0;
@@ -52,13 +49,13 @@ const float FLUX_STEP_LEAST_POWER = 1.0 / 65536.0;
 
 // The flux with noise of a step of its record's bands, so that rounding errs by nothing on average: photons of one history share their flux.
 vec3 dithered_flux(vec3 flux, uint slot, uint bounce) {
-    uvec3 bits = pcg4d(uvec4(push.first_sample + slot, bounce, push.first_pixel, push.seed)).xyz;
+    uvec3 bits = pcg4d(uvec4(push.key.first_index + slot, bounce, push.key.first_sequence, push.key.seed)).xyz;
     float below = max(uintBitsToFloat(floatBitsToUint(largest_component(flux)) & EXPONENT_BITS), FLUX_STEP_LEAST_POWER);
     vec3 noise = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
     return max(flux + noise * (FLUX_STEP_SHARE * below), vec3(0.0));
 }
 
-void deposit(uint slot, uint place, PathState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
+void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
     atomicAdd(photon_counters.deposits, 1u);
     PhotonKernel kernel;
     bool fit;
@@ -83,11 +80,8 @@ void deposit(uint slot, uint place, PathState photon, SurfacePoint point, vec3 n
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, path_set_bounce(photon.bounce));
     pack_photon(PhotonRecord(point.position, normal, photon.direction, flux, kernel), q0, q1, q2);
     add_history(path_set_bounce(photon.bounce), path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
-    uint first = PHOTON_QUARTERS * place;
-    photon_deposits_out[first] = q0;
-    photon_deposits_out[first + 1u] = q1;
-    photon_deposits_out[first + 2u] = q2;
-    flags |= FLAG_DEPOSIT;
+    store_waiting(place, q0, q1, q2);
+    flags |= FLAG_WAITING;
 }
 
 // Derivatives of the normal that a specular lobe reflects or refracts about, which faces wo.
@@ -132,7 +126,7 @@ Differentials scattered_differentials(Differentials d, Hit hit, Bsdf bsdf, vec3 
 }
 
 // Scatters the photon of a slot at its hit; true when it goes on.
-bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
+bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     Hit hit = load_hit(place);
     if (hit.triangle == NO_HIT) {
         return false;
@@ -145,7 +139,7 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
         return false;
     }
     if (HAS_ABSORPTION) {
-        photon.throughput = absorbed(photon.throughput, arrival_interior(a, path_gathered[slot].interior), hit.t);
+        photon.throughput = absorbed(photon.throughput, arrival_interior(a, walk_gathered[slot].interior), hit.t);
     }
     Bsdf bsdf = a.bsdf;
     bsdf.flags |= BSDF_IMPORTANCE;
@@ -155,7 +149,7 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
         footprint = transfer_differentials(photon_differentials[slot], hit.t, photon.direction, s.geometric_normal);
     }
     if (bounce >= push.first_deposit && arrival_has_diffuse_base(a)) {
-        PathState landed = photon;
+        WalkState landed = photon;
         if (HAS_ALPHA) {
             // Blended surfaces stop only that share of photons, but whoever meets them sees all of their light.
             landed.throughput /= material_coverage(a.material, surface_base_color(a.material, s).a);
@@ -195,7 +189,7 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
         photon_differentials[slot] = footprint;
     }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
-        path_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : OUTSIDE;
+        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : OUTSIDE;
     }
     if ((scattered.flags & LOBE_DIFFUSE) != 0u) {
         diffused = PHOTON_DIFFUSED;
@@ -204,7 +198,7 @@ bool scatter(uint slot, uint place, PathState photon, inout uint flags) {
     photon.origin = departure(a, wi, photon.throughput);
     photon.direction = normalize(wi);
     photon.bounce = path_set_joined(bounce + 1u, diffused);
-    path_states_out[slot] = photon;
+    walk_states_out[slot] = photon;
     return true;
 }
 
@@ -215,12 +209,12 @@ void main() {
     }
     uint slot = load_slot(place);
     uint flags = 0u;
-    if (scatter(slot, place, load_path(slot), flags)) {
+    if (scatter(slot, place, load_walk(slot), flags)) {
         flags |= FLAG_ALIVE;
     } else if (load_hit(place).triangle == NO_HIT) {
         atomicAdd(photon_counters.escaped, 1u);
     } else {
         atomicAdd(photon_counters.absorbed, 1u);
     }
-    path_flags_out[place] = flags;
+    walk_flags_out[place] = flags;
 }

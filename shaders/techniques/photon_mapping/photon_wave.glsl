@@ -1,23 +1,21 @@
-// Working memory of photons under way, beside that of paths (path_buffers.glsl): a photon is a path from a light on, whose throughput is the
-// light's power if it were the only photon. Its deposits wait by place, take the flag and the queue that shadow rays have in paths through
-// compaction, and are appended to the map's records in the order of that queue, bounce after bounce: the same order on every run.
+// Working memory of photons under way, beside that of all walks (walk/wave.glsl): a photon is a walk from a light on, whose throughput is the
+// light's power if it were the only photon. Its deposits wait by place through compaction, and are appended to the map's records in the order
+// of the queue of what waits, bounce after bounce: the same order on every run.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_WAVE_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_WAVE_GLSL
 
 #include "techniques/photon_mapping/kernel.glsl"
 #include "techniques/photon_mapping/photon_history.glsl"
 #include "transport/differentials.glsl"
-#include "transport/path_buffers.glsl"
+#include "walk/wave.glsl"
 
 // descriptor set 3: PhotonWave
 
-// Slots of random numbers at emission, the last two among those that paths use for light sampling at their first bounce.
+// Slots of random numbers at emission, the last two among those that walks use for light sampling at their first bounce.
 const uint PHOTON_DIMENSION_LIGHT = 0u;
 const uint PHOTON_DIMENSION_POINT = 1u;
 const uint PHOTON_DIMENSION_DIRECTION = 4u;
 const uint PHOTON_DIMENSION_WITHIN = 5u;
-
-const uint FLAG_DEPOSIT = FLAG_SHADOW;
 
 // State of a photon's path, beside its number of bounces: whether it has been scattered diffusely.
 const uint PHOTON_UNDIFFUSED = 0u;
@@ -31,8 +29,6 @@ layout(set = 3, binding = 0, scalar) restrict buffer PhotonCounters {
     uint without_kernel;  // those that were not, since their footprint is degenerate
 } photon_counters;
 layout(set = 3, binding = 1, scalar) restrict buffer PhotonDifferentials { Differentials photon_differentials[]; };  // by slot
-layout(set = 3, binding = 2, scalar) restrict writeonly buffer PhotonDepositsOut { uvec4 photon_deposits_out[]; };   // by place
-layout(set = 3, binding = 3) uniform utextureBuffer photon_deposits_in;
-layout(set = 3, binding = 4, scalar) restrict writeonly buffer PhotonRecords { uvec4 photon_records[]; };
+layout(set = 3, binding = 2, scalar) restrict writeonly buffer PhotonRecords { uvec4 photon_records[]; };
 
 #endif

@@ -8,7 +8,7 @@
 
 layout(local_size_x = 64) in;
 
-#include "transport/path_features.glsl"
+#include "transport/features.glsl"
 
 // What is seen is an octahedron of directions about the origin.
 layout(constant_id = 140) const bool SEES_ALL_DIRECTIONS = false;

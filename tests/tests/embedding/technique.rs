@@ -37,6 +37,7 @@ const EVEN: Card = Card {
     rows: &[],
     bias: Bias::Biased("looks at nothing"),
     needs: &[],
+    kernels: &[],
     path_set: PathSet::ALL,
     refusals: |profile| {
         let lit = !profile.has_environment();

@@ -7,7 +7,7 @@ use clap::Args;
 use clerestory::gpu::{Caps, DeviceSelection, DeviceSummary, Gpu, GpuOptions};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{self, Camera, Projection, Scene, SceneProfile};
-use clerestory::techniques;
+use clerestory::techniques::{self, Lack};
 
 use super::check_validation;
 use crate::failure::{Code, Failure, Outcome};
@@ -93,6 +93,8 @@ struct TechniqueNeeds {
     needs: Vec<Need>,
     /// Why it cannot be made here even for [`PROBE`], by its default settings; `None` when it can, or the device is unusable.
     fault: Option<String>,
+    /// Features and limits that the device does not have.
+    lacks: Vec<Lack>,
 }
 
 #[derive(serde::Serialize)]
@@ -154,6 +156,7 @@ impl DeviceInfo {
                     id: technique.id,
                     needs: technique.needs.iter().map(need).collect(),
                     fault,
+                    lacks: techniques::lacks(&caps, technique),
                 })
                 .collect(),
             summary,
@@ -224,10 +227,10 @@ impl DeviceInfo {
                     format!("{} ({answer})", need.feature)
                 })
                 .collect();
-            let needs = if needs.is_empty() {
-                "nothing beyond the engine's baseline".into()
-            } else {
-                needs.join(", ")
+            let needs = match (needs.is_empty(), technique.lacks.is_empty()) {
+                (true, true) => "nothing beyond the engine's baseline".into(),
+                (true, false) => "more than the device offers".into(),
+                (false, _) => needs.join(", "),
             };
             lines.push(format!("  technique    {} needs {needs}", technique.id));
             if let Some(fault) = &technique.fault {
@@ -238,9 +241,23 @@ impl DeviceInfo {
                 );
                 lines.push(output::red(&text, Stream::Output));
             }
+            lines.extend(technique.lacks.iter().filter_map(limit_text));
         }
         lines.join("\n") + "\n"
     }
+}
+
+/// A limit that is too low, in a line of its own; features are said among the needs.
+fn limit_text(lack: &Lack) -> Option<String> {
+    let offered = lack.offered?;
+    Some(output::red(
+        &format!(
+            "               lacks {} (it offers {offered}) for {}",
+            lack.what,
+            lack.kernels.join(", ")
+        ),
+        Stream::Output,
+    ))
 }
 
 /// Device features shown of every device, by their Vulkan names.

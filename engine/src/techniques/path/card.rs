@@ -6,11 +6,15 @@ use crate::Result;
 use crate::card::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
-use crate::gpu::shaders::transport::path_shade;
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::film::display;
+use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resolve, path_shade};
+use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
 use crate::settings::{SettingsDecl, TypedSettings};
 use crate::techniques::path::{PathTracer, PathTracerSettings};
+use crate::techniques::skipped::{Feature, skipped};
 use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
 use crate::transport::PathSet;
 
@@ -21,6 +25,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, super::ROWS],
     bias: Bias::Unbiased,
     needs: &[],
+    kernels: &KERNELS,
     path_set: PathSet::ALL,
     refusals: |_| Vec::new(),
     settings: SettingsDecl::of::<PathTracerSettings>(),
@@ -50,9 +55,23 @@ pub(in crate::techniques) const CARD: Card = Card {
     },
 };
 
-/// What each specialization constant of the shading stage stands for, and why it is off where nothing else is known.
-const FEATURES: [(&str, &str, &str); 19] = [
-    (HAS_METAL, "metal lobes", "no material is metal"),
+/// What a picture may take, of whatever scene.
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 10] = [
+    &path_camera::INFO,
+    &extend::INFO,
+    &path_medium::INFO,
+    &path_shade::INFO,
+    &compact_count::INFO,
+    &compact_scan::INFO,
+    &compact_scatter::INFO,
+    &shadow::INFO,
+    &path_resolve::INFO,
+    &display::INFO,
+];
+
+/// What the specialization constants of the shading stage stand for.
+pub(in crate::techniques) const FEATURES: [Feature; 19] = [
+    ("has_metal", METAL, "no material is metal"),
     (
         "has_conductor",
         "exact conductors",
@@ -64,11 +83,7 @@ const FEATURES: [(&str, &str, &str); 19] = [
         "no material reflects specularly",
     ),
     ("has_transmission", "transmission", "no material transmits"),
-    (
-        HAS_MULTIPLE_SCATTERING,
-        "multiple-scattering compensation",
-        "no material is metal",
-    ),
+    ("has_multiple_scattering", COMPENSATION, "no material is metal"),
     ("has_textures", "texture look-ups", "no material has a texture"),
     ("has_shading_normals", "shading normals", "no mesh interpolates normals"),
     ("has_normal_maps", "normal maps", "no material has one"),
@@ -96,8 +111,8 @@ const FEATURES: [(&str, &str, &str); 19] = [
         "the path set goes on alike after each, or the scene has but one",
     ),
 ];
-const HAS_METAL: &str = "has_metal";
-const HAS_MULTIPLE_SCATTERING: &str = "has_multiple_scattering";
+const METAL: &str = "metal lobes";
+const COMPENSATION: &str = "multiple-scattering compensation";
 
 impl Technique for PathTracer {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
@@ -144,28 +159,15 @@ impl Technique for PathTracer {
     }
 
     fn skipped(&self) -> Vec<Skipped> {
-        let pipelines = PathTracer::pipelines(self);
-        let off = |name: &str| {
-            let shade = pipelines
-                .iter()
-                .filter(|pipeline| pipeline.shader == path_shade::INFO.name);
-            shade
-                .flat_map(|pipeline| &pipeline.specialization)
-                .any(|(known, value)| *known == name && *value == 0)
-        };
-        let switched_off = !off(HAS_METAL) && !PathTracer::settings(self).multiple_scattering;
-        FEATURES
-            .iter()
-            .filter(|(name, ..)| off(name))
-            .map(|&(name, what, why)| Skipped {
-                what,
-                why: if name == HAS_MULTIPLE_SCATTERING && switched_off {
-                    "the setting multiple_scattering is off"
-                } else {
-                    why
-                },
-            })
-            .collect()
+        let mut skipped = skipped(&PathTracer::pipelines(self), path_shade::INFO.name, &FEATURES);
+        let metal = !skipped.iter().any(|skipped| skipped.what == METAL);
+        if metal && !PathTracer::settings(self).multiple_scattering {
+            let compensation = skipped.iter_mut().find(|skipped| skipped.what == COMPENSATION);
+            if let Some(compensation) = compensation {
+                compensation.why = "the setting multiple_scattering is off";
+            }
+        }
+        skipped
     }
 }
 
@@ -181,12 +183,12 @@ const ROWS: &[Row] = &[Row {
         sources::LAINE_2013.whole(),
     ],
     shaders: &[
-        "shaders/transport/path_camera.comp",
-        "shaders/transport/path_extend.comp",
-        "shaders/transport/path_medium.comp",
-        "shaders/transport/path_shade.comp",
-        "shaders/transport/path_shadow.comp",
-        "shaders/transport/path_resolve.comp",
+        "shaders/techniques/path/path_camera.comp",
+        "shaders/walk/extend.comp",
+        "shaders/techniques/path/path_medium.comp",
+        "shaders/techniques/path/path_shade.comp",
+        "shaders/walk/shadow.comp",
+        "shaders/techniques/path/path_resolve.comp",
     ],
     path_set: Some("all"),
     bias: Some(Bias::Unbiased),

@@ -4,7 +4,7 @@
 //! Simulation" (1997), chapters 9 and 10; wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013).
 //!
 //! Participating media (BG-4, PM-F-3), only where a scene has some: analytic free flight in homogeneous media, delta and ratio tracking through
-//! density grids, one walk for all bands; the shaders `transport/path_medium.comp` and `transport/media_tracking.glsl` name the sources. Bodies
+//! density grids, one walk for all bands; the shaders `techniques/path/path_medium.comp` and `transport/media_tracking.glsl` name the sources. Bodies
 //! may lie in bodies as long as their surfaces neither cross nor coincide; the camera may be in any of them, where its position counts for
 //! the whole lens and for all of an orthographic picture. Nothing from infinity is seen through an endless medium that extinguishes it.
 //!
@@ -13,40 +13,33 @@
 //! later dispatch, and samples that are not finite are counted and left out.
 
 pub(super) mod card;
-pub(crate) mod pipelines;
+mod pipelines;
 mod record;
 mod settings;
-pub(crate) mod stages;
-pub(crate) mod wave;
+mod wave;
 
 use std::sync::Arc;
-use std::time::Instant;
 
-use self::pipelines::{Pipelines, TracePipelines, camera_pipeline, ray_quota};
+use self::pipelines::{Pipelines, camera_pipeline};
+use self::record::{EyeStages, record_resolve};
 pub use self::settings::PathTracerSettings;
-use self::stages::StallWatch;
-use self::wave::{
-    Cursor, MediumCounters, Status, Wave, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device,
-    slots_of_picture,
-};
+use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::Result;
-use crate::accel::trace::wide_counter;
 use crate::card::{Bias, Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
-use crate::gpu::shaders::constants::{PATH_GROUP, STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
-use crate::gpu::shaders::sets::PathBuffers;
-use crate::gpu::{Access, Buffer, BufferView, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
+use crate::gpu::shaders::constants::WALK_GROUP;
+use crate::gpu::shaders::types::{FilmAov, FilmPixel, PathAov};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Timings};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::settings::TypedSettings;
 use crate::transport::GpuScene;
+use crate::walk::{ArrivalStage, WalkOptions, Walker, WaveBuffers, WaveNeeds, default_slots, slots_of_device};
 use glam::DVec3;
 
 /// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
 const BOUNCES_PER_SUBMISSION: usize = 12;
-/// Device time that a submission may take where a driver watches: they end what runs for some seconds.
-const SUBMISSION_SECONDS: f64 = 0.25;
 
 /// Exact counts of what the device did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -70,39 +63,6 @@ pub struct PathCounters {
     pub stalls: u64,
 }
 
-/// What a technique gathers where the rays of a bounce have arrived, before the surfaces there are shaded.
-pub(crate) trait ArrivalStage {
-    /// Records it for all places of the queue. Places that its quota stops stall the wave with `STALLED_ARRIVAL`.
-    fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, places: Places<'_>) -> Result<()>;
-
-    /// Records what the places that it has stopped at still lack, from a part on, as much of it as a watchdog has time for; the part to go
-    /// on with, in a submission of its own.
-    fn record_stopped(
-        &self,
-        recorder: &mut Recorder,
-        paths: &PathBuffers<'_>,
-        stopped: StoppedPlaces,
-        part: u64,
-    ) -> Result<Option<u64>>;
-}
-
-/// The places of a wave's queue: indirect arguments of dispatches over them.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Places<'a> {
-    /// One invocation a place.
-    pub items: BufferView<'a>,
-    /// One invocation for each [`COMPACT_CHUNK`](crate::gpu::shaders::constants::COMPACT_CHUNK) places.
-    pub chunks: BufferView<'a>,
-}
-
-/// How many places an arrival stage has stopped at.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct StoppedPlaces {
-    /// Of so many places in the queue.
-    pub places: u32,
-    pub stopped: u32,
-}
-
 /// A progressive rendering of one view.
 pub struct PathTracer {
     gpu: Gpu,
@@ -112,13 +72,9 @@ pub struct PathTracer {
     /// Where the camera is, for the medium around it.
     eye: DVec3,
     pipelines: Pipelines,
-    buffers: WaveBuffers,
+    walker: Walker,
+    aovs: Buffer,
     film: GpuFilm,
-    slots: u32,
-    /// Device time of a path's bounce in the last submission.
-    seconds_a_ray: Option<f64>,
-    /// Device time of submissions whose rays are not counted yet.
-    uncounted_seconds: f64,
     pending: Option<Wave>,
     cursor: Cursor,
     counters: PathCounters,
@@ -140,17 +96,32 @@ impl PathTracer {
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let slots = match settings.paths_in_flight {
             0 => default_slots(gpu),
-            wanted => wanted.next_multiple_of(PATH_GROUP),
+            wanted => wanted.next_multiple_of(WALK_GROUP),
         };
         let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
         let frame = CameraFrame::new(camera, size)?;
         let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
         let needs = WaveNeeds {
-            lights: scene.has_lights(),
+            waiting: scene.has_lights(),
             media: scene.profile().media.any(),
             airlight: settings.equiangular && scene.has_punctual_lights(),
         };
-        let (buffers, slots) = WaveBuffers::within_memory(gpu, slots, needs, &film)?;
+        // Beside what reading the film takes.
+        let band = film.bands().iter().map(|band| u64::from(band.pixels())).max();
+        let pixel_bytes = size_of::<FilmPixel>().max(size_of::<FilmAov>()) as u64;
+        let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
+        let (buffers, aovs) = WaveBuffers::within_memory(gpu, slots, needs, |slots| {
+            let bytes = size_of::<PathAov>() as u64 * if film.has_aovs() { u64::from(slots) } else { 0 };
+            let aovs = gpu.buffer(&BufferDesc::storage("path aovs", bytes, Category::Work))?;
+            gpu.buffer(&reading).map(|_| aovs)
+        })?;
+        let options = WalkOptions {
+            name: "path",
+            shadows: true,
+            ray_quota: settings.ray_quota,
+            bounces: BOUNCES_PER_SUBMISSION,
+        };
+        let walker = Walker::new(gpu, Arc::clone(&scene), buffers, options)?;
         Ok(Self {
             gpu: gpu.clone(),
             scene,
@@ -158,11 +129,9 @@ impl PathTracer {
             frame,
             eye: camera.transform.translation,
             pipelines,
-            buffers,
+            walker,
+            aovs,
             film,
-            slots,
-            seconds_a_ray: None,
-            uncounted_seconds: 0.0,
             pending: None,
             cursor: Cursor::default(),
             counters: PathCounters::default(),
@@ -210,7 +179,7 @@ impl PathTracer {
     pub(crate) fn step_with(&mut self, samples: u32, arrival: Option<&dyn ArrivalStage>) -> Result<Option<Step>> {
         let [width, height] = self.film.size();
         let wanted = u64::from(samples) * u64::from(width) * u64::from(height);
-        let Some((wave, next)) = self.cursor.next_wave(&self.film, self.slots, samples) else {
+        let Some((wave, next)) = self.cursor.next_wave(&self.film, self.slots(), samples) else {
             return Ok(None);
         };
         // A wave that fails is rendered again by the next step.
@@ -239,7 +208,7 @@ impl PathTracer {
 
     /// Paths under way together, at most.
     pub(crate) fn slots(&self) -> u32 {
-        self.slots
+        self.walker.buffers().slots()
     }
 
     /// Samples that every pixel has got.
@@ -259,7 +228,14 @@ impl PathTracer {
 
     /// The kernels with their specialization.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        self.pipelines.info()
+        let (p, trace) = (&self.pipelines, self.walker.trace_pipelines());
+        let mut all = vec![p.camera.info()];
+        all.extend(trace);
+        all.push(p.shade.info());
+        all.extend(self.walker.compaction_pipelines());
+        all.push(p.resolve.info());
+        all.extend(p.medium.as_ref().map(ComputePipeline::info));
+        all
     }
 
     /// Reads the picture: layers `radiance`, `variance` (of the mean), `samples`, and the AOVs that were asked for; with the number of
@@ -282,159 +258,43 @@ impl PathTracer {
         self.film.display(target, exposure, format)
     }
 
-    /// Renders a wave, in as many submissions as it takes.
+    /// Renders a wave.
     fn run(&mut self, wave: &Wave, arrival: Option<&dyn ArrivalStage>) -> Result<Vec<Timings>> {
-        let paths = wave.pixels * wave.samples;
-        let mut status = Status {
-            active_count: paths,
-            ..Status::default()
+        let mut stages = EyeStages {
+            scene: &self.scene,
+            settings: &self.settings,
+            frame: &self.frame,
+            eye: self.eye,
+            pipelines: &self.pipelines,
+            film: &self.film,
+            aovs: &self.aovs,
+            wave: *wave,
+            arrival,
+            pending: &mut self.pending,
         };
-        let mut timings = vec![self.submit_bounces(wave, &mut status, true, arrival)?];
-        let mut watch = StallWatch::new(ray_quota(&self.gpu, &self.scene, &self.settings)?);
-        while status.active_count > 0 || status.stalled != STALLED_NOT {
-            let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);
-            self.counters.stalls += u64::from(stalled);
-            if let Some(arrival) = arrival.filter(|_| status.stalled == STALLED_ARRIVAL) {
-                self.submit_stopped(&status, arrival, &mut timings)?;
-            }
-            timings.push(self.submit_bounces(wave, &mut status, false, arrival)?);
-            let stands = stalled && status.stalled != STALLED_NOT && status.rounds == rounds;
-            watch.submitted(stands)?;
-        }
-        self.counters.paths += u64::from(paths);
-        self.counters.extend_rays += wide_counter(status.extend_rays);
-        self.counters.shadow_rays += wide_counter(status.shadow_rays);
-        if let Some(media) = &self.buffers.media {
-            let counts = media.readback.read::<MediumCounters>(0, 1)?[0];
-            self.counters.medium_collisions += wide_counter(counts.collisions);
-            self.counters.null_collisions += wide_counter(counts.null_collisions);
-            self.counters.density_lookups += wide_counter(counts.density_lookups);
-            // A place's two rays are counted as one before.
-            self.counters.shadow_rays += wide_counter(counts.second_rays);
-        }
-        self.counters.waves += 1;
+        let walked = self
+            .walker
+            .run(wave.key(self.settings.seed), wave.paths(), &mut stages)?;
+        let (counters, media) = (&mut self.counters, walked.media);
+        counters.paths += u64::from(wave.paths());
+        counters.extend_rays += walked.rays;
+        // A place's two rays wait as one.
+        counters.shadow_rays += walked.waited + media.second_rays;
+        counters.stalls += walked.stalls;
+        counters.medium_collisions += media.collisions;
+        counters.null_collisions += media.null_collisions;
+        counters.density_lookups += media.density_lookups;
+        counters.waves += 1;
         self.pending = Some(*wave);
-        Ok(timings)
-    }
-
-    /// Submits what an arrival stage lacks at the places that it has stopped at.
-    fn submit_stopped(&self, status: &Status, arrival: &dyn ArrivalStage, timings: &mut Vec<Timings>) -> Result<()> {
-        let paths = self.buffers.set(status.rounds as usize % 2);
-        let stopped = StoppedPlaces {
-            places: status.active_count,
-            stopped: status.unfinished,
-        };
-        let mut part = Some(0);
-        while let Some(first) = part {
-            let mut recorder = self.gpu.recorder("path arrivals")?;
-            part = arrival.record_stopped(&mut recorder, &paths, stopped, first)?;
-            timings.push(recorder.submit()?.wait()?);
-        }
-        Ok(())
-    }
-
-    /// Submits some bounces of a wave, the first ones with its camera rays and the last wave's way to the film, and reads how far they came.
-    fn submit_bounces(
-        &mut self,
-        wave: &Wave,
-        status: &mut Status,
-        first: bool,
-        arrival: Option<&dyn ArrivalStage>,
-    ) -> Result<Timings> {
-        let stalled = status.stalled;
-        let rays_stalled = stalled == STALLED_EXTEND || stalled == STALLED_SHADOW;
-        if first {
-            self.uncounted_seconds = 0.0;
-        }
-        if rays_stalled && self.pipelines.resume.is_none() {
-            self.pipelines.resume = Some(TracePipelines::new(&self.gpu, &self.scene, &self.settings, true)?);
-        }
-        let resume = self.pipelines.resume.as_ref().filter(|_| rays_stalled);
-        let mut recorder = self.gpu.recorder("path wave")?;
-        if let Some(pending) = &self.pending {
-            self.record_resolve(&mut recorder, pending)?;
-        }
-        // A stalled round leaves no groups to dispatch.
-        let groups = group_counts(status.active_count);
-        (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
-        status.shadow_groups = group_counts(status.shadow_count)[0];
-        (status.stalled, status.unfinished) = (STALLED_NOT, 0);
-        recorder.pass("path: begin", |pass| {
-            pass.update(self.buffers.status.view(), &[*status])?;
-            if let Some(media) = self.buffers.media.as_ref().filter(|_| first) {
-                pass.update(media.counters.view(), &[MediumCounters::default()])?;
-            }
-            pass.memory_barrier(
-                Access::TRANSFER_WRITE | Access::COMPUTE,
-                Access::COMPUTE | Access::INDIRECT_READ,
-            );
-            Ok(())
-        })?;
-        if first {
-            self.record_camera(&mut recorder, wave)?;
-        }
-        if let Some(resume) = resume.filter(|_| stalled == STALLED_SHADOW) {
-            self.record_shadow(&mut recorder, wave, status.rounds as usize % 2, resume)?;
-        }
-        for bounce in 0..self.bounces_for(status.active_count) {
-            let resumed = resume.filter(|_| stalled == STALLED_EXTEND && bounce == 0);
-            let trace = resumed.unwrap_or(&self.pipelines.trace);
-            let parity = (status.rounds as usize + bounce) % 2;
-            if stalled == STALLED_ARRIVAL && bounce == 0 {
-                // The stage has gone on already.
-                self.record_arrivals(&mut recorder, wave, parity, None)?;
-            } else {
-                self.record_bounce(&mut recorder, wave, parity, trace, arrival)?;
-            }
-        }
-        recorder.pass("path: read status", |pass| {
-            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
-            pass.copy(
-                self.buffers.status.slice(0, size_of::<Status>() as u64),
-                self.buffers.readback.view(),
-            )?;
-            match &self.buffers.media {
-                Some(media) => pass.copy(media.counters.view(), media.readback.view()),
-                None => Ok(()),
-            }
-        })?;
-        let clock = Instant::now();
-        let submission = recorder.submit()?;
-        // Once submitted, the last wave reaches the film, whatever becomes of the wait.
-        self.pending = None;
-        let timings = submission.wait()?;
-        let seconds = timings
-            .untimed
-            .map_or(timings.seconds(), |_| clock.elapsed().as_secs_f64());
-        let rays_before = wide_counter(status.extend_rays);
-        *status = self.buffers.readback.read::<Status>(0, 1)?[0];
-        let rays = wide_counter(status.extend_rays) - rays_before;
-        // A stalled submission counts its rays when they have gone on to their end.
-        self.uncounted_seconds += seconds;
-        if rays > 0 {
-            self.seconds_a_ray = Some(std::mem::take(&mut self.uncounted_seconds) / rays as f64);
-        }
-        Ok(timings)
-    }
-
-    /// Bounces of the next submission: as many as a watchdog has time for if no path ends, by the pace of the last one.
-    fn bounces_for(&self, paths: u32) -> usize {
-        // Software drivers end nothing, and there the passes are the same on every run.
-        if self.gpu.caps().kind == DeviceKind::Cpu {
-            return BOUNCES_PER_SUBMISSION;
-        }
-        let Some(seconds_a_ray) = self.seconds_a_ray else {
-            return 1;
-        };
-        let bounces = SUBMISSION_SECONDS / (seconds_a_ray * f64::from(paths.max(1)));
-        (bounces as usize).clamp(1, BOUNCES_PER_SUBMISSION)
+        Ok(walked.timings)
     }
 
     /// Adds the last wave to the film.
     fn flush(&mut self) -> Result<()> {
         let Some(wave) = &self.pending else { return Ok(()) };
         let mut recorder = self.gpu.recorder("path film")?;
-        self.record_resolve(&mut recorder, wave)?;
+        let (film, buffers) = (&self.film, self.walker.buffers());
+        record_resolve(&mut recorder, &self.pipelines, film, buffers, &self.aovs, wave)?;
         let submission = recorder.submit()?;
         self.pending = None;
         submission.wait()?;
@@ -453,7 +313,7 @@ pub(crate) const ROWS: &[Row] = &[
             sources::KAJIYA_1986.whole(),
             sources::VEACH_1997.at("chapters 9 and 10"),
         ],
-        shaders: &["shaders/transport/path_shade.comp"],
+        shaders: &["shaders/techniques/path/path_shade.comp"],
         bias: Some(Bias::Unbiased),
         tests: &[
             "engine/src/transport/lights.rs::heuristics_sum_to_one",
@@ -472,8 +332,8 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Blending by chance costs noise.",
         sources: &[sources::ENDERTON_2010.whole()],
         shaders: &[
-            "shaders/transport/path_extend_alpha.comp",
-            "shaders/transport/path_shadow_alpha.comp",
+            "shaders/walk/extend.comp",
+            "shaders/walk/shadow.comp",
         ],
         bias: Some(Bias::Unbiased),
         tests: &[
@@ -491,7 +351,7 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("BG-3"),
         limits: "Solids of one absorption whose surfaces neither cross nor coincide.",
         sources: &[sources::KHRONOS_MATERIALS_VOLUME.at("law of Beer and Lambert")],
-        shaders: &["shaders/transport/path_shade.comp"],
+        shaders: &["shaders/techniques/path/path_shade.comp"],
         tests: &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
         experiment: "clerestory report absorption",
         ..Row::of(file!())

@@ -1,19 +1,57 @@
-//! The passes of a wave: what each stage reads, and the barriers between them.
+//! The passes of a wave of eye paths beside those of all walks: what each stage reads, and the barriers between them.
 
-use super::pipelines::TracePipelines;
-use super::stages::{WaveKey, indirect, stage_barrier};
-use super::wave::{Status, Wave};
-use super::{ArrivalStage, PathTracer, Places};
+use super::pipelines::Pipelines;
+use super::settings::PathTracerSettings;
+use super::wave::Wave;
 use crate::Result;
+use crate::film::GpuFilm;
 use crate::gpu::shaders::constants::{NO_MEDIUM, OUTSIDE};
-use crate::gpu::shaders::transport::{
-    path_camera, path_medium, path_resolve, path_shade, path_shadow_alpha, path_shadow_media, path_shadow_media_alpha,
-};
-use crate::gpu::{Access, Recorder};
+use crate::gpu::shaders::sets::{PathAovSet, WaveSet};
+use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resolve, path_shade};
+use crate::gpu::{Access, Buffer, Recorder};
+use crate::scene::camera_frame::CameraFrame;
+use crate::transport::GpuScene;
+use crate::walk::{ArrivalStage, Bounce, WalkStages, WaveBuffers, stage_barrier};
+use glam::DVec3;
 
-impl PathTracer {
-    pub(super) fn record_camera(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {
-        let v = &self.frame;
+/// What the stages of eye paths need: all of a path tracer but its walker.
+pub(super) struct EyeStages<'a> {
+    pub scene: &'a GpuScene,
+    pub settings: &'a PathTracerSettings,
+    pub frame: &'a CameraFrame,
+    pub eye: DVec3,
+    pub pipelines: &'a Pipelines,
+    pub film: &'a GpuFilm,
+    pub aovs: &'a Buffer,
+    pub wave: Wave,
+    pub arrival: Option<&'a dyn ArrivalStage>,
+    /// The last wave, until it has reached the film.
+    pub pending: &'a mut Option<Wave>,
+}
+
+impl EyeStages<'_> {
+    fn aov_set(&self) -> PathAovSet<'_> {
+        PathAovSet {
+            path_aovs: self.aovs.view(),
+        }
+    }
+}
+
+impl WalkStages for EyeStages<'_> {
+    /// The last wave's way to the film.
+    fn record_before(&mut self, recorder: &mut Recorder, buffers: &WaveBuffers) -> Result<()> {
+        match &*self.pending {
+            Some(pending) => record_resolve(recorder, self.pipelines, self.film, buffers, self.aovs, pending),
+            None => Ok(()),
+        }
+    }
+
+    fn submitted(&mut self) {
+        *self.pending = None;
+    }
+
+    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+        let v = self.frame;
         let push = path_camera::Push {
             origin: v.origin,
             half_width: v.half_width,
@@ -25,191 +63,103 @@ impl PathTracer {
             focus_distance: v.focus_distance,
             width: self.film.size()[0],
             height: self.film.size()[1],
-            first_pixel: wave.first_pixel,
-            pixel_count: wave.pixels,
-            first_sample: wave.first_sample,
-            sample_count: wave.samples,
-            seed: self.settings.seed,
+            pixel_count: self.wave.pixels,
             interior: self.scene.body_around(self.eye).unwrap_or(OUTSIDE),
+            key: self.wave.key(self.settings.seed),
         };
+        let camera = &self.pipelines.camera;
         recorder.pass("path: camera", |pass| {
-            let groups = self.pipelines.camera.groups_for(wave.pixels * wave.samples);
-            // Its output is the input of the first bounce, whose parity is 0.
-            pass.dispatch(&self.pipelines.camera, &[&self.buffers.set(1)], &push, [groups, 1, 1])?;
+            let groups = [camera.groups_for(self.wave.paths()), 1, 1];
+            pass.dispatch(camera, &[wave, &self.aov_set()], &push, groups)?;
             stage_barrier(pass);
             Ok(())
         })
     }
 
-    /// One bounce: rays, what happens where they arrive, the next queue, and the shadow rays, which decide nothing but what is gathered.
-    pub(super) fn record_bounce(
-        &self,
-        recorder: &mut Recorder,
-        wave: &Wave,
-        parity: usize,
-        trace: &TracePipelines,
-        arrival: Option<&dyn ArrivalStage>,
-    ) -> Result<()> {
-        let paths = self.buffers.set(parity);
-        let items = indirect(&self.buffers, std::mem::offset_of!(Status, item_groups));
-        let path_media = self.buffers.media_set();
-        recorder.pass("path: extend", |pass| {
-            trace.record_extend(pass, &self.scene, &paths, &path_media, self.key(wave), items)
-        })?;
-        self.record_arrivals(recorder, wave, parity, arrival)
+    fn arrival(&self) -> Option<&dyn ArrivalStage> {
+        self.arrival
     }
 
-    /// What happens where the rays of a bounce have arrived, and the next queue.
-    pub(super) fn record_arrivals(
-        &self,
-        recorder: &mut Recorder,
-        wave: &Wave,
-        parity: usize,
-        arrival: Option<&dyn ArrivalStage>,
-    ) -> Result<()> {
-        let p = &self.pipelines;
-        let paths = self.buffers.set(parity);
-        let scene = self.scene.scene_set();
-        let items = indirect(&self.buffers, std::mem::offset_of!(Status, item_groups));
-        let path_media = self.buffers.media_set();
-        let surrounding = self.scene.surrounding().unwrap_or(NO_MEDIUM);
-        if let Some(arrival) = arrival {
-            let chunks = indirect(&self.buffers, std::mem::offset_of!(Status, chunk_groups));
-            arrival.record(recorder, &paths, Places { items, chunks })?;
-        }
-        let [lower, upper] = self.scene.bounds();
-        if let (Some(medium), Some(media)) = (&p.medium, self.scene.media_set()) {
+    /// What happens on the way through media, and where paths have arrived.
+    fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        let (p, settings) = (self.pipelines, self.settings);
+        let (scene, items) = (self.scene.scene_set(), bounce.places.items);
+        let [lower, upper] = self.scene.bounds().map(|corner| corner.to_array());
+        let key = self.wave.key(settings.seed);
+        if let Some(medium) = &p.medium {
             let push = path_medium::Push {
-                scene_lower: lower.to_array(),
-                first_pixel: wave.first_pixel,
-                scene_upper: upper.to_array(),
-                first_sample: wave.first_sample,
-                sample_count: wave.samples,
-                seed: self.settings.seed,
-                path_set: self.settings.path_set.packed(),
-                roulette_start: self.settings.roulette_start,
-                roulette_cap: self.settings.roulette_cap,
-                surrounding,
-                accepting: self.settings.path_set.accepting(),
-                successors: self.settings.path_set.successors(),
+                scene_lower: lower,
+                path_set: settings.path_set.packed(),
+                scene_upper: upper,
+                roulette_cap: settings.roulette_cap,
+                key,
+                roulette_start: settings.roulette_start,
+                surrounding: self.scene.surrounding().unwrap_or(NO_MEDIUM),
+                accepting: settings.path_set.accepting(),
+                successors: settings.path_set.successors(),
             };
             recorder.pass("path: medium", |pass| {
-                pass.dispatch_indirect(medium, &[&paths, &scene, &media, &path_media], &push, items)?;
+                let media = self.scene.media_set();
+                pass.dispatch_indirect(medium, &[&bounce.wave, &scene, &media], &push, items)?;
                 stage_barrier(pass);
                 Ok(())
             })?;
         }
         let push = path_shade::Push {
-            scene_lower: lower.to_array(),
-            first_pixel: wave.first_pixel,
-            scene_upper: upper.to_array(),
-            first_sample: wave.first_sample,
-            sample_count: wave.samples,
-            seed: self.settings.seed,
-            path_set: self.settings.path_set.packed(),
-            roulette_start: self.settings.roulette_start,
-            roulette_cap: self.settings.roulette_cap,
-            accepting: self.settings.path_set.accepting(),
-            successors: self.settings.path_set.successors(),
+            scene_lower: lower,
+            path_set: settings.path_set.packed(),
+            scene_upper: upper,
+            roulette_cap: settings.roulette_cap,
+            key,
+            roulette_start: settings.roulette_start,
+            accepting: settings.path_set.accepting(),
+            successors: settings.path_set.successors(),
         };
         recorder.pass("path: shade", |pass| {
-            pass.dispatch_indirect(&p.shade, &[&paths, &scene, &path_media], &push, items)?;
-            stage_barrier(pass);
-            Ok(())
-        })?;
-        recorder.pass("path: compact", |pass| p.compaction.record(pass, &self.buffers, &paths))?;
-        self.record_shadow(recorder, wave, parity, &p.trace)
-    }
-
-    /// The shadow rays of the last bounce.
-    pub(super) fn record_shadow(
-        &self,
-        recorder: &mut Recorder,
-        wave: &Wave,
-        parity: usize,
-        trace: &TracePipelines,
-    ) -> Result<()> {
-        if !self.scene.has_lights() {
-            return Ok(());
-        }
-        let paths = self.buffers.set(parity);
-        let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
-        let rays = indirect(&self.buffers, std::mem::offset_of!(Status, shadow_groups));
-        let path_media = self.buffers.media_set();
-        let surrounding = self.scene.surrounding().unwrap_or(NO_MEDIUM);
-        recorder.pass("path: shadow", |pass| {
-            match trace {
-                TracePipelines::Opaque { shadow, .. } => {
-                    pass.dispatch_indirect(shadow, &[&paths, &index], &(), rays)?;
-                }
-                TracePipelines::Alpha { shadow, .. } => {
-                    let push = path_shadow_alpha::Push {
-                        first_pixel: wave.first_pixel,
-                        first_sample: wave.first_sample,
-                        sample_count: wave.samples,
-                        seed: self.settings.seed,
-                    };
-                    pass.dispatch_indirect(shadow, &[&paths, &index, &scene], &push, rays)?;
-                }
-                TracePipelines::Media { shadow, .. } => {
-                    let push = path_shadow_media::Push {
-                        first_pixel: wave.first_pixel,
-                        first_sample: wave.first_sample,
-                        sample_count: wave.samples,
-                        seed: self.settings.seed,
-                        surrounding,
-                    };
-                    if let Some(media) = self.scene.media_set() {
-                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene, &media, &path_media], &push, rays)?;
-                    }
-                }
-                TracePipelines::MediaAlpha { shadow, .. } => {
-                    let push = path_shadow_media_alpha::Push {
-                        first_pixel: wave.first_pixel,
-                        first_sample: wave.first_sample,
-                        sample_count: wave.samples,
-                        seed: self.settings.seed,
-                        surrounding,
-                    };
-                    if let Some(media) = self.scene.media_set() {
-                        pass.dispatch_indirect(shadow, &[&paths, &index, &scene, &media, &path_media], &push, rays)?;
-                    }
-                }
-            }
+            pass.dispatch_indirect(&p.shade, &[&bounce.wave, &scene, &self.aov_set()], &push, items)?;
             stage_barrier(pass);
             Ok(())
         })
     }
 
-    fn key(&self, wave: &Wave) -> WaveKey {
-        WaveKey {
-            first_pixel: wave.first_pixel,
-            first_sample: wave.first_sample,
-            sample_count: wave.samples,
-            seed: self.settings.seed,
+    /// The shadow rays, which decide nothing but what is gathered.
+    fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        if self.scene.has_lights() {
+            bounce.record_shadow(recorder)
+        } else {
+            Ok(())
         }
     }
+}
 
-    pub(super) fn record_resolve(&self, recorder: &mut Recorder, wave: &Wave) -> Result<()> {
-        let band = &self.film.bands()[wave.band];
-        let push = path_resolve::Push {
-            first_film_pixel: wave.first_pixel - band.first_pixel(),
-            pixel_count: wave.pixels,
-            sample_count: wave.samples,
-        };
-        recorder.pass("path: resolve", |pass| {
-            let groups = self.pipelines.resolve.groups_for(wave.pixels);
-            pass.dispatch(
-                &self.pipelines.resolve,
-                &[&self.buffers.set(0), &band.set()],
-                &push,
-                [groups, 1, 1],
-            )?;
-            pass.memory_barrier(
-                Access::COMPUTE,
-                Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,
-            );
-            Ok(())
-        })
-    }
+/// A wave's way to the film.
+pub(super) fn record_resolve(
+    recorder: &mut Recorder,
+    pipelines: &Pipelines,
+    film: &GpuFilm,
+    buffers: &WaveBuffers,
+    aovs: &Buffer,
+    wave: &Wave,
+) -> Result<()> {
+    let band = &film.bands()[wave.band];
+    let push = path_resolve::Push {
+        first_film_pixel: wave.first_pixel - band.first_pixel(),
+        pixel_count: wave.pixels,
+        sample_count: wave.samples,
+    };
+    let aovs = PathAovSet { path_aovs: aovs.view() };
+    recorder.pass("path: resolve", |pass| {
+        let groups = [pipelines.resolve.groups_for(wave.pixels), 1, 1];
+        pass.dispatch(
+            &pipelines.resolve,
+            &[&buffers.set(0), &aovs, &band.set()],
+            &push,
+            groups,
+        )?;
+        pass.memory_barrier(
+            Access::COMPUTE,
+            Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,
+        );
+        Ok(())
+    })
 }

@@ -3,9 +3,7 @@
 use crate::settings::AboveTo;
 use crate::transport::path_set::PathSet;
 use crate::transport::random::SamplerKind;
-
-/// Most paths in flight.
-pub(super) const SLOTS_MAX: u32 = 1 << 22;
+use crate::walk::SLOTS_MAX;
 
 crate::settings! {
     /// Settings of the path tracer.

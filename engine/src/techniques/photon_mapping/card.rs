@@ -7,9 +7,16 @@ use crate::Result;
 use crate::card::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::techniques::path::path_shade;
+use crate::gpu::shaders::techniques::photon_mapping::{
+    photon_append, photon_emit, photon_gather, photon_gather_packet, photon_scatter,
+};
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::{SettingsDecl, TypedSettings};
+use crate::techniques::path::card as path;
+use crate::techniques::skipped::{Feature, skipped};
 use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
 use crate::transport::PathSet;
 
@@ -20,6 +27,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS],
     bias: BIAS,
     needs: &[],
+    kernels: &KERNELS,
     path_set: PathSet::ALL,
     refusals,
     settings: SettingsDecl::of::<PhotonSettings>(),
@@ -48,6 +56,49 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
         Vec::new()
     }
 }
+
+/// What a picture may take with default settings, of whatever scene, beside what eye paths do.
+const OWN_KERNELS: [&ShaderInfo; 4] = [
+    &photon_emit::INFO,
+    &photon_scatter::INFO,
+    &photon_append::INFO,
+    &photon_gather::INFO,
+];
+const KERNELS: [&ShaderInfo; path::KERNELS.len() + OWN_KERNELS.len()] = {
+    let mut all = [OWN_KERNELS[0]; path::KERNELS.len() + OWN_KERNELS.len()];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = if i < path::KERNELS.len() {
+            path::KERNELS[i]
+        } else {
+            OWN_KERNELS[i - path::KERNELS.len()]
+        };
+        i += 1;
+    }
+    all
+};
+
+/// What the specialization constants of photons' scattering and of queries stand for, beside those of eye paths.
+const PHOTON_FEATURES: [Feature; 2] = [
+    ("has_differentials", "footprints of photons", "kernels have one size"),
+    (
+        "tells_caustics",
+        "telling caustics from other photons",
+        "there is no final gather",
+    ),
+];
+const QUERY_FEATURES: [Feature; 2] = [
+    (
+        "nearest",
+        "searches for the nearest photons",
+        "photons have kernels of their own",
+    ),
+    (
+        "counts_bounces",
+        "counting of scatterings",
+        "the path set has every number of them",
+    ),
+];
 
 impl Technique for PhotonMapper {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
@@ -100,7 +151,12 @@ impl Technique for PhotonMapper {
     }
 
     fn skipped(&self) -> Vec<Skipped> {
-        let mut skipped = Vec::new();
+        let pipelines = PhotonMapper::pipelines(self);
+        let off = |shader: &ShaderInfo, features: &[Feature]| skipped(&pipelines, shader.name, features);
+        let mut skipped = off(&path_shade::INFO, &path::FEATURES);
+        skipped.extend(off(&photon_scatter::INFO, &PHOTON_FEATURES));
+        skipped.extend(off(&photon_gather::INFO, &QUERY_FEATURES));
+        skipped.extend(off(&photon_gather_packet::INFO, &QUERY_FEATURES));
         if !self.has_map() {
             skipped.push(Skipped {
                 what: "photons and their map",
@@ -150,3 +206,35 @@ const ROWS: &[Row] = &[Row {
     experiment: "clerestory report photon-convergence photon-or-path photon-nearest photon-ring photon-frame photon-peers photon-settings",
     ..Row::of(file!())
 }];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_are_constants_of_their_kernels() {
+        for (shader, features) in [
+            (&photon_scatter::INFO, &PHOTON_FEATURES),
+            (&photon_gather::INFO, &QUERY_FEATURES),
+            (&photon_gather_packet::INFO, &QUERY_FEATURES),
+        ] {
+            for (name, ..) in features {
+                let known = shader.spec_constants.iter().any(|constant| constant.name == *name);
+                assert!(known, "{name} is no constant of {}", shader.name);
+            }
+        }
+        // What photons need of surfaces, eye paths need too, and say.
+        for constant in photon_scatter::INFO
+            .spec_constants
+            .iter()
+            .filter(|c| c.name.starts_with("has_"))
+        {
+            let said = path::FEATURES.iter().chain(&PHOTON_FEATURES);
+            assert!(
+                said.into_iter().any(|(name, ..)| *name == constant.name),
+                "{}",
+                constant.name
+            );
+        }
+    }
+}

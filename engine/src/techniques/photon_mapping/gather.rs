@@ -9,17 +9,15 @@ use crate::accel::trace::wide_counter;
 use crate::card::{Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
-    LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_GROUP, PATH_SET_DEAD,
-    PATH_SET_STATE_BITS, QUEUE_SLOTS,
+    LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_SET_DEAD, PATH_SET_STATE_BITS,
+    QUEUE_SLOTS, WALK_GROUP,
 };
-use crate::gpu::shaders::sets::{PathBuffers, PhotonMapSet};
+use crate::gpu::shaders::sets::{PhotonMapSet, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
 use crate::gpu::shaders::types::AskSettings;
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
-use crate::techniques::path::pipelines::surface_spec;
-use crate::techniques::path::stages::stage_barrier;
-use crate::techniques::path::{ArrivalStage, Places, StoppedPlaces};
-use crate::transport::{GpuScene, PathSet};
+use crate::transport::{GpuScene, PathSet, surface_spec};
+use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
 use crate::{Error, Result};
 
 /// Nodes and records of each of the rounds in which neighbours are found, and of the sum. With the loops over rounds and bins, which are
@@ -225,7 +223,7 @@ impl GatherStage<'_> {
 }
 
 impl ArrivalStage for GatherStage<'_> {
-    fn record(&self, recorder: &mut Recorder, paths: &PathBuffers<'_>, places: Places<'_>) -> Result<()> {
+    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
         let gather = self.gather;
         let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
         let mut groups = places.items;
@@ -233,12 +231,12 @@ impl ArrivalStage for GatherStage<'_> {
             recorder.pass("photon: gather queue", |pass| {
                 groups = gather
                     .queue
-                    .record(pass, self.scene, paths, places, self.ask(), &queue)?;
+                    .record(pass, self.scene, wave, places, self.ask(), &queue)?;
                 Ok(())
             })?;
         }
         recorder.pass("photon: gather", |pass| {
-            let (sets, push): ([&dyn BindingSet<'_>; 4], _) = ([paths, &scene, &queue, &map], self.push());
+            let (sets, push): ([&dyn BindingSet<'_>; 4], _) = ([wave, &scene, &queue, &map], self.push());
             match &gather.query {
                 Query::Single(kernel) => pass.dispatch_indirect(kernel, &sets, &push, groups)?,
                 Query::Packet(kernel) => pass.dispatch_indirect(kernel, &sets, &bytemuck::cast(push), groups)?,
@@ -251,7 +249,7 @@ impl ArrivalStage for GatherStage<'_> {
     fn record_stopped(
         &self,
         recorder: &mut Recorder,
-        paths: &PathBuffers<'_>,
+        wave: &WaveSet<'_>,
         stopped: StoppedPlaces,
         part: u64,
     ) -> Result<Option<u64>> {
@@ -286,7 +284,7 @@ impl ArrivalStage for GatherStage<'_> {
                     ..self.push()
                 };
                 let groups = linear.groups_for(parts.places);
-                pass.dispatch(linear, &[paths, &scene, &queue, &map], &push, [groups, 1, 1])?;
+                pass.dispatch(linear, &[wave, &scene, &queue, &map], &push, [groups, 1, 1])?;
                 stage_barrier(pass);
                 taken += parts.cost();
                 part += 1;
@@ -317,7 +315,7 @@ impl LinearParts {
             quota,
             count,
             stopped,
-            places: places.max(1).next_multiple_of(PATH_GROUP),
+            places: places.max(1).next_multiple_of(WALK_GROUP),
         }
     }
 
@@ -471,7 +469,7 @@ mod tests {
             let expected: Vec<u32> = (0..places).step_by(parts.places as usize).collect();
             assert_eq!(firsts, expected, "{parts:?}");
             assert!(
-                parts.places.is_multiple_of(PATH_GROUP) && parts.cost() <= LINEAR_RECORDS,
+                parts.places.is_multiple_of(WALK_GROUP) && parts.cost() <= LINEAR_RECORDS,
                 "{parts:?}"
             );
         }

@@ -28,9 +28,10 @@ use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
-use crate::techniques::path::{ArrivalStage, PathCounters};
+use crate::techniques::path::PathCounters;
 use crate::techniques::{PathTracer, PathTracerSettings};
 use crate::transport::GpuScene;
+use crate::walk::ArrivalStage;
 
 /// Exact counts, and what the host's share took.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]

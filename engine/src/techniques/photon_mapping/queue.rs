@@ -5,20 +5,18 @@
 
 use super::settings::MapQueue;
 use crate::card::{Role, Row, sources};
-use crate::gpu::shaders::constants::{COMPACT_CHUNK, PATH_GROUP, QUEUE_BLOCKS, QUEUE_COMPACTED, QUEUE_SLOTS};
-use crate::gpu::shaders::sets::{GatherQueue, PathBuffers};
+use crate::gpu::shaders::constants::{COMPACT_CHUNK, QUEUE_BLOCKS, QUEUE_COMPACTED, QUEUE_SLOTS, WALK_GROUP};
+use crate::gpu::shaders::sets::{GatherQueue, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_queue_blocks, photon_queue_flags};
 use crate::gpu::shaders::types::AskSettings;
 use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::kernels::{Count, IndirectCount, Partition, PartitionBuffers, PartitionOptions};
-use crate::techniques::path::Places;
-use crate::techniques::path::pipelines::surface_spec;
-use crate::techniques::path::stages::stage_barrier;
-use crate::transport::GpuScene;
+use crate::transport::{GpuScene, surface_spec};
+use crate::walk::{Places, stage_barrier};
 use crate::{Error, Result};
 
 /// Places that a workgroup of the queue in blocks walks.
-const PLACES_PER_GROUP: u32 = COMPACT_CHUNK * PATH_GROUP;
+const PLACES_PER_GROUP: u32 = COMPACT_CHUNK * WALK_GROUP;
 
 type Head = photon_queue_blocks::GatherQueueHead;
 
@@ -104,7 +102,7 @@ impl Queue {
             }
             MapQueue::Blocks => {
                 let caps = gpu.caps();
-                let divides = caps.subgroup_size > 0 && PATH_GROUP.is_multiple_of(caps.subgroup_size);
+                let divides = caps.subgroup_size > 0 && WALK_GROUP.is_multiple_of(caps.subgroup_size);
                 if !(caps.subgroup.basic && caps.subgroup.ballot && caps.full_subgroups && divides) {
                     return Err(Error::MissingFeature {
                         feature: "VK_SUBGROUP_FEATURE_BALLOT_BIT in full subgroups (computeFullSubgroups) of at most 64 lanes".into(),
@@ -182,7 +180,7 @@ impl Queue {
         &'a self,
         pass: &mut Pass<'_>,
         scene: &GpuScene,
-        paths: &PathBuffers<'_>,
+        wave: &WaveSet<'_>,
         places: Places<'a>,
         ask: AskSettings,
         set: &GatherQueue<'_>,
@@ -200,7 +198,7 @@ impl Queue {
             Self::Compacted(queue) => {
                 reset(pass, &queue.flag_count, &[0])?;
                 let push = photon_queue_flags::Push { ask };
-                pass.dispatch_indirect(&queue.flag, &[paths, &scene, set], &push, places.items)?;
+                pass.dispatch_indirect(&queue.flag, &[wave, &scene, set], &push, places.items)?;
                 stage_barrier(pass);
                 let buffers = PartitionBuffers {
                     flags: queue.flags.view(),
@@ -216,7 +214,7 @@ impl Queue {
                 stage_barrier(pass);
                 queue
                     .arguments
-                    .record(pass, queue.asking.view(), queue.slots, PATH_GROUP, &queue.head)?;
+                    .record(pass, queue.asking.view(), queue.slots, WALK_GROUP, &queue.head)?;
                 stage_barrier(pass);
                 Ok(queue.head.slice(0, size_of::<[u32; 3]>() as u64))
             }
@@ -227,7 +225,7 @@ impl Queue {
                 };
                 reset(pass, &queue.head, bytemuck::cast_slice(&[empty]))?;
                 let push = photon_queue_blocks::Push { ask };
-                pass.dispatch_indirect(&queue.append, &[paths, &scene, set], &push, places.chunks)?;
+                pass.dispatch_indirect(&queue.append, &[wave, &scene, set], &push, places.chunks)?;
                 stage_barrier(pass);
                 Ok(queue.head.slice(0, size_of::<[u32; 3]>() as u64))
             }

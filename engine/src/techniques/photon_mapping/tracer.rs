@@ -1,8 +1,8 @@
 //! Photons from the lights through the scene, in waves like those of paths, to the records that a map is made of.
 //!
 //! Sources: H. W. Jensen, "Realistic Image Synthesis Using Photon Mapping", 2001, chapter 5; "Interactive Manycore Photon Mapping", PhD
-//! thesis, Trinity College Dublin, 2011, §3.4.1 and §5.1. Stages: `photon_emit`, the path tracer's `path_extend`, `photon_scatter`, the path
-//! tracer's compaction, `photon_append`.
+//! thesis, Trinity College Dublin, 2011, §3.4.1 and §5.1. Stages: `photon_emit`, a walker's closest hits, `photon_scatter`, its compaction,
+//! `photon_append`.
 //!
 //! Guarantees: records depend on (seed, pass, number of photons) alone, and their order on the slots of a wave besides, never on the number of threads; photons that were
 //! emitted have escaped or were absorbed, to the count; records that do not fit are never lost in silence, since the pass is traced again
@@ -12,23 +12,23 @@ use std::sync::Arc;
 
 use super::kernel::KernelSettings;
 use super::settings::PhotonSettings;
-use crate::accel::trace::wide_counter;
 use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{PATH_GROUP, PHOTON_QUARTERS, STALLED_NOT};
-use crate::gpu::shaders::sets::PhotonWave;
+use crate::gpu::interface::BindingSet;
+use crate::gpu::shaders::constants::{PHOTON_QUARTERS, WALK_GROUP};
+use crate::gpu::shaders::sets::{PhotonWave, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_append, photon_emit, photon_scatter};
 use crate::gpu::shaders::types::{self, Differentials};
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
 use crate::gpu::{TexelView, Timings};
-use crate::techniques::path::PathTracerSettings;
-use crate::techniques::path::pipelines::{TracePipelines, ray_quota, surface_spec};
-use crate::techniques::path::stages::{Compaction, StallWatch, WaveKey, indirect, stage_barrier};
-use crate::techniques::path::wave::{Status, WaveBuffers, WaveNeeds, default_slots, group_counts, slots_of_device};
-use crate::transport::GpuScene;
+use crate::transport::{GpuScene, surface_spec};
+use crate::walk::{
+    Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveNeeds, default_slots, slots_of_device,
+    stage_barrier,
+};
 use crate::{Error, Result};
 
-/// Bounces recorded into one command buffer.
+/// Bounces recorded into one command buffer, at most.
 const BOUNCES_PER_SUBMISSION: usize = 8;
 /// Records that there is room for at first, a photon.
 const RECORDS_PER_PHOTON: u64 = 4;
@@ -84,18 +84,18 @@ pub(super) struct Traced {
 /// Traces photons of a scene.
 pub(super) struct PhotonTracer {
     gpu: Gpu,
-    scene: Arc<GpuScene>,
     settings: PhotonSettings,
+    walker: Walker,
+    kit: Kit,
+}
+
+/// All of it but its walker.
+struct Kit {
+    scene: Arc<GpuScene>,
     stored: Stored,
-    paths: PathTracerSettings,
     emit: ComputePipeline<photon_emit::Kernel>,
-    trace: TracePipelines,
-    resume: Option<TracePipelines>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
-    compaction: Compaction,
     append: ComputePipeline<photon_append::Kernel>,
-    buffers: WaveBuffers,
-    slots: u32,
     differentials: Buffer,
     counters: Buffer,
     counters_readback: Buffer,
@@ -103,10 +103,18 @@ pub(super) struct PhotonTracer {
     capacity: u32,
 }
 
+/// The stages of a wave of photons.
+struct PhotonStages<'a> {
+    kit: &'a Kit,
+    key: WalkKey,
+    /// Record of the wave's first deposit.
+    first: u32,
+    kernel: &'a KernelSettings,
+}
+
 impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, settings: &PhotonSettings, stored: Stored) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
-        let paths = PathTracerSettings::default();
         let has_differentials = settings.follows_footprints();
         let emit = photon_emit::Spec {
             has_textures: profile.has_textures,
@@ -131,38 +139,43 @@ impl PhotonTracer {
             tells_caustics: settings.final_gather,
             ..Default::default()
         });
-        let wanted = settings.photons.next_multiple_of(PATH_GROUP);
+        let wanted = settings.photons.next_multiple_of(WALK_GROUP);
         let slots = wanted.min(default_slots(gpu)).min(slots_of_device(gpu));
         let needs = WaveNeeds {
-            lights: true,
+            waiting: true,
             media: false,
             airlight: false,
+        };
+        let options = WalkOptions {
+            name: "photon",
+            shadows: false,
+            bounces: BOUNCES_PER_SUBMISSION,
+            ..WalkOptions::default()
         };
         let differentials = if has_differentials { slots } else { 1 };
         let work = |name, bytes: usize| gpu.buffer(&BufferDesc::storage(name, bytes as u64, Category::Work));
         let capacity = (u64::from(settings.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu)) as u32;
+        let buffers = WaveBuffers::new(gpu, slots, needs)?;
         Ok(Self {
-            emit: gpu.compute_pipeline(&emit)?,
-            trace: TracePipelines::new(gpu, &scene, &paths, false)?,
-            resume: None,
-            scatter: gpu.compute_pipeline(&scatter)?,
-            compaction: Compaction::new(gpu)?,
-            append: gpu.compute_pipeline(&())?,
-            buffers: WaveBuffers::new(gpu, slots, needs, false)?,
-            slots,
-            differentials: work(
-                "photon differentials",
-                size_of::<Differentials>() * differentials as usize,
-            )?,
-            counters: work("photon counters", size_of::<Counters>())?,
-            counters_readback: gpu.buffer(&BufferDesc::readback("photon counters", size_of::<Counters>() as u64))?,
-            records: record_texels(gpu, capacity)?,
-            capacity,
+            walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
+            kit: Kit {
+                emit: gpu.compute_pipeline(&emit)?,
+                scatter: gpu.compute_pipeline(&scatter)?,
+                append: gpu.compute_pipeline(&())?,
+                differentials: work(
+                    "photon differentials",
+                    size_of::<Differentials>() * differentials as usize,
+                )?,
+                counters: work("photon counters", size_of::<Counters>())?,
+                counters_readback: gpu
+                    .buffer(&BufferDesc::readback("photon counters", size_of::<Counters>() as u64))?,
+                records: record_texels(gpu, capacity)?,
+                capacity,
+                scene,
+                stored,
+            },
             gpu: gpu.clone(),
-            scene,
             settings: settings.clone(),
-            stored,
-            paths,
         })
     }
 
@@ -173,13 +186,14 @@ impl PhotonTracer {
 
     /// The records of the last pass, in the order of waves, in each of bounces and photons.
     pub fn records(&self) -> &TexelView {
-        &self.records
+        &self.kit.records
     }
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        let mut all = vec![self.emit.info(), self.scatter.info(), self.append.info()];
-        all.push(self.trace.info()[0].clone());
-        all.extend(self.compaction.info());
+        let kit = &self.kit;
+        let mut all = vec![kit.emit.info(), kit.scatter.info(), kit.append.info()];
+        all.extend(self.walker.trace_pipelines());
+        all.extend(self.walker.compaction_pipelines());
         all
     }
 
@@ -187,7 +201,7 @@ impl PhotonTracer {
     pub fn trace(&mut self, pass: u32, kernel: &KernelSettings) -> Result<Traced> {
         loop {
             let traced = self.trace_within(pass, kernel)?;
-            if traced.records <= self.capacity {
+            if traced.records <= self.kit.capacity {
                 return Ok(traced);
             }
             let (needed, most) = (u64::from(traced.records), records_of_device(&self.gpu));
@@ -201,8 +215,8 @@ impl PhotonTracer {
                 });
             }
             let capacity = (needed + needed / 4).min(most) as u32;
-            self.records = record_texels(&self.gpu, capacity)?;
-            self.capacity = capacity;
+            self.kit.records = record_texels(&self.gpu, capacity)?;
+            self.kit.capacity = capacity;
         }
     }
 
@@ -215,7 +229,7 @@ impl PhotonTracer {
         };
         let mut first_photon = 0;
         while first_photon < self.settings.photons {
-            let photons = self.slots.min(self.settings.photons - first_photon);
+            let photons = self.walker.buffers().slots().min(self.settings.photons - first_photon);
             self.trace_wave(pass, first_photon, photons, kernel, &mut traced)?;
             first_photon += photons;
         }
@@ -231,158 +245,77 @@ impl PhotonTracer {
         kernel: &KernelSettings,
         traced: &mut Traced,
     ) -> Result<()> {
-        let key = WaveKey {
-            first_pixel: pass,
-            first_sample: first_photon,
-            sample_count: photons,
+        let key = WalkKey {
+            first_sequence: pass,
+            first_index: first_photon,
+            indices: photons,
             seed: self.settings.seed ^ PHOTON_SEED,
         };
-        let mut status = Status {
-            active_count: photons,
-            ..Status::default()
+        let mut stages = PhotonStages {
+            kit: &self.kit,
+            key,
+            first: traced.records,
+            kernel,
         };
-        let mut watch = StallWatch::new(ray_quota(&self.gpu, &self.scene, &self.paths)?);
-        let mut begins = true;
-        while status.active_count > 0 || status.stalled != STALLED_NOT {
-            let before = status.rounds;
-            let first = traced.records;
-            traced
-                .timings
-                .push(self.submit(&key, &mut status, begins, first, kernel)?);
-            begins = false;
-            let stands = status.stalled != STALLED_NOT && status.rounds == before;
-            watch.submitted(stands)?;
-        }
-        let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
-        // Those of the queue are the deposits with a kernel: one word holds a wave's.
-        traced.records = traced.records.saturating_add(status.shadow_rays[0]);
-        traced.counts.rays += wide_counter(status.extend_rays);
+        let mut walked = self.walker.run(key, photons, &mut stages)?;
+        let counters = self.kit.counters_readback.read::<Counters>(0, 1)?[0];
+        // What waits are the deposits with a kernel.
+        let records = u32::try_from(walked.waited).unwrap_or(u32::MAX);
+        traced.timings.append(&mut walked.timings);
+        traced.records = traced.records.saturating_add(records);
+        traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
         traced.counts.absorbed += u64::from(counters.absorbed);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         Ok(())
     }
+}
 
-    /// Some bounces of a wave, the first ones with its emission; `first` is the record of its first deposit.
-    fn submit(
-        &mut self,
-        key: &WaveKey,
-        status: &mut Status,
-        begins: bool,
-        first: u32,
-        kernel: &KernelSettings,
-    ) -> Result<Timings> {
-        let stalled = status.stalled != STALLED_NOT;
-        if stalled && self.resume.is_none() {
-            self.resume = Some(TracePipelines::new(&self.gpu, &self.scene, &self.paths, true)?);
-        }
-        let groups = group_counts(status.active_count);
-        (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
-        (status.shadow_groups, status.shadow_count) = ([0, 1, 1], 0);
-        (status.stalled, status.unfinished) = (STALLED_NOT, 0);
-        let mut recorder = self.gpu.recorder("photon wave")?;
-        recorder.pass("photon: begin", |pass| {
-            pass.update(self.buffers.status.view(), &[*status])?;
-            if begins {
-                pass.fill(self.counters.view(), 0)?;
-            }
-            pass.memory_barrier(
-                Access::TRANSFER_WRITE | Access::COMPUTE,
-                Access::COMPUTE | Access::INDIRECT_READ,
-            );
-            Ok(())
-        })?;
-        if begins {
-            self.record_emit(&mut recorder, key)?;
-        }
-        for bounce in 0..BOUNCES_PER_SUBMISSION {
-            let resumed = self.resume.as_ref().filter(|_| stalled && bounce == 0);
-            let parity = (status.rounds as usize + bounce) % 2;
-            self.record_bounce(
-                &mut recorder,
-                key,
-                parity,
-                resumed.unwrap_or(&self.trace),
-                first,
-                kernel,
-            )?;
-        }
-        recorder.pass("photon: read status", |pass| {
-            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
-            pass.copy(
-                self.buffers.status.slice(0, size_of::<Status>() as u64),
-                self.buffers.readback.view(),
-            )?;
-            pass.copy(self.counters.view(), self.counters_readback.view())
-        })?;
-        let timings = recorder.submit()?.wait()?;
-        *status = self.buffers.readback.read::<Status>(0, 1)?[0];
-        Ok(timings)
-    }
-
+impl Kit {
     fn wave_set(&self) -> PhotonWave<'_> {
         PhotonWave {
             photon_counters: self.counters.view(),
             photon_differentials: self.differentials.view(),
-            // The memory of shadow rays, which photons have none of.
-            photon_deposits_out: self.buffers.shadow_rays.buffer().view(),
-            photon_deposits_in: &self.buffers.shadow_rays,
             photon_records: self.records.buffer().view(),
         }
     }
+}
 
-    fn record_emit(&self, recorder: &mut Recorder, key: &WaveKey) -> Result<()> {
-        let [lower, upper] = self.scene.bounds();
+impl WalkStages for PhotonStages<'_> {
+    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.fill(self.kit.counters.view(), 0)
+    }
+
+    /// Photons leave the lights.
+    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+        let kit = self.kit;
+        let [lower, upper] = kit.scene.bounds();
         let push = photon_emit::Push {
             scene_lower: lower.to_array(),
-            first_pixel: key.first_pixel,
-            scene_upper: upper.to_array(),
-            first_sample: key.first_sample,
-            sample_count: key.sample_count,
-            seed: key.seed,
             radius: 0.5 * (upper - lower).length(),
+            scene_upper: upper.to_array(),
+            key: self.key,
         };
         recorder.pass("photon: emit", |pass| {
-            let groups = [self.emit.groups_for(key.sample_count), 1, 1];
-            // Its output is the input of the first bounce, whose parity is 0.
-            let paths = self.buffers.set(1);
-            pass.dispatch(
-                &self.emit,
-                &[&paths, &self.scene.scene_set(), &self.wave_set()],
-                &push,
-                groups,
-            )?;
+            let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
+            let (scene, own) = (kit.scene.scene_set(), kit.wave_set());
+            pass.dispatch(&kit.emit, &[wave, &scene, &own], &push, groups)?;
             stage_barrier(pass);
             Ok(())
         })
     }
 
-    fn record_bounce(
-        &self,
-        recorder: &mut Recorder,
-        key: &WaveKey,
-        parity: usize,
-        trace: &TracePipelines,
-        first: u32,
-        kernel: &KernelSettings,
-    ) -> Result<()> {
-        let paths = self.buffers.set(parity);
-        let items = indirect(&self.buffers, std::mem::offset_of!(Status, item_groups));
-        let [lower, upper] = self.scene.bounds();
-        recorder.pass("photon: extend", |pass| {
-            trace.record_extend(pass, &self.scene, &paths, &self.buffers.media_set(), *key, items)
-        })?;
+    fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        let (kit, kernel) = (self.kit, self.kernel);
+        let [lower, upper] = kit.scene.bounds();
         let push = photon_scatter::Push {
             scene_lower: lower.to_array(),
-            first_pixel: key.first_pixel,
+            last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
             scene_upper: upper.to_array(),
-            first_sample: key.first_sample,
-            sample_count: key.sample_count,
-            seed: key.seed,
-            first_deposit: self.stored.first_bounce,
-            last_bounce: self.stored.last_bounce.min(BOUNCES_MAX),
-            flux_scale: flux_scale(&self.scene) as f32,
+            first_deposit: kit.stored.first_bounce,
+            key: self.key,
+            flux_scale: flux_scale(&kit.scene) as f32,
             kernel: types::KernelSettings {
                 shape: kernel.shape as u32,
                 spread: kernel.spread as f32,
@@ -394,25 +327,32 @@ impl PhotonTracer {
                 widens_flat: u32::from(kernel.widens_flat),
             },
         };
-        let wave = self.wave_set();
         recorder.pass("photon: scatter", |pass| {
-            pass.dispatch_indirect(&self.scatter, &[&paths, &self.scene.scene_set(), &wave], &push, items)?;
-            stage_barrier(pass);
-            Ok(())
-        })?;
-        recorder.pass("photon: compact", |pass| {
-            self.compaction.record(pass, &self.buffers, &paths)
-        })?;
-        recorder.pass("photon: append", |pass| {
-            let groups = indirect(&self.buffers, std::mem::offset_of!(Status, shadow_groups));
-            let push = photon_append::Push {
-                first,
-                capacity: self.capacity,
-            };
-            pass.dispatch_indirect(&self.append, &[&paths, &wave], &push, groups)?;
+            let (scene, own) = (kit.scene.scene_set(), kit.wave_set());
+            let sets: [&dyn BindingSet<'_>; 3] = [&bounce.wave, &scene, &own];
+            pass.dispatch_indirect(&kit.scatter, &sets, &push, bounce.places.items)?;
             stage_barrier(pass);
             Ok(())
         })
+    }
+
+    /// The deposits become records.
+    fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        let kit = self.kit;
+        recorder.pass("photon: append", |pass| {
+            let push = photon_append::Push {
+                first: self.first,
+                capacity: kit.capacity,
+            };
+            let own = kit.wave_set();
+            pass.dispatch_indirect(&kit.append, &[&bounce.wave, &own], &push, bounce.places.waiting)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.copy(self.kit.counters.view(), self.kit.counters_readback.view())
     }
 }
 

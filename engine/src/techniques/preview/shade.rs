@@ -17,8 +17,7 @@ use crate::gpu::{
 use crate::maps::directional_map::DirectionalMap;
 use crate::raster::{GBuffer, Output};
 use crate::scene::camera_frame::CameraFrame;
-use crate::techniques::path::pipelines::surface_spec;
-use crate::transport::GpuScene;
+use crate::transport::{GpuScene, surface_spec};
 use crate::{Error, Result};
 
 /// What of a G-buffer the kernel reads.

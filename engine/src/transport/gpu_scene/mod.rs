@@ -223,9 +223,17 @@ impl GpuScene {
         gpu.upload(self.buffers.lights.buffer(), offset, &[record])
     }
 
-    /// Set 3, of scenes with participating media.
-    pub fn media_set(&self) -> Option<MediaSet<'_>> {
-        self.media.as_ref().map(GpuMedia::set)
+    /// Set 3. Without participating media no specialized kernel reads it, and other buffers stand there.
+    pub fn media_set(&self) -> MediaSet<'_> {
+        let b = &self.buffers;
+        self.media.as_ref().map_or(
+            MediaSet {
+                media_records: &b.materials,
+                media_densities: &b.cdf,
+                media_majorants: &b.cdf,
+            },
+            GpuMedia::set,
+        )
     }
 
     /// Index of the medium outside of all bodies, if there is one that does something.

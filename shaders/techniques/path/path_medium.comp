@@ -15,29 +15,26 @@ layout(constant_id = 20) const bool HAS_GRIDS = true;        // media with a den
 layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
 layout(constant_id = 22) const bool HAS_AIRLIGHT = true;     // equi-angular samples
 
-#include "transport/path_features.glsl"
-#include "transport/path_buffers.glsl"
+#include "transport/features.glsl"
+#include "walk/wave.glsl"
 #include "transport/path_set.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
-    uint first_pixel;
-    vec3 scene_upper;
-    uint first_sample;
-    uint sample_count;
-    uint seed;
     uint path_set;          // PathSet, packed
-    uint roulette_start;    // first bounce at which Russian roulette may end a path
+    vec3 scene_upper;
     float roulette_cap;     // largest probability to go on
+    WalkKey key;            // sequences are pixels, places in them samples
+    uint roulette_start;    // first bounce at which Russian roulette may end a path
     uint surrounding;       // index of the medium outside of all bodies, or NO_MEDIUM
     uint accepting;         // states of the automaton in which light counts, a bit each
     uint successors[15];    // of each state
 } push;
 
-#include "transport/path_draws.glsl"
+#include "walk/draws.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/media_tracking.glsl"
-#include "transport/path_bodies.glsl"
+#include "transport/bodies.glsl"
 #include "transport/phase.glsl"
 
 // The way from the path's start to the surface.
@@ -48,9 +45,9 @@ struct Way {
 };
 
 // What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
-vec3 place_on_way(PathState path, Way way, float t) { return path.origin + max(way.start + t, 0.0) * path.direction; }
+vec3 place_on_way(WalkState path, Way way, float t) { return path.origin + max(way.start + t, 0.0) * path.direction; }
 
-ShadowRay shadow_ray(uint slot, PathState path, vec3 from, vec3 to, vec3 contribution) {
+ShadowRay shadow_ray(uint slot, WalkState path, vec3 from, vec3 to, vec3 contribution) {
     ShadowRay ray;
     ray.origin = from;
     ray.t_max = 1.0;
@@ -62,7 +59,7 @@ ShadowRay shadow_ray(uint slot, PathState path, vec3 from, vec3 to, vec3 contrib
 }
 
 // Light of a point or spot scattered once on the way, at a place chosen by the angle under which the light sees it. True where there is some.
-bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMedium m, Way way, vec2 u) {
+bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec2 u) {
     float probability;
     SceneLight light = load_light(distribution_sample(0u, light_count(), u.x, probability));
     if (light.kind != LIGHT_POINT && light.kind != LIGHT_SPOT) {
@@ -88,13 +85,13 @@ bool sample_airlight(uint slot, uint place, PathState path, vec3 bands, SceneMed
     if (contribution == vec3(0.0)) {
         return false;
     }
-    path_airlight_rays[place] = shadow_ray(slot, path, from, light.position, contribution);
-    path_shadow_starts[place].airlight_interior = way.interior;
+    walk_airlight_rays[place] = shadow_ray(slot, path, from, light.position, contribution);
+    walk_shadow_starts[place].airlight_interior = way.interior;
     return true;
 }
 
 // Light that a collision at `from`, t from the start of the way, scatters into the path. True where there is some.
-bool sample_collision_light(uint slot, uint place, PathState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
+bool sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
     vec2 choice = bounce_sample(slot, path.bounce, DIMENSION_LIGHT);
     vec2 u = bounce_sample(slot, path.bounce, DIMENSION_LIGHT_POINT);
     vec2 within = HAS_ENVIRONMENT ? bounce_sample(slot, path.bounce, DIMENSION_LIGHT_WITHIN) : vec2(0.0);
@@ -116,14 +113,14 @@ bool sample_collision_light(uint slot, uint place, PathState path, vec3 bands, S
     } else {
         shadow_segment(SurfacePoint(from, vec3(0.0)), vec3(0.0), light.point, light.normal, ray.origin, ray.direction);
     }
-    path_shadow_rays_out[place] = ray;
-    path_shadow_starts[place].sampled_interior = way.interior;
-    path_shadow_starts[place].start = 0.0;
+    store_shadow_ray(place, ray);
+    walk_shadow_starts[place].sampled_interior = way.interior;
+    walk_shadow_starts[place].start = 0.0;
     return true;
 }
 
 // The path's new direction at a collision; false when it ends.
-bool scatter(uint slot, SceneMedium m, vec3 at, inout PathState path) {
+bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     vec2 lobe = bounce_sample(slot, path.bounce, DIMENSION_LOBE);
     vec2 u = bounce_sample(slot, path.bounce, DIMENSION_DIRECTION);
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
@@ -150,7 +147,7 @@ void main() {
         return;
     }
     uint slot = load_slot(place);
-    PathState path = load_path(slot);
+    WalkState path = load_walk(slot);
     uint automaton = 0u;
     if (HAS_PATH_AUTOMATON) {
         automaton = path_set_state(path.bounce);
@@ -158,12 +155,12 @@ void main() {
     }
     MediumState state = MediumState(vec3(1.0 / 3.0), 0.0);
     if (status.rounds > 0u) {
-        state = path_medium_states[slot];
+        state = walk_medium_states[slot];
     }
     Hit hit = load_hit(place);
     Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
     if (hit.triangle != NO_HIT) {
-        crossing = cross_surface(hit.triangle, path.direction, path_gathered[slot].interior);
+        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
     }
     Way way = Way(state.start, hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start), crossing.interior);
     uint medium = medium_inside(way.interior, push.surrounding);
@@ -199,15 +196,15 @@ void main() {
                                                               attenuated_length(m.sigma_t.z, t_max));
             }
             if (HAS_AIRLIGHT && lighting && m.sigma_s != vec3(0.0)) {
-                Sampler s = path_sampler(slot, dimension + DIMENSION_AIRLIGHT);
+                Sampler s = walk_sampler(slot, dimension + DIMENSION_AIRLIGHT);
                 if (sample_airlight(slot, place, path, bands, m, way, sample_2d(s))) {
-                    flags |= FLAG_AIRLIGHT | FLAG_SHADOW;
+                    flags |= FLAG_AIRLIGHT | FLAG_WAITING;
                 }
             }
             if (passes) {
                 weight = transmittance(m.sigma_t, t_max);
             } else {
-                Sampler s = path_sampler(slot, dimension);
+                Sampler s = walk_sampler(slot, dimension);
                 FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, bands, t_max, sample_2d(s));
                 t = flight.t;
                 weight = flight.weight;
@@ -215,8 +212,7 @@ void main() {
                 outcome = flight.collides ? WALK_COLLIDED : WALK_LEFT;
             }
         } else if (HAS_GRIDS) {
-            uint pixel = push.first_pixel + slot / push.sample_count;
-            uvec4 key = uvec4(pixel, push.first_sample + slot % push.sample_count, dimension, push.seed);
+            uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
             GridWalk walk = begin_grid_walk(m, path.origin, path.direction, way.start, way.end);
             outcome = delta_tracking(m, key, path.throughput, passes, walk, state.bands, weight, emitted);
             t = (walk.entry - way.start) + walk.t;
@@ -228,7 +224,7 @@ void main() {
         }
         COUNT_MEDIUM(collisions, outcome == WALK_COLLIDED ? 1u : 0u)
         if (counted && emitted != vec3(0.0)) {
-            path_gathered[slot].radiance += emitted;
+            walk_gathered[slot].radiance += emitted;
         }
     }
     if (HAS_ABSORPTION && way.interior != OUTSIDE && outcome == WALK_LEFT) {
@@ -242,7 +238,7 @@ void main() {
         if (path.throughput != vec3(0.0)) {
             vec3 at = place_on_way(path, way, t);
             if (lighting && sample_collision_light(slot, place, path, bands, m, way, at, t)) {
-                flags |= FLAG_SAMPLED | FLAG_SHADOW;
+                flags |= FLAG_SAMPLED | FLAG_WAITING;
             }
             alive = scatter(slot, m, at, path);
             automaton = after;
@@ -260,14 +256,14 @@ void main() {
     } else {
         handled = false;
     }
-    path_gathered[slot].interior = interior;
-    path_medium_states[slot] = state;
-    path_medium_events[place] = MediumEvent(weight, (flags & FLAG_AIRLIGHT) | (handled ? EVENT_HANDLED : 0u));
-    path_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);
+    walk_gathered[slot].interior = interior;
+    walk_medium_states[slot] = state;
+    walk_medium_events[place] = MediumEvent(weight, (flags & FLAG_AIRLIGHT) | (handled ? EVENT_HANDLED : 0u));
+    walk_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);
     if (alive) {
         if (HAS_PATH_AUTOMATON) {
             path.bounce = path_set_joined(path.bounce, automaton);
         }
-        path_states_out[slot] = path;
+        walk_states_out[slot] = path;
     }
 }

@@ -13,10 +13,13 @@ layout(constant_id = 2) const bool ORTHOGRAPHIC = false;
 layout(constant_id = 3) const bool WRITE_AOVS = true;
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 
-#include "transport/path_buffers.glsl"
-#include "transport/path_dimensions.glsl"
-#include "transport/random.glsl"
+#include "techniques/path/path_aovs.glsl"
 #include "transport/warp.glsl"
+#include "walk/wave.glsl"
+
+// Slots of random numbers.
+const uint DIMENSION_PIXEL = 0u;
+const uint DIMENSION_LENS = 1u;
 
 layout(push_constant, scalar) uniform Push {
     vec3 origin;
@@ -29,21 +32,20 @@ layout(push_constant, scalar) uniform Push {
     float focus_distance;
     uint width;
     uint height;
-    uint first_pixel;
     uint pixel_count;
-    uint first_sample;
-    uint sample_count;
-    uint seed;
     uint interior;      // material of the body that the camera is inside of, or OUTSIDE
+    WalkKey key;        // sequences are pixels, places in them samples
 } push;
+
+#include "walk/draws.glsl"
 
 void main() {
     uint slot = gl_GlobalInvocationID.x;
-    if (slot >= push.pixel_count * push.sample_count) {
+    if (slot >= push.pixel_count * push.key.indices) {
         return;
     }
-    uint pixel = push.first_pixel + slot / push.sample_count;
-    Sampler s = Sampler(pixel, push.first_sample + slot % push.sample_count, DIMENSION_PIXEL, push.seed);
+    uint pixel = walk_sequence(slot);
+    Sampler s = walk_sampler(slot, DIMENSION_PIXEL);
     vec2 position = vec2(float(pixel % push.width), float(pixel / push.width)) + sample_2d(s);
     vec2 plane = vec2(2.0 * position.x / float(push.width) - 1.0, 1.0 - 2.0 * position.y / float(push.height))
         * vec2(push.half_width, push.half_height);
@@ -57,8 +59,8 @@ void main() {
         origin += offset;
         direction = direction * push.focus_distance - offset;
     }
-    path_states_out[slot] = PathState(origin, 0.0, normalize(direction), 0u, vec3(1.0), 1.0);
-    path_gathered[slot] = GatheredLight(vec3(0.0), push.interior);
+    walk_states_out[slot] = WalkState(origin, 0.0, normalize(direction), 0u, vec3(1.0), 1.0);
+    walk_gathered[slot] = GatheredLight(vec3(0.0), push.interior);
     if (WRITE_AOVS) {
         path_aovs[slot].filled = 0u;
     }

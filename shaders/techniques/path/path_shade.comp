@@ -1,6 +1,6 @@
 #version 460
 // Wavefront path tracer: what happens where a path has arrived. Emission with its multiple-importance weight, one light sample (its
-// shadow ray goes to path_shadow.comp), one direction of the surface's scattering function, Russian roulette.
+// shadow ray goes to walk/shadow.comp), one direction of the surface's scattering function, Russian roulette.
 //
 // BG-2, BG-3: unidirectional path tracing with next-event estimation (Kajiya 1986; Veach 1997, 9 and 10.3.2). Unbiased.
 #extension GL_GOOGLE_include_directive : require
@@ -8,28 +8,26 @@
 
 layout(local_size_x = 64) in;
 
-#include "transport/path_features.glsl"
+#include "transport/features.glsl"
+#include "techniques/path/path_aovs.glsl"
 #include "transport/arrival.glsl"
-#include "transport/path_set.glsl"
-#include "transport/light_choice.glsl"
 #include "transport/bsdf_label.glsl"
-#include "transport/path_media.glsl"
+#include "transport/light_choice.glsl"
+#include "transport/path_set.glsl"
+#include "walk/wave.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
-    uint first_pixel;
-    vec3 scene_upper;
-    uint first_sample;
-    uint sample_count;
-    uint seed;
     uint path_set;          // PathSet, packed
-    uint roulette_start;    // first bounce at which Russian roulette may end a path
+    vec3 scene_upper;
     float roulette_cap;     // largest probability to go on
+    WalkKey key;            // sequences are pixels, places in them samples
+    uint roulette_start;    // first bounce at which Russian roulette may end a path
     uint accepting;         // states of the automaton in which light counts, a bit each
     uint successors[15];    // of each state
 } push;
 
-#include "transport/path_draws.glsl"
+#include "walk/draws.glsl"
 
 // Least cosine by which the offset of a ray's origin counts as a way through a medium.
 const float LEAD_COS_MIN = 1.0 / 16.0;
@@ -43,7 +41,7 @@ float way_left_out(Surface s, vec3 origin, vec3 direction) {
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
 
 // Shades the hit of the path in a slot; true when the path goes on. What it meets is added to `radiance`.
-bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uint flags) {
+bool shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uint flags) {
     Hit hit = load_hit(place);
     uint state = 0u;
     if (HAS_PATH_AUTOMATON) {
@@ -68,7 +66,7 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     SceneMaterial m = a.material;
     Bsdf bsdf = a.bsdf;
     uint around = HAS_MEDIA ? s.around : OUTSIDE;
-    uint interior = arrival_interior(a, HAS_TRANSMISSION || HAS_MEDIA ? path_gathered[slot].interior : OUTSIDE);
+    uint interior = arrival_interior(a, HAS_TRANSMISSION || HAS_MEDIA ? walk_gathered[slot].interior : OUTSIDE);
     if (!HAS_MEDIA) {
         path.throughput = absorbed(path.throughput, interior, hit.t);
     }
@@ -133,12 +131,12 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
                     float way = distance(s.point.position, light.point.position);
                     ray_to_light.contribution = absorbed(ray_to_light.contribution, passed, way);
                 }
-                path_shadow_rays_out[place] = ray_to_light;
+                store_shadow_ray(place, ray_to_light);
                 if (HAS_MEDIA) {
-                    path_shadow_starts[place].sampled_interior = passed;
-                    path_shadow_starts[place].start = -way_left_out(s, start, wi) / length(ray_to_light.direction);
+                    walk_shadow_starts[place].sampled_interior = passed;
+                    walk_shadow_starts[place].start = -way_left_out(s, start, wi) / length(ray_to_light.direction);
                 }
-                flags |= HAS_MEDIA ? FLAG_SHADOW | FLAG_SAMPLED : FLAG_SHADOW;
+                flags |= HAS_MEDIA ? FLAG_WAITING | FLAG_SAMPLED : FLAG_WAITING;
             }
         }
     }
@@ -160,7 +158,7 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
         float eta = frame.wo.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
         path.eta_scale *= eta * eta;
-        path_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : around;
+        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : around;
     }
     path.bounce = bounce + 1u;
     if (path.bounce >= push.roulette_start) {
@@ -175,13 +173,13 @@ bool shade(uint slot, uint place, PathState path, inout vec3 radiance, inout uin
     path.origin = departure(a, wi, path.throughput);
     path.direction = normalize(wi);
     if (HAS_MEDIA) {
-        path_medium_states[slot].start = -way_left_out(s, path.origin, path.direction);
+        walk_medium_states[slot].start = -way_left_out(s, path.origin, path.direction);
     }
     path.pdf = scattered.pdf;
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);
     }
-    path_states_out[slot] = path;
+    walk_states_out[slot] = path;
     return true;
 }
 
@@ -193,20 +191,20 @@ void main() {
     uint slot = load_slot(place);
     vec3 radiance = vec3(0.0);
     uint flags = 0u;
-    PathState path = load_path(slot);
+    WalkState path = load_walk(slot);
     if (HAS_MEDIA) {
-        MediumEvent event = path_medium_events[place];
+        MediumEvent event = walk_medium_events[place];
         if ((event.flags & EVENT_HANDLED) != 0u) {
             return;
         }
-        flags = (event.flags & FLAG_AIRLIGHT) != 0u ? FLAG_AIRLIGHT | FLAG_SHADOW : 0u;
+        flags = (event.flags & FLAG_AIRLIGHT) != 0u ? FLAG_AIRLIGHT | FLAG_WAITING : 0u;
         path.throughput *= event.weight;
     }
     if (shade(slot, place, path, radiance, flags)) {
         flags |= FLAG_ALIVE;
     }
     if (radiance != vec3(0.0)) {
-        path_gathered[slot].radiance += radiance;
+        walk_gathered[slot].radiance += radiance;
     }
-    path_flags_out[place] = flags;
+    walk_flags_out[place] = flags;
 }

@@ -6,13 +6,13 @@
 
 layout(local_size_x = 64) in;
 
-#include "transport/path_compact.glsl"
+#include "walk/compact.glsl"
 
 // Lanes whose totals are summed before the sums are.
 const uint SCAN_BLOCK = 8u;
 
-shared uvec2 totals[PATH_GROUP];
-shared uvec2 block_totals[PATH_GROUP / SCAN_BLOCK];
+shared uvec2 totals[WALK_GROUP];
+shared uvec2 block_totals[WALK_GROUP / SCAN_BLOCK];
 
 void add_64(inout uint low, inout uint high, uint amount) {
     uint carry;
@@ -25,17 +25,17 @@ void main() {
     uint count = status.active_count;
     bool stalled = status.stalled != STALLED_NOT;
     uint chunks = stalled ? 0u : chunks_for(count);
-    uint each = (chunks + PATH_GROUP - 1u) / PATH_GROUP;
+    uint each = (chunks + WALK_GROUP - 1u) / WALK_GROUP;
     uint first = min(lane * each, chunks);
     uint last = min(first + each, chunks);
     uvec2 total = uvec2(0u);
     for (uint chunk = first; chunk < last; ++chunk) {
-        total += path_chunks[chunk];
+        total += walk_chunks[chunk];
     }
     totals[lane] = total;
     memoryBarrierBuffer();
     barrier();
-    if (lane < PATH_GROUP / SCAN_BLOCK) {
+    if (lane < WALK_GROUP / SCAN_BLOCK) {
         uvec2 sum = uvec2(0u);
         for (uint other = 0u; other < SCAN_BLOCK; ++other) {
             sum += totals[SCAN_BLOCK * lane + other];
@@ -52,28 +52,28 @@ void main() {
     }
     uvec2 offset = before;
     for (uint chunk = first; chunk < last; ++chunk) {
-        uvec2 counts = path_chunks[chunk];
-        path_chunks[chunk] = offset;
+        uvec2 counts = walk_chunks[chunk];
+        walk_chunks[chunk] = offset;
         offset += counts;
     }
-    if (lane == PATH_GROUP - 1u && stalled) {
+    if (lane == WALK_GROUP - 1u && stalled) {
         // What is recorded for later rounds has the queues in the wrong roles: it must find nothing to do. The host sets these again.
         status.item_groups[0] = 0u;
         status.chunk_groups[0] = 0u;
         status.scatter_groups[0] = 0u;
-        status.shadow_groups[0] = 0u;
+        status.waiting_groups[0] = 0u;
     }
-    if (lane == PATH_GROUP - 1u && !stalled) {
+    if (lane == WALK_GROUP - 1u && !stalled) {
         uvec2 all = before + total;
         status.scatter_groups[0] = status.chunk_groups[0];
         status.previous_count = count;
         status.active_count = all.x;
-        status.shadow_count = all.y;
-        status.shadow_groups[0] = groups_for(all.y);
+        status.waiting_count = all.y;
+        status.waiting_groups[0] = groups_for(all.y);
         status.item_groups[0] = groups_for(all.x);
         status.chunk_groups[0] = groups_for(chunks_for(all.x));
         status.rounds += count > 0u ? 1u : 0u;
-        add_64(status.extend_rays[0], status.extend_rays[1], count);
-        add_64(status.shadow_rays[0], status.shadow_rays[1], all.y);
+        add_64(status.rays[0], status.rays[1], count);
+        add_64(status.waited[0], status.waited[1], all.y);
     }
 }

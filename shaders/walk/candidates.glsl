@@ -1,47 +1,39 @@
-// Which candidate hits count for a path: all, or (with PATH_ALPHA defined) those where the material's alpha says that there is a surface.
+// Which candidate hits count for a ray: all, or, specialized so, those where the material's alpha says that there is a surface. What the trace
+// stages have in common stands here: their constants, and the push constants of all their kinds.
 //
-// A blended surface is met with probability alpha, drawn from a hash of (seed, pixel, sample, bounce, kind of ray, triangle): the same
+// A blended surface is met with probability alpha, drawn from a hash of (seed, sequence, index, bounce, kind of ray, triangle): the same
 // answer however often the traversal asks, and whatever index it walks.
-#ifndef CLERESTORY_TRANSPORT_PATH_CANDIDATES_GLSL
-#define CLERESTORY_TRANSPORT_PATH_CANDIDATES_GLSL
+#ifndef CLERESTORY_WALK_CANDIDATES_GLSL
+#define CLERESTORY_WALK_CANDIDATES_GLSL
 
-#include "transport/path_buffers.glsl"
-#include "transport/path_dimensions.glsl"
-
+// What a scene has, by the ids of transport/features.glsl.
+layout(constant_id = 17) const bool HAS_ALPHA = true;
+layout(constant_id = 19) const bool HAS_MEDIA = true;
 // Goes on with rays that the quota stopped in an earlier dispatch.
 layout(constant_id = 18) const bool RESUMES = false;
+
+#define CLERESTORY_SAMPLER SAMPLER_PCG
+#include "walk/wave.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    WalkKey key;
+    uint surrounding;  // index of the medium outside of all bodies, or NO_MEDIUM
+} push;
+
+#include "transport/attribute_features.glsl"
+#include "scene/material.glsl"
+#include "walk/draws.glsl"
 
 const uint CANDIDATES_EXTEND = 0u;
 const uint CANDIDATES_SHADOW = 1u;
 
-#if defined(PATH_ALPHA) || defined(PATH_MEDIA)
-
-#define CLERESTORY_SAMPLER SAMPLER_PCG
-#include "transport/random.glsl"
-
-layout(push_constant, scalar) uniform Push {
-    uint first_pixel;
-    uint first_sample;
-    uint sample_count;
-    uint seed;
-#ifdef PATH_MEDIA
-    uint surrounding;  // index of the medium outside of all bodies, or NO_MEDIUM
-#endif
-} push;
-
-#endif
-
-#ifdef PATH_ALPHA
-
-#include "transport/attribute_features.glsl"
-#include "scene/material.glsl"
-
-// (pixel, sample, bounce and kind, seed) of the ray under way.
+// (sequence, index, bounce and kind, seed) of the ray under way.
 uvec4 candidate_key;
 
 void begin_candidates(uint slot, uint bounce, uint kind) {
-    candidate_key = uvec4(push.first_pixel + slot / push.sample_count, push.first_sample + slot % push.sample_count,
-                          bounce * 2u + kind, push.seed);
+    if (HAS_ALPHA) {
+        candidate_key = uvec4(walk_sequence(slot), walk_index(slot), bounce * 2u + kind, push.key.seed);
+    }
 }
 
 bool accept_candidate(uint triangle, vec2 barycentrics) {
@@ -66,15 +58,7 @@ bool accept_candidate(uint triangle, vec2 barycentrics) {
     return unit_float(bits) < coverage;
 }
 
-#define CLERESTORY_CANDIDATE_FILTER
-#define BEGIN_CANDIDATES(SLOT, BOUNCE, KIND) begin_candidates(SLOT, BOUNCE, KIND);
-
-#else
-
-#define BEGIN_CANDIDATES(SLOT, BOUNCE, KIND)
-
-#endif
-
+#define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
 #define INDEX_RESUMES RESUMES
 #include "accel/index.glsl"
 

@@ -1,6 +1,6 @@
-// What a scene needs of the path tracer, as specialization constants: what is off compiles to nothing.
-#ifndef CLERESTORY_TRANSPORT_PATH_FEATURES_GLSL
-#define CLERESTORY_TRANSPORT_PATH_FEATURES_GLSL
+// What a scene needs of a kernel that knows surfaces, as specialization constants: what is off compiles to nothing.
+#ifndef CLERESTORY_TRANSPORT_FEATURES_GLSL
+#define CLERESTORY_TRANSPORT_FEATURES_GLSL
 
 #include "transport/attribute_features.glsl"
 

@@ -1,10 +1,8 @@
-// Which sampler slot (two dimensions each) every decision of a path draws from.
-#ifndef CLERESTORY_TRANSPORT_PATH_DIMENSIONS_GLSL
-#define CLERESTORY_TRANSPORT_PATH_DIMENSIONS_GLSL
+// Which sampler slot (two dimensions each) every decision of a walk draws from.
+#ifndef CLERESTORY_WALK_DIMENSIONS_GLSL
+#define CLERESTORY_WALK_DIMENSIONS_GLSL
 
-const uint DIMENSION_PIXEL = 0u;
-const uint DIMENSION_LENS = 1u;
-// From here on each bounce has DIMENSIONS_PER_BOUNCE slots.
+// Those before are for a walk's start. From here on each bounce has DIMENSIONS_PER_BOUNCE slots.
 const uint DIMENSION_FIRST_BOUNCE = 2u;
 const uint DIMENSIONS_PER_BOUNCE = 5u;
 const uint DIMENSION_DIRECTION = 0u;    // direction within a lobe
@@ -17,8 +15,5 @@ const uint DIMENSION_LIGHT_WITHIN = 4u; // direction within the texel
 const uint DIMENSION_FIRST_MEDIUM = 1u << 24;
 const uint DIMENSIONS_PER_WAY = 2u;
 const uint DIMENSION_AIRLIGHT = 1u;  // which light, and where on the way; the first is for the free flight
-
-// A distance beyond every scene: coordinates are below 2^30 m.
-const float FAR_AWAY = 3.0e38;
 
 #endif

@@ -1,11 +1,11 @@
 #version 460
-// Queue compaction, third stage: the paths that are alive to the other queue, and the places with shadow rays to theirs, in order.
+// Queue compaction, third stage: the walks that are alive to the other queue, and the places where something waits to theirs, in order.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 64) in;
 
-#include "transport/path_compact.glsl"
+#include "walk/compact.glsl"
 
 void main() {
     uint chunk = gl_GlobalInvocationID.x;
@@ -15,16 +15,16 @@ void main() {
     // The scan has counted this bounce already.
     bool first_bounce = status.rounds == 1u;
     uvec2 range = chunk_texels(chunk, status.previous_count);
-    uvec2 target = path_chunks[chunk];
+    uvec2 target = walk_chunks[chunk];
     for (uint texel = range.x; texel < range.y; ++texel) {
         uvec4 flags = load_flags(texel, status.previous_count);
         for (uint i = 0u; i < FLAGS_PER_TEXEL; ++i) {
             uint place = FLAGS_PER_TEXEL * texel + i;
             if ((flags[i] & FLAG_ALIVE) != 0u) {
-                path_queue_out[target.x++] = first_bounce ? place : texelFetch(path_queue_in, int(place)).x;
+                walk_queue_out[target.x++] = first_bounce ? place : texelFetch(walk_queue_in, int(place)).x;
             }
-            if ((flags[i] & FLAG_SHADOW) != 0u) {
-                path_shadow_queue_out[target.y++] = place;
+            if ((flags[i] & FLAG_WAITING) != 0u) {
+                walk_waiting_queue_out[target.y++] = place;
             }
         }
     }

@@ -1,14 +1,13 @@
-// The shadow stage for scenes with media: adds what light sampling found, as much of it as the media let through. Boundaries are passed,
-// every other surface blocks.
+// Shadow rays in scenes with media: boundaries are passed, every other surface blocks.
 //
 // Homogeneous media in closed form, grids by ratio tracking: unbiased. A ray that has met too many surfaces, or whose traversal or walk a quota
 // stops, stalls the wave and goes on from where it is.
-#ifndef CLERESTORY_TRANSPORT_PATH_SHADOW_MEDIA_GLSL
-#define CLERESTORY_TRANSPORT_PATH_SHADOW_MEDIA_GLSL
+#ifndef CLERESTORY_WALK_SHADOW_MEDIA_GLSL
+#define CLERESTORY_WALK_SHADOW_MEDIA_GLSL
 
-#include "transport/path_candidates.glsl"
+#include "transport/bodies.glsl"
 #include "transport/media_tracking.glsl"
-#include "transport/path_bodies.glsl"
+#include "walk/candidates.glsl"
 
 layout(constant_id = 10) const bool HAS_ABSORPTION = true;  // absorbing solids
 layout(constant_id = 20) const bool HAS_GRIDS = true;
@@ -17,11 +16,6 @@ layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
 // Surfaces met in one dispatch. With alpha, a traversal's iterations add up over the lanes.
 const uint SHADOW_SURFACES = 8u;
 const uint SHADOW_SURFACES_ALPHA = 2u;
-#ifdef PATH_ALPHA
-#define SHADOW_SURFACES_MAX SHADOW_SURFACES_ALPHA
-#else
-#define SHADOW_SURFACES_MAX SHADOW_SURFACES
-#endif
 // Random numbers of a walk; those of the next begin behind them.
 const uint WALK_SHIFT = 16u;
 // Stands for the round in the key of shadow rays' random numbers, so that those of ways do not return.
@@ -30,13 +24,13 @@ const uint SHADOW_KEY = 0x40000000u;
 // Of a place's rays, the one that is first in `rays`.
 ShadowRay first_ray(uint place, uint rays) {
     if ((rays & FLAG_AIRLIGHT) != 0u) {
-        return path_airlight_rays[place];
+        return walk_airlight_rays[place];
     }
     return load_shadow_ray(place);
 }
 
 ShadowState begin_ray(uint place, uint rays, float t_max, uint walks) {
-    ShadowStart from = path_shadow_starts[place];
+    ShadowStart from = walk_shadow_starts[place];
     bool airlight = (rays & FLAG_AIRLIGHT) != 0u;
     return ShadowState(vec3(1.0), airlight ? 0.0 : from.start, no_hit(t_max), airlight ? from.airlight_interior : from.sampled_interior, walks,
                        rays);
@@ -64,8 +58,7 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
             GridWalk walk = begin_grid_walk(m, s.origin, s.direction, state.start, state.hit.t);
             walk.draw = state.walks << WALK_SHIFT;
             ++state.walks;
-            uvec4 key = uvec4(push.first_pixel + s.slot / push.sample_count, push.first_sample + s.slot % push.sample_count,
-                              SHADOW_KEY + status.rounds, push.seed);
+            uvec4 key = uvec4(walk_sequence(s.slot), walk_index(s.slot), SHADOW_KEY + status.rounds, push.key.seed);
             outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
             COUNT_MEDIUM(density_lookups, walk.nulls)
             float reached = resumed_start(state.start, walk.entry + walk.t);
@@ -89,32 +82,29 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
     return ended;
 }
 
-void main() {
-    uint queue_place = gl_GlobalInvocationID.x;
-    if (status.stalled == STALLED_EXTEND || queue_place >= status.shadow_count) {
-        return;
-    }
+void trace_shadow_rays_through_media(uint queue_place) {
     uint resume = INDEX_START;
     if (RESUMES) {
-        resume = path_resume[queue_place];
+        resume = walk_resume[queue_place];
         if (resume == INDEX_FINISHED) {
             return;
         }
     }
-    uint place = texelFetch(path_shadow_queue_in, int(queue_place)).x;
-    uint rays = texelFetch(path_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
+    uint place = texelFetch(walk_waiting_queue_in, int(queue_place)).x;
+    uint rays = texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
     if (RESUMES) {
-        rays = path_shadow_states[queue_place].rays;
+        rays = walk_shadow_states[queue_place].rays;
     }
     ShadowRay s = first_ray(place, rays);
     ShadowState state = begin_ray(place, rays, s.t_max, 0u);
     if (RESUMES) {
-        state = path_shadow_states[queue_place];
+        state = walk_shadow_states[queue_place];
     }
-    BEGIN_CANDIDATES(s.slot, s.bounce, CANDIDATES_SHADOW)
+    begin_candidates(s.slot, s.bounce, CANDIDATES_SHADOW);
     bool stopped = false;
     uint iterations = GRID_WALK_QUOTA;
-    for (uint surface = 0u; surface < SHADOW_SURFACES_MAX && state.rays != 0u && !stopped; ++surface) {
+    uint surfaces = HAS_ALPHA ? SHADOW_SURFACES_ALPHA : SHADOW_SURFACES;
+    for (uint surface = 0u; surface < surfaces && state.rays != 0u && !stopped; ++surface) {
         resume = closest_hit(Ray(s.origin, search_start(state.start), s.direction, s.t_max), resume, state.hit);
         stopped = resume != INDEX_FINISHED;
         if (!stopped) {
@@ -122,7 +112,7 @@ void main() {
             uint outcome;
             if (pass_surface(s, state, iterations, outcome)) {
                 if (state.transmittance != vec3(0.0)) {
-                    path_gathered[s.slot].radiance += s.contribution * state.transmittance;
+                    walk_gathered[s.slot].radiance += s.contribution * state.transmittance;
                 }
                 rays = state.rays & (state.rays - 1u);
                 if (rays != 0u) {
@@ -136,11 +126,11 @@ void main() {
         }
     }
     if (state.rays == 0u) {
-        path_resume[queue_place] = INDEX_FINISHED;
+        walk_resume[queue_place] = INDEX_FINISHED;
         return;
     }
-    path_resume[queue_place] = resume;
-    path_shadow_states[queue_place] = state;
+    walk_resume[queue_place] = resume;
+    walk_shadow_states[queue_place] = state;
     atomicAdd(status.unfinished, 1u);
     atomicMax(status.stalled, STALLED_SHADOW);
 }

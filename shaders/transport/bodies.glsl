@@ -1,9 +1,12 @@
-// Which medium a way was in, and which one is beyond the surface that ends it; see path_media.glsl.
-#ifndef CLERESTORY_TRANSPORT_PATH_BODIES_GLSL
-#define CLERESTORY_TRANSPORT_PATH_BODIES_GLSL
+// Which medium a way was in, and which one is beyond the surface that ends it; see walk/media.glsl.
+#ifndef CLERESTORY_TRANSPORT_BODIES_GLSL
+#define CLERESTORY_TRANSPORT_BODIES_GLSL
 
 #include "scene/bindings.glsl"
-#include "transport/path_media.glsl"
+
+// Stands for the material of a body where there is none around.
+const uint OUTSIDE = 0xFFFFFFFFu;
+const uint NO_MEDIUM = 0xFFFFFFFFu;
 
 struct Crossing {
     uint interior;  // body that the way was in, or OUTSIDE

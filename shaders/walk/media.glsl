@@ -1,25 +1,23 @@
-// What paths know of media: set 4 of the path tracer's stages, and the surfaces that bound media.
+// What walks know of media, behind the rest of their working memory in set 0, and how they pass the surfaces that bound media.
 //
-// A body is a solid that refracts or an invisible boundary. Paths carry the material of the innermost body they are in; what is outside of a
+// A body is a solid that refracts or an invisible boundary. Walks carry the material of the innermost body they are in; what is outside of a
 // body is known for each of its triangles, so bodies may lie in bodies, as long as their surfaces do not cross. A surface of a body tells
-// by its side which body the way to it was in, whatever the path believed: rounding cannot leave a path in the wrong medium for good.
+// by its side which body the way to it was in, whatever the walk believed: rounding cannot leave a walk in the wrong medium for good.
 // Boundaries leave the ray as it is: the search for the next surface begins one rounding unit behind them. A surface at the same distance is
 // not skipped, since boundaries have the last numbers of all triangles and ties go to the first one; of boundaries in one place only
 // the first one is met.
-#ifndef CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
-#define CLERESTORY_TRANSPORT_PATH_MEDIA_GLSL
+#ifndef CLERESTORY_WALK_MEDIA_GLSL
+#define CLERESTORY_WALK_MEDIA_GLSL
 
-#include "transport/path_buffers.glsl"
-
-// descriptor set 4: PathMedia
+// Which is one set with this, whether a scene has media or not.
+#include "walk/wave.glsl"
 
 // There is nothing left for the shading stage.
 const uint EVENT_HANDLED = 1u;
-const uint NO_MEDIUM = 0xFFFFFFFFu;
 
 struct MediumState {
     vec3 bands;   // as in transport/medium.glsl
-    float start;  // distance along the ray up to which the path has come; negative by what the offset of its origin left out
+    float start;  // distance along the ray up to which the walk has come; negative by what the offset of its origin left out
 };
 
 struct MediumEvent {
@@ -43,13 +41,13 @@ struct ShadowState {
     uint rays;   // those still to follow: FLAG_AIRLIGHT, FLAG_SAMPLED; the first one is under way
 };
 
-layout(set = 4, binding = 0, scalar) restrict buffer PathMediumStates { MediumState path_medium_states[]; };     // by slot
-layout(set = 4, binding = 1, scalar) restrict buffer PathMediumEvents { MediumEvent path_medium_events[]; };     // by place
-layout(set = 4, binding = 2, scalar) restrict buffer PathShadowStarts { ShadowStart path_shadow_starts[]; };        // by place
-layout(set = 4, binding = 3, scalar) restrict buffer PathAirlightRays { ShadowRay path_airlight_rays[]; };       // by place
-layout(set = 4, binding = 4, scalar) restrict buffer PathShadowStates { ShadowState path_shadow_states[]; };     // by place in the shadow queue
+layout(set = 0, binding = 16, scalar) restrict buffer WalkMediumStates { MediumState walk_medium_states[]; };  // by slot
+layout(set = 0, binding = 17, scalar) restrict buffer WalkMediumEvents { MediumEvent walk_medium_events[]; };  // by place
+layout(set = 0, binding = 18, scalar) restrict buffer WalkShadowStarts { ShadowStart walk_shadow_starts[]; };  // by place
+layout(set = 0, binding = 19, scalar) restrict buffer WalkAirlightRays { ShadowRay walk_airlight_rays[]; };    // by place
+layout(set = 0, binding = 20, scalar) restrict buffer WalkShadowStates { ShadowState walk_shadow_states[]; };  // by place in the waiting queue
 // 64-bit counters, low word first.
-layout(set = 4, binding = 5, scalar) restrict buffer PathMediumCounters {
+layout(set = 0, binding = 21, scalar) restrict buffer WalkMediumCounters {
     uint collisions[2];
     uint null_collisions[2];
     uint density_lookups[2];

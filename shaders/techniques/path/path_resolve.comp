@@ -7,8 +7,9 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const bool WRITE_AOVS = true;
 
-#include "transport/path_buffers.glsl"
 #include "film/film_bindings.glsl"
+#include "techniques/path/path_aovs.glsl"
+#include "walk/wave.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint first_film_pixel;  // of the wave, within this buffer
@@ -24,7 +25,7 @@ void main() {
     uint target = push.first_film_pixel + pixel;
     FilmPixel film = film_pixels[target];
     for (uint i = 0u; i < push.sample_count; ++i) {
-        vec3 radiance = path_gathered[pixel * push.sample_count + i].radiance;
+        vec3 radiance = walk_gathered[pixel * push.sample_count + i].radiance;
         if (any(isnan(radiance))) {
             film.nan_samples += 1u;
             continue;

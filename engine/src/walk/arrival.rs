@@ -1,0 +1,48 @@
+//! What may be gathered where the rays of a bounce have arrived, before walks are scattered there.
+
+use crate::Result;
+use crate::gpu::shaders::sets::WaveSet;
+use crate::gpu::{BufferView, Recorder};
+
+/// A stage between arrival and scattering, for instance one that asks a map of photons.
+pub trait ArrivalStage {
+    /// Records it for all places of the queue. Places that its quota stops stall the wave with `STALLED_ARRIVAL` and are counted in
+    /// `status.unfinished`.
+    ///
+    /// # Errors
+    /// Those of recording.
+    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()>;
+
+    /// Records what the places that it has stopped at still lack, from a part on, as much of it as a watchdog has time for; the part to go
+    /// on with, in a submission of its own.
+    ///
+    /// # Errors
+    /// Those of recording, and [`Error::Overflow`](crate::Error::Overflow) where nothing can help such places.
+    fn record_stopped(
+        &self,
+        recorder: &mut Recorder,
+        wave: &WaveSet<'_>,
+        stopped: StoppedPlaces,
+        part: u64,
+    ) -> Result<Option<u64>>;
+}
+
+/// The places of a wave's queue: indirect arguments of dispatches over them.
+#[derive(Debug, Clone, Copy)]
+pub struct Places<'a> {
+    /// One invocation a place.
+    pub items: BufferView<'a>,
+    /// One invocation for each [`COMPACT_CHUNK`](crate::gpu::shaders::constants::COMPACT_CHUNK) places.
+    pub chunks: BufferView<'a>,
+    /// One invocation a place where something waits, once the queues are compacted.
+    pub waiting: BufferView<'a>,
+}
+
+/// How many places an arrival stage has stopped at.
+#[derive(Debug, Clone, Copy)]
+pub struct StoppedPlaces {
+    /// Of so many places in the queue.
+    pub places: u32,
+    /// Places with something left to do.
+    pub stopped: u32,
+}

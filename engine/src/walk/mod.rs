@@ -1,0 +1,27 @@
+//! Light's walks through a scene on the device, ray by ray, in waves: eye paths, photons, and whatever a host or a technique begins.
+//!
+//! A [`Walker`] follows a wave of walks to their ends. Its owner says by [`WalkStages`] where walks start, what happens where their rays arrive
+//! and what is done with what waits by place: shadow rays, for which the walker has a stage of its own, or deposits. The rest is the walker's: closest
+//! hits with alpha and media, compaction of the queues, rays that a quota stopped, and submissions as long as a watchdog allows.
+//!
+//! Wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013). Kernels include `walk/wave.glsl` and `walk/draws.glsl`;
+//! the working memory is descriptor set 0, [`WaveSet`]. `tests/tests/embedding/walk.rs` is a technique of a host's own.
+//!
+//! Guarantees: queues keep their order, so that memory is the same bits on every run, whatever the number of threads, the size of waves and the
+//! length of submissions; counts are exact; rays that a quota stopped go on where they were, none is lost.
+
+mod arrival;
+mod compaction;
+mod pace;
+mod stall;
+mod trace;
+mod walker;
+mod wave;
+
+pub use arrival::{ArrivalStage, Places, StoppedPlaces};
+pub use trace::{RAY_QUOTA, ray_quota};
+pub use walker::{Bounce, WalkOptions, WalkStages, Walked, Walker};
+pub use wave::{MediumCounts, SLOTS_MAX, WaveBuffers, WaveNeeds, default_slots, slots_of_device, stage_barrier};
+
+pub use crate::gpu::shaders::sets::WaveSet;
+pub use crate::gpu::shaders::types::WalkKey;

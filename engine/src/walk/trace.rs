@@ -1,0 +1,132 @@
+//! The stages that trace a wave's rays: closest hits, and shadow rays, with what a scene needs of alpha and media.
+//!
+//! One kernel a stage, specialized to the scene: what it lacks is not compiled in, and the bindings of what it lacks hold other buffers.
+
+use super::wave::stage_barrier;
+use crate::Result;
+use crate::gpu::shaders::constants::{NO_MEDIUM, SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
+use crate::gpu::shaders::sets::WaveSet;
+use crate::gpu::shaders::types::WalkKey;
+use crate::gpu::shaders::walk::{extend, shadow};
+use crate::gpu::{BufferView, ComputePipeline, Gpu, Pass, PipelineInfo, SOFTWARE_LOOP_CAP};
+use crate::transport::GpuScene;
+
+/// Loop iterations after which a ray goes on in a later dispatch, where nothing else is asked for: at most half of what a software driver runs.
+pub const RAY_QUOTA: u32 = 32_768;
+
+/// Iterations after which a ray among surfaces with alpha goes on in a later dispatch, at most: a software driver's subgroup of 16 then
+/// stays below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP), even if its lanes take turns.
+const ALPHA_QUOTA_MAX: u32 = 2048;
+
+/// The same where shadow rays pass boundaries of media, up to eight in a dispatch, and with alpha besides, up to two.
+const MEDIA_QUOTA_MAX: u32 = 2048;
+const MEDIA_ALPHA_QUOTA_MAX: u32 = 512;
+
+/// Loop iterations after which a ray in a scene goes on in a later dispatch: as many as were asked for, or as its stages can have.
+///
+/// # Errors
+/// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where a leaf of the scene's index alone takes a software driver too many.
+pub fn ray_quota(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<u32> {
+    // With media half of the iterations are for walks through grids.
+    let (most, iterations) = match (scene.profile().has_alpha(), scene.profile().media.any()) {
+        (false, false) => (u32::MAX, SOFTWARE_LOOP_CAP),
+        (true, false) => (ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP),
+        (false, true) => (MEDIA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES),
+        (true, true) => (MEDIA_ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES_ALPHA),
+    };
+    let filters = scene.profile().has_alpha();
+    scene
+        .index_traversal()
+        .quota_within(gpu.caps(), wanted.min(most), iterations, filters)
+}
+
+/// The kernels of both stages.
+pub(super) struct TracePipelines {
+    extend: ComputePipeline<extend::Kernel>,
+    /// None where no walk has shadow rays.
+    shadow: Option<ComputePipeline<shadow::Kernel>>,
+}
+
+impl TracePipelines {
+    /// For rays that begin, or for those that a quota stopped.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, index_quota: u32, shadows: bool, resumes: bool) -> Result<Self> {
+        let (profile, index_kind) = (scene.profile(), scene.index_traversal().kind());
+        let (has_alpha, has_media) = (profile.has_alpha(), profile.media.any());
+        // Attributes are read for alpha alone.
+        let has_textures = has_alpha && profile.has_textures;
+        let has_vertex_colors = has_alpha && profile.has_vertex_colors;
+        let extend = extend::Spec {
+            has_alpha,
+            has_media,
+            has_textures,
+            has_vertex_colors,
+            index_quota,
+            index_kind,
+            resumes,
+            ..Default::default()
+        };
+        let shadow = shadow::Spec {
+            has_alpha,
+            has_media,
+            has_textures,
+            has_vertex_colors,
+            has_absorption: has_media && profile.has_absorption,
+            has_grids: profile.media.heterogeneous,
+            has_homogeneous: profile.media.homogeneous,
+            index_quota,
+            index_kind,
+            resumes,
+            ..Default::default()
+        };
+        Ok(Self {
+            extend: gpu.compute_pipeline(&extend)?,
+            shadow: shadows.then(|| gpu.compute_pipeline(&shadow)).transpose()?,
+        })
+    }
+
+    pub fn info(&self) -> Vec<PipelineInfo> {
+        let shadow = self.shadow.as_ref().map(ComputePipeline::info);
+        std::iter::once(self.extend.info()).chain(shadow).collect()
+    }
+
+    /// The closest hits of a wave's rays.
+    pub fn record_extend(
+        &self,
+        pass: &mut Pass<'_>,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        key: WalkKey,
+        items: BufferView<'_>,
+    ) -> Result<()> {
+        let (index, set) = (scene.index_set(), scene.scene_set());
+        pass.dispatch_indirect(&self.extend, &[wave, &index, &set], &push(scene, key), items)?;
+        stage_barrier(pass);
+        Ok(())
+    }
+
+    /// The shadow rays of a wave.
+    pub fn record_shadow(
+        &self,
+        pass: &mut Pass<'_>,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        key: WalkKey,
+        rays: BufferView<'_>,
+    ) -> Result<()> {
+        if let Some(shadow) = &self.shadow {
+            let (index, set, media) = (scene.index_set(), scene.scene_set(), scene.media_set());
+            let push = bytemuck::cast(push(scene, key));
+            pass.dispatch_indirect(shadow, &[wave, &index, &set, &media], &push, rays)?;
+            stage_barrier(pass);
+        }
+        Ok(())
+    }
+}
+
+/// What both stages are told.
+fn push(scene: &GpuScene, key: WalkKey) -> extend::Push {
+    extend::Push {
+        key,
+        surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
+    }
+}

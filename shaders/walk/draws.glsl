@@ -1,0 +1,20 @@
+// Random numbers of a walk. Expects: a push-constant block `push` with a WalkKey `key`.
+#ifndef CLERESTORY_WALK_DRAWS_GLSL
+#define CLERESTORY_WALK_DRAWS_GLSL
+
+#include "transport/random.glsl"
+#include "walk/dimensions.glsl"
+
+// The sequence of the walk in a slot, and its place there.
+uint walk_sequence(uint slot) { return push.key.first_sequence + slot / push.key.indices; }
+uint walk_index(uint slot) { return push.key.first_index + slot % push.key.indices; }
+
+Sampler walk_sampler(uint slot, uint dimension) { return Sampler(walk_sequence(slot), walk_index(slot), dimension, push.key.seed); }
+
+// Two numbers of a bounce.
+vec2 bounce_sample(uint slot, uint bounce, uint dimension) {
+    Sampler s = walk_sampler(slot, DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_PER_BOUNCE + dimension);
+    return sample_2d(s);
+}
+
+#endif

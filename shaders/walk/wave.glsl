@@ -1,0 +1,143 @@
+// Working memory of a wave of walks: set 0 of every stage. A walk is light's way through a scene, ray by ray, from an eye or from a light.
+//
+// Walks live in slots; a queue holds the slots that are still alive. What one stage hands to the next within a bounce (hits, flags, what waits)
+// is indexed by the place in the queue. Nothing a walk computes depends on its slot or place, so queue order and wave size
+// never reach the picture.
+//
+// What is handed on is written as a storage buffer and read, by a later dispatch, as a texel buffer over the same memory: software drivers fetch
+// texels for all lanes at once, but load storage buffers lane by lane and word by word. No dispatch reads by one what it writes by the
+// other: queues and slots alternate between two buffers.
+//
+// What waits by place is WAITING_QUARTERS quarters that a stage behind the compaction takes up: a shadow ray (shadow.comp), or whatever a technique keeps
+// of a place.
+#ifndef CLERESTORY_WALK_WAVE_GLSL
+#define CLERESTORY_WALK_WAVE_GLSL
+
+#include "accel/ray.glsl"
+
+// descriptor set 0: WaveSet
+
+const uint STALLED_NOT = 0u;
+const uint STALLED_EXTEND = 1u;
+const uint STALLED_SHADOW = 2u;
+const uint STALLED_ARRIVAL = 3u;  // a stage between arrival and scattering
+
+const uint FLAG_ALIVE = 1u;
+const uint FLAG_WAITING = 2u;  // something waits at the place
+// In scenes with media, which shadow rays a place has: to light scattered once on the way there, and to light sampled at its end.
+const uint FLAG_AIRLIGHT = 4u;
+const uint FLAG_SAMPLED = 8u;
+
+// Four-word texels of a walk's state, and of what waits at a place.
+const uint WALK_STATE_QUARTERS = 3u;
+const uint WAITING_QUARTERS = 3u;
+// Places whose flags one texel holds.
+const uint FLAGS_PER_TEXEL = 4u;
+// Places of the queue that one invocation of the compaction kernels handles.
+const uint COMPACT_CHUNK = 32u;
+// Invocations of a workgroup of every stage.
+const uint WALK_GROUP = 64u;
+
+// What the random numbers of a wave's walks are keyed by: sequences, and walks of each. Of eye paths pixels and their samples, of photons
+// passes and the photons in them.
+struct WalkKey {
+    uint first_sequence;
+    uint first_index;  // in each sequence
+    uint indices;      // of each sequence in the wave, in neighbouring slots
+    uint seed;
+};
+
+struct WalkState {
+    vec3 origin;      // of the ray under way
+    float pdf;        // of its direction, solid angle; 0 after a delta lobe or at the start: emission then counts in full
+    vec3 direction;   // unit
+    uint bounce;      // scattering events so far
+    vec3 throughput;
+    float eta_scale;  // undoes the radiance scaling of refractions for Russian roulette
+};
+
+struct GatheredLight {
+    vec3 radiance;
+    uint interior;  // material of the solid that the walk is inside of, or OUTSIDE
+};
+
+struct ShadowRay {
+    vec3 origin;
+    float t_max;        // from t = 0
+    vec3 direction;
+    uint slot;
+    vec3 contribution;  // radiance if nothing is in between
+    uint bounce;        // scattering events with the one at the light
+};
+
+layout(set = 0, binding = 0, scalar) restrict buffer WaveStatusBlock {
+    uint item_groups[3];     // indirect arguments: one invocation a place
+    uint chunk_groups[3];    // one a chunk
+    uint scatter_groups[3];  // chunk_groups as they were before the last scan
+    uint waiting_groups[3];  // one a waiting place
+    uint active_count;       // places in the queue
+    uint previous_count;     // as it was before the last scan
+    uint waiting_count;      // waiting places of the bounce that the last scan ended
+    uint stalled;            // STALLED_*; every later stage leaves at once
+    uint unfinished;         // rays that a quota stopped
+    uint rounds;             // bounces finished in this wave
+    uint rays[2];            // 64-bit counters, low word first: rays followed to their ends
+    uint waited[2];          // places that have waited
+} status;
+layout(set = 0, binding = 1) uniform utextureBuffer walk_queue_in;
+layout(set = 0, binding = 2, scalar) restrict writeonly buffer WalkQueueOut { uint walk_queue_out[]; };
+layout(set = 0, binding = 3) uniform utextureBuffer walk_states_in;  // by slot
+layout(set = 0, binding = 4, scalar) restrict writeonly buffer WalkStatesOut { WalkState walk_states_out[]; };
+layout(set = 0, binding = 5, scalar) restrict buffer WalkGathered { GatheredLight walk_gathered[]; };  // by slot
+layout(set = 0, binding = 6) uniform utextureBuffer walk_hits_in;  // by place
+layout(set = 0, binding = 7, scalar) restrict buffer WalkHitsOut { Hit walk_hits_out[]; };
+layout(set = 0, binding = 8) uniform utextureBuffer walk_waiting_in;  // by place
+layout(set = 0, binding = 9, scalar) restrict writeonly buffer WalkWaitingOut { uvec4 walk_waiting_out[]; };
+layout(set = 0, binding = 10) uniform utextureBuffer walk_waiting_queue_in;  // places
+layout(set = 0, binding = 11, scalar) restrict writeonly buffer WalkWaitingQueueOut { uint walk_waiting_queue_out[]; };
+layout(set = 0, binding = 12) uniform utextureBuffer walk_flags_in;  // four places a texel
+layout(set = 0, binding = 13, scalar) restrict writeonly buffer WalkFlagsOut { uint walk_flags_out[]; };
+// Where stopped rays go on, by place in the queue of the stage that stalled.
+layout(set = 0, binding = 14, scalar) restrict buffer WalkResume { uint walk_resume[]; };
+layout(set = 0, binding = 15, scalar) restrict buffer WalkChunks { uvec2 walk_chunks[]; };  // walks alive, waiting places
+
+WalkState load_walk(uint slot) {
+    int first = int(WALK_STATE_QUARTERS * slot);
+    vec4 q0 = uintBitsToFloat(texelFetch(walk_states_in, first));
+    uvec4 q1 = texelFetch(walk_states_in, first + 1);
+    vec4 q2 = uintBitsToFloat(texelFetch(walk_states_in, first + 2));
+    return WalkState(q0.xyz, q0.w, uintBitsToFloat(q1.xyz), q1.w, q2.xyz, q2.w);
+}
+
+Hit load_hit(uint place) {
+    uvec4 q = texelFetch(walk_hits_in, int(place));
+    return Hit(uintBitsToFloat(q.x), uintBitsToFloat(q.yz), q.w);
+}
+
+ShadowRay load_shadow_ray(uint place) {
+    int first = int(WAITING_QUARTERS * place);
+    vec4 q0 = uintBitsToFloat(texelFetch(walk_waiting_in, first));
+    uvec4 q1 = texelFetch(walk_waiting_in, first + 1);
+    uvec4 q2 = texelFetch(walk_waiting_in, first + 2);
+    return ShadowRay(q0.xyz, q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), q2.w);
+}
+
+// Lets something wait at a place, which FLAG_WAITING must say.
+void store_waiting(uint place, uvec4 q0, uvec4 q1, uvec4 q2) {
+    uint first = WAITING_QUARTERS * place;
+    walk_waiting_out[first] = q0;
+    walk_waiting_out[first + 1u] = q1;
+    walk_waiting_out[first + 2u] = q2;
+}
+
+void store_shadow_ray(uint place, ShadowRay ray) {
+    store_waiting(place, uvec4(floatBitsToUint(ray.origin), floatBitsToUint(ray.t_max)), uvec4(floatBitsToUint(ray.direction), ray.slot),
+                  uvec4(floatBitsToUint(ray.contribution), ray.bounce));
+}
+
+// The slot at a place: in the first bounce, the place.
+uint load_slot(uint place) { return status.rounds == 0u ? place : texelFetch(walk_queue_in, int(place)).x; }
+
+#include "walk/media.glsl"
+
+#endif

@@ -1,0 +1,168 @@
+//! A wavefront technique of a host's own: its kernels begin and scatter walks, and the engine's walker follows them.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use clerestory::gpu::shaders::types::GatheredLight;
+use clerestory::gpu::{ComputePipeline, DeviceKind, Recorder};
+use clerestory::scene::{Material, Scene};
+use clerestory::transport::{GpuScene, surface_spec};
+use clerestory::walk::{
+    Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveNeeds, WaveSet, stage_barrier,
+};
+use clerestory::{Error, Result};
+use clerestory_tests::render::{floor, upload};
+use clerestory_tests::shaders::{walk_ambient, walk_start};
+use clerestory_tests::with_gpu;
+use glam::Vec3;
+
+/// Points of the row on the floor, m.
+const POINTS: [f64; 4] = [0.0, 0.5, 1.0, 1.5];
+/// Walks of each.
+const WALKS: u32 = 1 << 14;
+/// Half a side of the square ceiling, and how high it is, m.
+const CEILING: [f64; 2] = [0.75, 1.0];
+const ALBEDO: f64 = 0.5;
+
+/// What of a host's technique the walker calls.
+struct Ambient<'a> {
+    scene: &'a GpuScene,
+    start: &'a ComputePipeline<walk_start::Kernel>,
+    scatter: &'a ComputePipeline<walk_ambient::Kernel>,
+    key: WalkKey,
+    walks: u32,
+}
+
+impl WalkStages for Ambient<'_> {
+    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+        let push = walk_start::Push {
+            first: [POINTS[0] as f32, 0.5, 0.0],
+            walks: self.walks,
+            along: [(POINTS[1] - POINTS[0]) as f32, 0.0, 0.0],
+            // The same words, generated in the crate of either kernel.
+            key: bytemuck::cast(self.key),
+            direction: [0.0, -1.0, 0.0],
+        };
+        recorder.pass("ambient: start", |pass| {
+            let groups = [self.start.groups_for(self.walks), 1, 1];
+            pass.dispatch(self.start, &[wave], &push, groups)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        let [lower, upper] = self.scene.bounds();
+        let push = walk_ambient::Push {
+            scene_lower: lower.to_array(),
+            scene_upper: upper.to_array(),
+            // The same words, generated in the crate of either kernel.
+            key: bytemuck::cast(self.key),
+        };
+        recorder.pass("ambient: scatter", |pass| {
+            let scene = self.scene.scene_set();
+            pass.dispatch_indirect(self.scatter, &[&bounce.wave, &scene], &push, bounce.places.items)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        bounce.record_shadow(recorder)
+    }
+}
+
+/// A floor under a square ceiling.
+fn scene() -> Scene {
+    let mut scene = Scene::default();
+    let material = scene.add_material(Material::lambert("grey", Vec3::splat(ALBEDO as f32)));
+    scene.place(floor("floor", material, 20.0, 0.0));
+    scene.place(floor("ceiling", material, CEILING[0] as f32, CEILING[1] as f32));
+    scene
+}
+
+/// The share of a cosine-weighted hemisphere about the vertical at x on the floor that the ceiling fills: the form factor of a parallel rectangle, by its
+/// corners (Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-3).
+fn occlusion(x: f64) -> f64 {
+    let [half, height] = CEILING;
+    let corner = |a: f64, b: f64| {
+        let (a, b) = (a / height, b / height);
+        let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+        (a / ra * (b / ra).atan() + b / rb * (a / rb).atan()) / (2.0 * PI)
+    };
+    corner(half - x, half) - corner(-half - x, half) - corner(half - x, -half) + corner(-half - x, -half)
+}
+
+#[test]
+fn walks_of_the_hosts_own_gather_ambient_light_as_the_form_factor_has_it() {
+    with_gpu(|gpu| {
+        let scene = upload(gpu, &scene());
+        let start = gpu.compute_pipeline::<walk_start::Kernel>(&()).unwrap();
+        let spec = surface_spec!(walk_ambient, scene, {
+            has_alpha: false,
+            has_media: false,
+            ..Default::default()
+        });
+        let scatter = gpu.compute_pipeline::<walk_ambient::Kernel>(&spec).unwrap();
+        let walks = WALKS * POINTS.len() as u32;
+        let needs = WaveNeeds {
+            waiting: true,
+            media: false,
+            airlight: false,
+        };
+        let mut seen = Vec::new();
+        // One bounce a submission, and all in one.
+        for bounces in [1, 4] {
+            let buffers = WaveBuffers::new(gpu, walks, needs).unwrap();
+            let options = WalkOptions {
+                name: "ambient",
+                bounces,
+                ..WalkOptions::default()
+            };
+            let mut walker = Walker::new(gpu, Arc::clone(&scene), buffers, options).unwrap();
+            let key = WalkKey {
+                first_sequence: 0,
+                first_index: 0,
+                indices: WALKS,
+                seed: 11,
+            };
+            let mut stages = Ambient {
+                scene: &scene,
+                start: &start,
+                scatter: &scatter,
+                key,
+                walks,
+            };
+            let walked = walker.run(key, walks, &mut stages).unwrap();
+            // Each meets the floor, sends a shadow ray, and goes on once.
+            assert_eq!((walked.rays, walked.waited), (2 * u64::from(walks), u64::from(walks)));
+            assert_eq!(walked.stalls, 0);
+            let passes = walked.timings.iter().map(|timings| timings.count("ambient: shadow"));
+            let expected: &[usize] = if bounces == 1 { &[1, 1] } else { &[4] };
+            // Other devices are given less at first.
+            if gpu.caps().kind == DeviceKind::Cpu {
+                assert_eq!(passes.collect::<Vec<_>>(), expected);
+            }
+            let gathered = gpu.read::<GatheredLight>(walker.buffers().gathered(), walks as usize);
+            let radiance: Vec<[f32; 3]> = gathered.unwrap().iter().map(|light| light.radiance).collect();
+            seen.push(radiance);
+            let refused = walker.run(key, walks + 1, &mut stages).unwrap_err();
+            assert!(matches!(&refused, Error::Setting { .. }), "{refused}");
+        }
+        assert!(seen[0] == seen[1], "submissions show");
+        for (x, walks) in POINTS.iter().zip(seen[0].chunks(WALKS as usize)) {
+            // Any hit and closest hit must agree on every walk.
+            assert!(
+                walks
+                    .iter()
+                    .all(|w| w[0] == w[1] && (w[0] == 0.0 || w[0] == ALBEDO as f32))
+            );
+            let open = walks.iter().filter(|w| w[0] > 0.0).count() as f64 / walks.len() as f64;
+            let expected = 1.0 - occlusion(*x);
+            let deviation = (expected * (1.0 - expected) / walks.len() as f64).sqrt();
+            // Four points, each beyond 4.9 deviations once in a million.
+            let z = (open - expected) / deviation;
+            assert!(z.abs() < 4.9, "at {x} m {open} is open instead of {expected}, z {z}");
+        }
+    });
+}
