@@ -4,7 +4,7 @@
 #define CLERESTORY_TRANSPORT_ARRIVAL_GLSL
 
 #include "scene/bindings.glsl"
-#include "transport/path_buffers.glsl"
+#include "transport/outside.glsl"
 #include "transport/surface.glsl"
 
 struct Arrival {

@@ -11,6 +11,7 @@
 #define CLERESTORY_TRANSPORT_PATH_BUFFERS_GLSL
 
 #include "accel/ray.glsl"
+#include "transport/outside.glsl"
 
 // descriptor set 0: PathBuffers
 
@@ -24,8 +25,6 @@ const uint FLAG_SHADOW = 2u;
 // In scenes with media, which shadow rays a place has: to light scattered once on the way there, and to light sampled at its end.
 const uint FLAG_AIRLIGHT = 4u;
 const uint FLAG_SAMPLED = 8u;
-
-const uint OUTSIDE = 0xFFFFFFFFu;
 
 // Four-word texels of a path's state and of a shadow ray.
 const uint PATH_STATE_QUARTERS = 3u;

@@ -4,6 +4,7 @@
 
 #include "transport/path_features.glsl"
 #include "transport/arrival.glsl"
+#include "transport/path_buffers.glsl"
 #include "transport/path_set.glsl"
 
 layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
