@@ -78,25 +78,6 @@ pub struct SettingsDecl {
     check: fn(&Value) -> Result<()>,
 }
 
-/// For techniques without settings.
-impl TypedSettings for () {
-    fn infos() -> Vec<SettingInfo> {
-        Vec::new()
-    }
-
-    fn to_json(&self) -> Value {
-        Value::Object(Map::new())
-    }
-
-    fn set(&mut self, _: &str, _: &Value) -> Result<bool> {
-        Ok(false)
-    }
-
-    fn check(&self) -> Result<()> {
-        Ok(())
-    }
-}
-
 impl SettingsDecl {
     /// No settings.
     pub const NONE: Self = Self::of::<()>();
