@@ -1,4 +1,4 @@
-//! What the viewer shows: a path-traced picture that grows better with every frame.
+//! What the viewer shows: a picture that grows better with every frame, by any technique that can render the scene.
 
 use std::time::{Duration, Instant};
 
@@ -6,6 +6,8 @@ use clerestory::Result;
 use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
 use clerestory::render::{RenderOptions, Renderer, Rendering};
+use clerestory::settings::Settings;
+use clerestory::techniques::{self, Card};
 
 use crate::orbit::{Orbit, Pose};
 
@@ -22,6 +24,9 @@ pub struct Progressive {
     exposure: f32,
     format: PixelFormat,
     state: Option<State>,
+    /// Techniques that can render the scene on the device, and the number of the one at work.
+    able: Vec<&'static Card>,
+    at: usize,
 }
 
 struct State {
@@ -50,7 +55,19 @@ impl Progressive {
     /// A picture of the renderer's scene, by the camera and with the settings of `options` (size and samples are the window's matter);
     /// with bytes in the order of `format`. `exposure` is in stops.
     pub fn new(gpu: &Gpu, renderer: Renderer, options: RenderOptions, exposure: f32, format: PixelFormat) -> Self {
+        let offered = |card: &Card| {
+            let mut needs = card.needs.iter();
+            needs.all(|need| techniques::offers(gpu.caps(), need) == Some(true))
+        };
+        let able: Vec<_> = techniques::all()
+            .iter()
+            .filter(|card| offered(card) && (card.refusals)(renderer.gpu_scene().profile()).is_empty())
+            .collect();
+        let wanted = options.technique.as_deref();
+        let at = able.iter().position(|card| Some(card.id) == wanted).unwrap_or(0);
         Self {
+            able,
+            at,
             gpu: gpu.clone(),
             renderer,
             options: RenderOptions {
@@ -60,6 +77,25 @@ impl Progressive {
             exposure,
             format,
             state: None,
+        }
+    }
+
+    /// The technique's id.
+    pub fn technique(&self) -> &str {
+        self.options
+            .technique
+            .as_deref()
+            .or(self.able.get(self.at).map(|card| card.id))
+            .unwrap_or_default()
+    }
+
+    /// Goes on to the next technique that can render the scene, with its default settings.
+    pub fn next_technique(&mut self) {
+        self.at = (self.at + 1) % self.able.len().max(1);
+        if let Some(card) = self.able.get(self.at) {
+            self.options.technique = Some(card.id.into());
+            self.options.settings = Settings::default();
+            self.state = None;
         }
     }
 

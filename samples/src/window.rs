@@ -87,17 +87,20 @@ pub struct Options {
     size: Option<[u32; 2]>,
     frames: Option<u32>,
     resize: Option<[u32; 2]>,
+    /// Typed half-way.
+    keys: String,
     screenshot: Option<PathBuf>,
 }
 
 impl Options {
     /// The options there are.
-    pub const NAMES: [&str; 6] = [
+    pub const NAMES: [&str; 7] = [
         "--camera",
         "--exposure",
         "--size",
         "--frames",
         "--resize",
+        "--keys",
         "--screenshot",
     ];
 
@@ -113,6 +116,7 @@ impl Options {
             size: given.size("--size")?,
             frames: given.value("--frames")?,
             resize: given.size("--resize")?,
+            keys: given.text("--keys").unwrap_or_default().into(),
             screenshot: given.text("--screenshot").map(Into::into),
         })
     }
@@ -301,11 +305,16 @@ impl<S: Show, M> Program<S, M> {
             }
         }
         open.window.request_redraw();
+        if self.options.frames.is_some_and(|frames| self.shown >= frames / 2) {
+            for key in std::mem::take(&mut self.options.keys).chars() {
+                self.key(events, &Key::Character(key.to_string().into()));
+            }
+        }
     }
 
-    fn key(&mut self, events: &ActiveEventLoop, event: &KeyEvent) {
+    fn key(&mut self, events: &ActiveEventLoop, key: &Key) {
         let Some(open) = &mut self.open else { return };
-        match &event.logical_key {
+        match key {
             Key::Named(NamedKey::Escape) => self.leave(events, Ok(())),
             Key::Character(text) if text.eq_ignore_ascii_case("r") => open.orbit.reset(),
             other => open.show.key(other),
@@ -343,9 +352,15 @@ impl<S: Show, M: FnOnce(&Canvas<'_>) -> Result<S>> ApplicationHandler for Progra
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         match event {
             WindowEvent::CloseRequested => self.leave(events, Ok(())),
-            WindowEvent::KeyboardInput { event, .. } if event.state == ElementState::Pressed => {
-                self.key(events, &event);
-            }
+            WindowEvent::KeyboardInput {
+                event:
+                    KeyEvent {
+                        logical_key,
+                        state: ElementState::Pressed,
+                        ..
+                    },
+                ..
+            } => self.key(events, &logical_key),
             WindowEvent::ModifiersChanged(modifiers) => self.shift = modifiers.state().shift_key(),
             WindowEvent::RedrawRequested => self.redraw(events),
             WindowEvent::MouseInput { state, button, .. } => {

@@ -301,6 +301,33 @@ fn the_viewer_takes_orthographic_cameras_and_models_without_any() {
 }
 
 #[test]
+fn the_viewer_goes_through_the_techniques() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    let shown = |arguments: &[&str]| {
+        let output = viewer(&[arguments, &["--size", "48x48", "--frames", "4"]].concat(), &path);
+        assert!(output.status.success(), "{}", said(&output));
+        (mean(&open(&path), [0.0, 1.0], [0.0, 1.0]), said(&output))
+    };
+    let lit = "builtin:cornell-box?source=point";
+    let (path_traced, text) = shown(&[lit]);
+    assert!(text.contains("path, "), "{text}");
+    let (drawn, text) = shown(&[lit, "--technique", "photon", "--keys", "T"]);
+    assert!(text.contains("preview, "), "{text}");
+    // Direct light alone.
+    assert!(
+        drawn[1] > 10.0 && drawn[1] < path_traced[1],
+        "{drawn:?} {path_traced:?}"
+    );
+    // One beside the path tracer and photon mapping, and around.
+    let (_, text) = shown(&[lit, "--keys", "ttt"]);
+    assert!(text.contains("path, "), "{text}");
+    // What cannot render the scene is left out.
+    let (_, text) = shown(&["builtin:cornell-box", "--keys", "tt"]);
+    assert!(text.contains("path, "), "{text}");
+}
+
+#[test]
 fn the_viewer_refuses_what_it_does_not_know() {
     for arguments in [
         ["--frames", "many"],

@@ -13,13 +13,15 @@ fn fault(case: &HardCase, subject: &Subject, outcome: &Outcome) -> Option<String
         (Verdict::Fails, _) => false,
         (Verdict::Pass, Subject::Technique { info, .. }) => info.id != "path" || case.documented.is_none(),
         (Verdict::Pass, _) => true,
-        // What a technique refuses it says beforehand of the scene that the case shows.
+        // What a technique refuses it says beforehand of the scene that the case shows; one that shows a part of the light may refuse another of
+        // the case's scenes.
         (Verdict::Degrades, Subject::Technique { info, .. }) if outcome.refused => {
-            (case.picture)().is_ok_and(|scene| !(info.refusals)(&SceneProfile::of(&scene)).is_empty())
+            let shown = (case.picture)().map(|scene| (info.refusals)(&SceneProfile::of(&scene)));
+            subject.limits().is_some() || shown.is_ok_and(|reasons| !reasons.is_empty())
         }
         (Verdict::Degrades, _) => {
-            let documented = case.documented_of(subject);
-            documented.is_some() && outcome.reason.as_deref() == documented
+            let documented = case.documented_of(subject).map(str::to_owned);
+            outcome.reason.is_some() && (outcome.reason == documented || outcome.reason == subject.limits())
         }
     };
     (!expected).then(|| format!("{outcome:?}"))

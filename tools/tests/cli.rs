@@ -191,6 +191,38 @@ fn indexes_are_compared_also_where_the_device_cannot_build_one() -> Tested {
 }
 
 #[test]
+fn frame_methods_are_rendered_as_other_techniques() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let picture = folder.path().join("p.exr");
+    let scene = "builtin:cornell-box?source=point";
+    let small = [
+        "render",
+        scene,
+        "--technique",
+        "preview",
+        "--size",
+        "16x16",
+        "--spp",
+        "3",
+        "--stats",
+        "json",
+    ];
+    let output = succeed(&[&small[..], &["--path-set", "bounces=0..1", "-o", text(&picture)]].concat())?;
+    let report = json(&output.stdout)?;
+    assert_eq!(
+        (&report["technique"], &report["path_set"]),
+        (&"preview".into(), &"bounces=0..1".into())
+    );
+    assert_eq!(report["counters"]["frames"], 3);
+    assert_eq!(report["settings"]["shadow_layout"], "octahedron");
+    assert!(picture.exists());
+    let refused = |more: &[&str], code, words: &[&str]| refuse(&[&small[..], more].concat(), code, words);
+    refused(&["--path-set", "direct"], 2, &["preview has no --path-set"])?;
+    refused(&["--settings", "{\"shadow_side\": 0}"], 2, &["shadow"])?;
+    Ok(())
+}
+
+#[test]
 fn settings_reach_the_technique_and_the_reference_is_measured() -> Tested {
     let folder = tempfile::tempdir()?;
     let (reference, settings) = (folder.path().join("r.exr"), folder.path().join("settings.json"));

@@ -6,6 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use clerestory::film::exr;
+use clerestory::gpu::{Access, Gpu, GpuOptions, PipelineInfo, Recorder};
+use clerestory::settings::SettingsDecl;
+use clerestory::techniques::{Accumulated, Bias, Card, Frame, FrameMethod, FrameTarget};
+use clerestory::transport::PathSet;
+use clerestory_tools::experiments::render_sweep::{self, Places};
+use clerestory_tools::experiments::sweep::Cards;
+use clerestory_tools::experiments::watch::Unwatched;
+use clerestory_tools::experiments::{self, Kind};
 
 type Tested = Result<(), Box<dyn std::error::Error>>;
 
@@ -220,5 +228,87 @@ fn scenes_for_a_measure_with_its_own_are_refused() -> Tested {
     let output = Bench::new()?.run(experiment, &["--scene", "builtin:cornell-box"])?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(!output.status.success() && said.contains("leave out --scene"), "{said}");
+    Ok(())
+}
+
+/// A host's own technique: every pixel has the same radiance.
+struct Plain;
+
+impl FrameMethod for Plain {
+    fn record(&mut self, recorder: &mut Recorder, _: &Frame<'_>, target: &FrameTarget<'_>) -> clerestory::Result<()> {
+        recorder.pass("plain: fill", |pass| {
+            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_WRITE);
+            pass.fill(target.radiance.view(), 0.5f32.to_bits())?;
+            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+            Ok(())
+        })
+    }
+
+    fn path_set(&self) -> PathSet {
+        PathSet::EMITTED
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        Vec::new()
+    }
+}
+
+static PLAIN: Card = Card {
+    id: "plain",
+    summary: "the same radiance everywhere",
+    rows: &[],
+    bias: Bias::Biased("looks at nothing"),
+    needs: &[],
+    kernels: &[],
+    path_set: PathSet::EMITTED,
+    refusals: |_| Vec::new(),
+    settings: SettingsDecl::NONE,
+    variants: &[],
+    create: |gpu, _, view, _| Accumulated::boxed(gpu, view, Plain),
+};
+
+#[test]
+fn sweeps_take_techniques_of_a_host() -> Tested {
+    let bench = Bench::new()?;
+    let file = bench.folder.path().join("host.toml");
+    std::fs::write(
+        &file,
+        TEXT.replace("size =", "path_set = \"emitted\"\nsize =")
+            .replace("settings = { sampler = \"pcg\" }\n", ""),
+    )?;
+    let experiment = experiments::find(&file.display().to_string())?;
+    let Kind::Sweep(sweep) = experiment.kind()? else {
+        return Err("no sweep".into());
+    };
+    let mut sweep = sweep.clone();
+    sweep.variants[0].technique = "plain".into();
+    assert!(sweep.check().is_err_and(|error| error.to_string().contains("plain")));
+    sweep.cards = Cards(vec![&PLAIN]);
+    let places = Places {
+        folder: bench.out(),
+        references: bench.folder.path().join("references"),
+        fresh: false,
+    };
+    let gpu = Gpu::headless(&GpuOptions::default())?;
+    let load = |address: &str| clerestory::scene::load(address);
+    let results = render_sweep::run(&gpu, &experiment, &sweep, false, &places, &load, &Unwatched)?;
+    let variant = &results.scenes[0].variants[0];
+    assert_eq!((variant.technique.as_str(), variant.points.len()), ("plain", 2));
+    let reference = results.scenes[0].reference_picture.main_layer()?.values();
+    let squares = reference.iter().map(|value| (f64::from(*value) - 0.5).powi(2));
+    let expected = squares.sum::<f64>() / reference.len() as f64;
+    for point in &variant.points {
+        for measured in &point.measurements {
+            assert!((measured.error.mse + measured.error.reference_mse - expected).abs() < 1e-6 * expected);
+            assert_eq!(measured.counters["frames"] as f64, measured.samples);
+        }
+    }
+    // Another path set than its own is refused, not compared.
+    sweep.path_set = "all".into();
+    assert!(
+        sweep
+            .check()
+            .is_err_and(|error| error.to_string().contains("no others"))
+    );
     Ok(())
 }

@@ -62,8 +62,6 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::scene::sidecar::ROWS,
     crate::scene::tangents::ROWS,
     crate::scene::texture::ROWS,
-    crate::techniques::preview::live::ROWS,
-    crate::techniques::preview::ROWS,
     crate::transport::albedo::ROWS,
     crate::transport::bsdf::ROWS,
     crate::transport::differentials::ROWS,

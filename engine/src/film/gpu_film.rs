@@ -4,14 +4,20 @@
 //! so sums stay exact for millions of samples. Pixels are split into bands, each with buffers of its own, so that no picture's size meets
 //! `maxStorageBufferRange`. Deterministic as long as each pixel is added to by one invocation at a time, in order.
 
+use std::sync::OnceLock;
+
 use super::accumulate::TwoFloat;
 use super::picture::{ALBEDO, DEPTH, NORMAL, NonFiniteSamples, Picture, RADIANCE, SAMPLES, VARIANCE};
 use super::pixel_format::PixelFormat;
+use crate::gpu::interface::ComputeShader;
 use crate::gpu::shaders::constants::{AOV_ALBEDO, AOV_DEPTH, AOV_NORMAL};
-use crate::gpu::shaders::film::display;
+use crate::gpu::shaders::film::{add_frame, display};
 use crate::gpu::shaders::sets::FilmSet;
 use crate::gpu::shaders::types::{FilmAov, FilmPixel};
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu, Recorder, Timings, rw_compute_to_compute};
+use crate::gpu::{
+    Access, Buffer, BufferBarrier, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, Timings,
+    rw_compute_to_compute,
+};
 use crate::{Error, Result};
 
 /// Pixels of one band.
@@ -35,6 +41,9 @@ pub struct GpuFilm {
     size: [u32; 2],
     aovs: bool,
     bands: Vec<FilmBand>,
+    /// Made when they are first needed.
+    display: OnceLock<ComputePipeline<display::Kernel>>,
+    add_frame: OnceLock<ComputePipeline<add_frame::Kernel>>,
 }
 
 /// Consecutive pixels, by rows from the top, that share buffers.
@@ -70,6 +79,8 @@ impl GpuFilm {
             size,
             aovs,
             bands,
+            display: OnceLock::new(),
+            add_frame: OnceLock::new(),
         };
         film.clear()?;
         Ok(film)
@@ -163,6 +174,52 @@ impl GpuFilm {
         Ok((picture, left_out))
     }
 
+    /// Records the addition of a picture: to each pixel one sample, `radiance` of which holds three f32 a pixel, rows from the top. What compute
+    /// shaders have written there is waited for; afterwards they may write there again, and what was added is visible to them and to copies. Samples with NaNs or infinities are counted by kind and left out.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when the buffer is too small; [`Error::MissingBarrier`] in debug builds.
+    pub fn record_frame(&self, recorder: &mut Recorder, radiance: &Buffer) -> Result<()> {
+        let bytes = size_of::<[f32; 3]>() as u64 * u64::from(self.size[0]) * u64::from(self.size[1]);
+        if radiance.bytes() < bytes {
+            let cause = format!("has {} bytes; the picture needs {bytes}", radiance.bytes());
+            return Err(Error::setting("radiance", radiance.name(), cause));
+        }
+        let kernel = kept(&self.gpu, &self.add_frame)?;
+        recorder.pass("film: add frame", |pass| {
+            pass.barrier(&[BufferBarrier {
+                buffer: radiance,
+                from: Access::COMPUTE_WRITE,
+                to: Access::COMPUTE_READ,
+            }]);
+            for band in &self.bands {
+                let push = add_frame::Push {
+                    first_pixel: band.first_pixel,
+                    pixel_count: band.pixels,
+                };
+                let set = add_frame::Set0 {
+                    radiance: radiance.view(),
+                };
+                pass.dispatch(
+                    kernel,
+                    &[&set, &band.set()],
+                    &push,
+                    [kernel.groups_for(band.pixels), 1, 1],
+                )?;
+            }
+            pass.memory_barrier(
+                Access::COMPUTE,
+                Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,
+            );
+            Ok(())
+        })
+    }
+
+    /// The kernel that adds pictures, once one was added.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.add_frame.get().map(ComputePipeline::info).into_iter().collect()
+    }
+
     /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
     /// and sRGB-encoded.
     ///
@@ -192,7 +249,7 @@ impl GpuFilm {
             let cause = format!("has {} bytes; the picture needs {bytes}", target.bytes());
             return Err(Error::setting("target", target.name(), cause));
         }
-        let kernel = self.gpu.compute_pipeline::<display::Kernel>(&())?;
+        let kernel = kept(&self.gpu, &self.display)?;
         recorder.pass("film: display", |pass| {
             for band in &self.bands {
                 let push = display::Push {
@@ -205,7 +262,7 @@ impl GpuFilm {
                     film_pixels: band.sums.view(),
                     display_pixels: target.view(),
                 };
-                pass.dispatch(&kernel, &[&set], &push, [kernel.groups_for(band.pixels), 1, 1])?;
+                pass.dispatch(kernel, &[&set], &push, [kernel.groups_for(band.pixels), 1, 1])?;
                 pass.barrier(&[rw_compute_to_compute(target)]);
             }
             Ok(())
@@ -246,6 +303,18 @@ impl FilmBand {
             film_aovs: self.aovs.view(),
         }
     }
+}
+
+/// The kernel, made now if it was not before.
+fn kept<'a, K: ComputeShader<Spec = ()>>(
+    gpu: &Gpu,
+    place: &'a OnceLock<ComputePipeline<K>>,
+) -> Result<&'a ComputePipeline<K>> {
+    if let Some(kernel) = place.get() {
+        return Ok(kernel);
+    }
+    let made = gpu.compute_pipeline::<K>(&())?;
+    Ok(place.get_or_init(|| made))
 }
 
 /// Mean and variance of the mean, per channel; zero for a pixel without samples.

@@ -49,7 +49,8 @@ use crate::maps::{Parametrization, Texel};
 use crate::{Error, Result};
 
 /// How directions lie in the map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ShadowLayout {
     /// Six square faces.
     Cube,

@@ -35,12 +35,17 @@ impl View {
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used.
     pub fn of_camera(camera: &Camera, surfaces: &Surfaces<'_>, area: Area) -> Result<Self> {
-        let frame = CameraFrame::new(camera, area.size)?;
+        Self::of_frame(&CameraFrame::new(camera, area.size)?, surfaces, area)
+    }
+
+    /// As [`View::of_camera`], of a frame whose middle may lie beside its axis.
+    pub(crate) fn of_frame(frame: &CameraFrame, surfaces: &Surfaces<'_>, area: Area) -> Result<Self> {
         let axis = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let forward = axis(frame.forward);
+        let [beside, above] = frame.skew.map(f64::from);
         let rows = [
-            axis(frame.right) / f64::from(frame.half_width),
-            -axis(frame.up) / f64::from(frame.half_height),
+            (axis(frame.right) - beside * forward) / f64::from(frame.half_width),
+            (above * forward - axis(frame.up)) / f64::from(frame.half_height),
             forward,
         ];
         let origin = Vec3::from_array(frame.origin);

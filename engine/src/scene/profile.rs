@@ -316,6 +316,12 @@ impl SceneProfile {
         self.emissive_triangles > 0
     }
 
+    /// Whether anything but the environment is a light.
+    pub fn shines(&self) -> bool {
+        let lights = self.lights;
+        self.has_area_lights() || lights.point + lights.spot + lights.directional > 0
+    }
+
     /// Whether there is light from infinity.
     pub fn has_environment(&self) -> bool {
         self.environment != EnvironmentUse::Absent
@@ -324,6 +330,11 @@ impl SceneProfile {
     /// Whether some material transmits specularly.
     pub fn has_transmission(&self) -> bool {
         self.transmission.solid || self.transmission.thin
+    }
+
+    /// Whether no surface lets light through.
+    pub fn is_opaque(&self) -> bool {
+        !self.has_alpha() && !self.has_transmission()
     }
 
     /// Whether alpha matters.

@@ -79,6 +79,9 @@ pub struct SettingsDecl {
 }
 
 impl SettingsDecl {
+    /// No settings.
+    pub const NONE: Self = Self::of::<()>();
+
     /// Those of a type.
     pub const fn of<T: TypedSettings>() -> Self {
         Self {

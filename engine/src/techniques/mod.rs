@@ -3,20 +3,23 @@
 //! [`all`] lists the engine's own. Each says what it needs of a device, which scenes it can model (and refuses the others with the
 //! reason), which light paths its picture contains, and whether and how it is biased.
 //!
-//! [`preview`] is none of them: it draws one picture a frame into command buffers that its caller records, with nothing to add up.
+//! There are two kinds with one face, [`Technique`]. *Progressive* ones implement it: bounded steps add whole samples to a film. A [`FrameMethod`] draws one
+//! picture a frame, into a command buffer of the engine or of a host; [`Accumulated`] makes a technique of it. Whatever takes a technique takes both.
 //!
 //! # How to add one
 //!
-//! 1. A type with settings, pipelines, working memory and a [`GpuFilm`](crate::film::GpuFilm), made from a [`Gpu`], a [`GpuScene`] and a
-//!    [`View`]. [`PathTracer`](crate::techniques::PathTracer) shows the pattern: a file each for the settings (declared by
-//!    [`settings!`](crate::settings!)), the pipelines (specialized to [`GpuScene::profile`]), the working memory and the recording of passes.
-//! 2. [`Technique`] for it: each [`step`](Technique::step) is a bounded piece of work that adds whole samples to the film, in an order
-//!    that depends on settings and seed alone. What the scene does not need is left out, and said by [`skipped`](Technique::skipped).
-//! 3. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
-//! 4. In the engine: a folder of this one whose `card.rs` has the constant, with the technique's rows of the
-//!    [`catalogue`](crate::catalogue), and its line in [`all`]. In a host: nothing more; [`Renderer::start_technique`](crate::render::Renderer::start_technique) takes the constant as it is.
+//! `CONTRIBUTING.md` says it in one page, with [`ambient`] as the example: a folder here and one of the same name in `shaders/techniques/`, a test, an
+//! experiment, and the module's two lines in this file. In a host there is nothing to list:
+//! [`Renderer::start_technique`](crate::render::Renderer::start_technique) takes a [`Card`] as it is.
+//!
+//! 1. A frame method: a type with pipelines, specialized to [`GpuScene::profile`], that implements [`FrameMethod`]. A progressive technique: a type with settings,
+//!    pipelines, working memory and a [`GpuFilm`](crate::film::GpuFilm) that implements [`Technique`]; [`PathTracer`] shows the pattern. What the scene does not
+//!    need is left out, and said by `skipped`.
+//! 2. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
 
+pub mod ambient;
 mod features;
+pub mod frame;
 pub mod path;
 pub mod photon_mapping;
 pub mod preview;
@@ -37,6 +40,7 @@ use crate::{Error, Result};
 
 pub use crate::card::Bias;
 pub use features::{Lack, lacks, offers};
+pub use frame::{Accumulated, Frame, FrameMethod, FrameTarget};
 pub use path::{PathTracer, PathTracerSettings};
 
 /// A technique as the catalogue knows it.
@@ -79,6 +83,14 @@ pub struct Variant {
 
 /// Makes a technique for a view, with its settings, which [`Settings::read`] makes its own struct.
 pub type Create = fn(&Gpu, Arc<GpuScene>, &View<'_>, &Settings) -> Result<Box<dyn Technique>>;
+
+impl Variant {
+    /// The defaults.
+    pub const DEFAULTS: Self = Self {
+        name: "defaults",
+        settings: || serde_json::json!({}),
+    };
+}
 
 impl std::fmt::Debug for Card {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -152,7 +164,12 @@ pub struct Skipped {
 
 /// Every technique of the engine.
 pub fn all() -> &'static [Card] {
-    &[path::card::CARD, photon_mapping::card::CARD]
+    &[
+        path::card::CARD,
+        photon_mapping::card::CARD,
+        preview::card::CARD,
+        ambient::CARD,
+    ]
 }
 
 /// The technique of that id.
@@ -165,6 +182,15 @@ pub fn by_id(id: &str) -> Result<&'static Card> {
         Error::setting("technique", id, format!("is unknown; there is: {}", ids.join(", ")))
     })
 }
+
+/// The reasons that hold: what [`Card::refusals`] returns.
+pub fn reasons(all: &[(bool, &str)]) -> Vec<String> {
+    let holding = all.iter().filter(|(holds, _)| *holds);
+    holding.map(|(_, reason)| (*reason).to_owned()).collect()
+}
+
+/// The setting that restricts pictures to a part of the light paths.
+const PATH_SET: &str = "path_set";
 
 impl Card {
     /// Prepares the technique for a view, with its settings.
@@ -182,6 +208,7 @@ impl Card {
         features::check(gpu.caps(), self)?;
         let mut reasons = (self.refusals)(scene.profile());
         reasons.extend(self.path_set_refusal(settings));
+        let settings = &self.without_path_set(settings);
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
                 technique: self.id.into(),
@@ -191,9 +218,30 @@ impl Card {
         (self.create)(gpu, scene, view, settings)
     }
 
-    /// Why the path set in settings cannot be rendered, if it can be read and is no part of the technique's own.
+    /// Settings without a path set that says no more than the technique's own does, for one that has no such setting.
+    fn without_path_set(&self, settings: &Settings) -> Settings {
+        let mut json = settings.to_json();
+        let named = json.get(PATH_SET).and_then(|text| text.as_str()?.parse().ok());
+        if named == Some(self.path_set)
+            && !self.settings.has(PATH_SET)
+            && let Some(object) = json.as_object_mut()
+        {
+            object.remove(PATH_SET);
+            return json.into();
+        }
+        settings.clone()
+    }
+
+    /// Why the path set in settings cannot be rendered, if it can be read and is no part of the technique's own, or a part to which it cannot be
+    /// restricted.
     fn path_set_refusal(&self, settings: &Settings) -> Option<String> {
-        let wanted: PathSet = settings.to_json().get("path_set")?.as_str()?.parse().ok()?;
+        let wanted: PathSet = settings.to_json().get(PATH_SET)?.as_str()?.parse().ok()?;
+        if !self.settings.has(PATH_SET) && wanted != self.path_set {
+            return Some(format!(
+                "its pictures contain the paths {} and no others",
+                self.path_set
+            ));
+        }
         let missing = !wanted.is_subset_of(&self.path_set);
         missing.then(|| {
             format!(

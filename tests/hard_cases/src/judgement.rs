@@ -26,6 +26,8 @@ pub struct Figure {
     pub bound: f64,
     /// Up to here it degrades as documented.
     pub documented: f64,
+    /// What every picture must be, whatever light it holds: whole, finite, the same each time; and refusals.
+    pub of_soundness: bool,
 }
 
 impl Figure {
@@ -106,7 +108,23 @@ impl Judgement {
             measured,
             bound,
             documented,
+            of_soundness: false,
         });
+    }
+
+    /// Something of which there must be none in any picture, whatever light it holds.
+    fn none_at_all(&mut self, what: impl Into<String>, count: usize) {
+        self.none(what, count);
+        if let Some(figure) = self.figures.last_mut() {
+            figure.of_soundness = true;
+        }
+    }
+
+    /// Whether nothing is wrong but values.
+    pub fn has_sound_pictures(&self) -> bool {
+        self.figures
+            .iter()
+            .all(|figure| figure.passes() || !figure.of_soundness)
     }
 
     /// Something of which there must be none.
@@ -121,19 +139,19 @@ impl Judgement {
 
     /// Every sample was finite and is there, and all radiance is finite and not negative.
     pub fn sound(&mut self, what: &str, painted: &Painted) {
-        self.holds(format!("{what}: no picture"), !painted.radiance.is_empty());
-        self.none(
+        self.none_at_all(format!("{what}: no picture"), usize::from(painted.radiance.is_empty()));
+        self.none_at_all(
             format!("{what}: samples that are not finite"),
             painted.non_finite as usize,
         );
         let missing = painted.samples.iter().filter(|n| **n != painted.spp as f32).count();
-        self.none(format!("{what}: pixels that miss samples"), missing);
+        self.none_at_all(format!("{what}: pixels that miss samples"), missing);
         let wrong = painted
             .radiance
             .iter()
             .filter(|v| !(v.is_finite() && **v >= 0.0))
             .count();
-        self.none(format!("{what}: radiance negative or not finite"), wrong);
+        self.none_at_all(format!("{what}: radiance negative or not finite"), wrong);
     }
 
     /// Every value is exactly this.
@@ -174,8 +192,11 @@ impl Judgement {
     /// The bits of two pictures are the same.
     pub fn same_bits(&mut self, what: &str, a: &Painted, b: &Painted) {
         let differ = a.bits().iter().zip(&b.bits()).filter(|(a, b)| a != b).count();
-        self.none(format!("{what}: values that differ"), differ);
-        self.holds(format!("{what}: sizes differ"), a.bits().len() == b.bits().len());
+        self.none_at_all(format!("{what}: values that differ"), differ);
+        self.none_at_all(
+            format!("{what}: sizes differ"),
+            usize::from(a.bits().len() != b.bits().len()),
+        );
     }
 
     /// The mean over the picture is `expected`, by a z-test a channel, and so is every pixel, by that of `film::z_test`.
@@ -285,6 +306,6 @@ impl Judgement {
             Err(_) => None,
         };
         let found = fault.as_deref().unwrap_or("not refused as it has to be");
-        self.holds(format!("{what}: {found}"), fault.is_none());
+        self.none_at_all(format!("{what}: {found}"), usize::from(fault.is_some()));
     }
 }

@@ -2,6 +2,7 @@
 
 use clerestory::gpu::Gpu;
 use clerestory::techniques::{self, Bias, Card};
+use clerestory::transport::PathSet;
 use clerestory::{Error, Result};
 
 use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
@@ -10,6 +11,11 @@ use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
 /// hundredth in closed rooms.
 const PHOTONS: u32 = 1 << 14;
 const SAMPLES_PER_PASS: u32 = 1024;
+
+/// Texels along a side of light probes, of techniques that have them, and of their finest level that is filtered: none of the cases has a sky with
+/// details.
+const PROBE_SIDE: u32 = 64;
+const PROBE_FINEST: u32 = 32;
 
 /// What a case is run against.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +51,36 @@ impl Subject {
         matches!(self, Self::Technique { info, .. } if !matches!(info.bias, Bias::Unbiased))
     }
 
+    /// A technique's subjects: one for each sampler that its setting `sampler` offers; those with a bias, which are not judged by their noise,
+    /// have their default sampler alone. Cards of a host's own are as good as the engine's.
+    pub fn of(info: &'static Card) -> Vec<Self> {
+        let infos = info.settings.infos();
+        match infos.iter().find(|setting| setting.name == "sampler") {
+            Some(setting) if matches!(info.bias, Bias::Unbiased) => {
+                let subject = |sampler: &&'static str| Self::Technique {
+                    info,
+                    sampler: Some(*sampler),
+                };
+                setting.names.iter().map(subject).collect()
+            }
+            _ => vec![Self::Technique { info, sampler: None }],
+        }
+    }
+
+    /// What pictures of a technique lack by its own word, where that is a part of the light: such pictures are judged by whether they are whole,
+    /// finite and the same each time, and by values only as far as these are right all the same.
+    pub fn limits(&self) -> Option<String> {
+        let Self::Technique { info, .. } = self else {
+            return None;
+        };
+        let bias = match info.bias {
+            Bias::Unbiased => String::new(),
+            Bias::Consistent(cause) | Bias::Biased(cause) => format!("; {cause}"),
+        };
+        let of_parts = info.path_set != PathSet::ALL;
+        of_parts.then(|| format!("its pictures hold the light paths {} alone{bias}", info.path_set))
+    }
+
     /// Whether a case concerns it.
     pub fn concerns(&self, case: &HardCase) -> bool {
         match self {
@@ -55,21 +91,10 @@ impl Subject {
     }
 }
 
-/// All subjects: techniques with each sampler that their setting `sampler` offers, ray indexes, scattering functions. Techniques with a bias,
-/// which are not judged by their noise, have their default sampler alone.
+/// All subjects: the engine's techniques ([`Subject::of`]), ray indexes, scattering functions.
 pub fn subjects() -> Vec<Subject> {
     let mut all = Vec::new();
-    for info in techniques::all() {
-        match info.settings.infos().iter().find(|setting| setting.name == "sampler") {
-            Some(setting) if matches!(info.bias, Bias::Unbiased) => {
-                all.extend(setting.names.iter().map(|sampler| Subject::Technique {
-                    info,
-                    sampler: Some(*sampler),
-                }))
-            }
-            _ => all.push(Subject::Technique { info, sampler: None }),
-        }
-    }
+    all.extend(techniques::all().iter().flat_map(Subject::of));
     all.extend(INDEXES.iter().map(Subject::Index));
     all.push(Subject::Lobes);
     all
@@ -124,7 +149,9 @@ pub fn judge(gpu: &Gpu, case: &HardCase, subject: &Subject) -> Option<Outcome> {
             let sampler = sampler.map(|sampler| ("sampler", sampler));
             let easel = Easel::new(gpu, info, serde_json::Map::new())
                 .with("photons", PHOTONS)
-                .with("samples_per_pass", SAMPLES_PER_PASS);
+                .with("samples_per_pass", SAMPLES_PER_PASS)
+                .with("probe_side", PROBE_SIDE)
+                .with("probe_finest", PROBE_FINEST);
             (case.techniques?)(
                 &sampler
                     .into_iter()
@@ -165,6 +192,9 @@ fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Out
             } else if let (true, Some(documented)) = (worst.is_documented(), case.documented_of(subject)) {
                 outcome.verdict = Verdict::Degrades;
                 outcome.reason = Some(documented.to_owned());
+            } else if let (true, Some(limits)) = (judgement.has_sound_pictures(), subject.limits()) {
+                outcome.verdict = Verdict::Degrades;
+                outcome.reason = Some(limits);
             } else {
                 outcome.reason = Some(format!(
                     "{worst}: worse than is documented; avoid such scenes on this device and report the output of \

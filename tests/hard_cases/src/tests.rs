@@ -148,6 +148,27 @@ fn judgements_find_what_is_wrong() {
 }
 
 #[test]
+fn wrong_values_are_no_unsound_pictures() {
+    let sound = |check: &dyn Fn(&mut Judgement)| {
+        let mut judgement = Judgement::default();
+        check(&mut judgement);
+        judgement.has_sound_pictures()
+    };
+    assert!(sound(&|j| j.exactly("", &painted(1.0), [2.0; 3])));
+    assert!(!sound(&|j| j.exactly("", &painted(f32::NAN), [1.0; 3])));
+    assert!(!sound(&|j| j.same_bits("", &painted(1.0), &painted(0.5))));
+    assert!(!sound(&|j| j.refused("", Ok(()), |_| true)));
+    for info in clerestory::techniques::all() {
+        let partial = info.path_set != clerestory::transport::PathSet::ALL;
+        assert!(
+            Subject::of(info)
+                .iter()
+                .all(|subject| subject.limits().is_some() == partial)
+        );
+    }
+}
+
+#[test]
 fn the_worst_figure_decides() {
     let mut judgement = Judgement::default();
     judgement.at_most("fine", 1.0, 2.0);

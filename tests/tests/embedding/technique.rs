@@ -4,14 +4,22 @@ use std::collections::BTreeMap;
 
 use clerestory::film::{GpuFilm, NonFiniteSamples, Picture, PixelFormat, Step};
 use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
-use clerestory::gpu::{Access, Buffer, BufferDesc, Category, EnabledFeatures, Gpu, PipelineInfo};
+use clerestory::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, EnabledFeatures, Gpu, PipelineInfo, Recorder,
+};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::Camera;
 use clerestory::settings::{Settings, SettingsDecl};
-use clerestory::techniques::{Bias, Card, PathTracerSettings, Skipped, Technique};
+use clerestory::techniques::{
+    Accumulated, Bias, Card, Frame, FrameMethod, FrameTarget, PathTracerSettings, Skipped, Technique,
+};
 use clerestory::transport::PathSet;
+use clerestory::transport::random::{pcg4d, unit_float};
 use clerestory::{Error, Result};
+use clerestory_hard_cases::{Subject, Verdict, judge};
+use clerestory_tests::shaders::host_frame;
 use clerestory_tests::{assert_no_messages, gpu};
+use glam::UVec4;
 
 use crate::Host;
 
@@ -55,6 +63,67 @@ const EVEN: Card = Card {
         }))
     },
 };
+
+/// A frame method as a host would write it: pictures whose pixels are their places and a random number.
+struct Places {
+    pipeline: ComputePipeline<host_frame::Kernel>,
+    begun: u64,
+    drawn: u64,
+}
+
+const PLACES: Card = Card {
+    id: "places",
+    summary: "every pixel shows its place and a random number",
+    path_set: PathSet::EMITTED,
+    refusals: |_| Vec::new(),
+    settings: SettingsDecl::NONE,
+    create: |gpu, _, view, _| {
+        let method = Places {
+            pipeline: gpu.compute_pipeline(&())?,
+            begun: 0,
+            drawn: 0,
+        };
+        Accumulated::boxed(gpu, view, method)
+    },
+    ..EVEN
+};
+
+impl FrameMethod for Places {
+    fn begin(&mut self, _: &mut Recorder) -> Result<()> {
+        self.begun += 1;
+        Ok(())
+    }
+
+    fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
+        self.drawn += 1;
+        let [width, height] = target.size;
+        let push = host_frame::Push {
+            width,
+            height,
+            seed: frame.seed,
+            frame: frame.number,
+        };
+        recorder.pass("places: draw", |pass| {
+            let set = host_frame::Set0 {
+                radiance: target.radiance.view(),
+            };
+            let groups = self.pipeline.groups_over(width * height);
+            pass.dispatch(&self.pipeline, &[&set], &push, groups)
+        })
+    }
+
+    fn path_set(&self) -> PathSet {
+        PathSet::EMITTED
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        BTreeMap::from([("begun", self.begun), ("drawn", self.drawn)])
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        vec![self.pipeline.info()]
+    }
+}
 
 impl Technique for Even {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
@@ -172,6 +241,107 @@ fn a_technique_of_the_hosts_own_renders_into_the_same_film() {
     assert_no_messages(&gpu);
 }
 
+/// What the kernel draws of a pixel, in the order of the frames.
+fn places([width, height]: [u32; 2], seed: u32, frames: u32) -> Vec<[f32; 3]> {
+    let mean = |pixel: u32| {
+        let numbers = (0..frames).map(|frame| unit_float(pcg4d(UVec4::new(pixel, frame, 0, seed)).x));
+        (numbers.sum::<f64>() / f64::from(frames)) as f32
+    };
+    let pixel = |i: u32| {
+        [
+            (i % width) as f32 / width as f32,
+            (i / width) as f32 / height as f32,
+            mean(i),
+        ]
+    };
+    (0..width * height).map(pixel).collect()
+}
+
+#[test]
+fn a_frame_method_of_the_hosts_own_is_a_technique_like_others() {
+    let gpu = gpu();
+    let scene = clerestory::scene::load("builtin:cornell-box").unwrap();
+    let renderer = Renderer::new(&gpu, &scene).unwrap();
+    let (size, seed) = ([6, 5], 9);
+    let options = RenderOptions {
+        size,
+        spp: 40,
+        seed,
+        ..RenderOptions::default()
+    };
+    let mut rendering = renderer.start_technique(&PLACES, &options).unwrap();
+    let mut steps = 0;
+    while rendering.step().unwrap().is_some() {
+        steps += 1;
+    }
+    let found = rendering.picture().unwrap();
+    let expected = places(size, seed, 40);
+    let pixels = found.layer("radiance").unwrap().values().as_chunks::<3>().0;
+    for (pixel, expected) in pixels.iter().zip(&expected) {
+        // Means of 40 numbers are rounded once by the film, those of equal ones not at all.
+        assert_eq!(pixel[..2], expected[..2]);
+        assert!((pixel[2] - expected[2]).abs() <= f32::EPSILON, "{pixel:?} {expected:?}");
+    }
+    // One frame to compile, then 32 at most.
+    assert_eq!(steps, 3);
+    // Anew through another camera, and shown.
+    rendering.set_camera(&scene.cameras[0].clone()).unwrap();
+    rendering.set_spp(1);
+    while rendering.step().unwrap().is_some() {}
+    let screen = gpu
+        .buffer(&BufferDesc::storage("screen", 4 * 30, Category::Film))
+        .unwrap();
+    for _ in 0..2 {
+        rendering.display(&screen, 0.0, PixelFormat::Rgba8).unwrap();
+    }
+    let shown = gpu.read::<[u8; 4]>(screen.view(), 30).unwrap();
+    assert!(
+        shown.windows(2).take(5).all(|pair| pair[0][0] < pair[1][0]),
+        "{shown:?}"
+    );
+    let rendered = rendering.finish().unwrap();
+    let report = &rendered.report;
+    assert_eq!((report.technique.as_str(), report.samples), ("places", [1, 1]));
+    let expected = [("begun", 2), ("drawn", 41), ("frames", 41), ("samples", 41 * 30)];
+    assert_eq!(
+        report.counters,
+        expected.map(|(name, count)| (name.to_owned(), count)).into()
+    );
+    let names: Vec<&str> = report.passes.iter().map(|pass| pass.name.as_str()).collect();
+    assert_eq!(names, ["film: add frame", "places: draw"]);
+    assert!(
+        report
+            .pipelines
+            .iter()
+            .any(|pipeline| pipeline.shader == "film/add_frame")
+    );
+    assert_no_messages(&gpu);
+}
+
+/// The table of hard cases takes cards of a host's own, progressive ones and frame methods alike.
+#[test]
+fn cards_of_the_hosts_own_are_judged_by_the_hard_cases() {
+    let gpu = gpu();
+    let case = clerestory_hard_cases::by_name("picture-sizes").unwrap();
+    let subject = &Subject::of(&PLACES)[0];
+    assert_eq!(subject.name(), "places");
+    let outcome = judge(&gpu, case, subject).unwrap();
+    assert_eq!(outcome.verdict, Verdict::Pass, "{outcome:?}");
+    // Its pictures are whole and finite, but hold another light than is asked for: said, not hidden.
+    let case = clerestory_hard_cases::by_name("empty-scene").unwrap();
+    let outcome = judge(&gpu, case, subject).unwrap();
+    assert_eq!(outcome.verdict, Verdict::Degrades, "{outcome:?}");
+    assert!(outcome.reason.unwrap().contains("looks at nothing"));
+    // One that says that it holds all light is held to it.
+    let case = clerestory_hard_cases::by_name("one-triangle").unwrap();
+    let outcome = judge(&gpu, case, &Subject::of(&EVEN)[0]).unwrap();
+    assert!(outcome.refused, "{outcome:?}");
+    let case = clerestory_hard_cases::by_name("black-and-white").unwrap();
+    let outcome = judge(&gpu, case, &Subject::of(&EVEN)[0]).unwrap();
+    assert_eq!(outcome.verdict, Verdict::Fails, "{outcome:?}");
+    assert_no_messages(&gpu);
+}
+
 #[test]
 fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     const NEVER: Card = Card {
@@ -189,6 +359,7 @@ fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     // The host did not enable it.
     let needy = Card {
         needs: &["geometryShader"],
+    kernels: &[],
         ..NEVER
     };
     let error = refusal(&sky, &needy);
@@ -205,6 +376,7 @@ fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     }
     let misspelt = Card {
         needs: &["geometryShaders"],
+    kernels: &[],
         ..NEVER
     };
     let text = refusal(&sky, &misspelt).to_string();

@@ -6,3 +6,4 @@ mod moving;
 mod penumbra;
 mod shadows;
 mod subject;
+mod technique;

@@ -360,6 +360,9 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Settings> {
     });
     for (key, option, value) in [("path_set", "--path-set", path_set), ("sampler", "--sampler", sampler)] {
         let Some(value) = value else { continue };
+        if key == "path_set" && !info.settings.has(key) && arguments.path_set == Some(info.path_set) {
+            continue;
+        }
         if !info.settings.has(key) {
             return Err(Failure::usage(format!("technique {} has no {option}", info.id)));
         }

@@ -338,7 +338,10 @@ impl Running<'_> {
             Some(renderer) => renderer,
             None => stage.renderer.insert(Renderer::new(self.gpu, &stage.scene)?),
         };
-        let mut rendering = renderer.start(options)?;
+        let mut rendering = match options.technique.as_deref() {
+            Some(id) => renderer.start_technique(self.sweep.card(id)?, options)?,
+            None => renderer.start(options)?,
+        };
         while let Some(progress) = rendering.step()? {
             self.watch.step(progress);
             if self.watch.stopped() {

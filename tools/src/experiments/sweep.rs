@@ -35,8 +35,9 @@
 //!
 //! Unknown keys are refused. Settings are the technique's (`clerestory list path`).
 
+use clerestory::techniques::{self, Card};
 use clerestory::transport::PathSet;
-use clerestory::{Error, Result, techniques};
+use clerestory::{Error, Result};
 use serde_json::{Map, Value};
 
 /// Pixels of either side at most.
@@ -89,6 +90,20 @@ pub struct Sweep {
     /// What the smoke form changes.
     #[serde(default)]
     pub smoke: Smoke,
+    /// Techniques beyond the engine's own, which variants may name.
+    #[serde(skip)]
+    pub cards: Cards,
+}
+
+/// Cards of a host's own techniques.
+#[derive(Debug, Clone, Default)]
+pub struct Cards(pub Vec<&'static Card>);
+
+impl PartialEq for Cards {
+    fn eq(&self, other: &Self) -> bool {
+        let ids = |cards: &Self| cards.0.iter().map(|card| card.id).collect::<Vec<_>>();
+        ids(self) == ids(other)
+    }
 }
 
 /// How references are made.
@@ -183,6 +198,17 @@ impl Sweep {
         spp.chain(seconds).collect()
     }
 
+    /// The technique of that id: of [`Sweep::cards`], else the engine's.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for one that there is not.
+    pub fn card(&self, id: &str) -> Result<&'static Card> {
+        match self.cards.0.iter().find(|card| card.id == id) {
+            Some(card) => Ok(card),
+            None => techniques::by_id(id),
+        }
+    }
+
     /// The seeds of the repeats.
     pub fn seeds(&self) -> impl Iterator<Item = u32> {
         let first = self.seed;
@@ -264,7 +290,7 @@ impl Sweep {
     /// # Errors
     /// [`Error::Setting`] for a technique or setting that there is not, and for a path set that the technique cannot be restricted to.
     pub fn settings(&self, technique: &str, given: &Map<String, Value>) -> Result<Value> {
-        let info = techniques::by_id(technique)?;
+        let info = self.card(technique)?;
         let mut settings = match info.settings.defaults() {
             Value::Object(settings) => settings,
             _ => Map::new(),
@@ -284,8 +310,8 @@ impl Sweep {
         }
         if settings.contains_key("path_set") {
             settings.insert("path_set".into(), Value::String(path_set.to_string()));
-        } else if path_set != PathSet::ALL {
-            let cause = format!("technique {technique} cannot be restricted to paths");
+        } else if path_set != info.path_set {
+            let cause = format!("technique {technique} has the paths {} and no others", info.path_set);
             return Err(wrong("path_set", &self.path_set, &cause));
         }
         Ok(Value::Object(settings))
@@ -298,7 +324,7 @@ impl Sweep {
     /// As [`Sweep::settings`].
     pub fn reference_settings(&self) -> Result<Value> {
         let mut given = self.reference.settings.clone();
-        let info = techniques::by_id(&self.reference.technique)?;
+        let info = self.card(&self.reference.technique)?;
         if info.settings.has("sampler") {
             given
                 .entry("sampler")

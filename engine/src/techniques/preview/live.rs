@@ -122,7 +122,7 @@ impl LiveProbe {
 }
 
 /// Rows of the catalogue.
-pub(crate) const ROWS: &[Row] = &[Row {
+pub(super) const ROWS: &[Row] = &[Row {
     id: "CL-LIVE-MAP",
     name: "live maps: light at a place drawn each frame as an octahedron, for reflections of objects that move",
     role: Role::PartOf("CL-PREVIEW"),
@@ -140,6 +140,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
         "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
     ],
-    experiment: "clerestory report live-maps",
+    experiment: "clerestory report live-maps live-map-pictures",
     ..Row::of(file!())
 }];

@@ -18,23 +18,32 @@
 //! - Partial alpha is drawn opaque, in the picture, in shadow maps and in live maps.
 //!
 //! Deterministic: the same bits for the same frame.
+//!
+//! Two ways to it: [`Preview`], for hosts that move lights and surfaces, light parts by probes of their own and show one frame each time; and [`PreviewMethod`],
+//! a [`FrameMethod`](super::FrameMethod), which is the technique `preview`. That one sees each frame through another place of its pixels, and of the lens,
+//! so that edges and what is out of focus come right as frames add up; the environment is its probe. It refuses scenes whose light it would leave out:
+//! those where surfaces shine, those with media, and those where light passes through surfaces.
 
+pub(super) mod card;
+mod drawing;
 mod lights;
-pub(crate) mod live;
+mod live;
+mod method;
 pub mod probe;
 mod shade;
 
 pub use lights::{PreviewLights, PreviewShadows};
 pub use live::LiveProbe;
+pub use method::{PreviewMethod, PreviewSettings};
 pub use probe::{LightProbe, LightProbeDesc};
 pub use shade::{PARTS_MAX, PreviewPart};
 
-use self::shade::{Eye, OUTPUTS, Seen, Shade, Target};
-use crate::card::{Bias, Role, Row, sources};
+use self::drawing::Drawing;
+use self::shade::Target;
 use crate::film::{Picture, PixelFormat};
 use crate::gpu::shaders::techniques::preview::preview_display;
-use crate::gpu::{Area, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute};
-use crate::raster::{GBuffer, GBufferDesc, Layering, Surfaces, View};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute};
+use crate::raster::Surfaces;
 use crate::scene::camera_frame::CameraFrame;
 use crate::scene::{Camera, LightKind};
 use crate::transport::GpuScene;
@@ -57,17 +66,12 @@ pub struct PreviewDesc {
 
 /// Samples along a side of a pixel at most.
 const SAMPLES_MAX: u32 = 8;
-/// Lights at most: their records go into the command buffer.
-const LIGHTS_MAX: u32 = 1024;
-
 /// A picture of a scene, and what draws it.
 #[derive(Debug)]
 pub struct Preview {
     gpu: Gpu,
     desc: PreviewDesc,
-    gbuffer: GBuffer,
-    lights: PreviewLights,
-    shade: Shade,
+    drawing: Drawing,
     display: ComputePipeline<preview_display::Kernel>,
     /// Of samples, row by row.
     radiance: Buffer,
@@ -85,27 +89,7 @@ impl Preview {
             let cause = format!("is not from 1 to {SAMPLES_MAX}");
             return Err(Error::setting("samples", desc.samples, cause));
         }
-        if desc.lights > LIGHTS_MAX {
-            let cause = format!("are more than {LIGHTS_MAX}");
-            return Err(Error::setting("lights", desc.lights, cause));
-        }
-        if scene.profile().media.any() {
-            return Err(Error::Unsupported {
-                technique: "preview".into(),
-                reasons: vec!["the scene has participating media, which a preview of surfaces does not show".into()],
-            });
-        }
-        let surfaces = scene.surfaces();
         let size = desc.size.map(|side| side.saturating_mul(desc.samples));
-        let gbuffer = GBuffer::new(
-            gpu,
-            &surfaces,
-            &GBufferDesc {
-                size,
-                layering: Layering::One,
-                outputs: &OUTPUTS,
-            },
-        )?;
         let bytes = u64::from(size[0]) * u64::from(size[1]) * size_of::<[f32; 3]>() as u64;
         let limit = gpu.caps().max_storage_buffer_range;
         if bytes > limit {
@@ -116,13 +100,10 @@ impl Preview {
                 limit,
             });
         }
-        let lights = PreviewLights::new(gpu, &surfaces, desc.lights, desc.shadows)?;
         Ok(Self {
             gpu: gpu.clone(),
             desc,
-            gbuffer,
-            shade: Shade::new(gpu, scene, &lights, false, desc.has_probes)?,
-            lights,
+            drawing: Drawing::new(gpu, scene, size, desc.lights, desc.shadows, desc.has_probes)?,
             display: gpu.compute_pipeline(&())?,
             radiance: gpu.buffer(&BufferDesc::storage("preview radiance", bytes, Category::Film))?,
         })
@@ -135,7 +116,7 @@ impl Preview {
 
     /// The lights and their shadow maps.
     pub fn lights(&self) -> &PreviewLights {
-        &self.lights
+        &self.drawing.lights
     }
 
     /// Records the lights that pictures are lit by from here on: their records, and shadow maps of `surfaces` from those that have a place. To be recorded
@@ -149,7 +130,7 @@ impl Preview {
         surfaces: &Surfaces<'_>,
         lights: &[LightKind],
     ) -> Result<()> {
-        self.lights.record(recorder, surfaces, lights)
+        self.drawing.lights.record(recorder, surfaces, lights)
     }
 
     /// Records two passes: what a camera sees of `surfaces`, and its shading part by part. Pixels of triangles that belong to no part stay as
@@ -167,24 +148,14 @@ impl Preview {
         camera: &Camera,
         parts: &[PreviewPart<'_>],
     ) -> Result<()> {
-        let size = self.gbuffer.size();
-        let view = View::of_camera(camera, surfaces, Area::whole(size))?;
+        let size = self.drawing.size();
         let frame = CameraFrame::new(camera, size)?;
-        self.gbuffer.record(recorder, surfaces, &[view])?;
-        recorder.pass("preview: shade", |pass| {
-            let seen = Seen {
-                scene,
-                gbuffer: &self.gbuffer,
-                lights: &self.lights,
-                eye: Eye::Camera(&frame),
-                target: Target {
-                    buffer: &self.radiance,
-                    first: 0,
-                    stride: size[0],
-                },
-            };
-            self.shade.record(pass, &seen, parts)
-        })
+        let target = Target {
+            buffer: &self.radiance,
+            first: 0,
+            stride: size[0],
+        };
+        self.drawing.record(recorder, scene, surfaces, &frame, target, parts)
     }
 
     /// Records the way to the screen: four bytes a pixel, rows from the top, exposed by `exposure` stops, clipped and sRGB-encoded.
@@ -254,40 +225,6 @@ impl Preview {
 
     /// Bytes of its pictures and of the shadow maps.
     pub fn bytes(&self) -> u64 {
-        let shadows = self.lights.shadows().map_or(0, crate::raster::OmniShadowMaps::bytes);
-        self.gbuffer.bytes() + self.radiance.bytes() + shadows
+        self.drawing.bytes() + self.radiance.bytes()
     }
 }
-
-/// Rows of the catalogue.
-pub(crate) const ROWS: &[Row] = &[Row {
-    id: "CL-PREVIEW",
-    name: "raster preview: deferred shading with shadow maps and light probes",
-    role: Role::Kernel,
-    limits: "No interreflection beyond a probe, no shadows of directional lights, nothing seen through glass, partial alpha drawn opaque.",
-    sources: &[
-        sources::DEERING_1988.whole(),
-        sources::SAITO_TAKAHASHI_1990.whole(),
-        sources::KAUTZ_2000.whole(),
-        sources::KARIS_2013.whole(),
-    ],
-    shaders: &["shaders/techniques/preview/"],
-    bias: Some(Bias::Biased(
-        "no interreflection beyond a probe, no parallax, round lobes, unshadowed directional lights",
-    )),
-    tests: &[
-        "tests/tests/preview/light.rs::white_surfaces_vanish_in_a_white_furnace",
-        "tests/tests/preview/light.rs::albedos_in_a_uniform_environment_are_the_path_tracers",
-        "tests/tests/preview/light.rs::a_lambert_sphere_under_a_cosine_sky_has_the_closed_form",
-        "tests/tests/preview/light.rs::a_mirror_sphere_shows_the_environment",
-        "tests/tests/preview/light.rs::rough_reflections_are_close_to_the_path_tracers",
-        "tests/tests/preview/light.rs::direct_light_is_the_path_tracers",
-        "tests/tests/preview/moving.rs::moved_objects_are_as_if_made_there",
-        "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
-        "engine/src/techniques/preview/probe.rs::lobes_grow_from_level_to_level",
-        "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
-        "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",
-    ],
-    experiment: "clerestory report preview-picture",
-    ..Row::of(file!())
-}];

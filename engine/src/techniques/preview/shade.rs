@@ -12,7 +12,7 @@ use crate::gpu::shaders::constants::PROBE_LEVELS_MAX;
 use crate::gpu::shaders::techniques::preview::preview_shade as kernel;
 use crate::gpu::shaders::types::PreviewFrame;
 use crate::gpu::{
-    Access, Buffer, BufferBarrier, BufferDesc, Category, ComputePipeline, Gpu, Pass, Sampler, SamplerDesc,
+    Access, Buffer, BufferBarrier, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Sampler, SamplerDesc,
 };
 use crate::maps::directional_map::DirectionalMap;
 use crate::raster::{GBuffer, Output};
@@ -102,6 +102,11 @@ impl Shade {
             dark,
             no_shadows: gpu.buffer_with("no shadows", Category::Light, &[f32::INFINITY])?,
         })
+    }
+
+    /// The kernel with its specialization.
+    pub fn info(&self) -> PipelineInfo {
+        self.pipeline.info()
     }
 
     /// Records the shading of a G-buffer that was just drawn. Earlier uses of the target by compute shaders are waited for; afterwards it is
@@ -243,7 +248,7 @@ fn frame(seen: &Seen<'_>, part: &PreviewPart<'_>) -> PreviewFrame {
             frame.origin = camera.origin;
             frame.right = scaled(camera.right, camera.half_width);
             frame.down = scaled(camera.up, -camera.half_height);
-            frame.forward = camera.forward;
+            frame.forward = camera.middle().to_array();
             frame.is_parallel = camera.orthographic.into();
         }
         Eye::AllDirections(origin) => frame.origin = origin.to_array(),

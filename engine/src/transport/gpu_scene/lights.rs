@@ -1,7 +1,7 @@
 //! Everything that light sampling chooses among, and the probabilities of the choice: by power, as [`lights`](crate::transport::lights)
 //! has it, with limits for distant ones; then by texel of the environment.
 
-use glam::{DVec3, UVec2, Vec3};
+use glam::{DVec3, Mat3, Quat, UVec2, Vec3};
 
 use super::LightKinds;
 use super::geometry::{Geometry, corners_of, is_traceable};
@@ -12,6 +12,7 @@ use crate::gpu::shaders::constants::{
     MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT, RECIPROCAL_EXPONENTS,
 };
 use crate::gpu::shaders::types::{SceneEnvironment, SceneLight, SceneMaterial, SceneTriangle};
+use crate::gpu::{Buffer, Gpu};
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
 use crate::transport::distribution::{build_distribution, distribution_probability_2d};
 use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
@@ -245,4 +246,22 @@ fn environment_block(map: &Environment, cdf: &[f32], cdf_base: u32) -> Vec<u8> {
         }
     }
     block
+}
+
+/// What [`environment_block`] has put there.
+pub(super) fn read_environment(gpu: &Gpu, block: &Buffer) -> Result<Environment> {
+    let header_bytes = size_of::<SceneEnvironment>() as u64;
+    let header = gpu.read::<SceneEnvironment>(block.slice(0, header_bytes), 1)?[0];
+    let texels = header.width as usize * header.height as usize;
+    let texel_bytes = size_of::<[f32; 4]>() * texels;
+    let texels = gpu.read::<[f32; 4]>(block.slice(header_bytes, texel_bytes as u64), texels)?;
+    let [right, up, back] = [header.right, header.up, header.back].map(Vec3::from_array);
+    Ok(Environment {
+        name: "environment".into(),
+        width: header.width,
+        height: header.height,
+        radiance: texels.iter().map(|[r, g, b, _]| Vec3::new(*r, *g, *b)).collect(),
+        rotation: Quat::from_mat3(&Mat3::from_cols(right, up, back)),
+        strength: 1.0,
+    })
 }

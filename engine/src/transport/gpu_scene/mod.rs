@@ -33,7 +33,7 @@ use crate::gpu::shaders::sets::{IndexSet, MediaSet, SceneSet};
 use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
 use crate::gpu::{Category, Gpu, TexelView};
 use crate::raster::{ObjectTriangles, SurfaceFeatures, Surfaces};
-use crate::scene::{LightKind, Material, Scene, SceneProfile};
+use crate::scene::{Environment, LightKind, Material, Scene, SceneProfile};
 
 /// A scene in device memory. Make it once and render it with any technique.
 #[derive(Debug)]
@@ -220,7 +220,25 @@ impl GpuScene {
     pub fn move_light(&self, gpu: &Gpu, light: usize, kind: &LightKind) -> Result<()> {
         let (record, index) = self.punctual_lights.moved(light, kind)?;
         let offset = u64::from(index) * size_of::<SceneLight>() as u64;
-        gpu.upload(self.buffers.lights.buffer(), offset, &[record])
+        gpu.upload(self.buffers.lights.buffer(), offset, &[record])?;
+        self.punctual_lights.keep(light, kind);
+        Ok(())
+    }
+
+    /// The point, spot and directional lights that have power, as they are now, in the order of [`Scene::lights`].
+    pub fn lights_without_area(&self) -> Vec<LightKind> {
+        self.punctual_lights.shining()
+    }
+
+    /// The environment as it is on the device, its strength multiplied in; `None` without one.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn read_environment(&self, gpu: &Gpu) -> Result<Option<Environment>> {
+        if !self.profile.has_environment() {
+            return Ok(None);
+        }
+        lights::read_environment(gpu, self.buffers.environment.buffer()).map(Some)
     }
 
     /// Set 3. Without participating media no specialized kernel reads it, and other buffers stand there.

@@ -1,5 +1,7 @@
 //! The scene's lights without area and their records in the lights' table, so that a light can move without a new scene.
 
+use std::sync::Mutex;
+
 use super::lights::light_record;
 use crate::gpu::shaders::types::SceneLight;
 use crate::scene::LightKind;
@@ -12,6 +14,8 @@ use crate::{Error, Result};
 #[derive(Debug)]
 pub(super) struct PunctualLights {
     lights: Vec<Placed>,
+    /// As they are now.
+    kinds: Mutex<Vec<LightKind>>,
     /// Of the scene's bounding sphere, m.
     radius: f64,
 }
@@ -30,6 +34,7 @@ impl PunctualLights {
     pub fn new(radius: f64) -> Self {
         Self {
             lights: Vec::new(),
+            kinds: Mutex::default(),
             radius,
         }
     }
@@ -37,12 +42,34 @@ impl PunctualLights {
     /// Takes the scene's next light, whose record would be the one of that index; its power, W of luminance, with which it has a record.
     pub fn add(&mut self, kind: &LightKind, record: usize) -> f64 {
         let power = luminance(light_power(kind, self.radius));
+        self.kinds().push(*kind);
         self.lights.push(Placed {
             record: (power > 0.0).then_some(record as u32),
             kind: light_record(kind).kind,
             power,
         });
         power
+    }
+
+    fn kinds(&self) -> std::sync::MutexGuard<'_, Vec<LightKind>> {
+        // The list is whole whatever its last user did.
+        self.kinds.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// Those with power.
+    pub fn shining(&self) -> Vec<LightKind> {
+        let kinds = self.kinds();
+        let all = kinds.iter().zip(&self.lights);
+        all.filter(|(_, placed)| placed.record.is_some())
+            .map(|(kind, _)| *kind)
+            .collect()
+    }
+
+    /// Keeps what a light has become.
+    pub fn keep(&self, light: usize, kind: &LightKind) {
+        if let Some(kept) = self.kinds().get_mut(light) {
+            *kept = *kind;
+        }
     }
 
     /// The record of a light that has become `kind`, and its index.

@@ -64,6 +64,10 @@ impl PathSet {
     pub const DIRECT: Self = Self::simple(1, Some(1), PATH_SET_LOBES);
     /// Light that is scattered twice or more.
     pub const INDIRECT: Self = Self::simple(2, None, PATH_SET_LOBES);
+    /// Light that is emitted towards the eye or scattered once: `bounces=0..1`.
+    pub const UP_TO_DIRECT: Self = Self::simple(0, Some(1), PATH_SET_LOBES);
+    /// The same, scattered diffusely: `LE|LDE`.
+    pub const UP_TO_DIFFUSE: Self = Self::simple(0, Some(1), LOBE_DIFFUSE);
     /// No path: a black picture.
     pub const EMPTY: Self = Self {
         min_bounces: 0,

@@ -124,6 +124,7 @@ measures! {
     on_device "kd-threads" kd::kd_threads.of_any_scenes();
     on_device "kd-traversal" kd::kd_traversal.of_any_scenes();
     on_host "leaf-sizes" photon_maps::leaf_sizes;
+    on_device "live-map-pictures" preview::live_map_pictures;
     on_device "live-maps" preview::live_maps.of_any_scenes();
     on_host "map-borders" maps::map_borders;
     on_host "map-choice" maps::map_choice;
@@ -145,7 +146,6 @@ measures! {
     on_device "photon-queues" photons::photon_queues;
     on_device "photon-statistics" photons::photon_statistics;
     on_host "picture-formats" rendering::picture_formats;
-    on_device "preview-picture" preview::preview_picture;
     on_host "ray-offsets" rays::ray_offsets;
     on_host "sample-sums" rendering::sample_sums;
     on_device "scene-profile" rendering::scene_profile;

@@ -1,0 +1,91 @@
+//! Ambient occlusion, the smallest frame method: light of a uniform sky, scattered once and diffusely.
+//! One ray a pixel and frame, distributed by the cosine. Unbiased on `LE|LDE`. A ray that its quota stops makes its sample NaN, which the film counts and leaves out.
+
+use std::sync::Arc;
+
+use crate::Result;
+use crate::card::{Role, Row, sources};
+use crate::gpu::shaders::techniques::ambient::ambient as kernel;
+use crate::gpu::{ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
+use crate::scene::{EnvironmentUse, camera_frame::CameraFrame};
+use crate::settings::SettingsDecl;
+use crate::techniques::{Accumulated, Bias, Card, Frame, FrameMethod, FrameTarget, Variant, reasons};
+use crate::transport::{GpuScene, PathSet, surface_spec};
+
+const ROW: Row = Row {
+    id: "CL-AMBIENT",
+    name: "technique `ambient`: ambient occlusion under a uniform sky",
+    role: Role::Technique,
+    limits: "Light of a uniform sky, scattered once and diffusely: nothing else may shine, and nothing be seen through.",
+    sources: &[sources::ZHUKOV_1998.whole()],
+    shaders: &["shaders/techniques/ambient/"],
+    path_set: Some("bounces=0..1,lobes=diffuse"),
+    bias: Some(Bias::Unbiased),
+    tests: &["tests/tests/ambient.rs::pictures_are_the_path_tracers"],
+    experiment: "clerestory report ambient",
+    ..Row::of(file!())
+};
+
+pub(super) const CARD: Card = Card {
+    id: "ambient",
+    summary: "ambient occlusion: what a uniform sky sends to surfaces directly, by a ray for each pixel and frame",
+    rows: &[&[ROW]],
+    bias: Bias::Unbiased,
+    needs: &[],
+    kernels: &[&kernel::INFO],
+    path_set: PathSet::UP_TO_DIFFUSE,
+    refusals: |scene| {
+        reasons(&[
+            (scene.environment != EnvironmentUse::Constant, "the sky is not uniform"),
+            (scene.shines() || scene.has_unlit, "more shines than the sky"),
+            (!scene.is_opaque(), "surfaces let light through"),
+            (scene.media.any(), "it has participating media"),
+        ])
+    },
+    settings: SettingsDecl::NONE,
+    variants: &[Variant::DEFAULTS],
+    create: |gpu, scene, view, _| Accumulated::boxed(gpu, view, Ambient::new(gpu, scene)?),
+};
+
+/// The kernel, for a scene.
+#[derive(Debug)]
+pub struct Ambient(Arc<GpuScene>, ComputePipeline<kernel::Kernel>);
+
+impl Ambient {
+    /// Specializes the kernel.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for an index whose leaves are too long for a software device.
+    pub fn new(gpu: &Gpu, scene: Arc<GpuScene>) -> Result<Self> {
+        let (index, most) = (scene.index_traversal(), SOFTWARE_LOOP_CAP / 2); // each of the two rays
+        let pipeline = gpu.compute_pipeline(&surface_spec!(kernel, scene, {
+            index_quota: index.quota_within(gpu.caps(), most, most, false)?,
+            index_kind: index.kind(),
+            ..Default::default()
+        }))?;
+        Ok(Self(scene, pipeline))
+    }
+}
+
+impl FrameMethod for Ambient {
+    fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
+        let [lower, upper] = self.0.bounds().map(|corner| corner.to_array());
+        let camera = CameraFrame::new(frame.camera, target.size)?.rays(target.size);
+        let (frame, seed, radiance) = (frame.number, frame.seed, target.radiance.view());
+        let groups = self.1.groups_over(target.size[0] * target.size[1]);
+        #[rustfmt::skip]
+        let push = kernel::Push { camera, frame, seed, lower, upper };
+        recorder.pass("ambient: shade", |pass| {
+            let (set, index, scene) = (kernel::Set0 { radiance }, self.0.index_set(), self.0.scene_set());
+            pass.dispatch(&self.1, &[&set, &index, &scene], &push, groups)
+        })
+    }
+
+    fn path_set(&self) -> PathSet {
+        PathSet::UP_TO_DIFFUSE
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        vec![self.1.info()]
+    }
+}

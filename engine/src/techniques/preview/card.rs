@@ -1,0 +1,97 @@
+//! The raster preview as a technique.
+
+use super::{PreviewMethod, PreviewSettings, live};
+use crate::card::{Role, Row, sources};
+use crate::gpu::shaders::techniques::preview::{preview_display, preview_shade};
+use crate::raster::SHADOW_MAPS_MAX;
+use crate::scene::SceneProfile;
+use crate::settings::SettingsDecl;
+use crate::techniques::{Accumulated, Bias, Card, Variant};
+use crate::transport::PathSet;
+
+/// The causes, as the module's documentation has them.
+const BIAS: Bias = Bias::Biased(
+    "shadow maps err at borders of shadows and directional lights have none; an environment's light is not occluded, and its reflections are \
+     filtered by round lobes",
+);
+
+const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT"];
+
+/// The catalogue's entry.
+pub(in crate::techniques) const CARD: Card = Card {
+    id: "preview",
+    summary: "raster preview: surfaces from a G-buffer, lights with shadow maps, the environment as a filtered probe; a picture a frame",
+    rows: &[ROWS, live::ROWS],
+    bias: BIAS,
+    needs: NEEDS,
+    kernels: &[&preview_shade::INFO, &preview_display::INFO],
+    path_set: PathSet::UP_TO_DIRECT,
+    refusals,
+    settings: SettingsDecl::of::<PreviewSettings>(),
+    variants: &[Variant::DEFAULTS],
+    create: |gpu, scene, view, settings| {
+        let settings: PreviewSettings = settings.read()?;
+        Accumulated::boxed(gpu, view, PreviewMethod::new(gpu, scene, view.size, settings)?)
+    },
+};
+
+fn refusals(profile: &SceneProfile) -> Vec<String> {
+    let lights = profile.lights.point + profile.lights.spot + profile.lights.directional;
+    let shines = profile.has_area_lights() || profile.has_unlit;
+    let all = [
+        (
+            shines,
+            "surfaces shine, and what they send to others is not shown".to_owned(),
+        ),
+        (
+            profile.has_transmission(),
+            "nothing is seen through materials that transmit".into(),
+        ),
+        (profile.alpha.blend, "partial alpha is drawn opaque".into()),
+        (profile.media.any(), "participating media are not shown".into()),
+        (
+            lights > SHADOW_MAPS_MAX as usize,
+            format!("it has {lights} lights, and there are shadow maps for {SHADOW_MAPS_MAX}"),
+        ),
+    ];
+    all.into_iter()
+        .filter(|(holds, _)| *holds)
+        .map(|(_, why)| why)
+        .collect()
+}
+
+/// Rows of the catalogue.
+const ROWS: &[Row] = &[Row {
+    id: "CL-PREVIEW",
+    name: "technique `preview`: deferred shading with shadow maps and light probes, frame by frame, and the same for hosts' own frames",
+    role: Role::Technique,
+    limits: "Light of surfaces on others is left out but for what a host's probe holds; directional lights cast no shadows, and nothing is seen through glass.",
+    sources: &[
+        sources::DEERING_1988.whole(),
+        sources::SAITO_TAKAHASHI_1990.whole(),
+        sources::KAUTZ_2000.whole(),
+        sources::KARIS_2013.whole(),
+    ],
+    shaders: &["shaders/techniques/preview/"],
+    path_set: Some("bounces=0..1"),
+    bias: Some(BIAS),
+    needs: NEEDS,
+    tests: &[
+        "tests/tests/preview/light.rs::white_surfaces_vanish_in_a_white_furnace",
+        "tests/tests/preview/light.rs::albedos_in_a_uniform_environment_are_the_path_tracers",
+        "tests/tests/preview/light.rs::a_lambert_sphere_under_a_cosine_sky_has_the_closed_form",
+        "tests/tests/preview/light.rs::a_mirror_sphere_shows_the_environment",
+        "tests/tests/preview/light.rs::rough_reflections_are_close_to_the_path_tracers",
+        "tests/tests/preview/light.rs::direct_light_is_the_path_tracers",
+        "tests/tests/preview/moving.rs::moved_objects_are_as_if_made_there",
+        "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
+        "tests/tests/preview/technique.rs::pictures_come_to_be_the_path_tracers",
+        "tests/tests/preview/technique.rs::the_environment_is_read_back_as_it_was",
+        "engine/src/techniques/preview/probe.rs::lobes_grow_from_level_to_level",
+        "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
+        "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",
+    ],
+    experiment: "clerestory report preview-picture",
+    module: "engine/src/techniques/preview/mod.rs",
+    ..Row::of(file!())
+}];

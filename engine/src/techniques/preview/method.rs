@@ -1,0 +1,143 @@
+//! The preview as a frame method.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use super::drawing::Drawing;
+use super::lights::PreviewShadows;
+use super::probe::{LightProbe, LightProbeDesc};
+use super::shade::{PreviewPart, Target};
+use crate::Result;
+use crate::gpu::{Gpu, PipelineInfo, Recorder};
+use crate::raster::{SHADOW_WIDTH_MAX, ShadowLayout};
+use crate::scene::camera_frame::CameraFrame;
+use crate::settings::TypedSettings;
+use crate::techniques::{Frame, FrameMethod, FrameTarget, Skipped};
+use crate::transport::random::{Sampler, SamplerKind, sample_2d};
+use crate::transport::warp::square_to_disk;
+use crate::transport::{GpuScene, PathSet};
+
+crate::settings! {
+    /// Settings of [`PreviewMethod`].
+    pub struct PreviewSettings {
+        /// How directions lie in shadow maps; changes the borders of shadows.
+        pub shadow_layout: ShadowLayout = ShadowLayout::Octahedron;
+        /// Along a side of an octahedron, or of each face of a cube: more have less bias at borders of shadows.
+        pub shadow_side: u32 = 1024, in 1..=16_384, unit "texels";
+        /// That the filter of shadows is wide: softer borders instead of stairs.
+        pub shadow_width: u32 = 2, in 0..=SHADOW_WIDTH_MAX, unit "texels";
+        /// Along a side of the environment's map, a power of two: how sharp mirrors are.
+        pub probe_side: u32 = 256, in 64..=4096, unit "texels";
+        /// Along a side of its finest level that is filtered by a lobe, a power of two.
+        ///
+        /// The work before the first frame grows with its fourth power.
+        pub probe_finest: u32 = 128, in 32..=256, unit "texels";
+    }
+}
+
+/// Raster preview of a scene, a sample of every pixel a frame.
+#[derive(Debug)]
+pub struct PreviewMethod {
+    scene: Arc<GpuScene>,
+    settings: PreviewSettings,
+    drawing: Drawing,
+    /// The environment.
+    probe: Option<LightProbe>,
+    lights_drawn: u64,
+}
+
+impl PreviewMethod {
+    /// Allocates pictures of `size` pixels, makes the pipelines for a scene, and filters its environment, which waits for the device.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting), as [`PreviewShadows`] and [`LightProbeDesc`] have their ranges, and for more lights than shadow maps
+    /// serve; [`Error::Unsupported`](crate::Error::Unsupported) for participating media; [`Error::LimitExceeded`](crate::Error::LimitExceeded) for
+    /// sizes; [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::DeviceLost`](crate::Error::DeviceLost).
+    pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, size: [u32; 2], settings: PreviewSettings) -> Result<Self> {
+        let lights = scene.lights_without_area().len() as u32;
+        let shadows = (lights > 0).then_some(PreviewShadows {
+            layout: settings.shadow_layout,
+            side: settings.shadow_side,
+            width: settings.shadow_width,
+        });
+        let desc = LightProbeDesc {
+            side: settings.probe_side,
+            finest: settings.probe_finest,
+        };
+        let environment = scene.read_environment(gpu)?;
+        let probe = environment.map(|environment| LightProbe::of_environment(gpu, desc, &environment));
+        let probe = probe.transpose()?;
+        Ok(Self {
+            drawing: Drawing::new(gpu, &scene, size, lights, shadows, probe.is_some())?,
+            scene,
+            settings,
+            probe,
+            lights_drawn: 0,
+        })
+    }
+}
+
+impl FrameMethod for PreviewMethod {
+    fn begin(&mut self, recorder: &mut Recorder) -> Result<()> {
+        let lights = self.scene.lights_without_area();
+        self.lights_drawn += lights.len() as u64;
+        self.drawing.lights.record(recorder, &self.scene.surfaces(), &lights)
+    }
+
+    fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
+        let size = self.drawing.size();
+        target.check(size)?;
+        // One place of the pixels and of the lens a frame, the same for all of them.
+        let mut numbers = Sampler {
+            pixel: 0,
+            sample_index: frame.number,
+            dimension: 0,
+            seed: frame.seed,
+        };
+        let mut numbers = || sample_2d(&mut numbers, SamplerKind::Sobol);
+        let (place, lens): (DVec2, DVec2) = (numbers(), square_to_disk(numbers()));
+        let camera = CameraFrame::new(frame.camera, size)?.seen_through(size, place, lens);
+        let surfaces = self.scene.surfaces();
+        let part = PreviewPart {
+            triangles: 0..surfaces.triangles,
+            background: true,
+            probe: self.probe.as_ref(),
+        };
+        let target = Target {
+            buffer: target.radiance,
+            first: 0,
+            stride: size[0],
+        };
+        self.drawing
+            .record(recorder, &self.scene, &surfaces, &camera, target, &[part])
+    }
+
+    fn path_set(&self) -> PathSet {
+        PathSet::UP_TO_DIRECT
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.settings.to_json()
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        BTreeMap::from([("lights_drawn", self.lights_drawn)])
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.drawing.pipelines()
+    }
+
+    fn skipped(&self) -> Vec<Skipped> {
+        let profile = self.scene.profile();
+        let places = profile.lights.point + profile.lights.spot;
+        let all = [
+            (self.probe.is_none(), "light probe", "the scene has no environment"),
+            (places == 0, "shadow maps", "no light has a place"),
+        ];
+        let missing = all.into_iter().filter(|(is_missing, ..)| *is_missing);
+        missing.map(|(_, what, why)| Skipped { what, why }).collect()
+    }
+}
