@@ -13,7 +13,7 @@ layout(set = 0, binding = 0, scalar) restrict readonly buffer PhotonAreas { uvec
 layout(set = 0, binding = 1, scalar) restrict buffer MapStateBlock { MapTreeState map_state; };
 // What the host is told.
 layout(set = 0, binding = 2, scalar) restrict writeonly buffer PhotonCover {
-    uvec2 area;  // of all kernels, a number of 64 bits, m2
+    uint area[2];  // of all kernels, a number of 64 bits, m2
     uint leaf_size;
 } photon_cover;
 
@@ -41,7 +41,9 @@ void main() {
         bool is_more = wanted >= double(photon_push.least) + 0.5lf && !isinf(wanted);
         uint size = is_more ? uint(min(floor(wanted + 0.5lf), LEAF_SIZE_MAX)) : photon_push.least;
         map_state.leaf_size = size;
-        photon_cover.area = unpackDouble2x32(kernels);
+        uvec2 words = unpackDouble2x32(kernels);
+        photon_cover.area[0] = words.x;
+        photon_cover.area[1] = words.y;
         photon_cover.leaf_size = size;
     }
 }

@@ -58,6 +58,7 @@ impl MapFigures {
 
 /// A map in the host's memory, as queries read it.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct MapContents {
     /// Where queries begin: the box of all, and the reference of a pair or leaf.
     pub root: CompactRoot,
