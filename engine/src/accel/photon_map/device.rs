@@ -13,6 +13,7 @@
 
 use super::complete_bvh::INDEX_BITS;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
+use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::{lbvh_codes, lbvh_grid, map_begin, map_blocks, map_pairs, map_split};
 use crate::gpu::shaders::constants::{LBVH_BOX_QUARTERS, MAP_BLOCK, MAP_GROUP_SIZE, MAP_LEVELS};
@@ -382,6 +383,29 @@ fn blocks_of(places: u32) -> u64 {
     // One place is a block by itself.
     all.max(2)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-DEVICE-MAP",
+    name: "compact hierarchies of photon maps built by the device, from the root down a level at a time",
+    role: Role::PartOf("PM-SYS-1"),
+    limits: "Needs `shaderFloat64` for the boxes of kernels, else the host builds; as many boxes as texel buffers and workgroups allow.",
+    sources: &[sources::LAUTERBACH_2009.at("§3"), sources::FABIANOWSKI_2011.at("§6.1.2 and §6.2")],
+    shaders: &[
+        "shaders/accel/map_begin.comp",
+        "shaders/accel/map_blocks.comp",
+        "shaders/accel/map_pairs.comp",
+        "shaders/accel/map_split.comp",
+    ],
+    tests: &[
+        "tests/tests/photon/maps.rs::device_maps_of_hard_records_are_the_twins",
+        "tests/tests/photon/maps.rs::queries_of_device_maps_meet_every_kernel",
+        "tests/tests/photon/maps.rs::device_maps_of_scenes_are_the_twins_and_pictures_are_equal",
+        "tests/tests/photon/maps.rs::devices_without_numbers_of_64_bits_leave_maps_to_the_host",
+    ],
+    experiment: "clerestory report photon-frame",
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {
