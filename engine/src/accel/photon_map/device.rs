@@ -390,7 +390,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
     name: "compact hierarchies of photon maps built by the device, from the root down a level at a time",
     role: Role::PartOf("PM-SYS-1"),
     limits: "Needs `shaderFloat64` for the boxes of kernels, else the host builds; as many boxes as texel buffers and workgroups allow.",
-    sources: &[sources::LAUTERBACH_2009.at("§3"), sources::FABIANOWSKI_2011.at("§6.1.2 and §6.2")],
+    sources: &[
+        sources::LAUTERBACH_2009.whole(),
+        sources::FABIANOWSKI_2011.at("§6.1.2 and §6.2"),
+    ],
     shaders: &[
         "shaders/accel/map_begin.comp",
         "shaders/accel/map_blocks.comp",
