@@ -33,6 +33,9 @@ struct CompactRoot {
 // Nodes fetched and stack entries written; the caller sets them to zero.
 uvec2 compact_counters = uvec2(0u);
 
+// Bits of the three components, x highest.
+uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z); }
+
 #ifdef COMPACT_POINT
 // With COMPACT_PACKET defined, by includers with the extension for subgroup votes, the points of a subgroup go through the tree together:
 // each child that holds any of them is visited by all. A pair says where a point lies only for points in its parent's box, so that each
@@ -48,9 +51,6 @@ uvec2 compact_counters = uvec2(0u);
 #define COMPACT_LOWER(PLANES) (PLANES)
 #define COMPACT_UPPER(PLANES) (PLANES)
 #endif
-
-// Bits of the three components, x highest.
-uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z); }
 
 bool compact_point_query(CompactRoot root, vec3 point) {
     bool mine = all(lessThan(COMPACT_LOWER(root.lower), point)) && all(lessThan(point, COMPACT_UPPER(root.upper)));

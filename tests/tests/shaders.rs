@@ -40,12 +40,18 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("accel/lbvh_codes.comp", "SampledBuffer"),
     ("accel/lbvh_emit.comp", "SampledBuffer"),
     ("accel/lbvh_hierarchy.comp", "SampledBuffer"),
+    ("accel/map_begin.comp", "SampledBuffer"),
+    ("accel/map_blocks.comp", "SampledBuffer"),
+    ("accel/map_pairs.comp", "SampledBuffer"),
+    ("accel/map_split.comp", "SampledBuffer"),
     ("accel/trace_queue.comp", "SampledBuffer"),
     ("accel/trace_queue_vote.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_append.comp", "SampledBuffer"),
+    ("techniques/photon_mapping/photon_boxes.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_emit.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_gather.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_gather_packet.comp", "SampledBuffer"),
+    ("techniques/photon_mapping/photon_leaves.comp", "SampledBuffer"),
     ("techniques/photon_mapping/photon_scatter.comp", "SampledBuffer"),
     ("accel/trace_rays.comp", "SampledBuffer"),
     ("walk/extend.comp", "SampledBuffer"),
@@ -104,6 +110,8 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("kernels/scan_totals.comp", "SpecConstantOp"),
     // The choice of one lane of a subgroup.
     ("kernels/model_queue.comp", "GroupNonUniformElect"),
+    // Numbers of 64 bits from two words.
+    ("techniques/photon_mapping/photon_leaf_size.comp", "UnsupportedExtInst"),
     // Arrays of a specialized size.
     ("kernels/histogram.comp", "InvalidArraySize"),
 ];

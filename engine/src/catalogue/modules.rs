@@ -16,6 +16,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::photon_map::clustered::ROWS,
     crate::accel::photon_map::compact_bvh::ROWS,
     crate::accel::photon_map::complete_bvh::ROWS,
+    crate::accel::photon_map::device::ROWS,
     crate::accel::photon_map::leaf_threshold::ROWS,
     crate::accel::photon_map::merge::ROWS,
     crate::accel::photon_map::split_lists::ROWS,

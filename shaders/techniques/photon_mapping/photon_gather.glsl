@@ -65,9 +65,11 @@ bool compact_visit_point(uint record);
 #define COMPACT_UPPER(PLANES) (NEAREST ? (PLANES) - nearest_inset : (PLANES))
 #include "accel/compact_bvh.glsl"
 
+// Beside the other bindings of the map (photon_map.glsl): in memory, so that the device may have made it.
+layout(set = 6, binding = 3, scalar) restrict readonly buffer PhotonMapRoot { CompactRoot photon_map_root; };
+
 layout(push_constant, scalar) uniform Push {
     AskSettings ask;
-    CompactRoot root;
     uint caustic_states;  // of those that ask, those that gather photons not scattered diffusely alone
     uint least_bounces;   // scatterings in all, with that at the point
     float scale;          // of stored fluxes
@@ -146,7 +148,7 @@ bool find_nearest(float radius) {
         for (uint i = 0u; i < NEAREST_BINS; ++i) {
             nearest_bins[i] = 0u;
         }
-        if (!compact_point_query(push.root, gather.position)) {
+        if (!compact_point_query(photon_map_root, gather.position)) {
             if (halvings == NEAREST_HALVINGS) {
                 return false;
             }
@@ -205,7 +207,7 @@ bool gather_photons() {
     if (NEAREST && !find_nearest(push.radius)) {
         return false;
     }
-    return compact_point_query(push.root, gather.position);
+    return compact_point_query(photon_map_root, gather.position);
 }
 
 void main() {

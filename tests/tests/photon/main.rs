@@ -10,6 +10,7 @@ mod convergence;
 mod determinism;
 mod flux;
 mod lights;
+mod maps;
 mod materials;
 mod queues;
 mod scale;

@@ -203,7 +203,6 @@ impl GatherStage<'_> {
     fn push(&self) -> photon_gather::Push {
         photon_gather::Push {
             ask: self.ask(),
-            root: self.map.root,
             caustic_states: self.gather.caustic_states,
             least_bounces: self.gather.bounces[0],
             scale: self.scale,
@@ -218,6 +217,7 @@ impl GatherStage<'_> {
             photon_pairs: &self.map.pairs,
             photon_map_records: &self.map.records,
             gather_counters: self.gather.counters.view(),
+            photon_map_root: self.map.root.view(),
         }
     }
 }

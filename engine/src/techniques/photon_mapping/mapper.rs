@@ -19,13 +19,13 @@ use std::time::Instant;
 
 use super::gather::{Gather, GatherCounts};
 use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
-use super::map::PhotonMap;
-use super::settings::PhotonSettings;
+use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
+use super::settings::{MapBuild, PhotonSettings};
 use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
 use crate::Result;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
-use crate::gpu::{Buffer, Gpu, PipelineInfo};
+use crate::gpu::{Buffer, Gpu, PipelineInfo, Submission};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
 use crate::techniques::path::PathCounters;
@@ -51,8 +51,16 @@ pub struct MapperCounts {
     pub gather: GatherCounts,
     /// Seconds of wall clock that photons were traced for.
     pub trace_seconds: f64,
-    /// Seconds of wall clock that maps were built for by the host, with copies.
+    /// Seconds that maps were built for: by the host those of wall clock, with copies; by the device those of wall clock until a build was
+    /// submitted, and of its passes.
     pub map_seconds: f64,
+}
+
+impl MapperCounts {
+    /// The last map.
+    fn note(&mut self, map: MapFigures) {
+        (self.cover, self.leaf_size) = (map.cover, map.leaf_size);
+    }
 }
 
 /// A photon where it landed, as the map of a pass has it.
@@ -80,8 +88,11 @@ pub struct PhotonMapper {
 struct Photons {
     tracer: PhotonTracer,
     gather: Gather,
+    maker: MapMaker,
     /// Of the pass under way.
     map: Option<PhotonMap>,
+    /// The device's build of it, which is waited for with the eye paths behind it.
+    building: Option<Submission>,
 }
 
 impl PhotonMapper {
@@ -116,7 +127,9 @@ impl PhotonMapper {
             Some(tracer) => Some(Photons {
                 tracer,
                 gather: Gather::new(gpu, &scene, &settings, &eye_paths, eye.slots())?,
+                maker: MapMaker::new(gpu, settings.map_build)?,
                 map: None,
+                building: None,
             }),
             None => None,
         };
@@ -160,6 +173,7 @@ impl PhotonMapper {
         let mut all = self.eye.pipelines();
         if let Some(photons) = &self.photons {
             all.extend(photons.tracer.pipelines());
+            all.extend(photons.maker.pipelines());
             all.extend(photons.gather.pipelines());
         }
         all
@@ -193,7 +207,7 @@ impl PhotonMapper {
     /// Before the first pass.
     fn begin(&mut self) {
         if let Some(photons) = &mut self.photons {
-            photons.map = None;
+            (photons.map, photons.building) = (None, None);
         }
     }
 
@@ -221,10 +235,20 @@ impl PhotonMapper {
             timings.extend(traced.timings);
             self.counts.trace_seconds += clock.elapsed().as_secs_f64();
             let clock = Instant::now();
-            let records = photons.tracer.records().buffer().view();
-            let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;
-            let map = PhotonMap::build(&self.gpu, &records, self.scene.surface_area())?;
-            (self.counts.cover, self.counts.leaf_size) = (map.cover, map.leaf_size);
+            let area = self.scene.surface_area();
+            let made = photons
+                .maker
+                .make(&self.gpu, photons.tracer.records(), traced.records, area)?;
+            let map = match made {
+                Made::ByHost(map, figures) => {
+                    self.counts.note(figures);
+                    map
+                }
+                Made::ByDevice(map, building) => {
+                    photons.building = Some(building);
+                    map
+                }
+            };
             photons.map = Some(map);
             self.counts.map_seconds += clock.elapsed().as_secs_f64();
             self.counts.passes += 1;
@@ -242,7 +266,14 @@ impl PhotonMapper {
         };
         let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
         let step = self.eye.step_with(end, arrival)?;
-        if let Some(photons) = &self.photons {
+        if let Some(photons) = &mut self.photons {
+            if let Some(building) = photons.building.take() {
+                let built = building.wait()?;
+                self.counts.map_seconds += seconds_of(&built);
+                timings.push(built);
+                let figures = photons.maker.figures(self.scene.surface_area())?;
+                figures.into_iter().for_each(|figures| self.counts.note(figures));
+            }
             let counts = photons.gather.take_counts()?;
             self.counts.gather.queries += counts.queries;
             self.counts.gather.photons += counts.photons;
@@ -290,6 +321,23 @@ impl PhotonMapper {
             }
         });
         Ok(mapped.collect())
+    }
+
+    /// Traces the photons of a pass and reads their map back as `build` makes it, which is the same whoever does. The picture is not touched,
+    /// and counts go on; `None` where there are no photons.
+    ///
+    /// # Errors
+    /// As [`PhotonMapper::step`] and [`map_contents`](super::map_contents).
+    pub fn map(&mut self, pass: u32, build: MapBuild) -> Result<Option<MapContents>> {
+        let kernel = self.kernel(pass);
+        let Some(photons) = &mut self.photons else {
+            return Ok(None);
+        };
+        let traced = photons.tracer.trace(pass, &kernel)?;
+        self.counts.photons += traced.counts;
+        let (records, area) = (photons.tracer.records(), self.scene.surface_area());
+        let mut maker = MapMaker::new(&self.gpu, build)?;
+        maker.contents(&self.gpu, records, traced.records, area).map(Some)
     }
 
     /// How the kernels of a pass are made.

@@ -3,6 +3,7 @@
 pub mod kernel;
 
 pub(super) mod card;
+mod device_map;
 mod gather;
 mod map;
 mod mapper;
@@ -11,6 +12,7 @@ mod settings;
 mod tracer;
 
 pub use gather::GatherCounts;
+pub use map::{MapContents, map_contents};
 pub use mapper::{MappedPhoton, MapperCounts, PhotonMapper};
-pub use settings::{MapQuery, MapQueue, PhotonSettings};
+pub use settings::{MapBuild, MapQuery, MapQueue, PhotonSettings};
 pub use tracer::PhotonCounts;

@@ -48,6 +48,18 @@ pub enum MapQueue {
     Blocks,
 }
 
+/// Who builds the map. The same bytes either way, where the device rounds numbers of 64 bits as IEEE 754 says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapBuild {
+    /// The device where it can (`shaderFloat64`, and memory for it), else the host.
+    Auto,
+    /// The device: photons are never read back.
+    Device,
+    /// The host: photons are read back, and the map is copied to the device.
+    Host,
+}
+
 crate::settings! {
     /// Settings of photon mapping.
     pub struct PhotonSettings {
@@ -99,6 +111,9 @@ crate::settings! {
         /// Invocations of queries are for every path under way, for those that ask the map by stream compaction, or in blocks that subgroups
         /// collect; changes no picture but as query does.
         pub queue: MapQueue = MapQueue::Slots;
+        /// Who builds the map: the device, which needs shaderFloat64, so that photons are never read back, or the host; auto is the device where
+        /// it can. Changes no picture.
+        pub map_build: MapBuild = MapBuild::Auto;
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
         pub sampler: SamplerKind = SamplerKind::Sobol;
     }

@@ -13,6 +13,7 @@ use clerestory::{Result, scene};
 use glam::Vec3;
 
 use super::cases::{CASES, Case, mapper};
+use super::map_builds;
 use crate::experiments::measures::Context;
 use crate::experiments::table::{Cell, Table};
 use crate::timing::{Spread, median};
@@ -26,8 +27,9 @@ const SMOKE_FRAMES: u32 = 2;
 const SMOKE_SCENES: [&str; 1] = ["Passage"];
 /// The light's way in a frame: 3 cm an axis, away from ceilings.
 const STEP: Vec3 = Vec3::new(0.03, -0.03, 0.03);
-/// How passes of photons are called, and that of queries among the eye's.
+/// How passes of photons are called, those of their map, and that of queries among the eye's.
 const PHOTON_PASSES: &str = "photon: ";
+const MAP_PASSES: &str = "map: ";
 const GATHER_PASSES: &str = "photon: gather";
 
 /// Milliseconds and counts of one frame.
@@ -51,6 +53,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     let gpu = (context.gpu)()?;
     let mut table = frames_table();
     let mut rates = rates_table();
+    let mut maps = map_builds::table();
     let cases: Vec<(&Case, KernelProfile, &str)> = CASES
         .iter()
         .map(|case| (case, KernelProfile::Uniform, ""))
@@ -74,11 +77,20 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         let frames = frames(context, &gpu, case, &settings)?;
         table.row(frames_row(&name, case, &frames));
         rates.row(rates_row(&name, &frames));
+        if word.is_empty() {
+            maps.row(map_builds::row(
+                context,
+                &gpu,
+                case,
+                if context.smoke { SMOKE_SIZE } else { SIZE },
+            )?);
+        }
     }
+    map_builds::note(&mut maps, context.smoke);
     let size = if context.smoke { SMOKE_SIZE } else { SIZE };
     table.note(format!(
         "{} × {} pixels, one sample each, direct light by shadow rays; medians of {} frames, the lamp 3 cm further along each axis in each. Photons, map and \
-         kernels are those of the frame alone. Trace and render are GPU times; the map is built by the host, with copies. A frame is wall clock without the \
+         kernels are those of the frame alone. Trace and render are GPU times; the map's are those of its passes, with the host's share, or of the host with copies where the device cannot build it. A frame is wall clock without the \
          upload of the moved scene and the memory for its light.",
         size[0],
         size[1],
@@ -86,7 +98,7 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
     ));
     table.note("Source: 512 × 512 pixels at most, on a GPU of 2008; the last row's kernel is Epanechnikov's, 1 % slower there.");
     rates.note("Of the same frames: the stage's count over its time; median, least and greatest.");
-    Ok(vec![table, rates])
+    Ok(vec![table, rates, maps])
 }
 
 /// Moves every light: lamps, and meshes that shine.
@@ -154,7 +166,7 @@ impl Frame {
                 self.render += milliseconds;
             } else if pass.name.starts_with(PHOTON_PASSES) {
                 self.trace += milliseconds;
-            } else {
+            } else if !pass.name.starts_with(MAP_PASSES) {
                 self.render += milliseconds;
             }
         }
