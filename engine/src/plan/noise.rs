@@ -13,57 +13,91 @@ const REACHES: [usize; 3] = [8, 2, 0];
 /// Standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half.
 const TRUST: f64 = 0.05;
 
+/// How the square of a pixel's true radiance is found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Truth {
+    /// From its neighbourhood where noise hides it: whatever is bright in one picture alone is rare light that pixels around may get, too.
+    Neighbourhood,
+    /// No less than the square of both pictures' mean: what is bright in one picture alone belongs to the pixel. So it is where light that
+    /// is scattered diffusely comes from kernels, and only what the eye sees by way of mirrors is sampled.
+    Pixel,
+}
+
 /// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + `offset`) over pixels and channels, as
 /// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it.
 ///
 /// # Errors
 /// [`Error::Setting`] when the sizes differ; [`Error::Picture`] without radiance.
 pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64> {
-    let (width, height) = (a.width() as usize, a.height() as usize);
-    if (b.width() as usize, b.height() as usize) != (width, height) {
-        return Err(Error::setting(
-            "pair of pictures",
-            format!("{width} × {height}"),
-            "have different sizes",
-        ));
-    }
-    let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
-    let mut sum = 0.0;
+    noise_of_pair(a, b, offset, Truth::Neighbourhood)
+}
+
+/// As [`relative_mse_of_pair`], relative to that truth.
+pub(super) fn noise_of_pair(a: &Picture, b: &Picture, offset: f64, kind: Truth) -> Result<f64> {
+    same_size(a, b)?;
+    let (mut sum, mut count) = (0.0, 0_usize);
     for channel in 0..3 {
-        let pair = |i: usize| {
-            let (a, b) = (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
-            // A pixel without a finite sample says nothing.
-            if a.is_finite() && b.is_finite() {
-                (a, b)
-            } else {
-                (0.0, 0.0)
-            }
-        };
-        let squares: Vec<f64> = (0..width * height).map(pair).map(|(a, b)| a * b).collect();
-        let variances: Vec<f64> = (0..width * height)
-            .map(pair)
-            .map(|(a, b)| (a - b) * (a - b) / 2.0)
-            .collect();
-        let mut truth = vec![0.0; width * height];
-        for reach in REACHES {
-            let (near_squares, near_variances) = (blurred(&squares, width, reach), blurred(&variances, width, reach));
-            let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
-            for (truth, (square, variance)) in truth.iter_mut().zip(near_squares.iter().zip(&near_variances)) {
-                // A narrower neighbourhood only where there is little noise: a large difference makes the product small, and the two
-                // must not meet in one quotient.
-                let (signal, noise) = (square.max(0.0) * TRUST, variance / count.sqrt());
-                let all = signal * signal + noise * noise;
-                let trust = if all > 0.0 && reach != REACHES[0] {
-                    signal * signal / all
-                } else {
-                    1.0
-                };
-                *truth += trust * (square.max(0.0) - *truth);
+        let (variances, mut truth) = channel_of_pair(a, b, channel, TRUST)?;
+        if kind == Truth::Pixel {
+            let values = a.main_layer()?.values().iter().zip(b.main_layer()?.values());
+            for (truth, (a, b)) in truth.iter_mut().zip(values.skip(channel).step_by(3)) {
+                let mean = (f64::from(*a) + f64::from(*b)) / 2.0;
+                *truth = truth.max(mean * mean);
             }
         }
         sum += variances.iter().zip(&truth).map(|(v, t)| v / (t + offset)).sum::<f64>();
+        count += variances.len();
     }
-    Ok(sum / (3 * width * height).max(1) as f64)
+    Ok(sum / count.max(1) as f64)
+}
+
+/// Refuses two pictures that cannot be compared.
+pub(super) fn same_size(a: &Picture, b: &Picture) -> Result<()> {
+    let (width, height) = (a.width(), a.height());
+    if (b.width(), b.height()) == (width, height) {
+        return Ok(());
+    }
+    let size = format!("{width} × {height}");
+    Err(Error::setting("pair of pictures", size, "have different sizes"))
+}
+
+/// Of each pixel of a channel: the variance of either picture, and the square of its true radiance, as far as the two know them. `trust` is the
+/// standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half.
+pub(super) fn channel_of_pair(a: &Picture, b: &Picture, channel: usize, trust: f64) -> Result<(Vec<f64>, Vec<f64>)> {
+    let (width, height) = (a.width() as usize, a.height() as usize);
+    let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
+    let pair = |i: usize| {
+        let (a, b) = (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
+        // A pixel without a finite sample says nothing.
+        if a.is_finite() && b.is_finite() {
+            (a, b)
+        } else {
+            (0.0, 0.0)
+        }
+    };
+    let squares: Vec<f64> = (0..width * height).map(pair).map(|(a, b)| a * b).collect();
+    let variances: Vec<f64> = (0..width * height)
+        .map(pair)
+        .map(|(a, b)| (a - b) * (a - b) / 2.0)
+        .collect();
+    let mut truth = vec![0.0; width * height];
+    for reach in REACHES {
+        let (near_squares, near_variances) = (blurred(&squares, width, reach), blurred(&variances, width, reach));
+        let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
+        for (truth, (square, variance)) in truth.iter_mut().zip(near_squares.iter().zip(&near_variances)) {
+            // A narrower neighbourhood only where there is little noise: a large difference makes the product small, and the two
+            // must not meet in one quotient.
+            let (signal, noise) = (square.max(0.0) * trust, variance / count.sqrt());
+            let all = signal * signal + noise * noise;
+            let trust = if all > 0.0 && reach != REACHES[0] {
+                signal * signal / all
+            } else {
+                1.0
+            };
+            *truth += trust * (square.max(0.0) - *truth);
+        }
+    }
+    Ok((variances, truth))
 }
 
 /// Relative mean squared error that the `variance` layer of a picture stands for: what independent samples of that spread would have.
@@ -118,6 +152,18 @@ mod tests {
             (truth * (1.0 + deviation * normal)) as f32
         });
         Picture::from_radiance(64, 64, values.collect()).unwrap()
+    }
+
+    #[test]
+    fn a_lone_bright_pixel_is_rare_light_or_its_own() {
+        let mut values = vec![0.5; 32 * 32 * 3];
+        let b = Picture::from_radiance(32, 32, values.clone()).unwrap();
+        values[3 * 500] = 400.0;
+        let a = Picture::from_radiance(32, 32, values).unwrap();
+        let of = |kind| noise_of_pair(&a, &b, 0.01, kind).unwrap() * 3.0 * 1024.0;
+        // 400² ∕ 2 over some radiance near 0.5, or over 200².
+        assert!(of(Truth::Neighbourhood) > 1e4, "{}", of(Truth::Neighbourhood));
+        assert!((of(Truth::Pixel) - 2.0).abs() < 0.02, "{}", of(Truth::Pixel));
     }
 
     #[test]
