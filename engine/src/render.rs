@@ -12,7 +12,7 @@ use crate::accel::{IndexKind, IndexReport};
 use crate::film::PixelFormat;
 use crate::film::picture::{Metadata, NonFiniteSamples, Picture};
 use crate::gpu::{Buffer, Gpu, MemoryReport, PipelineInfo};
-use crate::scene::{Camera, Note, Scene, SceneProfile};
+use crate::scene::{Camera, Light, Note, Scene, SceneProfile};
 use crate::settings::Settings;
 use crate::techniques::{self, Card, Skipped, Technique, View};
 use crate::transport::{GpuScene, PathSet};
@@ -222,11 +222,12 @@ impl Renderer {
         let folder = desc.index_folder.as_deref();
         let gpu_scene = Arc::new(GpuScene::with_kept_index(gpu, scene, &desc.index, folder)?);
         let upload_seconds = start.elapsed().as_secs_f64();
-        // Only names and cameras are needed from here on; the geometry lives on the device.
+        // Only names, cameras and the names of lights are needed from here on; the geometry lives on the device.
         let scene = Scene {
             name: scene.name.clone(),
             source: scene.source.clone(),
             cameras: scene.cameras.clone(),
+            lights: scene.lights.clone(),
             defaults: scene.defaults.clone(),
             notes: scene.notes.clone(),
             ..Scene::default()
@@ -242,6 +243,11 @@ impl Renderer {
     /// The scene on the device.
     pub fn gpu_scene(&self) -> &Arc<GpuScene> {
         &self.gpu_scene
+    }
+
+    /// Lights without area, as the scene has them.
+    pub(crate) fn lights(&self) -> &[Light] {
+        &self.scene.lights
     }
 
     /// All samples of a picture, and its report.

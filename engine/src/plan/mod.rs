@@ -1,35 +1,51 @@
 //! Automatic choice: which technique, with which settings and how many samples, meets an asked error or time.
 //!
 //! Nothing is known beforehand: each candidate renders small pilot pictures of the view at hand, twice with independent seeds. Their
-//! difference gives its error ([`relative_mse_of_pair`]), their time its cost, and two or more numbers of samples the slope of its
-//! error ([`ErrorModel`]). A technique that cannot model the scene, that the device cannot run, or whose pictures hold other light paths
+//! difference gives its noise ([`relative_mse_of_pair`]), their time its cost, and two or more numbers of samples the slope of its
+//! noise ([`ErrorModel`]). A technique that cannot model the scene, that the device cannot run, or whose pictures hold other light paths
 //! than those asked for is never chosen, and [`Plan::candidates`] says why.
+//!
+//! Bias is judged as well ([`Candidate::judged_by`] says by what). Both pilots of a technique against two of the path tracer, of other seeds, give
+//! the square of its bias without the noise of either ([`relative_bias_of_pairs`]):
+//!
+//! - of a **biased** technique it stays as it is, and one that may exceed the error asked for is refused with that figure;
+//! - of a **consistent** one it falls as a power of its samples, which two numbers of samples measure ([`BiasModel`]). Where the path tracer's
+//!   noise hides it, or misses paths, the technique is judged by how far its own pictures still move ([`relative_drift_of_pairs`]);
+//! - the **path tracer** itself never finds what lights without area give by way of mirrors and smooth glass. In scenes that have both, it
+//!   is held against a consistent technique as if biased, and where there is none, it comes last, and [`Candidate::misses`] and
+//!   [`Plan::shortfall`] name the lights.
+//!
+//! The predicted error is √(bias² + noise²). Pilots take one first round of each candidate with the compilation of its kernels, and then at
+//! most 15 % of the time predicted, or two seconds where no time is to be kept. What they find is the same in every run for as many rounds;
+//! how many there are, and what is predicted to be faster, is the clock's.
 //!
 //! Predictions are estimates: a pilot does not see what is rarer than its samples (a caustic of one path in a million), and times are
 //! those of a machine that does nothing else.
 
+mod bias;
+mod judge;
 mod model;
 mod noise;
+mod paths;
 mod pilot;
+mod verdict;
 
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-pub use model::{CostModel, ErrorModel};
+pub use bias::{BiasEstimate, relative_bias_of_pairs, relative_drift_of_pairs};
+pub use model::{BiasModel, CostModel, ErrorModel};
 pub use noise::{relative_mse_by_variance, relative_mse_of_pair};
 
 use crate::card::{Role, Row};
 use crate::render::{RenderOptions, Renderer};
-use crate::techniques::{self, Card};
+use crate::techniques::{self, Bias, Card};
 use crate::transport::PathSet;
 use crate::{Error, Result};
-use pilot::{PILOT_SHARE, Trial, rounds};
-
-/// Relative difference of two predictions that is none.
-const TOLERANCE: f64 = 1e-3;
-/// Score of a missed goal, beyond every number of seconds.
-const MISSED: f64 = 1e12;
+use judge::REFERENCE;
+use pilot::{Asked, PILOT_SHARE, Trial, rounds};
+use verdict::{score, shortfall};
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
@@ -42,7 +58,6 @@ pub struct Goal {
 
 /// What became of a technique with its settings.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-#[non_exhaustive]
 pub struct Candidate {
     /// Technique id.
     pub technique: &'static str,
@@ -50,29 +65,49 @@ pub struct Candidate {
     pub variant: &'static str,
     /// Settings as JSON.
     pub settings: Value,
-    /// Why it was not tried, or not to the end; empty for those that were.
+    /// Why it cannot be chosen, tried or not; empty for those that can.
     pub reason: String,
+    /// What of the light paths asked for it does not find, in words; empty where it finds all.
+    pub misses: String,
     /// Samples a pixel of its last pilots, 0 without.
     pub pilot_spp: u32,
-    /// Root of the relative MSE of those.
-    pub pilot_error: f64,
+    /// Root of the relative MSE of those by noise alone.
+    pub pilot_noise: f64,
     /// Whether its pilots have met any light. Without it `error` is that of a black picture: nothing is known.
     pub lit: bool,
-    /// The error falls as samples^(−slope/2).
+    /// The noise falls as samples^(−slope/2).
     pub slope: f64,
     /// Predicted seconds for each sample a pixel of the whole picture.
     pub seconds_a_sample: f64,
     /// Samples a pixel that it would take.
     pub spp: u32,
-    /// Predicted root of the relative MSE.
+    /// Predicted root of the relative MSE by noise alone.
+    pub noise: f64,
+    /// Predicted root of the relative squared bias; `None` where nothing is known of it.
+    pub bias: Option<f64>,
+    /// What that is at most, but for one case in 40.
+    pub bias_at_most: Option<f64>,
+    /// What the bias was found by, and the law by which it falls; empty for what has none.
+    pub judged_by: String,
+    /// Predicted root of the relative MSE: √(bias² + noise²).
     pub error: f64,
     /// Predicted seconds of rendering, without the pilots.
     pub seconds: f64,
 }
 
+/// The pilots that biased and consistent techniques were held against.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Reference {
+    /// Technique id.
+    pub technique: &'static str,
+    /// Samples a pixel.
+    pub pilot_spp: u32,
+    /// Root of the relative MSE of each by noise.
+    pub pilot_noise: f64,
+}
+
 /// The choice, its prediction, and all that was looked at.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-#[non_exhaustive]
 pub struct Plan {
     /// What was asked for.
     pub goal: Goal,
@@ -80,8 +115,14 @@ pub struct Plan {
     pub chosen: usize,
     /// Everything that could have been chosen, and why it could not.
     pub candidates: Vec<Candidate>,
+    /// What others were judged by; `None` where nothing could.
+    pub reference: Option<Reference>,
     /// Seconds that the pilots took, with the compilation of their kernels.
     pub pilot_seconds: f64,
+    /// Their share of the whole predicted time.
+    pub pilot_share: f64,
+    /// The share that rounds of pilots after the first are kept to.
+    pub pilot_share_limit: f64,
     /// Why the goal cannot be met; empty when it can.
     pub shortfall: String,
 }
@@ -98,7 +139,7 @@ impl Plan {
         let left = |time: Duration| time.saturating_sub(Duration::from_secs_f64(self.pilot_seconds));
         RenderOptions {
             technique: Some(choice.technique.into()),
-            settings: choice.settings.clone().into(),
+            settings: choice.settings.clone(),
             spp: choice.spp,
             time_budget: self.goal.time.map(left).or(base.time_budget),
             ..base.clone()
@@ -106,9 +147,9 @@ impl Plan {
     }
 }
 
-/// Renders pilots and chooses. `options` is the picture as asked for: view, size, seed, and what of technique and settings is not free;
-/// its samples are not looked at. `proceed` is called between pieces of work; when it says no, pilots end and the choice is made
-/// among what is known.
+/// Renders pilots and chooses among the engine's techniques. `options` is the picture as asked for: view, size, seed, and what of technique and
+/// settings is not free; its samples are not looked at. `proceed` is called between pieces of work; when it says no, pilots end and the choice
+/// is made among what is known.
 ///
 /// # Errors
 /// [`Error::Setting`] for a goal that is none; [`Error::Unsupported`] when no technique can render the scene as asked, with every
@@ -119,13 +160,37 @@ pub fn plan(
     goal: Goal,
     proceed: &mut dyn FnMut() -> bool,
 ) -> Result<Plan> {
+    let cards: Vec<&Card> = match &options.technique {
+        Some(id) => vec![techniques::by_id(id)?],
+        None => techniques::all().iter().collect(),
+    };
+    plan_among(renderer, &cards, options, goal, proceed)
+}
+
+/// As [`plan`](fn@plan), among cards that may be the host's own, whatever technique the options name. The picture of one is begun with
+/// [`Renderer::start_technique`] and [`Plan::options`].
+///
+/// # Errors
+/// As [`plan`](fn@plan).
+pub fn plan_among(
+    renderer: &Renderer,
+    cards: &[&Card],
+    options: &RenderOptions,
+    goal: Goal,
+    proceed: &mut dyn FnMut() -> bool,
+) -> Result<Plan> {
     let start = Instant::now();
     check(goal)?;
-    let wanted = wanted_path_set(&options.settings.to_json())?;
-    let mut candidates = candidates(options)?;
-    let mut trials: Vec<Option<Trial>> = Vec::new();
-    let pixels = f64::from(options.size[0]) * f64::from(options.size[1]);
-    for candidate in &mut candidates {
+    let asked = Asked {
+        renderer,
+        options,
+        paths: wanted_path_set(&options.settings)?,
+        goal,
+    };
+    let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) =
+        candidates(cards, &options.settings).into_iter().unzip();
+    let mut trials: Vec<Option<Trial<'_>>> = Vec::new();
+    for (index, (candidate, card)) in candidates.iter_mut().zip(&cards).enumerate() {
         let late = goal
             .time
             .is_some_and(|time| start.elapsed().as_secs_f64() > PILOT_SHARE * time.as_secs_f64());
@@ -134,7 +199,7 @@ pub fn plan(
             candidate.reason = "there was no time to try it".into();
             None
         } else {
-            Trial::start(renderer, options, candidate, wanted, pixels)?
+            Trial::start(&asked, card, candidate, index)?
         };
         trials.push(trial);
     }
@@ -145,8 +210,16 @@ pub fn plan(
             reasons: candidates.iter().map(reason).collect(),
         });
     }
-    rounds(&mut trials, goal, pixels, start, proceed)?;
+    // Someone has to judge what is biased.
+    let is_biased = |trial: &Trial<'_>| trial.card.bias != Bias::Unbiased;
+    if trials.iter().flatten().any(is_biased) && !trials.iter().flatten().any(|trial| trial.card.id == REFERENCE) {
+        let card = techniques::by_id(REFERENCE)?;
+        let mut judge = Candidate::of(card, "judge", merged(serde_json::json!({}), &options.settings, card));
+        trials.push(Trial::judge(&asked, card, &mut judge)?);
+    }
+    rounds(&mut trials, &asked, start, proceed)?;
     let pilot_seconds = start.elapsed().as_secs_f64();
+    // A judge that is no candidate stands at the end, beyond all of them.
     for (candidate, trial) in candidates.iter_mut().zip(&trials) {
         if let Some(trial) = trial {
             trial.predict(candidate, goal, pilot_seconds);
@@ -159,9 +232,12 @@ pub fn plan(
     Ok(Plan {
         goal,
         chosen,
-        candidates,
+        reference: judge::reference(&trials).map(Trial::as_reference),
         pilot_seconds,
+        pilot_share: pilot_seconds / (pilot_seconds + candidates[chosen].seconds),
+        pilot_share_limit: PILOT_SHARE,
         shortfall,
+        candidates,
     })
 }
 
@@ -185,85 +261,62 @@ fn wanted_path_set(settings: &Value) -> Result<PathSet> {
     }
 }
 
-/// Every technique with each of its variants. What the options fix is fixed; variants that it makes equal are listed once.
-fn candidates(options: &RenderOptions) -> Result<Vec<Candidate>> {
-    let infos = match &options.technique {
-        Some(id) => vec![techniques::by_id(id)?],
-        None => techniques::all().iter().collect(),
-    };
-    let mut found: Vec<Candidate> = Vec::new();
-    let fixed = options.settings.to_json();
-    for info in infos {
-        for variant in info.variants {
-            let mut settings = (variant.settings)();
-            merge(&mut settings, &fixed, info);
-            if found
-                .iter()
-                .any(|other| other.technique == info.id && other.settings == settings)
-            {
-                continue;
+/// Every technique with each of its variants. What is fixed is fixed; variants that it makes equal are listed once.
+fn candidates<'a>(cards: &[&'a Card], fixed: &Value) -> Vec<(&'a Card, Candidate)> {
+    let mut found: Vec<(&Card, Candidate)> = Vec::new();
+    for &card in cards {
+        let defaults = [("defaults", serde_json::json!({}))];
+        let variants: Vec<(&'static str, Value)> = if card.variants.is_empty() {
+            defaults.into()
+        } else {
+            let each = card.variants.iter();
+            each.map(|variant| (variant.name, (variant.settings)())).collect()
+        };
+        for (name, settings) in variants {
+            let settings = merged(settings, fixed, card);
+            let there = |(_, other): &(&Card, Candidate)| other.technique == card.id && other.settings == settings;
+            if !found.iter().any(there) {
+                found.push((card, Candidate::of(card, name, settings)));
             }
-            found.push(Candidate {
-                technique: info.id,
-                variant: variant.name,
-                settings,
-                reason: String::new(),
-                pilot_spp: 0,
-                pilot_error: 0.0,
-                slope: 0.0,
-                lit: false,
-                seconds_a_sample: 0.0,
-                spp: 0,
-                error: 0.0,
-                seconds: 0.0,
-            });
         }
     }
-    Ok(found)
+    found
 }
 
-/// Puts what is fixed over a variant's settings; keys that the technique does not have are none of its business.
-fn merge(settings: &mut Value, fixed: &Value, info: &Card) {
+impl Candidate {
+    /// Before anything is known.
+    fn of(card: &Card, variant: &'static str, settings: Value) -> Self {
+        Self {
+            technique: card.id,
+            variant,
+            settings,
+            reason: String::new(),
+            misses: String::new(),
+            pilot_spp: 0,
+            pilot_noise: 0.0,
+            slope: 0.0,
+            lit: false,
+            seconds_a_sample: 0.0,
+            spp: 0,
+            noise: 0.0,
+            bias: None,
+            bias_at_most: None,
+            judged_by: String::new(),
+            error: 0.0,
+            seconds: 0.0,
+        }
+    }
+}
+
+/// A variant's settings under what is fixed; keys that the technique does not have are none of its business.
+fn merged(mut settings: Value, fixed: &Value, card: &Card) -> Value {
+    let known = (card.default_settings)();
     if let (Some(settings), Some(fixed)) = (settings.as_object_mut(), fixed.as_object()) {
-        for (key, value) in fixed.iter().filter(|(key, _)| info.settings.has(key)) {
+        for (key, value) in fixed.iter().filter(|(key, _)| known.get(key).is_some()) {
             settings.insert(key.clone(), value.clone());
         }
     }
-}
-
-/// Smaller is better: seconds where an error is to be reached, the error where only the time counts.
-fn score(candidate: &Candidate, goal: Goal) -> f64 {
-    let late = |time: Duration| candidate.seconds > time.as_secs_f64();
-    match goal.error {
-        _ if !candidate.lit => 2.0 * MISSED,
-        // What misses the error because of the time is judged by how far.
-        Some(wanted) if goal.time.is_some_and(late) || candidate.error > wanted * (1.0 + TOLERANCE) => {
-            MISSED * candidate.error
-        }
-        Some(_) => candidate.seconds,
-        None => candidate.error,
-    }
-}
-
-/// Why the choice does not meet the goal.
-fn shortfall(choice: &Candidate, goal: Goal, pilot_seconds: f64) -> String {
-    if !choice.lit {
-        return "no pilot has met any light: nothing is known of the error".into();
-    }
-    let all = choice.seconds + pilot_seconds;
-    if let Some(time) = goal.time.map(|time| time.as_secs_f64())
-        && all > time * (1.0 + TOLERANCE)
-    {
-        return format!("{time:.3} s are too short: one sample a pixel and the pilots take about {all:.3} s");
-    }
-    match (goal.error, goal.time) {
-        (Some(error), Some(time)) if choice.error > error * (1.0 + TOLERANCE) => format!(
-            "an error of {error} takes longer than {:.3} s; {:.4} can be had in that time",
-            time.as_secs_f64(),
-            choice.error
-        ),
-        _ => String::new(),
-    }
+    settings
 }
 
 /// Rows of the catalogue.
@@ -296,52 +349,15 @@ mod tests {
 
     #[test]
     fn fixed_settings_leave_fewer_candidates() {
-        let free = candidates(&RenderOptions::default()).unwrap();
+        let path = [techniques::by_id(REFERENCE).unwrap()];
+        let free = candidates(&path, &Value::Null);
         assert!(free.len() > 1, "{free:?}");
-        let options = RenderOptions {
-            settings: serde_json::json!({ "sampler": "pcg", "path_set": "direct" }).into(),
-            ..RenderOptions::default()
-        };
-        let fixed = candidates(&options).unwrap();
+        let settings = serde_json::json!({ "sampler": "pcg", "path_set": "direct" });
+        let fixed = candidates(&path, &settings);
         assert!(fixed.len() < free.len(), "{fixed:?}");
-        for candidate in fixed {
+        for (_, candidate) in fixed {
             assert_eq!(candidate.settings["sampler"], "pcg");
             assert_eq!(candidate.settings["path_set"], "direct");
         }
-        let unknown = RenderOptions {
-            technique: Some("none".into()),
-            ..RenderOptions::default()
-        };
-        assert!(candidates(&unknown).is_err());
-    }
-
-    #[test]
-    fn what_cannot_be_had_is_said() {
-        let mut choice = Candidate {
-            technique: "path",
-            variant: "default",
-            settings: Value::Null,
-            reason: String::new(),
-            pilot_spp: 4,
-            pilot_error: 0.5,
-            slope: 1.0,
-            lit: true,
-            seconds_a_sample: 0.1,
-            spp: 10,
-            error: 0.3,
-            seconds: 1.0,
-        };
-        let goal = |error, seconds: Option<f64>| Goal {
-            error,
-            time: seconds.map(Duration::from_secs_f64),
-        };
-        assert!(shortfall(&choice, goal(Some(0.3), None), 0.5).is_empty());
-        assert!(shortfall(&choice, goal(None, Some(1.5)), 0.5).is_empty());
-        assert!(shortfall(&choice, goal(None, Some(1.2)), 0.5).contains("too short"));
-        assert!(shortfall(&choice, goal(Some(0.1), Some(2.0)), 0.5).contains("0.3"));
-        let goal = goal(Some(0.1), Some(2.0));
-        let far = score(&choice, goal);
-        choice.error = 0.09;
-        assert!(score(&choice, goal) < far);
     }
 }

@@ -1,4 +1,6 @@
-//! Models of error and cost over samples a pixel, fitted to pilot renderings.
+//! Models of error, bias and cost over samples a pixel, fitted to pilot renderings.
+
+use super::bias::BiasEstimate;
 
 /// Slopes that an error of sampling can have: independent samples −1, stratified ones of smooth pixels steeper.
 const SLOPES: std::ops::RangeInclusive<f64> = 1.0..=1.5;
@@ -9,14 +11,28 @@ const BELIEF: f64 = 0.5;
 /// What a number may exceed a whole one by and still count as that.
 const HAIR: f64 = 1e-6;
 
+/// Least slope of techniques whose kernels shrink as they go on: with reduction α, the variance of progressive photon mapping falls as
+/// passes^(−α).
+const LEAST_SLOPE_OF_KERNELS: f64 = 0.5;
+
 /// Relative MSE over samples a pixel.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ErrorModel {
+    /// Whether the noise may fall more slowly than that of independent samples.
+    shrinking_kernels: bool,
     /// Samples a pixel and relative MSE, with rising samples.
     points: Vec<(f64, f64)>,
 }
 
 impl ErrorModel {
+    /// Of a technique whose kernels shrink as it goes on, so that its noise falls more slowly than that of independent samples.
+    pub fn of_shrinking_kernels() -> Self {
+        Self {
+            shrinking_kernels: true,
+            points: Vec::new(),
+        }
+    }
+
     /// Adds a measurement with more samples than those before.
     pub fn add(&mut self, samples: u32, relative_mse: f64) {
         self.points.push((f64::from(samples), relative_mse));
@@ -24,16 +40,22 @@ impl ErrorModel {
 
     /// The error falls as samples^(−slope).
     pub fn slope(&self) -> f64 {
+        let least = if self.shrinking_kernels {
+            LEAST_SLOPE_OF_KERNELS
+        } else {
+            *SLOPES.start()
+        };
         let [.., (n0, e0), (n1, e1)] = self.points[..] else {
-            return *SLOPES.start();
+            return least;
         };
         let measured = if e0 > 0.0 && e1 > 0.0 {
             (e0 / e1).ln() / (n1 / n0).ln()
         } else {
             *SLOPES.start()
         };
-        let measured = measured.clamp(*SLOPES.start(), *SLOPES.end());
-        SLOPES.start() + BELIEF * (measured - SLOPES.start())
+        let measured = measured.clamp(least, *SLOPES.end());
+        let surplus = (measured - SLOPES.start()).max(0.0);
+        measured - (1.0 - BELIEF) * surplus
     }
 
     /// Relative MSE expected of `samples` samples a pixel: between measurements by the power law through both, beyond the last by the
@@ -65,6 +87,126 @@ impl ErrorModel {
         }
         let samples = n * (e / relative_mse.max(f64::MIN_POSITIVE)).powf(1.0 / self.slope());
         (samples - HAIR).ceil().clamp(1.0, f64::from(u32::MAX)) as u32
+    }
+}
+
+/// Exponents that a falling squared bias can have. That of a kernel's blur falls as its area squared, that of its edges as its radius: with a
+/// reduction of 2/3 of photon mapping as passes^(−2/3) and passes^(−1/6).
+const EXPONENTS: std::ops::RangeInclusive<f64> = 0.0..=2.0;
+/// Exponent where pilots have not shown any: between those two.
+const UNSEEN_EXPONENT: f64 = 1.0 / 3.0;
+/// Least exponent by which where a picture is going can be told from how it moves.
+const SETTLING_EXPONENT: f64 = 0.1;
+
+/// Relative squared bias over samples a pixel: a power law through the last measurement.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BiasModel {
+    /// Samples a pixel of the last measurement.
+    at: f64,
+    /// What it found, and what may be by its noise.
+    square: f64,
+    upper: f64,
+    /// The squared bias falls as samples^(−exponent).
+    exponent: f64,
+}
+
+impl BiasModel {
+    /// A bias that stays, found at some number of samples.
+    pub fn constant(samples: u32, found: BiasEstimate) -> Self {
+        Self {
+            at: samples.into(),
+            square: found.square.max(0.0),
+            upper: found.upper(),
+            exponent: 0.0,
+        }
+    }
+
+    /// A bias that falls, found at rising numbers of samples: as it did between the last two measurements that are told from noise, and
+    /// by an exponent of 1/3 where there are no two. `None` without a measurement.
+    pub fn falling(found: &[(u32, BiasEstimate)]) -> Option<Self> {
+        let (samples, last) = found.last()?;
+        let resolved: Vec<_> = found.iter().filter(|(_, found)| found.is_resolved()).collect();
+        let exponent = match resolved[..] {
+            [.., (n0, b0), (n1, b1)] => (b0.square / b1.square).ln() / (f64::from(*n1) / f64::from(*n0)).ln(),
+            _ => UNSEEN_EXPONENT,
+        };
+        Some(Self {
+            exponent: exponent.clamp(*EXPONENTS.start(), *EXPONENTS.end()),
+            ..Self::constant(*samples, *last)
+        })
+    }
+
+    /// Where a picture is going, by how far its expectation has moved between successive numbers of samples: where the bias falls as
+    /// samples^(−p/2) in each pixel, from n to Rn it moves by R^(p/2) − 1 times what is left. p is measured by two movements that are told
+    /// from noise. `None` without a movement, and where they do not get smaller.
+    pub fn settling(moved: &[(u32, u32, BiasEstimate)]) -> Option<Self> {
+        let (from, to, last) = moved.last()?;
+        let ratio = f64::from(*to) / f64::from(*from);
+        let exponent = match moved {
+            [.., (n0, _, b0), (n1, _, b1)] if b0.is_resolved() && b1.is_resolved() => {
+                (b0.square / b1.square).ln() / (f64::from(*n1) / f64::from(*n0)).ln()
+            }
+            _ => UNSEEN_EXPONENT,
+        };
+        if exponent < SETTLING_EXPONENT {
+            return None;
+        }
+        let exponent = exponent.min(*EXPONENTS.end());
+        let left = (ratio.powf(exponent / 2.0) - 1.0).powi(-2);
+        Some(Self {
+            at: f64::from(*to),
+            square: last.square.max(0.0) * left,
+            upper: last.upper() * left,
+            exponent,
+        })
+    }
+
+    /// Exponent of the squared bias: it falls as samples^(−exponent).
+    pub fn exponent(&self) -> f64 {
+        self.exponent
+    }
+
+    /// Relative squared bias expected of that many samples a pixel.
+    pub fn square(&self, samples: f64) -> f64 {
+        self.square * self.decay(samples)
+    }
+
+    /// What it is at most, but for one case in 40.
+    pub fn upper(&self, samples: f64) -> f64 {
+        self.upper * self.decay(samples)
+    }
+
+    fn decay(&self, samples: f64) -> f64 {
+        if self.exponent == 0.0 {
+            1.0
+        } else {
+            (samples / self.at).powf(-self.exponent)
+        }
+    }
+
+    /// Least number of samples a pixel from which noise and bias together stay within a relative MSE, and the bias does so with what it may be
+    /// by its noise; `None` where no number does.
+    pub fn samples(&self, noise: &ErrorModel, relative_mse: f64) -> Option<u32> {
+        if self.upper == 0.0 {
+            return Some(noise.samples(relative_mse));
+        }
+        let meets = |samples: u32| {
+            let samples = f64::from(samples);
+            noise.relative_mse(samples) + self.square(samples) <= relative_mse && self.upper(samples) <= relative_mse
+        };
+        if !meets(u32::MAX) {
+            return None;
+        }
+        let (mut short, mut enough) = (0, u32::MAX);
+        while enough - short > 1 {
+            let middle = short + (enough - short) / 2;
+            if meets(middle) {
+                enough = middle;
+            } else {
+                short = middle;
+            }
+        }
+        Some(enough)
     }
 }
 
@@ -117,10 +259,63 @@ mod tests {
         error.add(1024, 0.0);
         assert_eq!(error.samples(1e-3), 1);
 
+        let mut kernels = ErrorModel::of_shrinking_kernels();
+        kernels.add(4, 0.4);
+        kernels.add(16, 0.4 / 4_f64.powf(0.7));
+        assert!((kernels.slope() - 0.7).abs() < 1e-12);
+        kernels.add(64, 0.4);
+        assert_eq!(kernels.slope(), LEAST_SLOPE_OF_KERNELS);
+
         let cost = CostModel {
             start: 0.5,
             sample: 0.25,
         };
         assert_eq!((cost.seconds(4.0), cost.samples(1.6), cost.samples(0.1)), (1.5, 4, 0));
+    }
+
+    #[test]
+    fn biases_fall_as_they_were_seen_to() {
+        let found = |square: f64, deviation: f64| BiasEstimate { square, deviation };
+        let constant = BiasModel::constant(16, found(0.01, 0.001));
+        assert_eq!((constant.square(1e6), constant.upper(1.0)), (0.01, 0.012));
+        assert_eq!(BiasModel::constant(16, found(-0.01, 0.001)).square(4.0), 0.0);
+        // A quarter at four times the samples.
+        let falling = BiasModel::falling(&[(4, found(0.04, 0.001)), (16, found(0.01, 0.001))]).unwrap();
+        assert!((falling.exponent() - 1.0).abs() < 1e-12 && (falling.square(64.0) - 0.0025).abs() < 1e-12);
+        // What is not told from noise shows no law.
+        let hidden = BiasModel::falling(&[(4, found(0.04, 0.001)), (16, found(0.01, 0.009))]).unwrap();
+        assert_eq!(hidden.exponent(), UNSEEN_EXPONENT);
+        assert!(BiasModel::falling(&[]).is_none());
+
+        // A bias of 0.4 · samples^(−1/3) in every pixel.
+        let bias = |samples: f64| 0.4 * samples.powf(-1.0 / 3.0);
+        let moved = |from: u32| {
+            let by = bias(from.into()) - bias(4.0 * f64::from(from));
+            (from, 4 * from, found(by * by, 1e-9))
+        };
+        let settling = BiasModel::settling(&[moved(4), moved(16)]).unwrap();
+        assert!((settling.exponent() - 2.0 / 3.0).abs() < 1e-6, "{settling:?}");
+        assert!((settling.square(64.0).sqrt() / bias(64.0) - 1.0).abs() < 1e-6, "{settling:?}");
+        assert!((settling.square(4096.0).sqrt() / bias(4096.0) - 1.0).abs() < 1e-6, "{settling:?}");
+        // One movement alone is read by the slower law, and one that does not get smaller not at all.
+        assert!(BiasModel::settling(&[moved(16)]).unwrap().square(64.0).sqrt() > bias(64.0));
+        assert!(BiasModel::settling(&[(4, 16, found(0.01, 1e-9)), (16, 64, found(0.01, 1e-9))]).is_none());
+        assert!(BiasModel::settling(&[]).is_none());
+    }
+
+    #[test]
+    fn samples_serve_noise_and_bias_together() {
+        let found = |square: f64, deviation: f64| BiasEstimate { square, deviation };
+        let mut noise = ErrorModel::default();
+        noise.add(4, 0.04);
+        assert_eq!(BiasModel::default().samples(&noise, 0.01), Some(noise.samples(0.01)));
+        // 0.16 ∕ 32 + 0.005 = 0.01.
+        let constant = BiasModel::constant(4, found(0.005, 0.0));
+        assert_eq!(constant.samples(&noise, 0.01 * (1.0 + 1e-12)), Some(32));
+        assert_eq!(constant.samples(&noise, 0.004), None);
+        // Small as far as is known, but it may be larger.
+        assert_eq!(BiasModel::constant(4, found(0.005, 0.003)).samples(&noise, 0.01), None);
+        let falling = BiasModel::falling(&[(4, found(0.08, 0.0)), (16, found(0.02, 0.0))]).unwrap();
+        assert_eq!(falling.samples(&noise, 0.048 * (1.0 + 1e-12)), Some(10));
     }
 }

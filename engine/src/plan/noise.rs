@@ -19,51 +19,62 @@ const TRUST: f64 = 0.05;
 /// # Errors
 /// [`Error::Setting`] when the sizes differ; [`Error::Picture`] without radiance.
 pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64> {
-    let (width, height) = (a.width() as usize, a.height() as usize);
-    if (b.width() as usize, b.height() as usize) != (width, height) {
-        return Err(Error::setting(
-            "pair of pictures",
-            format!("{width} × {height}"),
-            "have different sizes",
-        ));
-    }
-    let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
-    let mut sum = 0.0;
+    same_size(a, b)?;
+    let (mut sum, mut count) = (0.0, 0_usize);
     for channel in 0..3 {
-        let pair = |i: usize| {
-            let (a, b) = (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
-            // A pixel without a finite sample says nothing.
-            if a.is_finite() && b.is_finite() {
-                (a, b)
-            } else {
-                (0.0, 0.0)
-            }
-        };
-        let squares: Vec<f64> = (0..width * height).map(pair).map(|(a, b)| a * b).collect();
-        let variances: Vec<f64> = (0..width * height)
-            .map(pair)
-            .map(|(a, b)| (a - b) * (a - b) / 2.0)
-            .collect();
-        let mut truth = vec![0.0; width * height];
-        for reach in REACHES {
-            let (near_squares, near_variances) = (blurred(&squares, width, reach), blurred(&variances, width, reach));
-            let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
-            for (truth, (square, variance)) in truth.iter_mut().zip(near_squares.iter().zip(&near_variances)) {
-                // A narrower neighbourhood only where there is little noise: a large difference makes the product small, and the two
-                // must not meet in one quotient.
-                let (signal, noise) = (square.max(0.0) * TRUST, variance / count.sqrt());
-                let all = signal * signal + noise * noise;
-                let trust = if all > 0.0 && reach != REACHES[0] {
-                    signal * signal / all
-                } else {
-                    1.0
-                };
-                *truth += trust * (square.max(0.0) - *truth);
-            }
-        }
+        let (variances, truth) = channel_of_pair(a, b, channel)?;
         sum += variances.iter().zip(&truth).map(|(v, t)| v / (t + offset)).sum::<f64>();
+        count += variances.len();
     }
-    Ok(sum / (3 * width * height).max(1) as f64)
+    Ok(sum / count.max(1) as f64)
+}
+
+/// Refuses two pictures that cannot be compared.
+pub(super) fn same_size(a: &Picture, b: &Picture) -> Result<()> {
+    let (width, height) = (a.width(), a.height());
+    if (b.width(), b.height()) == (width, height) {
+        return Ok(());
+    }
+    let size = format!("{width} × {height}");
+    Err(Error::setting("pair of pictures", size, "have different sizes"))
+}
+
+/// Of each pixel of a channel: the variance of either picture, and the square of its true radiance, as far as the two know them.
+pub(super) fn channel_of_pair(a: &Picture, b: &Picture, channel: usize) -> Result<(Vec<f64>, Vec<f64>)> {
+    let (width, height) = (a.width() as usize, a.height() as usize);
+    let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
+    let pair = |i: usize| {
+        let (a, b) = (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
+        // A pixel without a finite sample says nothing.
+        if a.is_finite() && b.is_finite() {
+            (a, b)
+        } else {
+            (0.0, 0.0)
+        }
+    };
+    let squares: Vec<f64> = (0..width * height).map(pair).map(|(a, b)| a * b).collect();
+    let variances: Vec<f64> = (0..width * height)
+        .map(pair)
+        .map(|(a, b)| (a - b) * (a - b) / 2.0)
+        .collect();
+    let mut truth = vec![0.0; width * height];
+    for reach in REACHES {
+        let (near_squares, near_variances) = (blurred(&squares, width, reach), blurred(&variances, width, reach));
+        let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
+        for (truth, (square, variance)) in truth.iter_mut().zip(near_squares.iter().zip(&near_variances)) {
+            // A narrower neighbourhood only where there is little noise: a large difference makes the product small, and the two
+            // must not meet in one quotient.
+            let (signal, noise) = (square.max(0.0) * TRUST, variance / count.sqrt());
+            let all = signal * signal + noise * noise;
+            let trust = if all > 0.0 && reach != REACHES[0] {
+                signal * signal / all
+            } else {
+                1.0
+            };
+            *truth += trust * (square.max(0.0) - *truth);
+        }
+    }
+    Ok((variances, truth))
 }
 
 /// Relative mean squared error that the `variance` layer of a picture stands for: what independent samples of that spread would have.

@@ -1,13 +1,18 @@
 //! Pilot pictures: two small ones of each candidate with independent seeds, refined round by round.
+//!
+//! Seeds and rounds decide what they find, to the bit; how many rounds there are, and what a sample costs, the clock.
 
 use std::time::{Duration, Instant};
 
+use super::judge::{self, Judgement, REFERENCE};
 use super::model::{CostModel, ErrorModel};
 use super::noise::relative_mse_of_pair;
-use super::{Candidate, Goal};
+use super::paths::{same_picture, unseen_by_eye_paths};
+use super::{Candidate, Goal, Reference};
+use crate::film::Picture;
 use crate::film::metrics::RELATIVE_MSE_OFFSET;
 use crate::render::{RenderOptions, Renderer, Rendering};
-use crate::techniques::{self, Bias};
+use crate::techniques::{Bias, Card};
 use crate::transport::PathSet;
 use crate::{Error, Result};
 
@@ -23,6 +28,10 @@ pub const PILOT_SHARE: f64 = 0.15;
 const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
 /// Beyond the relative MSE of what has met light.
 const UNLIT_COST: f64 = f64::MAX;
+/// Beyond every other cost: of what cannot be chosen.
+const IMPOSSIBLE_COST: f64 = f64::INFINITY;
+/// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
+const SMALL: u32 = 4;
 /// Seconds of rounds that pilots may take whatever the picture costs, where no time is to be kept.
 const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
@@ -30,17 +39,48 @@ const HOPELESS: f64 = 2.0;
 /// Distance of the pilots' seeds from the picture's and from each other.
 const SEED_STEP: u32 = 0x9E37_79B9;
 
-/// A candidate with its pilots.
-pub struct Trial {
+/// The two pilots' pictures after a round.
+pub struct Stage {
+    pub spp: u32,
+    pub pictures: [Picture; 2],
+}
+
+/// A technique with its pilots.
+pub struct Trial<'a> {
+    pub card: &'a Card,
+    /// What of the wanted paths it does not find, in words; empty where it finds all.
+    pub misses: String,
+    /// After each round.
+    pub stages: Vec<Stage>,
+    pub spp: u32,
+    /// Whether its pilots have met any light; without it nothing is known of the error.
+    pub lit: bool,
+    pub judgement: Judgement,
+    /// Whether it is there to judge others alone.
+    judges_only: bool,
     pilots: [Rendering; 2],
     error: ErrorModel,
     cost: CostModel,
-    spp: u32,
+    /// Share of a pilot sample's time that does not depend on the number of pixels.
+    fixed: f64,
     /// Seconds of its last round, and of all.
     round_seconds: f64,
     all_seconds: f64,
-    /// Whether its pilots have met any light; without it nothing is known of the error.
-    lit: bool,
+}
+
+/// What all trials have in common.
+pub struct Asked<'a> {
+    pub renderer: &'a Renderer,
+    pub options: &'a RenderOptions,
+    pub paths: PathSet,
+    pub goal: Goal,
+}
+
+impl Asked<'_> {
+    /// Pixels of the picture itself.
+    fn pixels(&self) -> f64 {
+        f64::from(self.options.size[0]) * f64::from(self.options.size[1])
+    }
 }
 
 /// The pilots' size: as the picture's, with fewer pixels.
@@ -49,37 +89,30 @@ fn pilot_size([width, height]: [u32; 2]) -> [u32; 2] {
     [width, height].map(|side| ((f64::from(side) * scale) as u32).max(PILOT_SIDE.min(side)))
 }
 
-impl Trial {
-    /// Begins pilots, and compiles their kernels with a first sample; `None`, with the reason, for what cannot be chosen.
-    pub fn start(
-        renderer: &Renderer,
-        options: &RenderOptions,
-        candidate: &mut Candidate,
-        wanted: PathSet,
-        pixels: f64,
-    ) -> Result<Option<Self>> {
-        let info = techniques::by_id(candidate.technique)?;
-        match info.bias {
-            Bias::Unbiased => {}
-            Bias::Consistent(cause) | Bias::Biased(cause) => {
-                candidate.reason = format!("its pictures have a bias that pilots cannot see: {cause}");
-                return Ok(None);
-            }
-        }
+impl<'a> Trial<'a> {
+    /// Begins pilots, and compiles their kernels with a first sample; `None`, with the reason, for what cannot be chosen. `index` keeps the
+    /// seeds of biased techniques apart from those that they are held against.
+    pub fn start(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate, index: usize) -> Result<Option<Self>> {
+        let Asked { renderer, options, .. } = *asked;
         let size = pilot_size(options.size);
-        let begin = |seed_steps: u32| {
-            renderer.start(&RenderOptions {
-                technique: Some(candidate.technique.into()),
-                settings: candidate.settings.clone().into(),
+        let first_seed = match card.bias {
+            Bias::Unbiased => 1,
+            Bias::Consistent(_) | Bias::Biased(_) => 2 * index as u32 + 3,
+        };
+        let begin = |seed_steps: u32, size: [u32; 2]| {
+            let pilot = RenderOptions {
+                technique: Some(card.id.into()),
+                settings: candidate.settings.clone(),
                 size,
                 spp: 1,
                 seed: options.seed.wrapping_add(seed_steps.wrapping_mul(SEED_STEP)),
                 aovs: false,
                 time_budget: None,
                 camera: options.camera.clone(),
-            })
+            };
+            renderer.start_technique(card, &pilot)
         };
-        let mut first = match begin(1) {
+        let mut first = match begin(first_seed, size) {
             Ok(first) => first,
             Err(error @ (Error::Unsupported { .. } | Error::MissingFeature { .. })) => {
                 candidate.reason = error.to_string();
@@ -87,27 +120,59 @@ impl Trial {
             }
             Err(error) => return Err(error),
         };
-        if first.path_set() != wanted {
+        let profile = renderer.gpu_scene().profile();
+        if !same_picture(profile, &first.path_set(), &asked.paths) {
             candidate.reason = format!("its pictures hold the light paths {:?}", first.path_set().to_string());
             return Ok(None);
         }
+        let misses = if card.id == REFERENCE {
+            unseen_by_eye_paths(profile, renderer.lights(), &asked.paths)?
+        } else {
+            None
+        };
         run(&mut first)?;
         // The second one finds its kernels compiled, as the picture itself will.
         let from = Instant::now();
-        let mut second = begin(2)?;
+        let mut second = begin(first_seed + 1, size)?;
         run(&mut second)?;
         let start = from.elapsed().as_secs_f64();
+        let small = size.map(|side| (side / SMALL).max(1));
+        let alike = card.bias == Bias::Unbiased || size == options.size;
+        let small_seconds = if alike { None } else { Some(round_of_another_size(begin(first_seed, small)?)?) };
         let mut trial = Self {
-            pilots: [first, second],
-            error: ErrorModel::default(),
-            cost: CostModel { start, sample: 0.0 },
+            card,
+            misses: misses.unwrap_or_default(),
+            stages: Vec::new(),
             spp: 1,
+            lit: false,
+            judgement: Judgement::default(),
+            judges_only: false,
+            pilots: [first, second],
+            error: match card.bias {
+                Bias::Consistent(_) => ErrorModel::of_shrinking_kernels(),
+                Bias::Unbiased | Bias::Biased(_) => ErrorModel::default(),
+            },
+            cost: CostModel { start, sample: 0.0 },
+            fixed: 0.0,
             round_seconds: 0.0,
             all_seconds: 0.0,
-            lit: false,
         };
-        trial.round(ROUNDS[0], pixels)?;
+        trial.round(ROUNDS[0], asked.pixels())?;
+        if let Some(small_seconds) = small_seconds {
+            let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+            trial.fixed = fixed_share([area(small), small_seconds], [area(size), trial.round_seconds / 2.0]);
+            trial.cost.sample = trial.seconds_a_sample(ROUNDS[0] - 1, asked.pixels());
+        }
         Ok(Some(trial))
+    }
+
+    /// One of the reference technique that is no candidate.
+    pub fn judge(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate) -> Result<Option<Self>> {
+        let trial = Self::start(asked, card, candidate, 0)?;
+        Ok(trial.map(|trial| Self {
+            judges_only: true,
+            ..trial
+        }))
     }
 
     /// Refines both pilots to `spp` samples a pixel; `pixels` are those of the picture itself.
@@ -119,9 +184,7 @@ impl Trial {
         }
         self.round_seconds = from.elapsed().as_secs_f64();
         self.all_seconds += self.round_seconds;
-        let [width, height] = self.pilots[0].size();
-        let samples = f64::from(width) * f64::from(height) * f64::from(spp - self.spp) * 2.0;
-        self.cost.sample = self.round_seconds / samples * pixels;
+        self.cost.sample = self.seconds_a_sample(spp - self.spp, pixels);
         let [a, b] = &mut self.pilots;
         let pictures = [a.picture()?, b.picture()?];
         for picture in &pictures {
@@ -131,14 +194,25 @@ impl Trial {
             spp,
             relative_mse_of_pair(&pictures[0], &pictures[1], RELATIVE_MSE_OFFSET)?,
         );
+        self.stages.push(Stage { spp, pictures });
         self.spp = spp;
         Ok(())
+    }
+
+    /// Seconds for each sample a pixel of a picture of so many pixels, by a round of so many samples.
+    fn seconds_a_sample(&self, samples: u32, pixels: f64) -> f64 {
+        let [width, height] = self.pilots[0].size();
+        let larger = pixels / (f64::from(width) * f64::from(height));
+        self.round_seconds / f64::from(2 * samples.max(1)) * (self.fixed + (1.0 - self.fixed) * larger)
     }
 
     /// Samples a pixel for the goal, when the pilots have taken `spent` seconds.
     fn samples(&self, goal: Goal, spent: f64) -> u32 {
         let for_error = goal.error.map(|error| match self.lit {
-            true => self.error.samples(error * error),
+            // What cannot reach it is shown with as many as noise alone would take.
+            true => self
+                .reach(error)
+                .unwrap_or_else(|| self.error.samples(error * error)),
             // Nothing is known: as many as the longest pilots, at the least.
             false => ROUNDS[ROUNDS.len() - 1],
         });
@@ -149,7 +223,17 @@ impl Trial {
         }
     }
 
-    /// Relative MSE expected of that many samples a pixel.
+    /// Samples a pixel for an error, noise and bias together.
+    fn reach(&self, error: f64) -> Option<u32> {
+        self.judgement.bias?.samples(&self.error, error * error)
+    }
+
+    /// Relative MSE of its last pilots by noise alone.
+    pub fn noise(&self) -> f64 {
+        self.error.relative_mse(f64::from(self.spp))
+    }
+
+    /// Relative MSE expected of that many samples a pixel, by noise alone.
     fn relative_mse(&self, samples: u32) -> f64 {
         if self.lit {
             self.error.relative_mse(f64::from(samples))
@@ -158,17 +242,62 @@ impl Trial {
         }
     }
 
+    /// Whether it can still be chosen, for all that is known of its bias.
+    fn is_possible(&self, goal: Goal) -> bool {
+        let reaches = || goal.error.is_none_or(|error| self.reach(error).is_some());
+        !self.judges_only && (self.judgement.may_be_seen || !self.lit || self.judgement.bias.is_some() && reaches())
+    }
+
     /// Writes what the pilots have found to the candidate.
     pub fn predict(&self, candidate: &mut Candidate, goal: Goal, spent: f64) {
         candidate.pilot_spp = self.spp;
-        candidate.pilot_error = self.relative_mse(self.spp).sqrt();
+        candidate.pilot_noise = self.relative_mse(self.spp).sqrt();
         candidate.slope = self.error.slope();
         candidate.seconds_a_sample = self.cost.sample;
         candidate.spp = self.samples(goal, spent);
         candidate.lit = self.lit;
-        candidate.error = self.relative_mse(candidate.spp).sqrt();
-        candidate.seconds = self.cost.seconds(f64::from(candidate.spp));
+        candidate.misses.clone_from(&self.misses);
+        let noise = self.relative_mse(candidate.spp);
+        candidate.noise = noise.sqrt();
+        candidate.judged_by.clone_from(&self.judgement.by);
+        let samples = f64::from(candidate.spp);
+        let bias = self.judgement.bias;
+        candidate.bias = bias.map(|bias| bias.square(samples).sqrt());
+        candidate.bias_at_most = bias.map(|bias| bias.upper(samples).sqrt());
+        candidate.error = (noise + bias.map_or(0.0, |bias| bias.square(samples))).sqrt();
+        candidate.seconds = self.cost.seconds(samples);
+        if self.lit {
+            let reaches = goal.error.is_none_or(|error| self.reach(error).is_some());
+            candidate.reason = self.judgement.refusal(goal.error, reaches).unwrap_or_default();
+        }
     }
+
+    /// What judges others with: technique, samples a pixel, noise.
+    pub fn as_reference(&self) -> Reference {
+        Reference {
+            technique: self.card.id,
+            pilot_spp: self.spp,
+            pilot_noise: self.noise().sqrt(),
+        }
+    }
+}
+
+/// Share of a sample's time that does not depend on the pixels, by pairs of pixels and seconds of a small and a larger picture.
+fn fixed_share([small, small_seconds]: [f64; 2], [large, seconds]: [f64; 2]) -> f64 {
+    if large <= small || seconds <= 0.0 {
+        return 0.0;
+    }
+    let each = ((seconds - small_seconds) / (large - small)).max(0.0);
+    (1.0 - each * large / seconds).clamp(0.0, 1.0)
+}
+
+/// Seconds of the first round of a pilot of another size.
+fn round_of_another_size(mut pilot: Rendering) -> Result<f64> {
+    run(&mut pilot)?;
+    let from = Instant::now();
+    pilot.set_spp(ROUNDS[0]);
+    run(&mut pilot)?;
+    Ok(from.elapsed().as_secs_f64())
 }
 
 /// Works until all samples that were asked for are there.
@@ -177,26 +306,30 @@ fn run(rendering: &mut Rendering) -> Result<()> {
     Ok(())
 }
 
-/// Further rounds for what can still be chosen, as long as they cost little beside the picture itself.
+/// Further rounds for what can still be chosen, and for what judges it, as long as they cost little beside the picture itself. Every trial is
+/// judged in the end.
 pub fn rounds(
-    trials: &mut [Option<Trial>],
-    goal: Goal,
-    pixels: f64,
+    trials: &mut [Option<Trial<'_>>],
+    asked: &Asked<'_>,
     start: Instant,
     proceed: &mut dyn FnMut() -> bool,
 ) -> Result<()> {
+    let goal = asked.goal;
     for (&last, &spp) in ROUNDS.iter().zip(&ROUNDS[1..]) {
+        judge(trials, goal)?;
         let spent = start.elapsed().as_secs_f64();
-        let predicted = |trial: &Trial| trial.cost.seconds(f64::from(trial.samples(goal, spent)));
+        let predicted = |trial: &Trial<'_>| trial.cost.seconds(f64::from(trial.samples(goal, spent)));
         // Under a time alone all take equally long, and the one with the smaller error is the better one.
-        let cost = |trial: &Trial| match goal.error {
+        let cost = |trial: &Trial<'_>| match goal.error {
+            _ if !trial.is_possible(goal) => IMPOSSIBLE_COST,
             Some(_) => predicted(trial),
             // What has met no light is the last choice, but goes on as long as nothing else has.
             None if trial.lit => trial.relative_mse(trial.samples(goal, spent)),
             None => UNLIT_COST,
         };
-        let best = trials.iter().flatten().map(&cost).fold(f64::INFINITY, f64::min);
-        let picture = trials.iter().flatten().map(predicted).fold(f64::INFINITY, f64::min);
+        let able = || trials.iter().flatten().filter(|trial| !trial.judges_only);
+        let best = able().map(&cost).fold(f64::INFINITY, f64::min);
+        let picture = able().map(predicted).fold(f64::INFINITY, f64::min);
         let rounds: f64 = trials.iter().flatten().map(|trial| trial.all_seconds).sum();
         let share = PILOT_SHARE * (picture + spent);
         let allowed = match goal.time {
@@ -204,31 +337,56 @@ pub fn rounds(
             None => share.max(FREE_SECONDS) - rounds,
         };
         let blind = goal.time.is_none() && trials.iter().flatten().all(|trial| !trial.lit);
-        // All that can still be chosen, or else the best alone.
+        // All that can still be chosen, or else the best alone; and what judges them.
         let affordable = [HOPELESS, 1.0].into_iter().find_map(|factor| {
-            let on = |trial: &Option<Trial>| {
-                trial
-                    .as_ref()
-                    .is_some_and(|t| t.spp == last && cost(t) <= factor * best)
-            };
-            let going_on: Vec<bool> = trials.iter().map(on).collect();
+            let mut on: Vec<bool> = trials
+                .iter()
+                .map(|trial| {
+                    trial
+                        .as_ref()
+                        .is_some_and(|t| t.spp == last && cost(t) <= factor * best)
+                })
+                .collect();
+            let judged = trials
+                .iter()
+                .zip(&on)
+                .any(|(trial, on)| *on && trial.as_ref().is_some_and(|t| t.card.bias != Bias::Unbiased));
+            let reference = judge::reference(trials);
+            for (trial, on) in trials.iter().zip(&mut on) {
+                if let (Some(trial), Some(reference)) = (trial, reference)
+                    && std::ptr::eq(trial, reference)
+                {
+                    *on |= judged && trial.spp == last && trial.misses.is_empty();
+                }
+            }
             // A round has four times the samples of all before it.
             let next: f64 = trials
                 .iter()
-                .filter(|t| on(t))
-                .flatten()
+                .zip(&on)
+                .filter(|(_, on)| **on)
+                .filter_map(|(trial, _)| trial.as_ref())
                 .map(|t| t.round_seconds * 4.0)
                 .sum();
-            (next <= allowed || blind).then_some(going_on)
+            (next <= allowed || blind).then_some(on)
         });
         let Some(going_on) = affordable else { return Ok(()) };
         for (trial, on) in trials.iter_mut().zip(going_on) {
             if let Some(trial) = trial.as_mut().filter(|_| on) {
                 if !proceed() {
-                    return Ok(());
+                    return judge(trials, goal);
                 }
-                trial.round(spp, pixels)?;
+                trial.round(spp, asked.pixels())?;
             }
+        }
+    }
+    judge(trials, goal)
+}
+
+fn judge(trials: &mut [Option<Trial<'_>>], goal: Goal) -> Result<()> {
+    let judgements = judge::judgements(trials, goal.error)?;
+    for (trial, judgement) in trials.iter_mut().zip(judgements) {
+        if let Some(trial) = trial {
+            trial.judgement = judgement;
         }
     }
     Ok(())

@@ -73,6 +73,10 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
     /// Chooses technique, settings and samples for this error: the root of the relative MSE, 0.02 is 2 %
+    ///
+    /// Small pilot pictures judge noise and bias of every technique; one whose bias exceeds the error is refused with that figure, and so is the
+    /// path tracer where it misses light that others find (what lights without area give by way of mirrors and smooth glass). --explain shows
+    /// all figures.
     #[arg(long, value_name = "ERROR", value_parser = positive, conflicts_with_all = ["spp", "time_budget"])]
     error: Option<f64>,
     /// Chooses technique, settings and samples for this time, pilots included; with --error, its limit: 10s, 500ms, 2min

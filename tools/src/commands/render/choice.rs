@@ -59,10 +59,17 @@ pub fn announce(plan: &Plan, options: &RenderOptions, explain: bool) -> Outcome<
         output::warn(&plan.shortfall);
     }
     let choice = plan.choice();
+    let parts = match choice.bias {
+        Some(bias) if bias > 0.0 => format!(" (bias {bias:.4}, noise {:.4})", choice.noise),
+        _ => String::new(),
+    };
     output::note(&format!(
-        "chosen: {}, {}, {} samples a pixel; predicted: error {:.4}, {:.2} s after {:.2} s of pilots",
+        "chosen: {}, {}, {} samples a pixel; predicted: error {:.4}{parts}, {:.2} s after {:.2} s of pilots",
         choice.technique, choice.variant, choice.spp, choice.error, choice.seconds, plan.pilot_seconds
     ));
+    if !choice.judged_by.is_empty() {
+        output::note(&format!("bias judged by {}", choice.judged_by));
+    }
     Ok(plan.options(options))
 }
 
@@ -71,36 +78,57 @@ fn candidates(plan: &Plan) -> String {
         "technique",
         "settings",
         "pilots",
-        "pilot error",
+        "pilot noise",
         "slope",
         "s a sample",
         "samples",
+        "bias",
+        "at most",
+        "noise",
         "error",
         "seconds",
         "verdict",
     ];
-    let mut table = Table::new(&heads, &[1, 9]);
+    let mut table = Table::new(&heads, &[1, 12]);
     for (index, candidate) in plan.candidates.iter().enumerate() {
         let tried = candidate.pilot_spp > 0;
         let cell = |text: String| if tried { text } else { "-".into() };
+        let share = |value: Option<f64>| match value {
+            Some(value) if tried => format!("{value:.4}"),
+            _ => "-".into(),
+        };
         let verdict = match &candidate.reason {
             _ if index == plan.chosen => "chosen",
             reason if !reason.is_empty() => reason,
             _ if plan.goal.error.is_some() => "takes longer",
             _ => "errs more",
         };
+        let verdict = if candidate.judged_by.is_empty() {
+            verdict.to_owned()
+        } else {
+            format!("{verdict}; bias judged by {}", candidate.judged_by)
+        };
         table.row([
             candidate.technique.to_owned(),
             candidate.variant.to_owned(),
             cell(candidate.pilot_spp.to_string()),
-            cell(format!("{:.4}", candidate.pilot_error)),
+            cell(format!("{:.4}", candidate.pilot_noise)),
             cell(format!("{:.2}", -candidate.slope / 2.0)),
             cell(format!("{:.4}", candidate.seconds_a_sample)),
             cell(candidate.spp.to_string()),
+            share(candidate.bias),
+            share(candidate.bias_at_most),
+            cell(format!("{:.4}", candidate.noise)),
             cell(format!("{:.4}", candidate.error)),
             cell(format!("{:.2}", candidate.seconds)),
-            verdict.to_owned(),
+            verdict,
         ]);
     }
-    table.text()
+    let share = format!(
+        "pilots: {:.2} s, {:.0} % of all that is predicted; rounds after the first are kept to {:.0} %\n",
+        plan.pilot_seconds,
+        100.0 * plan.pilot_share,
+        100.0 * plan.pilot_share_limit
+    );
+    table.text() + &share
 }

@@ -1,12 +1,13 @@
-//! Automatic choice: is the error of the picture the one that was asked for?
+//! Automatic choice: is the error of the picture the one that was asked for, and is the technique the one that wins?
 //!
-//! Oracle: a reference with many independent samples, whose own variance is subtracted.
+//! Oracle: a reference with many independent samples, whose own variance is subtracted. Where the path tracer cannot find all paths, it is photon
+//! mapping's, of a seed of its own and many more passes.
 
 use std::time::{Duration, Instant};
 
 use clerestory::plan::{Goal, plan};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
-use clerestory::{Result, scene};
+use clerestory::{Error, Result, scene};
 
 use crate::experiments::measures::Context;
 use crate::experiments::table::Table;
@@ -27,6 +28,55 @@ const PAIRS: [(&str, Asked); 12] = [
     ("builtin:smoke", Asked::Error(0.1)),
     ("builtin:fog-box?source=point", Asked::Error(0.1)),
     ("builtin:cloud", Asked::Error(0.1)),
+];
+/// A scene, the technique that is expected to win on it, and what is asked for. Named before any of them was tried.
+struct Contest {
+    address: &'static str,
+    path_set: &'static str,
+    side: u32,
+    error: f64,
+    winner: &'static str,
+    rival: &'static str,
+    reference: (&'static str, u32),
+}
+
+const CONTESTS: [Contest; 4] = [
+    Contest {
+        address: "builtin:cornell-box?sphere=glass&boxes=none&lamp=0.1",
+        path_set: "all",
+        side: 48,
+        error: 0.1,
+        winner: "photon",
+        rival: "path",
+        reference: ("path", 24_576),
+    },
+    Contest {
+        address: "builtin:cornell-box?sphere=glass&boxes=none&source=point",
+        path_set: "all",
+        side: 48,
+        error: 0.1,
+        winner: "photon",
+        rival: "path",
+        reference: ("photon", 1024),
+    },
+    Contest {
+        address: "builtin:cornell-box?source=point",
+        path_set: "direct",
+        side: 256,
+        error: 0.1,
+        winner: "preview",
+        rival: "path",
+        reference: ("path", 512),
+    },
+    Contest {
+        address: "builtin:cathedral?source=point",
+        path_set: "direct",
+        side: 256,
+        error: 0.1,
+        winner: "preview",
+        rival: "path",
+        reference: ("path", 512),
+    },
 ];
 /// Within this factor an error or a time counts as kept.
 const FACTOR: f64 = 1.5;
@@ -54,6 +104,123 @@ fn render(renderer: &Renderer, options: &RenderOptions, watch: &dyn Watch) -> Re
 
 /// The measure.
 pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
+    Ok(vec![contests(context)?, goals(context)?])
+}
+
+/// Which technique is chosen, and how far the other one comes in the same time.
+fn contests(context: &Context<'_>) -> Result<Table> {
+    let contests = if context.smoke { &CONTESTS[1..2] } else { &CONTESTS[..] };
+    let (gpu, watch) = ((context.gpu)()?, context.watch);
+    let mut table = Table::new(
+        "Techniques",
+        &[
+            "scene",
+            "light paths",
+            "asked: error",
+            "expected",
+            "chosen",
+            "samples a pixel",
+            "predicted bias",
+            "predicted noise",
+            "predicted error",
+            "error",
+            "predicted seconds",
+            "seconds",
+            "pilots: seconds",
+            "other: error in as many seconds",
+            "other: why not",
+            "wins",
+        ],
+    );
+    let (mut as_expected, mut done) = (0_u64, 0_usize);
+    for contest in contests {
+        watch.begin(contest.address, done, contests.len());
+        let renderer = Renderer::new(&gpu, &scene::load(contest.address)?)?;
+        let (reference, spp) = contest.reference;
+        let (side, spp) = if context.smoke { (8, 16) } else { (contest.side, spp) };
+        let base = RenderOptions {
+            size: [side; 2],
+            settings: serde_json::json!({ "path_set": contest.path_set }),
+            ..RenderOptions::default()
+        };
+        let of_reference = RenderOptions {
+            technique: Some(reference.into()),
+            spp,
+            seed: REFERENCE_SEED,
+            settings: serde_json::json!({ "path_set": contest.path_set, "sampler": "pcg" }),
+            ..base.clone()
+        };
+        let Some(reference) = render(&renderer, &of_reference, watch)? else {
+            break;
+        };
+        let goal = Goal {
+            error: Some(contest.error),
+            time: None,
+        };
+        let plan = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
+        let choice = plan.choice();
+        let Some(rendered) = render(&renderer, &plan.options(&base), watch)? else {
+            break;
+        };
+        let seconds = rendered.report.render_seconds;
+        let error_of = |rendered: &Rendered| -> Result<f64> {
+            let error = unbiased::measure(&rendered.picture, &reference.picture)?;
+            Ok(error.relative_mse.max(0.0).sqrt())
+        };
+        let error = error_of(&rendered)?;
+        let other_id = if choice.technique == contest.rival { contest.winner } else { contest.rival };
+        let other = plan.candidates.iter().find(|candidate| candidate.technique == other_id);
+        let other_options = RenderOptions {
+            technique: Some(other_id.into()),
+            settings: other.map_or_else(|| base.settings.clone(), |other| other.settings.clone()),
+            spp: u32::MAX,
+            time_budget: Some(Duration::from_secs_f64(seconds)),
+            ..base.clone()
+        };
+        // Its kernels are compiled, as those of the chosen one are, unless the scene is none for it.
+        let other_error = match render(&renderer, &other_options, watch) {
+            Ok(Some(rendered)) => Some(error_of(&rendered)?),
+            Ok(None) => break,
+            Err(Error::Unsupported { .. } | Error::Setting { .. }) => None,
+            Err(error) => return Err(error),
+        };
+        let why = match other {
+            Some(other) if !other.reason.is_empty() => other.reason.clone(),
+            Some(other) => format!("{:.2} s predicted", other.seconds),
+            None => "is none of the techniques".into(),
+        };
+        done += 1;
+        as_expected += u64::from(choice.technique == contest.winner);
+        let or_dash = |value: Option<f64>| value.map_or_else(|| "-".into(), Into::into);
+        table.row([
+            contest.address.trim_start_matches("builtin:").into(),
+            contest.path_set.into(),
+            contest.error.into(),
+            contest.winner.into(),
+            choice.technique.into(),
+            u64::from(choice.spp).into(),
+            or_dash(choice.bias),
+            choice.noise.into(),
+            choice.error.into(),
+            error.into(),
+            choice.seconds.into(),
+            seconds.into(),
+            plan.pilot_seconds.into(),
+            or_dash(other_error),
+            why.into(),
+            if other_error.is_none_or(|other| error < other) { "yes".into() } else { "no".into() },
+        ]);
+    }
+    table.note(format!(
+        "{as_expected} of {done} chosen as expected beforehand. Scenes are square, of 48 and 256 pixels. Errors: root of the relative MSE against a \
+         reference of a seed of its own, whose variance is subtracted: 24,576 and 512 samples a pixel of the path tracer, 1024 passes of photon \
+         mapping where the path tracer cannot find a caustic. Seconds are those of the picture, without the pilots; the other technique gets as many."
+    ));
+    Ok(table)
+}
+
+/// Whether errors and times are kept.
+fn goals(context: &Context<'_>) -> Result<Table> {
     let (side, reference_spp, pairs) = if context.smoke {
         (8, 512, &PAIRS[..1])
     } else {
@@ -139,5 +306,5 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
         "{kept} of {done} within a factor of {FACTOR} of the asked error, or of the predicted one in the asked time. Errors: root of the relative \
          MSE, {side} × {side} pixels, against {reference_spp} independent samples a pixel whose variance is subtracted."
     ));
-    Ok(vec![table])
+    Ok(table)
 }

@@ -1,0 +1,235 @@
+//! What is known of a technique's bias, and by what.
+//!
+//! An unbiased technique has none. Others are held against two independent pilots of the path tracer. A consistent one is also asked how far its
+//! own pictures still move as it works on; that counts where the path tracer cannot find all paths, or where its noise hides what its pilots
+//! would show. What the path tracer cannot find makes it a biased technique of its own: it is held against a consistent one's pilots.
+
+use super::bias::{BiasEstimate, relative_bias_of_pairs, relative_drift_of_pairs};
+use super::model::BiasModel;
+use super::pilot::Trial;
+use crate::Result;
+use crate::film::metrics::RELATIVE_MSE_OFFSET;
+use crate::techniques::Bias;
+
+/// The technique whose pilots judge others.
+pub const REFERENCE: &str = "path";
+/// Pilot rounds of a consistent technique that show how its bias falls, and by how far its pictures move.
+const CONSISTENT_ROUNDS: usize = 3;
+
+/// A bias, and how it was found.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Judgement {
+    /// `None` where nothing is known.
+    pub bias: Option<BiasModel>,
+    /// What it was found by, in words; empty for what has none.
+    pub by: String,
+    /// Whether more pilots could still show it, where they now do not.
+    pub may_be_seen: bool,
+}
+
+impl Judgement {
+    fn unknown(why: &str, may_be_seen: bool) -> Self {
+        Self {
+            bias: None,
+            by: why.into(),
+            may_be_seen,
+        }
+    }
+
+    /// Why that error cannot be reached by it; `None` where it can.
+    pub fn refusal(&self, goal: Option<f64>, reaches: bool) -> Option<String> {
+        let Some(bias) = &self.bias else {
+            return Some(format!("its bias is not known: {}", self.by));
+        };
+        let goal = goal.filter(|_| !reaches)?;
+        // Of a falling bias what is left after the most samples.
+        let last = f64::from(u32::MAX);
+        let (found, upper) = if bias.exponent() == 0.0 {
+            (bias.square(1.0), bias.upper(1.0))
+        } else {
+            (bias.square(last), bias.upper(last))
+        };
+        Some(if found.sqrt() >= goal {
+            format!("bias {} exceeds the goal of {}", percent(found.sqrt()), percent(goal))
+        } else {
+            format!(
+                "bias may be as much as {}, beyond the goal of {}: {} is found, and noise of the pilots hides the rest",
+                percent(upper.sqrt()),
+                percent(goal),
+                percent(found.sqrt())
+            )
+        })
+    }
+}
+
+/// Two digits: `3.1 %`, `12 %`, `0.45 %`.
+pub fn percent(share: f64) -> String {
+    let value = share * 100.0;
+    let text = match value {
+        10.0.. => format!("{value:.0}"),
+        1.0.. => format!("{value:.1}"),
+        _ => format!("{value:.2}"),
+    };
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    format!("{text} %")
+}
+
+/// The pilots that others are held against: of the reference technique, those with the most samples and then the least noise.
+pub fn reference<'a, 't>(trials: &'a [Option<Trial<'t>>]) -> Option<&'a Trial<'t>> {
+    let able = trials.iter().flatten().filter(|trial| trial.card.id == REFERENCE && trial.lit);
+    able.min_by(|a, b| b.spp.cmp(&a.spp).then(a.noise().total_cmp(&b.noise())))
+}
+
+/// Of every trial, in order. `error` is the one that is asked for.
+pub fn judgements(trials: &[Option<Trial<'_>>], error: Option<f64>) -> Result<Vec<Judgement>> {
+    let reference = reference(trials);
+    let consistent = trials.iter().flatten().filter(|trial| {
+        matches!(trial.card.bias, Bias::Consistent(_)) && trial.lit
+    });
+    let consistent = consistent.min_by(|a, b| b.spp.cmp(&a.spp).then(a.noise().total_cmp(&b.noise())));
+    trials
+        .iter()
+        .map(|trial| match trial {
+            Some(trial) => judge(trial, reference, consistent, error),
+            None => Ok(Judgement::default()),
+        })
+        .collect()
+}
+
+fn judge(
+    trial: &Trial<'_>,
+    reference: Option<&Trial<'_>>,
+    consistent: Option<&Trial<'_>>,
+    error: Option<f64>,
+) -> Result<Judgement> {
+    let blind = !trial.misses.is_empty();
+    match trial.card.bias {
+        // Without light nothing is known anyway.
+        Bias::Unbiased if !blind || !trial.lit => Ok(Judgement {
+            bias: Some(BiasModel::default()),
+            ..Judgement::default()
+        }),
+        Bias::Unbiased => match consistent {
+            Some(consistent) => {
+                let found = against(trial, consistent)?;
+                Ok(Judgement {
+                    bias: found.last().map(|(spp, found)| BiasModel::constant(*spp, *found)),
+                    by: format!("{}, of {} samples a pixel: it misses {}", consistent.card.id, consistent.spp, trial.misses),
+                    may_be_seen: false,
+                })
+            }
+            None => Ok(Judgement::unknown(&format!("it misses {}", trial.misses), false)),
+        },
+        Bias::Biased(_) => {
+            // Where the reference misses light, a consistent technique stands in for it.
+            let Some(judge) = reference.filter(|reference| reference.misses.is_empty()).or(consistent) else {
+                return Ok(Judgement::unknown("there is no technique here to hold it against", false));
+            };
+            let found = against(trial, judge)?;
+            let last = found.last().map(|(_, found)| *found).unwrap_or_default();
+            Ok(Judgement {
+                bias: found.last().map(|(spp, found)| BiasModel::constant(*spp, *found)),
+                by: format!("{}, of {} samples a pixel", judge.card.id, judge.spp),
+                // Neither within the goal nor beyond it.
+                may_be_seen: error.is_some_and(|e| last.square < e * e && last.upper() > e * e),
+            })
+        }
+        Bias::Consistent(_) => judge_consistent(trial, reference),
+    }
+}
+
+fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<Judgement> {
+    let moved = moved(trial)?;
+    let own = BiasModel::settling(&moved);
+    let spp = f64::from(trial.spp);
+    let may_be_seen = trial.stages.len() < CONSISTENT_ROUNDS;
+    let by_reference = match reference {
+        Some(reference) if reference.misses.is_empty() => Some((against(trial, reference)?, reference)),
+        _ => None,
+    };
+    let told_apart = |found: &[(u32, BiasEstimate)]| {
+        let last = found.last().map(|(_, found)| *found).unwrap_or_default();
+        last.is_resolved() || own.as_ref().is_none_or(|own| last.upper() <= own.upper(spp))
+    };
+    if let Some((found, reference)) = by_reference.filter(|(found, _)| told_apart(found)) {
+        let bias = BiasModel::falling(&found);
+        let law = bias.map_or_else(String::new, |bias| law(&bias));
+        return Ok(Judgement {
+            bias,
+            by: format!("{}, of {} samples a pixel; {law}", reference.card.id, reference.spp),
+            may_be_seen,
+        });
+    }
+    let why = match reference {
+        Some(reference) if !reference.misses.is_empty() => format!("{} misses {}", reference.card.id, reference.misses),
+        Some(reference) => format!("{} is too noisy in {} samples a pixel", reference.card.id, reference.spp),
+        None => "nothing else can".into(),
+    };
+    let stages: Vec<String> = trial.stages.iter().map(|stage| stage.spp.to_string()).collect();
+    Ok(match own {
+        Some(own) => Judgement {
+            by: format!(
+                "its own pictures of {} samples a pixel, since {why}; {}",
+                stages.join(", "),
+                law(&own)
+            ),
+            bias: Some(own),
+            may_be_seen,
+        },
+        None if moved.is_empty() => Judgement::unknown("there was no time for pictures of two budgets", may_be_seen),
+        None => Judgement::unknown(
+            &format!("its own pictures of {} samples a pixel do not settle, and {why}", stages.join(", ")),
+            may_be_seen,
+        ),
+    })
+}
+
+fn law(bias: &BiasModel) -> String {
+    format!("bias falls as samples^(-{:.2})", bias.exponent() / 2.0)
+}
+
+/// Bias of each of a trial's stages against the last one of another technique.
+fn against(trial: &Trial<'_>, judge: &Trial<'_>) -> Result<Vec<(u32, BiasEstimate)>> {
+    let Some(last) = judge.stages.last() else {
+        return Ok(Vec::new());
+    };
+    let [p, q] = &last.pictures;
+    let stages = trial.stages.iter().map(|stage| {
+        let [a, b] = &stage.pictures;
+        Ok((stage.spp, relative_bias_of_pairs([a, b], [p, q], RELATIVE_MSE_OFFSET)?))
+    });
+    stages.collect()
+}
+
+/// How far a trial's expectation has moved from each stage to the next.
+fn moved(trial: &Trial<'_>) -> Result<Vec<(u32, u32, BiasEstimate)>> {
+    let pairs = trial.stages.windows(2).map(|stages| {
+        let [early, late] = [&stages[0], &stages[1]];
+        let ([a, b], [c, d]) = (&early.pictures, &late.pictures);
+        let moved = relative_drift_of_pairs([a, b], [c, d], RELATIVE_MSE_OFFSET)?;
+        Ok((early.spp, late.spp, moved))
+    });
+    pairs.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refusals_name_the_bias_and_the_goal() {
+        assert_eq!([0.031, 0.02, 0.12, 0.0045, 0.1].map(percent), ["3.1 %", "2 %", "12 %", "0.45 %", "10 %"]);
+        let of = |square, deviation| Judgement {
+            bias: Some(BiasModel::constant(64, BiasEstimate { square, deviation })),
+            ..Judgement::default()
+        };
+        let seen = of(0.031 * 0.031, 1e-6);
+        assert_eq!(seen.refusal(Some(0.02), false).unwrap(), "bias 3.1 % exceeds the goal of 2 %");
+        assert_eq!(seen.refusal(Some(0.05), true), None);
+        assert_eq!(seen.refusal(None, false), None);
+        let hidden = of(0.01 * 0.01, 0.0004).refusal(Some(0.02), false).unwrap();
+        assert!(hidden.starts_with("bias may be as much as 3 %") && hidden.contains("1 % is found"), "{hidden}");
+        let unknown = Judgement::unknown("no pilots", false);
+        assert!(unknown.refusal(None, true).unwrap().contains("no pilots"));
+    }
+}
