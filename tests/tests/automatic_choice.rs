@@ -1,12 +1,17 @@
 //! Automatic choice on a device: predictions against what comes out, and reasons where nothing can be chosen.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
-use clerestory::film::{CompareOptions, compare};
-use clerestory::plan::{ErrorModel, Goal, plan, relative_mse_by_variance, relative_mse_of_pair};
+use clerestory::film::{CompareOptions, NonFiniteSamples, Picture, Step, compare};
+use clerestory::gpu::{Buffer, PipelineInfo};
+use clerestory::plan::{ErrorModel, Goal, plan, plan_among, relative_mse_by_variance, relative_mse_of_pair};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
-use clerestory::{Error, scene};
+use clerestory::scene::Camera;
+use clerestory::techniques::{self, Bias, Card, Skipped, Technique};
+use clerestory::transport::PathSet;
+use clerestory::{Error, Result, scene};
 use clerestory_tests::with_gpu;
 
 /// Predicted and true error may differ by this factor: both are means over 16² pixels whose errors differ much.
@@ -114,5 +119,165 @@ fn what_cannot_be_chosen_says_why() {
         assert_eq!(chosen.choice().settings["path_set"], "direct");
         let none = Goal::default();
         assert!(matches!(plan_of(&options(), none), Err(Error::Setting { .. })));
+    });
+}
+
+/// A technique of a host's own that errs: the path tracer's pictures, too bright by a twentieth.
+struct Bright(Box<dyn Technique>);
+
+const BRIGHT: Card = Card {
+    id: "bright",
+    summary: "the path tracer's pictures, too bright",
+    publication: "none",
+    bias: Bias::Biased("everything is multiplied"),
+    needs: &[],
+    path_set: PathSet::ALL,
+    refusals: |_| Vec::new(),
+    settings: &[],
+    default_settings: || (techniques::by_id("path").unwrap().default_settings)(),
+    variants: &[],
+    create: |gpu, scene, view, settings| {
+        let path = techniques::by_id("path")?;
+        Ok(Box::new(Bright((path.create)(gpu, scene, view, settings)?)))
+    },
+};
+
+impl Technique for Bright {
+    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        self.0.step(samples)
+    }
+
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        let (picture, non_finite) = self.0.picture()?;
+        let values = picture.main_layer()?.values().iter().map(|value| value * 1.05);
+        let bright = Picture::from_radiance(picture.width(), picture.height(), values.collect())?;
+        Ok((bright, non_finite))
+    }
+
+    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
+        self.0.display(target, exposure, bgra)
+    }
+
+    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        self.0.set_camera(camera)
+    }
+
+    fn path_set(&self) -> PathSet {
+        self.0.path_set()
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        self.0.settings()
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        self.0.counters()
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.0.pipelines()
+    }
+
+    fn skipped(&self) -> Vec<Skipped> {
+        self.0.skipped()
+    }
+}
+
+fn goal(error: f64) -> Goal {
+    Goal {
+        error: Some(error),
+        time: None,
+    }
+}
+
+// Direct light of a point has next to no noise, so that the first pilots tell the bias whatever the clock says of further ones.
+#[test]
+fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
+    with_gpu(|gpu| {
+        let renderer = Renderer::new(gpu, &scene::load("builtin:cornell-box?source=point").unwrap()).unwrap();
+        let options = RenderOptions {
+            technique: None,
+            settings: serde_json::json!({ "path_set": "direct", "sampler": "sobol" }),
+            ..options()
+        };
+        let among = |cards: &[&Card], error| plan_among(&renderer, cards, &options, goal(error), &mut || true).unwrap();
+        // Alone it is taken, and what it lacks is said; it is judged by pilots of the path tracer that is no candidate.
+        let strict = among(&[&BRIGHT], 0.02);
+        let choice = strict.choice();
+        let bias = choice.bias.unwrap();
+        assert!((0.03..0.05).contains(&bias), "{choice:?}");
+        assert!(
+            choice.reason.starts_with("bias ") && choice.reason.ends_with(" % exceeds the goal of 2 %"),
+            "{choice:?}"
+        );
+        assert!(
+            strict.shortfall.contains(&choice.reason) && choice.judged_by.contains("path, of"),
+            "{strict:?}"
+        );
+        assert!(
+            (choice.error - bias.hypot(choice.noise)).abs() < 1e-9 && choice.noise > 0.0,
+            "{choice:?}"
+        );
+        assert_eq!(
+            (strict.candidates.len(), strict.reference.as_ref().unwrap().technique),
+            (1, "path")
+        );
+        let lenient = among(&[&BRIGHT], 0.1);
+        assert!(
+            lenient.shortfall.is_empty() && lenient.choice().reason.is_empty(),
+            "{lenient:?}"
+        );
+        assert!(lenient.choice().error < 0.1 * 1.001, "{lenient:?}");
+        // Beside the path tracer, which has no bias, it is not.
+        let both = among(&[&BRIGHT, techniques::by_id("path").unwrap()], 0.02);
+        assert_eq!(both.choice().technique, "path", "{both:?}");
+        assert!(both.candidates[0].reason.contains("exceeds the goal"), "{both:?}");
+    });
+}
+
+#[test]
+fn the_path_tracer_does_not_win_by_what_it_misses() {
+    with_gpu(|gpu| {
+        let address = "builtin:cornell-box?sphere=glass&boxes=none&source=point";
+        let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
+        let of = |technique: Option<&str>, settings: serde_json::Value| {
+            let options = RenderOptions {
+                technique: technique.map(Into::into),
+                settings,
+                ..options()
+            };
+            plan(&renderer, &options, goal(0.2), &mut || true).unwrap()
+        };
+        let free = of(None, serde_json::json!({ "sampler": "sobol" }));
+        let choice = free.choice();
+        assert_eq!((choice.technique, choice.reason.as_str()), ("photon", ""), "{free:?}");
+        assert!(
+            choice.judged_by.contains("its own pictures") && choice.judged_by.contains("path misses"),
+            "{choice:?}"
+        );
+        assert!(choice.bias.unwrap() > 0.0 && choice.error <= 0.2 * 1.001, "{choice:?}");
+        for path in free.candidates.iter().filter(|candidate| candidate.technique == "path") {
+            assert!(
+                path.misses.contains("point light \"light\"") && path.judged_by.contains("photon"),
+                "{path:?}"
+            );
+            assert!(path.reason.contains("the goal of 20 %"), "{path:?}");
+        }
+        // Where there is nothing else, it says so.
+        let alone = of(Some("path"), serde_json::json!({ "sampler": "sobol" }));
+        assert!(
+            alone.shortfall.contains("misses") && alone.shortfall.contains("point light \"light\""),
+            "{alone:?}"
+        );
+        assert_eq!(alone.choice().bias, None);
+        // And nothing where those paths were not asked for.
+        let direct = of(
+            Some("path"),
+            serde_json::json!({ "path_set": "direct", "sampler": "sobol" }),
+        );
+        assert!(
+            direct.shortfall.is_empty() && direct.choice().misses.is_empty(),
+            "{direct:?}"
+        );
     });
 }

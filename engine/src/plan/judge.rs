@@ -25,6 +25,8 @@ pub struct Judgement {
     pub by: String,
     /// Whether more pilots could still show it, where they now do not.
     pub may_be_seen: bool,
+    /// Relative MSE of an unbiased technique's last pilots by light that they have not met, but a consistent technique has.
+    pub unseen: f64,
 }
 
 impl Judgement {
@@ -33,6 +35,7 @@ impl Judgement {
             bias: None,
             by: why.into(),
             may_be_seen,
+            unseen: 0.0,
         }
     }
 
@@ -70,22 +73,30 @@ pub fn percent(share: f64) -> String {
         1.0.. => format!("{value:.1}"),
         _ => format!("{value:.2}"),
     };
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
     format!("{text} %")
 }
 
 /// The pilots that others are held against: of the reference technique, those with the most samples and then the least noise.
 pub fn reference<'a, 't>(trials: &'a [Option<Trial<'t>>]) -> Option<&'a Trial<'t>> {
-    let able = trials.iter().flatten().filter(|trial| trial.card.id == REFERENCE && trial.lit);
+    let able = trials
+        .iter()
+        .flatten()
+        .filter(|trial| trial.card.id == REFERENCE && trial.lit);
     able.min_by(|a, b| b.spp.cmp(&a.spp).then(a.noise().total_cmp(&b.noise())))
 }
 
 /// Of every trial, in order. `error` is the one that is asked for.
 pub fn judgements(trials: &[Option<Trial<'_>>], error: Option<f64>) -> Result<Vec<Judgement>> {
     let reference = reference(trials);
-    let consistent = trials.iter().flatten().filter(|trial| {
-        matches!(trial.card.bias, Bias::Consistent(_)) && trial.lit
-    });
+    let consistent = trials
+        .iter()
+        .flatten()
+        .filter(|trial| matches!(trial.card.bias, Bias::Consistent(_)) && trial.lit);
     let consistent = consistent.min_by(|a, b| b.spp.cmp(&a.spp).then(a.noise().total_cmp(&b.noise())));
     trials
         .iter()
@@ -107,6 +118,10 @@ fn judge(
         // Without light nothing is known anyway.
         Bias::Unbiased if !blind || !trial.lit => Ok(Judgement {
             bias: Some(BiasModel::default()),
+            unseen: match consistent {
+                Some(consistent) if trial.lit => unseen(consistent, trial)?.unwrap_or(0.0),
+                _ => 0.0,
+            },
             ..Judgement::default()
         }),
         Bias::Unbiased => match consistent {
@@ -114,8 +129,11 @@ fn judge(
                 let found = against(trial, consistent)?;
                 Ok(Judgement {
                     bias: found.last().map(|(spp, found)| BiasModel::constant(*spp, *found)),
-                    by: format!("{}, of {} samples a pixel: it misses {}", consistent.card.id, consistent.spp, trial.misses),
-                    may_be_seen: false,
+                    by: format!(
+                        "{}, of {} samples a pixel: it misses {}",
+                        consistent.card.id, consistent.spp, trial.misses
+                    ),
+                    ..Judgement::default()
                 })
             }
             None => Ok(Judgement::unknown(&format!("it misses {}", trial.misses), false)),
@@ -123,7 +141,10 @@ fn judge(
         Bias::Biased(_) => {
             // Where the reference misses light, a consistent technique stands in for it.
             let Some(judge) = reference.filter(|reference| reference.misses.is_empty()).or(consistent) else {
-                return Ok(Judgement::unknown("there is no technique here to hold it against", false));
+                return Ok(Judgement::unknown(
+                    "there is no technique here to hold it against",
+                    false,
+                ));
             };
             let found = against(trial, judge)?;
             let last = found.last().map(|(_, found)| *found).unwrap_or_default();
@@ -132,6 +153,7 @@ fn judge(
                 by: format!("{}, of {} samples a pixel", judge.card.id, judge.spp),
                 // Neither within the goal nor beyond it.
                 may_be_seen: error.is_some_and(|e| last.square < e * e && last.upper() > e * e),
+                unseen: 0.0,
             })
         }
         Bias::Consistent(_) => judge_consistent(trial, reference),
@@ -143,26 +165,40 @@ fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<
     let own = BiasModel::settling(&moved);
     let spp = f64::from(trial.spp);
     let may_be_seen = trial.stages.len() < CONSISTENT_ROUNDS;
+    let mut has_unseen = false;
     let by_reference = match reference {
-        Some(reference) if reference.misses.is_empty() => Some((against(trial, reference)?, reference)),
+        Some(reference) if reference.misses.is_empty() => {
+            has_unseen = unseen(trial, reference)?.is_some();
+            Some((against(trial, reference)?, reference))
+        }
         _ => None,
     };
     let told_apart = |found: &[(u32, BiasEstimate)]| {
         let last = found.last().map(|(_, found)| *found).unwrap_or_default();
         last.is_resolved() || own.as_ref().is_none_or(|own| last.upper() <= own.upper(spp))
     };
-    if let Some((found, reference)) = by_reference.filter(|(found, _)| told_apart(found)) {
+    if let Some((found, reference)) = by_reference.filter(|(found, _)| !has_unseen && told_apart(found)) {
         let bias = BiasModel::falling(&found);
         let law = bias.map_or_else(String::new, |bias| law(&bias));
         return Ok(Judgement {
             bias,
             by: format!("{}, of {} samples a pixel; {law}", reference.card.id, reference.spp),
             may_be_seen,
+            unseen: 0.0,
         });
     }
     let why = match reference {
         Some(reference) if !reference.misses.is_empty() => format!("{} misses {}", reference.card.id, reference.misses),
-        Some(reference) => format!("{} is too noisy in {} samples a pixel", reference.card.id, reference.spp),
+        Some(reference) if has_unseen => {
+            format!(
+                "{} has not met all light in {} samples a pixel",
+                reference.card.id, reference.spp
+            )
+        }
+        Some(reference) => format!(
+            "{} is too noisy in {} samples a pixel",
+            reference.card.id, reference.spp
+        ),
         None => "nothing else can".into(),
     };
     let stages: Vec<String> = trial.stages.iter().map(|stage| stage.spp.to_string()).collect();
@@ -175,10 +211,14 @@ fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<
             ),
             bias: Some(own),
             may_be_seen,
+            unseen: 0.0,
         },
         None if moved.is_empty() => Judgement::unknown("there was no time for pictures of two budgets", may_be_seen),
         None => Judgement::unknown(
-            &format!("its own pictures of {} samples a pixel do not settle, and {why}", stages.join(", ")),
+            &format!(
+                "its own pictures of {} samples a pixel do not settle, and {why}",
+                stages.join(", ")
+            ),
             may_be_seen,
         ),
     })
@@ -186,6 +226,20 @@ fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<
 
 fn law(bias: &BiasModel) -> String {
     format!("bias falls as samples^(-{:.2})", bias.exponent() / 2.0)
+}
+
+/// What an unbiased technique's pilots have not met: they are darker than a consistent one's, by more than that one still moves. `None` where
+/// nothing shows it.
+fn unseen(consistent: &Trial<'_>, unbiased: &Trial<'_>) -> Result<Option<f64>> {
+    let Some(own) = BiasModel::settling(&moved(consistent)?) else {
+        return Ok(None);
+    };
+    let found = against(consistent, unbiased)?
+        .last()
+        .map(|(_, found)| *found)
+        .unwrap_or_default();
+    let rest = found.lower() - own.upper(f64::from(consistent.spp));
+    Ok((found.brighter && rest > 0.0).then_some(rest))
 }
 
 /// Bias of each of a trial's stages against the last one of another technique.
@@ -218,17 +272,33 @@ mod tests {
 
     #[test]
     fn refusals_name_the_bias_and_the_goal() {
-        assert_eq!([0.031, 0.02, 0.12, 0.0045, 0.1].map(percent), ["3.1 %", "2 %", "12 %", "0.45 %", "10 %"]);
+        assert_eq!(
+            [0.031, 0.02, 0.12, 0.0045, 0.1].map(percent),
+            ["3.1 %", "2 %", "12 %", "0.45 %", "10 %"]
+        );
         let of = |square, deviation| Judgement {
-            bias: Some(BiasModel::constant(64, BiasEstimate { square, deviation })),
+            bias: Some(BiasModel::constant(
+                64,
+                BiasEstimate {
+                    square,
+                    deviation,
+                    brighter: true,
+                },
+            )),
             ..Judgement::default()
         };
         let seen = of(0.031 * 0.031, 1e-6);
-        assert_eq!(seen.refusal(Some(0.02), false).unwrap(), "bias 3.1 % exceeds the goal of 2 %");
+        assert_eq!(
+            seen.refusal(Some(0.02), false).unwrap(),
+            "bias 3.1 % exceeds the goal of 2 %"
+        );
         assert_eq!(seen.refusal(Some(0.05), true), None);
         assert_eq!(seen.refusal(None, false), None);
         let hidden = of(0.01 * 0.01, 0.0004).refusal(Some(0.02), false).unwrap();
-        assert!(hidden.starts_with("bias may be as much as 3 %") && hidden.contains("1 % is found"), "{hidden}");
+        assert!(
+            hidden.starts_with("bias may be as much as 3 %") && hidden.contains("1 % is found"),
+            "{hidden}"
+        );
         let unknown = Judgement::unknown("no pilots", false);
         assert!(unknown.refusal(None, true).unwrap().contains("no pilots"));
     }

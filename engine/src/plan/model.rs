@@ -22,6 +22,8 @@ pub struct ErrorModel {
     shrinking_kernels: bool,
     /// Samples a pixel and relative MSE, with rising samples.
     points: Vec<(f64, f64)>,
+    /// What the last measurement has not seen, for all that is known.
+    unseen: f64,
 }
 
 impl ErrorModel {
@@ -29,8 +31,13 @@ impl ErrorModel {
     pub fn of_shrinking_kernels() -> Self {
         Self {
             shrinking_kernels: true,
-            points: Vec::new(),
+            ..Self::default()
         }
+    }
+
+    /// Says that the last measurement has missed so much: light too rare to be met. It falls as noise of independent samples does.
+    pub fn set_unseen(&mut self, relative_mse: f64) {
+        self.unseen = relative_mse;
     }
 
     /// Adds a measurement with more samples than those before.
@@ -61,6 +68,11 @@ impl ErrorModel {
     /// Relative MSE expected of `samples` samples a pixel: between measurements by the power law through both, beyond the last by the
     /// slope; 0 without a measurement.
     pub fn relative_mse(&self, samples: f64) -> f64 {
+        let last = self.points.last().map_or(0.0, |(n, _)| *n);
+        self.seen(samples) + self.unseen * last / samples
+    }
+
+    fn seen(&self, samples: f64) -> f64 {
         for pair in self.points.windows(2) {
             let [(n0, e0), (n1, e1)] = [pair[0], pair[1]];
             if samples < n1 && e0 > 0.0 && e1 > 0.0 {
@@ -73,6 +85,9 @@ impl ErrorModel {
 
     /// Least number of samples a pixel for that relative MSE, at least 1 and at most `u32::MAX`.
     pub fn samples(&self, relative_mse: f64) -> u32 {
+        if self.unseen > 0.0 {
+            return least(|samples| self.relative_mse(samples) <= relative_mse).unwrap_or(u32::MAX);
+        }
         let Some((n, e)) = self.points.last() else { return 1 };
         if *e <= 0.0 {
             return 1;
@@ -93,8 +108,8 @@ impl ErrorModel {
 /// Exponents that a falling squared bias can have. That of a kernel's blur falls as its area squared, that of its edges as its radius: with a
 /// reduction of 2/3 of photon mapping as passes^(−2/3) and passes^(−1/6).
 const EXPONENTS: std::ops::RangeInclusive<f64> = 0.0..=2.0;
-/// Exponent where pilots have not shown any: between those two.
-const UNSEEN_EXPONENT: f64 = 1.0 / 3.0;
+/// Exponent where pilots have not shown any: of blur, with that reduction (Knaus and Zwicker 2011, §4).
+const UNSEEN_EXPONENT: f64 = 2.0 / 3.0;
 /// Least exponent by which where a picture is going can be told from how it moves.
 const SETTLING_EXPONENT: f64 = 0.1;
 
@@ -122,7 +137,7 @@ impl BiasModel {
     }
 
     /// A bias that falls, found at rising numbers of samples: as it did between the last two measurements that are told from noise, and
-    /// by an exponent of 1/3 where there are no two. `None` without a measurement.
+    /// by that of a kernel's blur where there are no two. `None` without a measurement.
     pub fn falling(found: &[(u32, BiasEstimate)]) -> Option<Self> {
         let (samples, last) = found.last()?;
         let resolved: Vec<_> = found.iter().filter(|(_, found)| found.is_resolved()).collect();
@@ -190,24 +205,27 @@ impl BiasModel {
         if self.upper == 0.0 {
             return Some(noise.samples(relative_mse));
         }
-        let meets = |samples: u32| {
-            let samples = f64::from(samples);
+        least(|samples| {
             noise.relative_mse(samples) + self.square(samples) <= relative_mse && self.upper(samples) <= relative_mse
-        };
-        if !meets(u32::MAX) {
-            return None;
-        }
-        let (mut short, mut enough) = (0, u32::MAX);
-        while enough - short > 1 {
-            let middle = short + (enough - short) / 2;
-            if meets(middle) {
-                enough = middle;
-            } else {
-                short = middle;
-            }
-        }
-        Some(enough)
+        })
     }
+}
+
+/// The least number of samples from which on something holds; `None` where it never does.
+fn least(holds: impl Fn(f64) -> bool) -> Option<u32> {
+    if !holds(u32::MAX.into()) {
+        return None;
+    }
+    let (mut short, mut enough) = (0, u32::MAX);
+    while enough - short > 1 {
+        let middle = short + (enough - short) / 2;
+        if holds(middle.into()) {
+            enough = middle;
+        } else {
+            short = middle;
+        }
+    }
+    Some(enough)
 }
 
 /// Seconds over samples a pixel.
@@ -259,6 +277,11 @@ mod tests {
         error.add(1024, 0.0);
         assert_eq!(error.samples(1e-3), 1);
 
+        let mut rare = ErrorModel::default();
+        rare.add(4, 0.04);
+        rare.set_unseen(0.36);
+        assert!((rare.relative_mse(16.0) - 0.1).abs() < 1e-12 && rare.samples(0.1 * (1.0 + 1e-12)) == 16);
+
         let mut kernels = ErrorModel::of_shrinking_kernels();
         kernels.add(4, 0.4);
         kernels.add(16, 0.4 / 4_f64.powf(0.7));
@@ -275,7 +298,11 @@ mod tests {
 
     #[test]
     fn biases_fall_as_they_were_seen_to() {
-        let found = |square: f64, deviation: f64| BiasEstimate { square, deviation };
+        let found = |square: f64, deviation: f64| BiasEstimate {
+            square,
+            deviation,
+            brighter: true,
+        };
         let constant = BiasModel::constant(16, found(0.01, 0.001));
         assert_eq!((constant.square(1e6), constant.upper(1.0)), (0.01, 0.012));
         assert_eq!(BiasModel::constant(16, found(-0.01, 0.001)).square(4.0), 0.0);
@@ -295,17 +322,28 @@ mod tests {
         };
         let settling = BiasModel::settling(&[moved(4), moved(16)]).unwrap();
         assert!((settling.exponent() - 2.0 / 3.0).abs() < 1e-6, "{settling:?}");
-        assert!((settling.square(64.0).sqrt() / bias(64.0) - 1.0).abs() < 1e-6, "{settling:?}");
-        assert!((settling.square(4096.0).sqrt() / bias(4096.0) - 1.0).abs() < 1e-6, "{settling:?}");
-        // One movement alone is read by the slower law, and one that does not get smaller not at all.
-        assert!(BiasModel::settling(&[moved(16)]).unwrap().square(64.0).sqrt() > bias(64.0));
+        assert!(
+            (settling.square(64.0).sqrt() / bias(64.0) - 1.0).abs() < 1e-6,
+            "{settling:?}"
+        );
+        assert!(
+            (settling.square(4096.0).sqrt() / bias(4096.0) - 1.0).abs() < 1e-6,
+            "{settling:?}"
+        );
+        // One movement alone is read by the law of blur, and one that does not get smaller not at all.
+        let alone = BiasModel::settling(&[moved(16)]).unwrap();
+        assert!((alone.square(64.0).sqrt() / bias(64.0) - 1.0).abs() < 1e-6, "{alone:?}");
         assert!(BiasModel::settling(&[(4, 16, found(0.01, 1e-9)), (16, 64, found(0.01, 1e-9))]).is_none());
         assert!(BiasModel::settling(&[]).is_none());
     }
 
     #[test]
     fn samples_serve_noise_and_bias_together() {
-        let found = |square: f64, deviation: f64| BiasEstimate { square, deviation };
+        let found = |square: f64, deviation: f64| BiasEstimate {
+            square,
+            deviation,
+            brighter: true,
+        };
         let mut noise = ErrorModel::default();
         noise.add(4, 0.04);
         assert_eq!(BiasModel::default().samples(&noise, 0.01), Some(noise.samples(0.01)));

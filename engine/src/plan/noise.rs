@@ -13,16 +13,38 @@ const REACHES: [usize; 3] = [8, 2, 0];
 /// Standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half.
 const TRUST: f64 = 0.05;
 
+/// How the square of a pixel's true radiance is found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Truth {
+    /// From its neighbourhood where noise hides it: whatever is bright in one picture alone is rare light that pixels around may get, too.
+    Neighbourhood,
+    /// No less than the square of both pictures' mean: what is bright in one picture alone belongs to the pixel. So it is where light that
+    /// is scattered diffusely comes from kernels, and only what the eye sees by way of mirrors is sampled.
+    Pixel,
+}
+
 /// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + `offset`) over pixels and channels, as
 /// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it.
 ///
 /// # Errors
 /// [`Error::Setting`] when the sizes differ; [`Error::Picture`] without radiance.
 pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64> {
+    noise_of_pair(a, b, offset, Truth::Neighbourhood)
+}
+
+/// As [`relative_mse_of_pair`], relative to that truth.
+pub(super) fn noise_of_pair(a: &Picture, b: &Picture, offset: f64, kind: Truth) -> Result<f64> {
     same_size(a, b)?;
     let (mut sum, mut count) = (0.0, 0_usize);
     for channel in 0..3 {
-        let (variances, truth) = channel_of_pair(a, b, channel)?;
+        let (variances, mut truth) = channel_of_pair(a, b, channel, TRUST)?;
+        if kind == Truth::Pixel {
+            let values = a.main_layer()?.values().iter().zip(b.main_layer()?.values());
+            for (truth, (a, b)) in truth.iter_mut().zip(values.skip(channel).step_by(3)) {
+                let mean = (f64::from(*a) + f64::from(*b)) / 2.0;
+                *truth = truth.max(mean * mean);
+            }
+        }
         sum += variances.iter().zip(&truth).map(|(v, t)| v / (t + offset)).sum::<f64>();
         count += variances.len();
     }
@@ -39,8 +61,9 @@ pub(super) fn same_size(a: &Picture, b: &Picture) -> Result<()> {
     Err(Error::setting("pair of pictures", size, "have different sizes"))
 }
 
-/// Of each pixel of a channel: the variance of either picture, and the square of its true radiance, as far as the two know them.
-pub(super) fn channel_of_pair(a: &Picture, b: &Picture, channel: usize) -> Result<(Vec<f64>, Vec<f64>)> {
+/// Of each pixel of a channel: the variance of either picture, and the square of its true radiance, as far as the two know them. `trust` is the
+/// standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half.
+pub(super) fn channel_of_pair(a: &Picture, b: &Picture, channel: usize, trust: f64) -> Result<(Vec<f64>, Vec<f64>)> {
     let (width, height) = (a.width() as usize, a.height() as usize);
     let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
     let pair = |i: usize| {
@@ -64,7 +87,7 @@ pub(super) fn channel_of_pair(a: &Picture, b: &Picture, channel: usize) -> Resul
         for (truth, (square, variance)) in truth.iter_mut().zip(near_squares.iter().zip(&near_variances)) {
             // A narrower neighbourhood only where there is little noise: a large difference makes the product small, and the two
             // must not meet in one quotient.
-            let (signal, noise) = (square.max(0.0) * TRUST, variance / count.sqrt());
+            let (signal, noise) = (square.max(0.0) * trust, variance / count.sqrt());
             let all = signal * signal + noise * noise;
             let trust = if all > 0.0 && reach != REACHES[0] {
                 signal * signal / all
@@ -129,6 +152,18 @@ mod tests {
             (truth * (1.0 + deviation * normal)) as f32
         });
         Picture::from_radiance(64, 64, values.collect()).unwrap()
+    }
+
+    #[test]
+    fn a_lone_bright_pixel_is_rare_light_or_its_own() {
+        let mut values = vec![0.5; 32 * 32 * 3];
+        let b = Picture::from_radiance(32, 32, values.clone()).unwrap();
+        values[3 * 500] = 400.0;
+        let a = Picture::from_radiance(32, 32, values).unwrap();
+        let of = |kind| noise_of_pair(&a, &b, 0.01, kind).unwrap() * 3.0 * 1024.0;
+        // 400² ∕ 2 over some radiance near 0.5, or over 200².
+        assert!(of(Truth::Neighbourhood) > 1e4, "{}", of(Truth::Neighbourhood));
+        assert!((of(Truth::Pixel) - 2.0).abs() < 0.02, "{}", of(Truth::Pixel));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::judge::{self, Judgement, REFERENCE};
 use super::model::{CostModel, ErrorModel};
-use super::noise::relative_mse_of_pair;
+use super::noise::{Truth, noise_of_pair};
 use super::paths::{same_picture, unseen_by_eye_paths};
 use super::{Candidate, Goal, Reference};
 use crate::film::Picture;
@@ -138,7 +138,11 @@ impl<'a> Trial<'a> {
         let start = from.elapsed().as_secs_f64();
         let small = size.map(|side| (side / SMALL).max(1));
         let alike = card.bias == Bias::Unbiased || size == options.size;
-        let small_seconds = if alike { None } else { Some(round_of_another_size(begin(first_seed, small)?)?) };
+        let small_seconds = if alike {
+            None
+        } else {
+            Some(round_of_another_size(begin(first_seed, small)?)?)
+        };
         let mut trial = Self {
             card,
             misses: misses.unwrap_or_default(),
@@ -157,6 +161,11 @@ impl<'a> Trial<'a> {
             round_seconds: 0.0,
             all_seconds: 0.0,
         };
+        // How far a picture moves as it goes on shows from the first sample.
+        if matches!(card.bias, Bias::Consistent(_)) {
+            let pictures = trial.pictures()?;
+            trial.stages.push(Stage { spp: 1, pictures });
+        }
         trial.round(ROUNDS[0], asked.pixels())?;
         if let Some(small_seconds) = small_seconds {
             let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
@@ -185,18 +194,26 @@ impl<'a> Trial<'a> {
         self.round_seconds = from.elapsed().as_secs_f64();
         self.all_seconds += self.round_seconds;
         self.cost.sample = self.seconds_a_sample(spp - self.spp, pixels);
-        let [a, b] = &mut self.pilots;
-        let pictures = [a.picture()?, b.picture()?];
+        let pictures = self.pictures()?;
         for picture in &pictures {
             self.lit |= picture.main_layer()?.values().iter().any(|value| *value != 0.0);
         }
+        let truth = match self.card.bias {
+            Bias::Consistent(_) => Truth::Pixel,
+            Bias::Unbiased | Bias::Biased(_) => Truth::Neighbourhood,
+        };
         self.error.add(
             spp,
-            relative_mse_of_pair(&pictures[0], &pictures[1], RELATIVE_MSE_OFFSET)?,
+            noise_of_pair(&pictures[0], &pictures[1], RELATIVE_MSE_OFFSET, truth)?,
         );
         self.stages.push(Stage { spp, pictures });
         self.spp = spp;
         Ok(())
+    }
+
+    fn pictures(&mut self) -> Result<[Picture; 2]> {
+        let [a, b] = &mut self.pilots;
+        Ok([a.picture()?, b.picture()?])
     }
 
     /// Seconds for each sample a pixel of a picture of so many pixels, by a round of so many samples.
@@ -210,9 +227,7 @@ impl<'a> Trial<'a> {
     fn samples(&self, goal: Goal, spent: f64) -> u32 {
         let for_error = goal.error.map(|error| match self.lit {
             // What cannot reach it is shown with as many as noise alone would take.
-            true => self
-                .reach(error)
-                .unwrap_or_else(|| self.error.samples(error * error)),
+            true => self.reach(error).unwrap_or_else(|| self.error.samples(error * error)),
             // Nothing is known: as many as the longest pilots, at the least.
             false => ROUNDS[ROUNDS.len() - 1],
         });
@@ -386,6 +401,7 @@ fn judge(trials: &mut [Option<Trial<'_>>], goal: Goal) -> Result<()> {
     let judgements = judge::judgements(trials, goal.error)?;
     for (trial, judgement) in trials.iter_mut().zip(judgements) {
         if let Some(trial) = trial {
+            trial.error.set_unseen(judgement.unseen);
             trial.judgement = judgement;
         }
     }

@@ -168,7 +168,11 @@ fn contests(context: &Context<'_>) -> Result<Table> {
             Ok(error.relative_mse.max(0.0).sqrt())
         };
         let error = error_of(&rendered)?;
-        let other_id = if choice.technique == contest.rival { contest.winner } else { contest.rival };
+        let other_id = if choice.technique == contest.rival {
+            contest.winner
+        } else {
+            contest.rival
+        };
         let other = plan.candidates.iter().find(|candidate| candidate.technique == other_id);
         let other_options = RenderOptions {
             technique: Some(other_id.into()),
@@ -208,7 +212,11 @@ fn contests(context: &Context<'_>) -> Result<Table> {
             plan.pilot_seconds.into(),
             or_dash(other_error),
             why.into(),
-            if other_error.is_none_or(|other| error < other) { "yes".into() } else { "no".into() },
+            if other_error.is_none_or(|other| error < other) {
+                "yes".into()
+            } else {
+                "no".into()
+            },
         ]);
     }
     table.note(format!(
