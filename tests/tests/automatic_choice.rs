@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
-use clerestory::film::{CompareOptions, NonFiniteSamples, Picture, Step, compare};
+use clerestory::film::{CompareOptions, NonFiniteSamples, Picture, PixelFormat, Step, compare};
 use clerestory::gpu::{Buffer, PipelineInfo};
 use clerestory::plan::{ErrorModel, Goal, plan, plan_among, relative_mse_by_variance, relative_mse_of_pair};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::Camera;
-use clerestory::techniques::{self, Bias, Card, Skipped, Technique};
+use clerestory::settings::SettingsDecl;
+use clerestory::techniques::{self, Bias, Card, PathTracerSettings, Skipped, Technique};
 use clerestory::transport::PathSet;
 use clerestory::{Error, Result, scene};
 use clerestory_tests::with_gpu;
@@ -133,8 +134,7 @@ const BRIGHT: Card = Card {
     needs: &[],
     path_set: PathSet::ALL,
     refusals: |_| Vec::new(),
-    settings: &[],
-    default_settings: || (techniques::by_id("path").unwrap().default_settings)(),
+    settings: SettingsDecl::of::<PathTracerSettings>(),
     variants: &[],
     create: |gpu, scene, view, settings| {
         let path = techniques::by_id("path")?;
@@ -154,8 +154,8 @@ impl Technique for Bright {
         Ok((bright, non_finite))
     }
 
-    fn display(&mut self, target: &Buffer, exposure: f32, bgra: bool) -> Result<()> {
-        self.0.display(target, exposure, bgra)
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        self.0.display(target, exposure, format)
     }
 
     fn set_camera(&mut self, camera: &Camera) -> Result<()> {
@@ -197,7 +197,7 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
         let renderer = Renderer::new(gpu, &scene::load("builtin:cornell-box?source=point").unwrap()).unwrap();
         let options = RenderOptions {
             technique: None,
-            settings: serde_json::json!({ "path_set": "direct", "sampler": "sobol" }),
+            settings: serde_json::json!({ "path_set": "direct", "sampler": "sobol" }).into(),
             ..options()
         };
         let among = |cards: &[&Card], error| plan_among(&renderer, cards, &options, goal(error), &mut || true).unwrap();
@@ -243,7 +243,7 @@ fn the_path_tracer_does_not_win_by_what_it_misses() {
         let of = |technique: Option<&str>, settings: serde_json::Value| {
             let options = RenderOptions {
                 technique: technique.map(Into::into),
-                settings,
+                settings: settings.into(),
                 ..options()
             };
             plan(&renderer, &options, goal(0.2), &mut || true).unwrap()

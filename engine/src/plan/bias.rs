@@ -27,7 +27,7 @@ pub struct BiasEstimate {
     pub square: f64,
     /// Its standard error.
     pub deviation: f64,
-    /// Whether the technique is the brighter one, all in all.
+    /// Whether most of it lies where the technique is the brighter one.
     pub brighter: bool,
 }
 
@@ -104,14 +104,21 @@ struct Values {
     mean: f64,
 }
 
+/// Sums over a tile.
+#[derive(Clone, Default)]
+struct Tile {
+    square: f64,
+    difference: f64,
+    count: f64,
+}
+
 /// Mean of the products over the squared radiance that the two pictures know, with its standard error by tiles.
 fn tiled([p, q]: [&Picture; 2], offset: f64, values: impl Fn(usize) -> Values) -> Result<BiasEstimate> {
     let (width, height) = (p.width() as usize, p.height() as usize);
     let side = ((width * height) as f64 / TILES).sqrt() as usize;
     let side = side.clamp(*TILE_SIDES.start(), *TILE_SIDES.end());
     let across = width.div_ceil(side);
-    let mut tiles = vec![(0.0, 0.0); across * height.div_ceil(side)];
-    let mut brighter = 0.0;
+    let mut tiles = vec![Tile::default(); across * height.div_ceil(side)];
     for channel in 0..3 {
         let (_, truth) = channel_of_pair(p, q, channel, TRUST)?;
         for (i, truth) in truth.iter().enumerate() {
@@ -119,25 +126,28 @@ fn tiled([p, q]: [&Picture; 2], offset: f64, values: impl Fn(usize) -> Values) -
             let weight = 1.0 / (truth.max(values.mean * values.mean) + offset);
             let value = values.product * weight;
             // A pixel without a finite sample says nothing.
-            let value = if value.is_finite() {
-                brighter += values.difference * weight.sqrt();
-                value
+            let (value, difference) = if value.is_finite() {
+                (value, values.difference * weight.sqrt())
             } else {
-                0.0
+                (0.0, 0.0)
             };
             let tile = &mut tiles[i / width / side * across + i % width / side];
-            *tile = (tile.0 + value, tile.1 + 1.0);
+            tile.square += value;
+            tile.difference += difference;
+            tile.count += 1.0;
         }
     }
     let (sum, count) = tiles
         .iter()
-        .fold((0.0, 0.0), |all, tile| (all.0 + tile.0, all.1 + tile.1));
+        .fold((0.0, 0.0), |(sum, count), tile| (sum + tile.square, count + tile.count));
     let mean = sum / f64::max(count, 1.0);
-    let squares: f64 = tiles.iter().map(|(sum, count)| (sum - count * mean).powi(2)).sum();
+    let deviations = tiles.iter().map(|tile| tile.square - tile.count * mean);
+    let squares: f64 = deviations.map(|deviation| deviation * deviation).sum();
     let number = tiles.len() as f64;
+    let brighter = tiles.iter().filter(|tile| tile.difference > 0.0);
     Ok(BiasEstimate {
         square: mean,
-        brighter: brighter > 0.0,
+        brighter: brighter.map(|tile| tile.square).sum::<f64>() > sum / 2.0,
         // A single tile tells nothing of its own spread.
         deviation: if number > 1.0 {
             (squares * number / (number - 1.0)).sqrt() / count

@@ -58,6 +58,7 @@ pub struct Goal {
 
 /// What became of a technique with its settings.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Candidate {
     /// Technique id.
     pub technique: &'static str,
@@ -97,6 +98,7 @@ pub struct Candidate {
 
 /// The pilots that biased and consistent techniques were held against.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Reference {
     /// Technique id.
     pub technique: &'static str,
@@ -108,6 +110,7 @@ pub struct Reference {
 
 /// The choice, its prediction, and all that was looked at.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Plan {
     /// What was asked for.
     pub goal: Goal,
@@ -139,7 +142,7 @@ impl Plan {
         let left = |time: Duration| time.saturating_sub(Duration::from_secs_f64(self.pilot_seconds));
         RenderOptions {
             technique: Some(choice.technique.into()),
-            settings: choice.settings.clone(),
+            settings: choice.settings.clone().into(),
             spp: choice.spp,
             time_budget: self.goal.time.map(left).or(base.time_budget),
             ..base.clone()
@@ -181,14 +184,14 @@ pub fn plan_among(
 ) -> Result<Plan> {
     let start = Instant::now();
     check(goal)?;
+    let fixed = options.settings.to_json();
     let asked = Asked {
         renderer,
         options,
-        paths: wanted_path_set(&options.settings)?,
+        paths: wanted_path_set(&fixed)?,
         goal,
     };
-    let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) =
-        candidates(cards, &options.settings).into_iter().unzip();
+    let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) = candidates(cards, &fixed).into_iter().unzip();
     let mut trials: Vec<Option<Trial<'_>>> = Vec::new();
     for (index, (candidate, card)) in candidates.iter_mut().zip(&cards).enumerate() {
         let late = goal
@@ -214,7 +217,7 @@ pub fn plan_among(
     let is_biased = |trial: &Trial<'_>| trial.card.bias != Bias::Unbiased;
     if trials.iter().flatten().any(is_biased) && !trials.iter().flatten().any(|trial| trial.card.id == REFERENCE) {
         let card = techniques::by_id(REFERENCE)?;
-        let mut judge = Candidate::of(card, "judge", merged(serde_json::json!({}), &options.settings, card));
+        let mut judge = Candidate::of(card, "judge", merged(serde_json::json!({}), &fixed, card));
         trials.push(Trial::judge(&asked, card, &mut judge)?);
     }
     rounds(&mut trials, &asked, start, proceed)?;
@@ -310,9 +313,8 @@ impl Candidate {
 
 /// A variant's settings under what is fixed; keys that the technique does not have are none of its business.
 fn merged(mut settings: Value, fixed: &Value, card: &Card) -> Value {
-    let known = (card.default_settings)();
     if let (Some(settings), Some(fixed)) = (settings.as_object_mut(), fixed.as_object()) {
-        for (key, value) in fixed.iter().filter(|(key, _)| known.get(key).is_some()) {
+        for (key, value) in fixed.iter().filter(|(key, _)| card.settings.has(key)) {
             settings.insert(key.clone(), value.clone());
         }
     }

@@ -102,7 +102,7 @@ impl<'a> Trial<'a> {
         let begin = |seed_steps: u32, size: [u32; 2]| {
             let pilot = RenderOptions {
                 technique: Some(card.id.into()),
-                settings: candidate.settings.clone(),
+                settings: candidate.settings.clone().into(),
                 size,
                 spp: 1,
                 seed: options.seed.wrapping_add(seed_steps.wrapping_mul(SEED_STEP)),

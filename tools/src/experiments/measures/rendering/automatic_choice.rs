@@ -140,14 +140,14 @@ fn contests(context: &Context<'_>) -> Result<Table> {
         let (side, spp) = if context.smoke { (8, 16) } else { (contest.side, spp) };
         let base = RenderOptions {
             size: [side; 2],
-            settings: serde_json::json!({ "path_set": contest.path_set }),
+            settings: serde_json::json!({ "path_set": contest.path_set }).into(),
             ..RenderOptions::default()
         };
         let of_reference = RenderOptions {
             technique: Some(reference.into()),
             spp,
             seed: REFERENCE_SEED,
-            settings: serde_json::json!({ "path_set": contest.path_set, "sampler": "pcg" }),
+            settings: serde_json::json!({ "path_set": contest.path_set, "sampler": "pcg" }).into(),
             ..base.clone()
         };
         let Some(reference) = render(&renderer, &of_reference, watch)? else {
@@ -176,7 +176,7 @@ fn contests(context: &Context<'_>) -> Result<Table> {
         let other = plan.candidates.iter().find(|candidate| candidate.technique == other_id);
         let other_options = RenderOptions {
             technique: Some(other_id.into()),
-            settings: other.map_or_else(|| base.settings.clone(), |other| other.settings.clone()),
+            settings: other.map_or_else(|| base.settings.clone(), |other| other.settings.clone().into()),
             spp: u32::MAX,
             time_budget: Some(Duration::from_secs_f64(seconds)),
             ..base.clone()
