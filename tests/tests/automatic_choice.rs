@@ -129,13 +129,13 @@ struct Bright(Box<dyn Technique>);
 const BRIGHT: Card = Card {
     id: "bright",
     summary: "the path tracer's pictures, too bright",
-    publication: "none",
     bias: Bias::Biased("everything is multiplied"),
     needs: &[],
     path_set: PathSet::ALL,
     refusals: |_| Vec::new(),
     settings: SettingsDecl::of::<PathTracerSettings>(),
     variants: &[],
+    rows: &[],
     create: |gpu, scene, view, settings| {
         let path = techniques::by_id("path")?;
         Ok(Box::new(Bright((path.create)(gpu, scene, view, settings)?)))
