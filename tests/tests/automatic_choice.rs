@@ -136,6 +136,7 @@ const BRIGHT: Card = Card {
     settings: SettingsDecl::of::<PathTracerSettings>(),
     variants: &[],
     rows: &[],
+    kernels: &[],
     create: |gpu, scene, view, settings| {
         let path = techniques::by_id("path")?;
         Ok(Box::new(Bright((path.create)(gpu, scene, view, settings)?)))

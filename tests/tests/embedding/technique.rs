@@ -359,7 +359,7 @@ fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     // The host did not enable it.
     let needy = Card {
         needs: &["geometryShader"],
-    kernels: &[],
+        kernels: &[],
         ..NEVER
     };
     let error = refusal(&sky, &needy);
@@ -376,7 +376,7 @@ fn a_technique_is_refused_with_the_reason_before_it_is_made() {
     }
     let misspelt = Card {
         needs: &["geometryShaders"],
-    kernels: &[],
+        kernels: &[],
         ..NEVER
     };
     let text = refusal(&sky, &misspelt).to_string();

@@ -331,10 +331,7 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("BG-3"),
         limits: "Blending by chance costs noise.",
         sources: &[sources::ENDERTON_2010.whole()],
-        shaders: &[
-            "shaders/walk/extend.comp",
-            "shaders/walk/shadow.comp",
-        ],
+        shaders: &["shaders/walk/extend.comp", "shaders/walk/shadow.comp"],
         bias: Some(Bias::Unbiased),
         tests: &[
             "tests/tests/alpha.rs::masks_are_all_or_nothing",
