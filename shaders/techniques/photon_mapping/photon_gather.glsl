@@ -66,7 +66,7 @@ bool compact_visit_point(uint record);
 #include "accel/compact_bvh.glsl"
 
 // Beside the other bindings of the map (photon_map.glsl): in memory, so that the device may have made it.
-layout(set = 6, binding = 3, scalar) restrict readonly buffer PhotonMapRoot { CompactRoot photon_map_root; };
+layout(set = 1, binding = 3, scalar) restrict readonly buffer PhotonMapRoot { CompactRoot photon_map_root; };
 
 layout(push_constant, scalar) uniform Push {
     AskSettings ask;
