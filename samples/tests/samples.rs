@@ -152,7 +152,10 @@ fn own_kernel_draws_edges_and_darkens_corners() {
     assert!(lamp[0] > 150.0, "lamp {lamp:?}");
     let inked = picture
         .pixels()
-        .filter(|pixel| pixel.0[2] > 2 * pixel.0[0].max(pixel.0[1]).max(10))
+        .filter(|pixel| {
+            let [red, green, blue] = pixel.0.map(u32::from);
+            blue > 2 * red.max(green).max(10)
+        })
         .count();
     assert!(inked > 20, "{inked} pixels of ink");
     // A mistake is an error with its line, before anything is rendered.

@@ -206,7 +206,30 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
         let strict = among(&[&BRIGHT], 0.02);
         let choice = strict.choice();
         let bias = choice.bias.unwrap();
-        assert!((0.03..0.05).contains(&bias), "{choice:?}");
+        // A twentieth of the radiance, by the metric's weights, which are small where the room is dark.
+        let truth = render(
+            &renderer,
+            &RenderOptions {
+                technique: Some("path".into()),
+                spp: 1024,
+                seed: 9,
+                ..options.clone()
+            },
+        );
+        let squares: Vec<f64> = truth
+            .picture
+            .main_layer()
+            .unwrap()
+            .values()
+            .iter()
+            .map(|value| f64::from(*value).powi(2))
+            .collect();
+        let weighted = squares
+            .iter()
+            .map(|square| square / (square + RELATIVE_MSE_OFFSET))
+            .sum::<f64>();
+        let expected = 0.05 * (weighted / squares.len() as f64).sqrt();
+        assert!((bias / expected - 1.0).abs() < 0.1, "{expected}: {choice:?}");
         assert!(
             choice.reason.starts_with("bias ") && choice.reason.ends_with(" % exceeds the goal of 2 %"),
             "{choice:?}"
@@ -256,7 +279,11 @@ fn the_path_tracer_does_not_win_by_what_it_misses() {
             choice.judged_by.contains("its own pictures") && choice.judged_by.contains("path misses"),
             "{choice:?}"
         );
-        assert!(choice.bias.unwrap() > 0.0 && choice.error <= 0.2 * 1.001, "{choice:?}");
+        // What is found of it may be none, where noise hides the rest.
+        assert!(
+            choice.bias_at_most.unwrap() > 0.0 && choice.error <= 0.2 * 1.001,
+            "{choice:?}"
+        );
         for path in free.candidates.iter().filter(|candidate| candidate.technique == "path") {
             assert!(
                 path.misses.contains("point light \"light\"") && path.judged_by.contains("photon"),

@@ -79,7 +79,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("layer.geom", "UnsupportedExecutionModel"),
     ("layer.vert", "ShaderViewportIndexLayerEXT"),
     ("view.vert", "ViewIndex"),
-    ("walk_ambient.comp", "SampledBuffer"),
+    ("walk_sky_light.comp", "SampledBuffer"),
     ("walk_start.comp", "SampledBuffer"),
     // A reference that naga does not follow.
     ("cube_probe.comp", "InvalidId"),

@@ -40,6 +40,8 @@ pub(crate) mod recorder;
 mod reflect;
 mod rendering;
 mod resources;
+// A method of one kernel has a kernel of its name.
+#[allow(clippy::module_inception)]
 pub mod shaders;
 mod submission;
 mod surface;

@@ -14,8 +14,8 @@
 /// use clerestory::settings::TypedSettings;
 ///
 /// clerestory::settings! {
-///     /// Settings of ambient occlusion.
-///     pub struct AmbientSettings {
+///     /// Settings of occlusion.
+///     pub struct OcclusionSettings {
 ///         /// Rays of each pixel and frame; more have less noise.
 ///         pub rays: u32 = 4, in 1..=256, unit "rays";
 ///         /// Farthest surface that shades; 0 for all. Changes the picture.
@@ -29,14 +29,14 @@
 ///     }
 /// }
 ///
-/// let settings = AmbientSettings { rays: 0, ..Default::default() };
+/// let settings = OcclusionSettings { rays: 0, ..Default::default() };
 /// assert_eq!(
 ///     settings.check().unwrap_err().to_string(),
 ///     "setting rays: 0 is out of range; it may be 1 … 256 (rays)"
 /// );
-/// let read = AmbientSettings::from_json(&serde_json::json!({ "reach": 0.5 }))?;
+/// let read = OcclusionSettings::from_json(&serde_json::json!({ "reach": 0.5 }))?;
 /// assert_eq!((read.rays, read.reach), (4, 0.5));
-/// assert_eq!(AmbientSettings::infos()[0].meaning, "Rays of each pixel and frame; more have less noise");
+/// assert_eq!(OcclusionSettings::infos()[0].meaning, "Rays of each pixel and frame; more have less noise");
 /// # clerestory::Result::Ok(())
 /// ```
 #[macro_export]

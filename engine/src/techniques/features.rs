@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::film::{add_frame, display};
 use crate::gpu::{Caps, ExceededLimit};
 use crate::{Error, Result};
 
@@ -29,6 +31,9 @@ const FEATURES: [Feature; 16] = [
     ("VK_SUBGROUP_FEATURE_BALLOT_BIT", |caps| caps.subgroup.ballot),
     ("VK_SUBGROUP_FEATURE_SHUFFLE_BIT", |caps| caps.subgroup.shuffle),
 ];
+
+/// What every technique's film takes.
+const FILM_KERNELS: [&ShaderInfo; 2] = [&add_frame::INFO, &display::INFO];
 
 /// Whether a device has a feature, by its Vulkan name; `None` for a name that the engine does not know.
 pub fn offers(caps: &Caps, feature: &str) -> Option<bool> {
@@ -62,7 +67,7 @@ pub fn lacks(caps: &Caps, technique: &Card) -> Vec<Lack> {
         })
         .collect();
     let mut limits: BTreeMap<&str, (ExceededLimit, Vec<&str>)> = BTreeMap::new();
-    for shader in technique.kernels {
+    for shader in technique.kernels.iter().chain(&FILM_KERNELS) {
         for exceeded in caps.exceeded_by(shader) {
             let (worst, names) = limits.entry(exceeded.name).or_insert((exceeded, Vec::new()));
             worst.wanted = worst.wanted.max(exceeded.wanted);

@@ -165,7 +165,7 @@ impl Host {
         let names = own.make("names", 4 * u64::from(TRIANGLES), vk::BufferUsageFlags::empty())?;
         let picture = own.make("picture", shown_bytes + strip_bytes, vk::BufferUsageFlags::empty())?;
         let root = own.make("root", 64, vk::BufferUsageFlags::empty())?;
-        let grey = |word: u32| 0xFF00_0000 | (word & 0xFF) * 0x01_0101;
+        let grey = |word: u32| 0xFF00_0000 | ((word & 0xFF) * 0x01_0101);
         own.write(&greys, numbers().take(count as usize).map(grey))?;
         let places: Vec<u32> = numbers().take(3 * TRIANGLES as usize).collect();
         let triangle = |place: &[u32]| {

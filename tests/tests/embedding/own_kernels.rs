@@ -199,6 +199,9 @@ fn mistakes_in_wgsl_have_their_place() {
     });
 }
 
+/// A binding at fault, words of the error, what is given, and the push constants.
+type Mistake<'a> = (&'a str, &'a str, Vec<(&'a str, OwnResource<'a>)>, &'a [u8]);
+
 #[test]
 fn what_a_dispatch_is_given_is_checked_by_name() {
     with_gpu(|gpu| {
@@ -231,7 +234,7 @@ fn what_a_dispatch_is_given_is_checked_by_name() {
             })
         };
         let misplaced = input.slice(4, 64);
-        let mut cases: Vec<(&str, &str, Vec<(&str, OwnResource<'_>)>, &[u8])> = vec![
+        let mut cases: Vec<Mistake<'_>> = vec![
             ("never", "was not given", good[..3].to_vec(), push),
             (
                 "result",

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use clerestory::film::{GpuFilm, NonFiniteSamples, Picture, PixelFormat, Step};
+use clerestory::gpu::shaders::film::add_frame;
 use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
 use clerestory::gpu::{
     Access, Buffer, BufferDesc, Category, ComputePipeline, EnabledFeatures, Gpu, PipelineInfo, Recorder,
@@ -313,7 +314,7 @@ fn a_frame_method_of_the_hosts_own_is_a_technique_like_others() {
         report
             .pipelines
             .iter()
-            .any(|pipeline| pipeline.shader == "film/add_frame")
+            .any(|pipeline| pipeline.shader == add_frame::INFO.name)
     );
     assert_no_messages(&gpu);
 }
@@ -336,8 +337,12 @@ fn cards_of_the_hosts_own_are_judged_by_the_hard_cases() {
     let case = clerestory_hard_cases::by_name("one-triangle").unwrap();
     let outcome = judge(&gpu, case, &Subject::of(&EVEN)[0]).unwrap();
     assert!(outcome.refused, "{outcome:?}");
+    static WITHOUT_REFUSALS: Card = Card {
+        refusals: |_| Vec::new(),
+        ..EVEN
+    };
     let case = clerestory_hard_cases::by_name("black-and-white").unwrap();
-    let outcome = judge(&gpu, case, &Subject::of(&EVEN)[0]).unwrap();
+    let outcome = judge(&gpu, case, &Subject::of(&WITHOUT_REFUSALS)[0]).unwrap();
     assert_eq!(outcome.verdict, Verdict::Fails, "{outcome:?}");
     assert_no_messages(&gpu);
 }
@@ -425,7 +430,10 @@ fn settings_of_a_hosts_own_come_as_struct_or_json_and_are_checked_by_their_decla
             "setting radiance: \"x\" does not fit",
         ),
         (serde_json::json!({"colour": 1}).into(), "there is: radiance"),
-        (Settings::of(PathTracerSettings::default()), "EvenSettings"),
+        (
+            Settings::of(PathTracerSettings::default()),
+            "is for no setting of that name; there is: radiance",
+        ),
     ] {
         let text = start(settings).err().expect("a refusal").to_string();
         assert!(text.contains(words), "{words}: {text}");

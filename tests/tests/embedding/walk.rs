@@ -12,7 +12,7 @@ use clerestory::walk::{
 };
 use clerestory::{Error, Result};
 use clerestory_tests::render::{floor, upload};
-use clerestory_tests::shaders::{walk_ambient, walk_start};
+use clerestory_tests::shaders::{walk_sky_light, walk_start};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
@@ -28,7 +28,7 @@ const ALBEDO: f64 = 0.5;
 struct Ambient<'a> {
     scene: &'a GpuScene,
     start: &'a ComputePipeline<walk_start::Kernel>,
-    scatter: &'a ComputePipeline<walk_ambient::Kernel>,
+    scatter: &'a ComputePipeline<walk_sky_light::Kernel>,
     key: WalkKey,
     walks: u32,
 }
@@ -43,7 +43,7 @@ impl WalkStages for Ambient<'_> {
             key: bytemuck::cast(self.key),
             direction: [0.0, -1.0, 0.0],
         };
-        recorder.pass("ambient: start", |pass| {
+        recorder.pass("sky light: start", |pass| {
             let groups = [self.start.groups_for(self.walks), 1, 1];
             pass.dispatch(self.start, &[wave], &push, groups)?;
             stage_barrier(pass);
@@ -53,13 +53,13 @@ impl WalkStages for Ambient<'_> {
 
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let [lower, upper] = self.scene.bounds();
-        let push = walk_ambient::Push {
+        let push = walk_sky_light::Push {
             scene_lower: lower.to_array(),
             scene_upper: upper.to_array(),
             // The same words, generated in the crate of either kernel.
             key: bytemuck::cast(self.key),
         };
-        recorder.pass("ambient: scatter", |pass| {
+        recorder.pass("sky light: scatter", |pass| {
             let scene = self.scene.scene_set();
             pass.dispatch_indirect(self.scatter, &[&bounce.wave, &scene], &push, bounce.places.items)?;
             stage_barrier(pass);
@@ -98,12 +98,12 @@ fn walks_of_the_hosts_own_gather_ambient_light_as_the_form_factor_has_it() {
     with_gpu(|gpu| {
         let scene = upload(gpu, &scene());
         let start = gpu.compute_pipeline::<walk_start::Kernel>(&()).unwrap();
-        let spec = surface_spec!(walk_ambient, scene, {
+        let spec = surface_spec!(walk_sky_light, scene, {
             has_alpha: false,
             has_media: false,
             ..Default::default()
         });
-        let scatter = gpu.compute_pipeline::<walk_ambient::Kernel>(&spec).unwrap();
+        let scatter = gpu.compute_pipeline::<walk_sky_light::Kernel>(&spec).unwrap();
         let walks = WALKS * POINTS.len() as u32;
         let needs = WaveNeeds {
             waiting: true,
@@ -115,7 +115,7 @@ fn walks_of_the_hosts_own_gather_ambient_light_as_the_form_factor_has_it() {
         for bounces in [1, 4] {
             let buffers = WaveBuffers::new(gpu, walks, needs).unwrap();
             let options = WalkOptions {
-                name: "ambient",
+                name: "sky light",
                 bounces,
                 ..WalkOptions::default()
             };
@@ -137,7 +137,7 @@ fn walks_of_the_hosts_own_gather_ambient_light_as_the_form_factor_has_it() {
             // Each meets the floor, sends a shadow ray, and goes on once.
             assert_eq!((walked.rays, walked.waited), (2 * u64::from(walks), u64::from(walks)));
             assert_eq!(walked.stalls, 0);
-            let passes = walked.timings.iter().map(|timings| timings.count("ambient: shadow"));
+            let passes = walked.timings.iter().map(|timings| timings.count("sky light: shadow"));
             let expected: &[usize] = if bounces == 1 { &[1, 1] } else { &[4] };
             // Other devices are given less at first.
             if gpu.caps().kind == DeviceKind::Cpu {

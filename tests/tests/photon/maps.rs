@@ -162,10 +162,11 @@ fn queries_of_device_maps_meet_every_kernel() {
             let point = random.vector();
             let mut met = vec![false; map.records.len()];
             tree.point_query(point, &mut QueryCounters::default(), |first| {
-                for place in first as usize.. {
-                    assert!(!std::mem::replace(&mut met[place], true), "twice");
+                let leaf = met.iter_mut().zip(&map.records).skip(first as usize);
+                for (met, record) in leaf {
+                    assert!(!std::mem::replace(met, true), "twice");
                     visited += 1;
-                    if photon_ends_leaf(&map.records[place]) {
+                    if photon_ends_leaf(record) {
                         break;
                     }
                 }

@@ -19,7 +19,7 @@ const ROW: Row = Row {
     limits: "Light of a uniform sky, scattered once and diffusely: nothing else may shine, and nothing be seen through.",
     sources: &[sources::ZHUKOV_1998.whole()],
     shaders: &["shaders/techniques/ambient/"],
-    path_set: Some("bounces=0..1,lobes=diffuse"),
+    path_set: Some("bounces=0..1,lobes=diffuse+reflection+transmission"),
     bias: Some(Bias::Unbiased),
     tests: &["tests/tests/ambient.rs::pictures_are_the_path_tracers"],
     experiment: "clerestory report ambient",

@@ -137,7 +137,7 @@ pub(super) enum MapMaker {
 /// A map, of which the device may still be building what it says of itself.
 pub(super) enum Made {
     ByHost(PhotonMap, MapFigures),
-    ByDevice(PhotonMap, Submission),
+    ByDevice(PhotonMap, Box<Submission>),
 }
 
 impl MapMaker {
@@ -161,7 +161,7 @@ impl MapMaker {
             && count > 0
         {
             match maps.build(records, count, scene_area) {
-                Ok((map, submission)) => return Ok(Made::ByDevice(map, submission)),
+                Ok((map, submission)) => return Ok(Made::ByDevice(map, Box::new(submission))),
                 Err(Error::LimitExceeded { .. } | Error::OutOfMemory { .. }) if *or_host => {}
                 Err(error) => return Err(error),
             }

@@ -245,7 +245,7 @@ impl PhotonMapper {
                     map
                 }
                 Made::ByDevice(map, building) => {
-                    photons.building = Some(building);
+                    photons.building = Some(*building);
                     map
                 }
             };

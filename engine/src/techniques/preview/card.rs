@@ -93,5 +93,4 @@ const ROWS: &[Row] = &[Row {
     ],
     experiment: "clerestory report preview-picture",
     module: "engine/src/techniques/preview/mod.rs",
-    ..Row::of(file!())
 }];
