@@ -229,9 +229,14 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
             .map(|square| square / (square + RELATIVE_MSE_OFFSET))
             .sum::<f64>();
         let expected = 0.05 * (weighted / squares.len() as f64).sqrt();
-        assert!((bias / expected - 1.0).abs() < 0.1, "{expected}: {choice:?}");
+        // How many pilots there are depends on the clock: fewer find it less exactly, and say so.
+        let at_most = choice.bias_at_most.unwrap();
         assert!(
-            choice.reason.starts_with("bias ") && choice.reason.ends_with(" % exceeds the goal of 2 %"),
+            expected < 1.05 * at_most && bias < 1.1 * expected,
+            "{expected}: {choice:?}"
+        );
+        assert!(
+            choice.reason.starts_with("bias ") && choice.reason.contains("the goal of 2 %"),
             "{choice:?}"
         );
         assert!(
@@ -255,7 +260,7 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
         // Beside the path tracer, which has no bias, it is not.
         let both = among(&[&BRIGHT, techniques::by_id("path").unwrap()], 0.02);
         assert_eq!(both.choice().technique, "path", "{both:?}");
-        assert!(both.candidates[0].reason.contains("exceeds the goal"), "{both:?}");
+        assert!(both.candidates[0].reason.contains("the goal of 2 %"), "{both:?}");
     });
 }
 

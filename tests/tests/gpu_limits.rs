@@ -310,7 +310,7 @@ fn four_descriptor_sets_are_enough_for_every_technique() {
         let addresses = [
             "builtin:cornell-box",
             "builtin:cornell-box?source=point",
-            "builtin:soup?n=300&size=0.2",
+            "builtin:triangle-soup?n=300",
         ];
         let scenes = addresses.map(|address| clerestory::scene::load(address).unwrap());
         let able = scenes

@@ -11,7 +11,10 @@ use clerestory_samples::shaders as sample_shaders;
 use clerestory_tests::shaders as test_shaders;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-/// The modules that naga cannot read or does not accept, each with words of its reason. One that it starts to accept must leave the list.
+/// What naga says of modules with texel buffers, which it does not know.
+const NO_TEXELS: &str = "SampledBuffer";
+
+/// The other modules that naga cannot read or does not accept, each with words of its reason. One that it starts to accept must leave the list.
 const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Matrix columns of three rows without padding: naga knows the standard layouts only, not the scalar one.
     ("layout_probe.comp", "UnsupportedMatrixStride"),
@@ -24,63 +27,18 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Vectors of three numbers one behind the other.
     ("accel/lbvh_boxes.comp", "ArrayStride"),
     ("techniques/preview/preview_display.comp", "ArrayStride"),
-    // Texel buffers.
-    ("twin_texture.comp", "SampledBuffer"),
-    ("scene/records.comp", "SampledBuffer"),
-    ("techniques/path/path_camera.comp", "SampledBuffer"),
-    ("techniques/path/path_shade.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_queue_blocks.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_queue_flags.comp", "SampledBuffer"),
-    ("walk/compact_count.comp", "SampledBuffer"),
-    ("walk/compact_scan.comp", "SampledBuffer"),
-    ("walk/compact_scatter.comp", "SampledBuffer"),
-    ("techniques/path/path_resolve.comp", "SampledBuffer"),
-    ("kernels/radix_count_serial.comp", "SampledBuffer"),
-    ("kernels/radix_scatter_serial.comp", "SampledBuffer"),
-    ("accel/lbvh_codes.comp", "SampledBuffer"),
-    ("accel/lbvh_emit.comp", "SampledBuffer"),
-    ("accel/lbvh_hierarchy.comp", "SampledBuffer"),
-    ("accel/map_begin.comp", "SampledBuffer"),
-    ("accel/map_blocks.comp", "SampledBuffer"),
-    ("accel/map_pairs.comp", "SampledBuffer"),
-    ("accel/map_split.comp", "SampledBuffer"),
-    ("accel/trace_queue.comp", "SampledBuffer"),
-    ("accel/trace_queue_vote.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_append.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_boxes.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_emit.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_gather.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_gather_packet.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_leaves.comp", "SampledBuffer"),
-    ("techniques/photon_mapping/photon_scatter.comp", "SampledBuffer"),
-    ("accel/trace_rays.comp", "SampledBuffer"),
-    ("walk/extend.comp", "SampledBuffer"),
-    ("walk/shadow.comp", "SampledBuffer"),
-    ("techniques/path/path_medium.comp", "SampledBuffer"),
-    ("techniques/preview/preview_shade.comp", "SampledBuffer"),
     ("raster/splat_points.comp", "SpecConstantOp"),
     // Two numbers right behind one, of three words in all.
     ("raster/splat_pull.comp", "MemberOverlap"),
     ("raster/splat_push.comp", "MemberOverlap"),
-    ("raster/surface.frag", "SampledBuffer"),
-    ("raster/surface_halves.geom", "SampledBuffer"),
-    ("raster/surface_instance.vert", "SampledBuffer"),
-    ("raster/surface_outlines.geom", "SampledBuffer"),
-    ("raster/surface_paraboloid.vert", "SampledBuffer"),
-    ("raster/surface_split.geom", "SampledBuffer"),
-    ("raster/surface_unsplit.vert", "SampledBuffer"),
-    ("raster/surface.vert", "SampledBuffer"),
-    ("raster/surface_layer.geom", "SampledBuffer"),
-    ("raster/surface_layer.vert", "SampledBuffer"),
-    ("raster/surface_octant.vert", "SampledBuffer"),
-    ("raster/surface_view.vert", "SampledBuffer"),
-    ("raster/surface_world.vert", "SampledBuffer"),
     // Graphics beyond WebGPU's: geometry shaders, layers by vertex shaders, signed numbers of views.
     ("layer.geom", "UnsupportedExecutionModel"),
     ("layer.vert", "ShaderViewportIndexLayerEXT"),
     ("view.vert", "ViewIndex"),
-    ("walk_sky_light.comp", "SampledBuffer"),
-    ("walk_start.comp", "SampledBuffer"),
+    // Vectors of three numbers without a gap behind them.
+    ("accel/lbvh_retry.comp", "MemberOffset"),
+    ("film/add_frame.comp", "ArrayStride"),
+    ("host_frame.comp", "ArrayStride"),
     // A reference that naga does not follow.
     ("cube_probe.comp", "InvalidId"),
     // Comparisons of specialization constants.
@@ -140,6 +98,13 @@ fn all() -> impl Iterator<Item = &'static ShaderInfo> {
     shaders::ALL.iter().chain(others).copied()
 }
 
+fn has_texels(shader: &ShaderInfo) -> bool {
+    shader
+        .bindings
+        .iter()
+        .any(|binding| binding.kind == BindingKind::TexelBuffer)
+}
+
 fn naga_says(shader: &ShaderInfo) -> Result<(), String> {
     let options = naga::front::spv::Options::default();
     let module = naga::front::spv::parse_u8_slice(&without_lines(shader.spirv), &options)
@@ -159,6 +124,7 @@ fn naga_accepts_every_module_that_it_can_read() {
             (Ok(()), None) => {}
             (Ok(()), Some(_)) => wrong.push(format!("{}: naga accepts it now; take it off the list", shader.name)),
             (Err(reason), Some((_, words))) if reason.contains(words) => {}
+            (Err(reason), None) if has_texels(shader) && reason.contains(NO_TEXELS) => {}
             (Err(reason), _) => wrong.push(format!("{}: {reason}", shader.name)),
         }
     }

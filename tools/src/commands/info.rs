@@ -7,7 +7,7 @@ use clap::Args;
 use clerestory::gpu::{Caps, DeviceSelection, DeviceSummary, Gpu, GpuOptions};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{self, Camera, Projection, Scene, SceneProfile};
-use clerestory::techniques::{self, Lack};
+use clerestory::techniques::{self, Card, Lack};
 
 use super::check_validation;
 use crate::failure::{Code, Failure, Outcome};
@@ -91,7 +91,7 @@ struct DeviceInfo {
 struct TechniqueNeeds {
     id: &'static str,
     needs: Vec<Need>,
-    /// Why it cannot be made here even for [`PROBE`], by its default settings; `None` when it can, or the device is unusable.
+    /// Why it cannot be made here even for one of [`PROBES`], by its default settings; `None` when it can, or the device is unusable.
     fault: Option<String>,
     /// Features and limits that the device does not have.
     lacks: Vec<Lack>,
@@ -104,8 +104,12 @@ struct Need {
     present: Option<bool>,
 }
 
-/// The scene that techniques are made for, to see whether a device's limits hold all of their kernels.
-const PROBE: &str = "builtin:furnace-box";
+/// Scenes that techniques are made for, each for the first that it can render, to see whether a device's limits hold all of their kernels.
+const PROBES: [&str; 3] = [
+    "builtin:furnace-box",
+    "builtin:cornell-box?source=point",
+    "builtin:triangle-soup?n=8",
+];
 
 /// Why a device cannot be made or used, and each technique's fault on it; the validation layers are heard when the options ask for them.
 fn faults_of(options: &GpuOptions) -> (Option<String>, Vec<Option<String>>) {
@@ -113,25 +117,32 @@ fn faults_of(options: &GpuOptions) -> (Option<String>, Vec<Option<String>>) {
         Ok(gpu) => gpu,
         Err(error) => return (Some(error.to_string()), Vec::new()),
     };
-    let renderer = scene::load(PROBE).and_then(|scene| Renderer::new(&gpu, &scene));
-    let faults = match renderer {
-        Ok(renderer) => techniques::all()
-            .iter()
-            .map(|technique| {
-                let options = RenderOptions {
-                    technique: Some(technique.id.into()),
-                    size: [8, 8],
-                    spp: 1,
-                    ..RenderOptions::default()
-                };
-                renderer.start(&options).err().map(|error| error.to_string())
-            })
-            .collect(),
-        Err(error) => vec![Some(error.to_string()); techniques::all().len()],
-    };
+    let faults = techniques::all()
+        .iter()
+        .map(|card| fault_of(&gpu, card).err())
+        .collect();
     let log = gpu.validation_log();
     drop(gpu);
     (check_validation(&log).err().map(|failure| failure.message), faults)
+}
+
+/// Makes a technique for the first of [`PROBES`] that it does not refuse.
+fn fault_of(gpu: &Gpu, card: &Card) -> Result<(), String> {
+    let words = |error: clerestory::Error| error.to_string();
+    for address in PROBES {
+        let scene = scene::load(address).map_err(words)?;
+        if (card.refusals)(&SceneProfile::of(&scene)).is_empty() {
+            let options = RenderOptions {
+                technique: Some(card.id.into()),
+                size: [8, 8],
+                spp: 1,
+                ..RenderOptions::default()
+            };
+            let renderer = Renderer::new(gpu, &scene).map_err(words)?;
+            return renderer.start(&options).map(drop).map_err(words);
+        }
+    }
+    Ok(())
 }
 
 impl DeviceInfo {
