@@ -176,7 +176,7 @@ pub struct Progress {
 ///     index: "lbvh".parse::<IndexKind>()?,
 ///     ..RendererDesc::default()
 /// };
-/// # clerestory::Result::Ok(())
+/// # Ok::<(), clerestory::Error>(())
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct RendererDesc {

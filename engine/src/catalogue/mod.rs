@@ -1,6 +1,6 @@
 //! The catalogue: the rows of all modules, so that a reader finds where a publication lives in the code.
 //!
-//! A row ([`Row`]) stands beside its module; those of techniques come with their [`Card`](crate::techniques::Card), the others by the list in `modules.rs`.
+//! A row ([`Row`]) stands beside its module; those of techniques come with their [`Card`], the others by the list in `modules.rs`.
 //! Ids with the prefixes `BG-`, `DP-`, `OEM-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility
 //! and media, photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
 //! the prefix `CL-` are the engine's own, for published methods outside of those documents. Guarantee: the tests below check that the

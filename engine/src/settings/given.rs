@@ -20,7 +20,7 @@ use crate::{Error, Result};
 /// });
 /// let read = Settings::from(serde_json::json!({ "roulette_start": 8 }));
 /// assert_eq!(typed.read::<PathTracerSettings>()?, read.read()?);
-/// # clerestory::Result::Ok(())
+/// # Ok::<(), clerestory::Error>(())
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct Settings(Given);

@@ -37,7 +37,7 @@
 /// let read = OcclusionSettings::from_json(&serde_json::json!({ "reach": 0.5 }))?;
 /// assert_eq!((read.rays, read.reach), (4, 0.5));
 /// assert_eq!(OcclusionSettings::infos()[0].meaning, "Rays of each pixel and frame; more have less noise");
-/// # clerestory::Result::Ok(())
+/// # Ok::<(), clerestory::Error>(())
 /// ```
 #[macro_export]
 macro_rules! settings {
