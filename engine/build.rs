@@ -4,11 +4,11 @@
 mod shaders;
 
 fn main() {
-    // A package carries the folder inside; in the repository it stands beside the crate.
-    let own = if std::path::Path::new("shaders").exists() {
-        "shaders"
-    } else {
+    // A package carries the folder inside; in the repository it stands beside the crate, whatever the making of a package has left inside.
+    let own = if std::path::Path::new("../tools/package").exists() {
         "../shaders"
+    } else {
+        "shaders"
     };
     shaders::build(
         own,
