@@ -448,9 +448,14 @@ mod tests {
         let (unusable, faults) = with(2);
         assert_eq!(unusable, None);
         assert_eq!(faults.len(), techniques::all().len());
-        for fault in faults {
+        for (technique, fault) in techniques::all().iter().zip(faults) {
             let fault = fault.unwrap_or_default();
-            assert!(fault.contains("maxPerStageDescriptorStorageBuffers >= "), "{fault}");
+            let walks = ["path", "photon"].contains(&technique.id);
+            assert!(
+                fault.contains("maxPerStageDescriptorStorageBuffers >= ") || (!walks && fault.is_empty()),
+                "{}: {fault}",
+                technique.id
+            );
         }
     }
 }
