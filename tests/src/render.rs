@@ -4,14 +4,27 @@ use std::sync::Arc;
 
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
-use clerestory::scene::Scene;
+use clerestory::scene::{Camera, Scene};
 use clerestory::techniques::path::PathCounters;
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathSet};
 pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, floor_from_above, lamp, point_triangle};
 
+use glam::DVec3;
+
 use crate::statistics::expect_mean;
+
+/// Looks down from the side at what stands within half a metre about the origin.
+pub fn camera_aslant() -> Camera {
+    Camera::look_at(
+        "main",
+        DVec3::new(0.6, 1.6, 2.2),
+        DVec3::new(0.0, 0.1, 0.0),
+        DVec3::Y,
+        0.7,
+    )
+}
 
 /// A finished picture.
 #[derive(Debug, Clone, PartialEq)]

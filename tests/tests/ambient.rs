@@ -15,9 +15,9 @@ use clerestory::techniques::{Frame, FrameMethod, FrameTarget, by_id};
 use clerestory::transport::GpuScene;
 use clerestory_hard_cases::{Subject, subjects};
 use clerestory_samples::progressive::Progressive;
-use clerestory_tests::render::{builtin, cuboid, floor, floor_from_above, pixel_averages};
+use clerestory_tests::render::{builtin, camera_aslant, cuboid, floor, floor_from_above, pixel_averages};
 use clerestory_tests::with_gpu;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 const PATHS: &str = "LE|LDE";
 const SIZE: [u32; 2] = [24, 24];
@@ -63,13 +63,7 @@ fn blocks() -> Scene {
     scene.cameras.push(Camera {
         lens_radius: 0.02,
         focus_distance: 2.5,
-        ..Camera::look_at(
-            "main",
-            DVec3::new(0.6, 1.6, 2.2),
-            DVec3::new(0.0, 0.1, 0.0),
-            DVec3::Y,
-            0.7,
-        )
+        ..camera_aslant()
     });
     scene
 }

@@ -12,6 +12,16 @@ use clerestory::scene::SceneProfile;
 use clerestory::techniques;
 use clerestory_tests::shaders::{layout_probe, out_of_bounds, uniform_probe};
 use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
+/// A device that has these limits of descriptors.
+fn gpu_of_limits(descriptors: DescriptorLimits) -> Gpu {
+    gpu_with(&GpuOptions {
+        lesser: Lesser {
+            descriptors: Some(descriptors),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    })
+}
 
 #[test]
 fn limits_and_memory_are_reported() {
@@ -139,13 +149,7 @@ fn a_pipeline_beyond_the_limits_names_limit_wanted_and_offered() {
         ),
     ];
     for (wanted, limits) in lesser {
-        let gpu = gpu_with(&GpuOptions {
-            lesser: Lesser {
-                descriptors: Some(limits),
-                ..Lesser::default()
-            },
-            ..GpuOptions::default()
-        });
+        let gpu = gpu_of_limits(limits);
         match gpu.compute_pipeline::<layout_probe::Kernel>(&Default::default()) {
             Err(Error::MissingFeature {
                 feature,
@@ -249,13 +253,7 @@ fn the_path_tracer_says_what_a_device_of_the_least_limits_lacks() {
         per_stage_storage_buffers: 4,
         ..gpu_with(&GpuOptions::default()).caps().descriptors
     };
-    let gpu = gpu_with(&GpuOptions {
-        lesser: Lesser {
-            descriptors: Some(descriptors),
-            ..Lesser::default()
-        },
-        ..GpuOptions::default()
-    });
+    let gpu = gpu_of_limits(descriptors);
     let scene = clerestory::scene::load("builtin:cornell-box").unwrap();
     let options = RenderOptions {
         size: [8, 8],
@@ -296,23 +294,17 @@ fn four_descriptor_sets_are_enough_for_every_technique() {
         bound_sets: 4,
         ..gpu_with(&GpuOptions::default()).caps().descriptors
     };
-    let gpu = gpu_with(&GpuOptions {
-        lesser: Lesser {
-            descriptors: Some(descriptors),
-            ..Lesser::default()
-        },
-        ..GpuOptions::default()
-    });
+    let gpu = gpu_of_limits(descriptors);
+    // A scene for each of them, in the order of how much is in it.
+    let addresses = [
+        "builtin:cornell-box",
+        "builtin:cornell-box?source=point",
+        "builtin:triangle-soup?n=300",
+    ];
+    let scenes = addresses.map(|address| clerestory::scene::load(address).unwrap());
     for technique in techniques::all() {
-        assert!(!technique.kernels.is_empty(), "{}", technique.id);
+        assert!(!technique.kernels.concat().is_empty(), "{}", technique.id);
         assert_eq!(techniques::lacks(gpu.caps(), technique), [], "{}", technique.id);
-        // A scene for each of them, in the order of how much is in it.
-        let addresses = [
-            "builtin:cornell-box",
-            "builtin:cornell-box?source=point",
-            "builtin:triangle-soup?n=300",
-        ];
-        let scenes = addresses.map(|address| clerestory::scene::load(address).unwrap());
         let able = scenes
             .iter()
             .find(|scene| (technique.refusals)(&SceneProfile::of(scene)).is_empty());
@@ -332,9 +324,10 @@ fn four_descriptor_sets_are_enough_for_every_technique() {
         };
         let rendered = render(&gpu, scene, &options).unwrap();
         // And nothing is made that was not asked about.
+        let kernels = technique.kernels.concat();
         for pipeline in &rendered.report.pipelines {
-            let known = technique.kernels.iter().any(|kernel| kernel.name == pipeline.shader)
-                || pipeline.shader.starts_with("film/");
+            let known =
+                kernels.iter().any(|kernel| kernel.name == pipeline.shader) || pipeline.shader.starts_with("film/");
             assert!(known, "{} makes {}", technique.id, pipeline.shader);
         }
     }
@@ -343,13 +336,7 @@ fn four_descriptor_sets_are_enough_for_every_technique() {
         bound_sets: 3,
         ..descriptors
     };
-    let gpu = gpu_with(&GpuOptions {
-        lesser: Lesser {
-            descriptors: Some(fewer),
-            ..Lesser::default()
-        },
-        ..GpuOptions::default()
-    });
+    let gpu = gpu_of_limits(fewer);
     let lacks = techniques::lacks(gpu.caps(), techniques::by_id("path").unwrap());
     let what: Vec<_> = lacks.iter().map(|lack| lack.what.as_str()).collect();
     assert_eq!(what, ["maxBoundDescriptorSets >= 4"]);
@@ -368,18 +355,12 @@ fn a_pipeline_takes_of_the_limits_what_its_shader_uses() {
     assert!(used(storage) < declared(storage) && used(texels) < declared(texels));
     let with = |storage_buffers| {
         let descriptors = gpu_with(&GpuOptions::default()).caps().descriptors;
-        gpu_with(&GpuOptions {
-            lesser: Lesser {
-                descriptors: Some(DescriptorLimits {
-                    per_stage_storage_buffers: storage_buffers,
-                    per_pipeline_storage_buffers: storage_buffers,
-                    per_stage_sampled_images: used(texels),
-                    per_stage_resources: used(storage) + used(texels),
-                    ..descriptors
-                }),
-                ..Lesser::default()
-            },
-            ..GpuOptions::default()
+        gpu_of_limits(DescriptorLimits {
+            per_stage_storage_buffers: storage_buffers,
+            per_pipeline_storage_buffers: storage_buffers,
+            per_stage_sampled_images: used(texels),
+            per_stage_resources: used(storage) + used(texels),
+            ..descriptors
         })
     };
     let gpu = with(used(storage));

@@ -103,14 +103,7 @@ pub(super) fn compile_text(name: &str, text: &str, purpose: Purpose) -> Result<V
     }
     let failed = |error: shaderc::Error| wrong(error.to_string());
     let compiler = shaderc::Compiler::new().map_err(failed)?;
-    let mut options = shaderc::CompileOptions::new().map_err(failed)?;
-    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_1 as u32);
-    options.set_target_spirv(shaderc::SpirvVersion::V1_3);
-    options.set_warnings_as_errors();
-    options.set_optimization_level(match purpose {
-        Purpose::Reflection => shaderc::OptimizationLevel::Zero,
-        Purpose::Execution => shaderc::OptimizationLevel::Performance,
-    });
+    let options = options_for(purpose).map_err(failed)?;
     compiler
         .compile_into_spirv(text, shaderc::ShaderKind::Compute, name, "main", Some(&options))
         .map(|module| module.as_binary_u8().to_vec())
@@ -128,14 +121,7 @@ pub(super) fn compile(info: &ShaderInfo, source: &Path, includes: &Path, purpose
     let failed = |error: shaderc::Error| shader_error(info, error.to_string());
     let text = read(source).map_err(|error| Error::io(source, error))?;
     let compiler = shaderc::Compiler::new().map_err(failed)?;
-    let mut options = shaderc::CompileOptions::new().map_err(failed)?;
-    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_1 as u32);
-    options.set_target_spirv(shaderc::SpirvVersion::V1_3);
-    options.set_warnings_as_errors();
-    options.set_optimization_level(match purpose {
-        Purpose::Reflection => shaderc::OptimizationLevel::Zero,
-        Purpose::Execution => shaderc::OptimizationLevel::Performance,
-    });
+    let mut options = options_for(purpose).map_err(failed)?;
     // A file beside the includer is asked for first; what is not there is asked for again as standard.
     options.set_include_callback(|name, kind, includer, _| {
         let folder = match kind {
@@ -158,6 +144,20 @@ pub(super) fn compile(info: &ShaderInfo, source: &Path, includes: &Path, purpose
         .compile_into_spirv(&text, kind, &source.to_string_lossy(), "main", Some(&options))
         .map(|module| module.as_binary_u8().to_vec())
         .map_err(failed)
+}
+
+/// The flags of the build's own modules.
+#[cfg(feature = "shaderc")]
+fn options_for(purpose: Purpose) -> std::result::Result<shaderc::CompileOptions<'static>, shaderc::Error> {
+    let mut options = shaderc::CompileOptions::new()?;
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_1 as u32);
+    options.set_target_spirv(shaderc::SpirvVersion::V1_3);
+    options.set_warnings_as_errors();
+    options.set_optimization_level(match purpose {
+        Purpose::Reflection => shaderc::OptimizationLevel::Zero,
+        Purpose::Execution => shaderc::OptimizationLevel::Performance,
+    });
+    Ok(options)
 }
 
 /// A file as text that a C string can hold.

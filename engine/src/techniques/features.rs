@@ -67,7 +67,7 @@ pub fn lacks(caps: &Caps, technique: &Card) -> Vec<Lack> {
         })
         .collect();
     let mut limits: BTreeMap<&str, (ExceededLimit, Vec<&str>)> = BTreeMap::new();
-    for shader in technique.kernels.iter().chain(&FILM_KERNELS) {
+    for shader in technique.kernels.iter().copied().flatten().chain(&FILM_KERNELS) {
         for exceeded in caps.exceeded_by(shader) {
             let (worst, names) = limits.entry(exceeded.name).or_insert((exceeded, Vec::new()));
             worst.wanted = worst.wanted.max(exceeded.wanted);

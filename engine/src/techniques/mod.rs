@@ -56,9 +56,9 @@ pub struct Card {
     pub bias: Bias,
     /// Device features beyond the baseline, by the Vulkan names that [`offers`] knows.
     pub needs: &'static [&'static str],
-    /// Kernels that a picture may take, of whatever scene, with default settings; [`lacks`] tells from their interfaces which limits of a device are too
+    /// Kernels that a picture may take, of whatever scene, with default settings, beside those of the film, a list a file; [`lacks`] tells from their interfaces which limits of a device are too
     /// low. The list may be empty: what is missing is then found when a pipeline is made.
-    pub kernels: &'static [&'static ShaderInfo],
+    pub kernels: &'static [&'static [&'static ShaderInfo]],
     /// The light paths of its picture with default settings; a setting `path_set` may restrict them to a part.
     pub path_set: PathSet,
     /// Why it cannot model a scene; empty when it can.

@@ -7,7 +7,7 @@ use clerestory::scene::{Camera, Environment, LightKind, Material, Scene};
 use clerestory::techniques::preview::{LightProbe, LightProbeDesc, Preview, PreviewDesc, PreviewPart, PreviewShadows};
 use clerestory::transport::GpuScene;
 use clerestory_hard_cases::scenes::{cuboid, floor};
-use clerestory_tests::render::{builtin, independent, paths, render};
+use clerestory_tests::render::{builtin, camera_aslant, independent, paths, render};
 use clerestory_tests::with_gpu;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -229,13 +229,7 @@ fn lit_block(light: LightKind) -> Scene {
         Vec3::new(0.2, 0.5, 0.1),
     ));
     scene.add_light("light", light);
-    scene.cameras.push(Camera::look_at(
-        "main",
-        DVec3::new(0.6, 1.6, 2.2),
-        DVec3::new(0.0, 0.1, 0.0),
-        DVec3::Y,
-        0.7,
-    ));
+    scene.cameras.push(camera_aslant());
     scene
 }
 

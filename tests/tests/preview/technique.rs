@@ -4,7 +4,7 @@ use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{Camera, Environment, LightKind, Material, Scene};
 use clerestory::{Error, techniques};
 use clerestory_hard_cases::scenes::{cuboid, floor};
-use clerestory_tests::render::builtin;
+use clerestory_tests::render::{builtin, camera_aslant};
 use clerestory_tests::with_gpu;
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -42,13 +42,7 @@ fn block() -> Scene {
     scene.cameras.push(Camera {
         lens_radius: 0.1,
         focus_distance: 1.2,
-        ..Camera::look_at(
-            "main",
-            DVec3::new(0.6, 1.6, 2.2),
-            DVec3::new(0.0, 0.1, 0.0),
-            DVec3::Y,
-            0.7,
-        )
+        ..camera_aslant()
     });
     scene
 }

@@ -117,32 +117,36 @@ fn faults_of(options: &GpuOptions) -> (Option<String>, Vec<Option<String>>) {
         Ok(gpu) => gpu,
         Err(error) => return (Some(error.to_string()), Vec::new()),
     };
-    let faults = techniques::all()
-        .iter()
-        .map(|card| fault_of(&gpu, card).err())
-        .collect();
+    let words = |error: clerestory::Error| error.to_string();
+    let probe = |address: &&str| {
+        scene::load(address)
+            .and_then(|scene| Renderer::new(&gpu, &scene))
+            .map_err(words)
+    };
+    let probes: Result<Vec<Renderer>, String> = PROBES.iter().map(probe).collect();
+    let fault = |card: &Card| match &probes {
+        Ok(probes) => fault_of(probes, card).err().map(words),
+        Err(error) => Some(error.clone()),
+    };
+    let faults = techniques::all().iter().map(fault).collect();
+    drop(probes);
     let log = gpu.validation_log();
     drop(gpu);
     (check_validation(&log).err().map(|failure| failure.message), faults)
 }
 
-/// Makes a technique for the first of [`PROBES`] that it does not refuse.
-fn fault_of(gpu: &Gpu, card: &Card) -> Result<(), String> {
-    let words = |error: clerestory::Error| error.to_string();
-    for address in PROBES {
-        let scene = scene::load(address).map_err(words)?;
-        if (card.refusals)(&SceneProfile::of(&scene)).is_empty() {
-            let options = RenderOptions {
-                technique: Some(card.id.into()),
-                size: [8, 8],
-                spp: 1,
-                ..RenderOptions::default()
-            };
-            let renderer = Renderer::new(gpu, &scene).map_err(words)?;
-            return renderer.start(&options).map(drop).map_err(words);
-        }
-    }
-    Ok(())
+/// Makes a technique for the first of the probes that it does not refuse.
+fn fault_of(probes: &[Renderer], card: &Card) -> clerestory::Result<()> {
+    let able = probes
+        .iter()
+        .find(|probe| (card.refusals)(probe.gpu_scene().profile()).is_empty());
+    let options = RenderOptions {
+        technique: Some(card.id.into()),
+        size: [8, 8],
+        spp: 1,
+        ..RenderOptions::default()
+    };
+    able.map_or(Ok(()), |probe| probe.start(&options).map(drop))
 }
 
 impl DeviceInfo {

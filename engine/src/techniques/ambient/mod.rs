@@ -32,7 +32,7 @@ pub(super) const CARD: Card = Card {
     rows: &[&[ROW]],
     bias: Bias::Unbiased,
     needs: &[],
-    kernels: &[&kernel::INFO],
+    kernels: &[&[&kernel::INFO]],
     path_set: PathSet::UP_TO_DIFFUSE,
     refusals: |scene| {
         reasons(&[

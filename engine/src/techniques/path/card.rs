@@ -7,7 +7,6 @@ use crate::card::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
-use crate::gpu::shaders::film::display;
 use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resolve, path_shade};
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
 use crate::gpu::{Buffer, PipelineInfo};
@@ -25,7 +24,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, super::ROWS],
     bias: Bias::Unbiased,
     needs: &[],
-    kernels: &KERNELS,
+    kernels: &[&KERNELS],
     path_set: PathSet::ALL,
     refusals: |_| Vec::new(),
     settings: SettingsDecl::of::<PathTracerSettings>(),
@@ -56,7 +55,7 @@ pub(in crate::techniques) const CARD: Card = Card {
 };
 
 /// What a picture may take, of whatever scene.
-pub(in crate::techniques) const KERNELS: [&ShaderInfo; 10] = [
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 9] = [
     &path_camera::INFO,
     &extend::INFO,
     &path_medium::INFO,
@@ -66,7 +65,6 @@ pub(in crate::techniques) const KERNELS: [&ShaderInfo; 10] = [
     &compact_scatter::INFO,
     &shadow::INFO,
     &path_resolve::INFO,
-    &display::INFO,
 ];
 
 /// What the specialization constants of the shading stage stand for.

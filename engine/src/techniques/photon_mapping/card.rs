@@ -27,7 +27,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS],
     bias: BIAS,
     needs: &[],
-    kernels: &KERNELS,
+    kernels: &[&path::KERNELS, &KERNELS],
     path_set: PathSet::ALL,
     refusals,
     settings: SettingsDecl::of::<PhotonSettings>(),
@@ -58,25 +58,12 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
 }
 
 /// What a picture may take with default settings, of whatever scene, beside what eye paths do.
-const OWN_KERNELS: [&ShaderInfo; 4] = [
+const KERNELS: [&ShaderInfo; 4] = [
     &photon_emit::INFO,
     &photon_scatter::INFO,
     &photon_append::INFO,
     &photon_gather::INFO,
 ];
-const KERNELS: [&ShaderInfo; path::KERNELS.len() + OWN_KERNELS.len()] = {
-    let mut all = [OWN_KERNELS[0]; path::KERNELS.len() + OWN_KERNELS.len()];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = if i < path::KERNELS.len() {
-            path::KERNELS[i]
-        } else {
-            OWN_KERNELS[i - path::KERNELS.len()]
-        };
-        i += 1;
-    }
-    all
-};
 
 /// What the specialization constants of photons' scattering and of queries stand for, beside those of eye paths.
 const PHOTON_FEATURES: [Feature; 2] = [

@@ -24,7 +24,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, live::ROWS],
     bias: BIAS,
     needs: NEEDS,
-    kernels: &[&preview_shade::INFO, &preview_display::INFO],
+    kernels: &[&[&preview_shade::INFO, &preview_display::INFO]],
     path_set: PathSet::UP_TO_DIRECT,
     refusals,
     settings: SettingsDecl::of::<PreviewSettings>(),
