@@ -192,6 +192,26 @@ fn out_of_memory_is_an_error_with_its_cause() {
 }
 
 #[test]
+fn pipelines_stay_until_they_are_released() {
+    let (_guard, gpu) = faulty(
+        FaultCall::CreateComputePipelines,
+        2,
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+    );
+    let make = || gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).map(drop);
+    // The second call of the driver fails: what is asked for again is not made again.
+    make().unwrap();
+    make().unwrap();
+    gpu.release_pipelines();
+    assert!(matches!(make(), Err(Error::OutOfMemory { .. })));
+    make().unwrap();
+    let log = gpu.validation_log();
+    drop(gpu);
+    let messages = log.take();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+#[test]
 fn exhausted_descriptors_fail_the_pass_and_not_the_program() {
     let (_guard, gpu) = faulty(
         FaultCall::AllocateDescriptorSets,

@@ -233,7 +233,10 @@ impl Gpu {
             instance,
         };
         inner.name(timeline, "timeline");
-        Ok(Self { inner: Arc::new(inner) })
+        Ok(Self {
+            inner: Arc::new(inner),
+            kept: Arc::default(),
+        })
     }
 }
 

@@ -11,7 +11,7 @@ use super::instance::{Instance, ValidationLog, ValidationMessage};
 use super::marker::InFlight;
 use super::memory::{AllocationInfo, Memory, MemoryReport};
 use super::options::Validation;
-use super::pipeline::PipelineTable;
+use super::pipeline::{KeptPipelines, PipelineTable};
 use super::pipeline_cache::PipelineCache;
 use super::resources::FrameResources;
 use crate::{Error, Result};
@@ -20,6 +20,7 @@ use crate::{Error, Result};
 #[derive(Clone)]
 pub struct Gpu {
     pub(super) inner: Arc<Inner>,
+    pub(super) kept: Arc<KeptPipelines>,
 }
 
 impl std::fmt::Debug for Gpu {

@@ -1,8 +1,8 @@
 //! Compute pipelines made from reflected shaders.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::marker::PhantomData;
-use std::sync::{Arc, PoisonError, Weak};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use ash::vk;
 
@@ -13,6 +13,30 @@ use crate::{Error, Result};
 
 /// Live pipelines by shader and specialization, so that equal ones are made once.
 pub(super) type PipelineTable = BTreeMap<(&'static str, Vec<(u32, u32)>), Weak<PipelineInner>>;
+
+/// Pipelines that are kept beyond their last user: several techniques' worth. The next picture of a scene with the same features takes them as they are.
+const KEPT: usize = 128;
+
+/// The pipelines asked for last, the latest at the back. They own the device, so that its handles keep them and not what the handles share.
+#[derive(Default)]
+pub(super) struct KeptPipelines(Mutex<VecDeque<Arc<PipelineInner>>>);
+
+impl KeptPipelines {
+    fn keep(&self, inner: &Arc<PipelineInner>) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.retain(|other| !Arc::ptr_eq(other, inner));
+        kept.push_back(Arc::clone(inner));
+        let surplus = kept.len().saturating_sub(KEPT);
+        let dropped: Vec<_> = kept.drain(..surplus).collect();
+        drop(kept);
+        drop(dropped);
+    }
+
+    fn clear(&self) {
+        let all = std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
+        drop(all);
+    }
+}
 
 /// Workgroups along an axis that every device dispatches.
 const ROW_GROUPS: u32 = 65_535;
@@ -58,27 +82,36 @@ pub(super) struct PipelineInner {
 }
 
 impl Gpu {
-    /// Makes the pipeline of a shader, or shares one that is alive with the same specialization.
+    /// Makes the pipeline of a shader, or shares one that is alive with the same specialization. The last 128 stay alive for as long as any handle of
+    /// the device, or until [`Gpu::release_pipelines`]: to compile one may take a driver longer than the picture that it is for.
     ///
     /// # Errors
     /// [`Error::MissingFeature`] when the workgroup is larger or the descriptors are more than the device allows,
-    /// [`Error::OutOfMemory`], [`Error::Vulkan`].
+    /// [`Error::OutOfMemory`], [`Error::Vulkan`], [`Error::DeviceLost`].
     pub fn compute_pipeline<K: ComputeShader>(&self, spec: &K::Spec) -> Result<ComputePipeline<K>> {
-        let (info, values) = (K::info(), spec.values());
-        let key = (info.name, values.clone());
-        let mut table = self.inner.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(inner) = table.get(&key).and_then(Weak::upgrade) {
-            return Ok(ComputePipeline {
-                inner,
-                shader: PhantomData,
-            });
-        }
-        let inner = Arc::new(PipelineInner::compute(&self.inner, info, info.spirv, values)?);
-        table.insert(key, Arc::downgrade(&inner));
+        self.inner.check_alive()?;
+        let inner = self.shared_pipeline(K::info(), spec.values())?;
+        self.kept.keep(&inner);
         Ok(ComputePipeline {
             inner,
             shader: PhantomData,
         })
+    }
+
+    fn shared_pipeline(&self, info: &'static ShaderInfo, values: Vec<(u32, u32)>) -> Result<Arc<PipelineInner>> {
+        let key = (info.name, values.clone());
+        let mut table = self.inner.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(inner) = table.get(&key).and_then(Weak::upgrade) {
+            return Ok(inner);
+        }
+        let inner = Arc::new(PipelineInner::compute(&self.inner, info, info.spirv, values)?);
+        table.insert(key, Arc::downgrade(&inner));
+        Ok(inner)
+    }
+
+    /// Destroys the compute pipelines that nothing uses any more.
+    pub fn release_pipelines(&self) {
+        self.kept.clear();
     }
 }
 

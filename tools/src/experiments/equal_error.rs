@@ -45,8 +45,12 @@ pub fn common_error<'a>(curves: impl IntoIterator<Item = &'a [(f64, f64)]>) -> O
     common
 }
 
-/// What `error` costs on a curve of (cost, error) by rising budget: where it is first reached. `None` for a curve without points.
+/// What `error` costs on a curve of (cost, error) by rising budget: where it is first reached. `None` for a curve without points, and where
+/// work of this kind is none, as rays are to a technique that draws.
 pub fn cost_of(curve: &[(f64, f64)], error: f64) -> Option<Cost> {
+    if curve.iter().any(|(cost, _)| *cost <= 0.0) {
+        return None;
+    }
     let first = curve.first()?;
     if first.1 <= error {
         return Some(if first.1 == error {
@@ -83,6 +87,7 @@ mod tests {
         assert_eq!(cost_of(&curve, 2.0), Some(Cost::AtMost(0.1)));
         assert_eq!(cost_of(&curve, 0.1), Some(Cost::Above(1.6)));
         assert_eq!(cost_of(&[], 0.1), None);
+        assert_eq!(cost_of(&[(0.0, 0.2), (0.0, 0.05)], 0.1), None);
     }
 
     #[test]

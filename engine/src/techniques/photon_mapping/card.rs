@@ -188,7 +188,7 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/photon/traps.rs::glass_is_not_black",
         "tests/tests/photon/traps.rs::the_ring_has_its_cusp_where_geometry_puts_it",
         "tests/tests/photon/traps.rs::colours_bleed_through_the_passage_as_they_should",
-        "tests/tests/hard_cases.rs::techniques_take_every_second_case_as_documented",
+        "tests/tests/hard_cases.rs::photon_mapping_takes_the_cases_as_documented",
     ],
     experiment: "clerestory report photon-convergence photon-or-path photon-nearest photon-ring photon-frame photon-peers photon-settings",
     ..Row::of(file!())
