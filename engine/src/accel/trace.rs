@@ -447,7 +447,7 @@ impl RayTracer {
     /// Dispatches that go through `count` rays. Of a queue's none but the last leaves a workgroup with less than its quota.
     fn dispatches(&self, count: u32) -> u32 {
         match &self.kernel {
-            Kernel::RayPerThread(kernel) => kernel.groups_for(count).div_ceil(self.gpu.caps().max_workgroups),
+            Kernel::RayPerThread(kernel) => kernel.groups_for(count).div_ceil(self.gpu.caps().max_workgroups[0]),
             Kernel::Queue(threads, _) => {
                 let crew = u64::from(threads.groups) * u64::from(threads.fetches);
                 u64::from(count.div_ceil(threads.batch)).div_ceil(crew) as u32
@@ -467,7 +467,7 @@ impl RayTracer {
         };
         match &self.kernel {
             Kernel::RayPerThread(kernel) => {
-                let most = u64::from(self.gpu.caps().max_workgroups) * u64::from(kernel.group_size());
+                let most = u64::from(self.gpu.caps().max_workgroups[0]) * u64::from(kernel.group_size());
                 let ray_count = u64::from(count - *first).min(most) as u32;
                 let set = trace_rays::Set0 {
                     trace_rays: buffers.rays.view(),

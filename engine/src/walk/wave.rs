@@ -90,7 +90,7 @@ pub fn slots_of_device(gpu: &Gpu) -> u32 {
     let slot_bytes = size_of::<WalkState>().max(WAITING_BYTES) as u64;
     let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
     let by_texels = gpu.caps().max_texel_buffer_elements * TEXEL_BYTES / slot_bytes;
-    let by_groups = u64::from(gpu.caps().max_workgroups) * u64::from(WALK_GROUP);
+    let by_groups = u64::from(gpu.caps().max_workgroups[0]) * u64::from(WALK_GROUP);
     let slots = by_range.min(by_texels).min(by_groups).min(u64::from(SLOTS_MAX)) as u32;
     slots - slots % WALK_GROUP
 }

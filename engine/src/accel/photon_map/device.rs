@@ -136,7 +136,7 @@ impl MapBuilder {
     /// The most boxes that the device can build over, memory allowing.
     pub fn max_boxes(&self) -> u32 {
         let caps = self.gpu.caps();
-        let dispatched = u64::from(caps.max_workgroups) * u64::from(MAP_GROUP_SIZE);
+        let dispatched = u64::from(caps.max_workgroups[0]) * u64::from(MAP_GROUP_SIZE);
         // Boxes of places and blocks are the most texels: two a box, and a third of it besides.
         let texels = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
         let indexed = 1 << INDEX_BITS;
