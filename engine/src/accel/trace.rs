@@ -20,7 +20,9 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
 use crate::gpu::shaders::sets::IndexSet;
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings, wide_counter,
+};
 use crate::{Error, Result};
 
 /// Most rays of one call.
@@ -28,11 +30,6 @@ pub const MAX_RAYS: usize = 1 << 31;
 
 /// Dispatches of one submission, so that none takes seconds.
 const DISPATCHES_PER_SUBMISSION: u32 = 1024;
-
-/// A counter of the kernels: two words, the low one first.
-pub fn wide_counter([low, high]: [u32; 2]) -> u64 {
-    u64::from(high) << 32 | u64::from(low)
-}
 
 /// What rays met, and the work it took.
 #[derive(Debug, Clone, Default)]

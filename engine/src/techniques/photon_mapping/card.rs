@@ -49,7 +49,8 @@ pub(in crate::techniques) const CARD: Card = Card {
     },
 };
 
-fn refusals(profile: &SceneProfile) -> Vec<String> {
+/// Why a scene cannot be modelled.
+pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
     if profile.media.any() {
         vec!["the scene has participating media, and photon maps hold surfaces only".into()]
     } else {
