@@ -16,9 +16,9 @@ use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::{SettingsDecl, TypedSettings};
 use crate::techniques::path::card as path;
-use crate::techniques::skipped::{Feature, skipped};
+use crate::techniques::skipped::{Omission, skipped};
 use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
-use crate::transport::PathSet;
+use crate::transport::{PathSet, SURFACE_FEATURES};
 
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
@@ -67,7 +67,7 @@ const KERNELS: [&ShaderInfo; 4] = [
 ];
 
 /// What the specialization constants of photons' scattering and of queries stand for, beside those of eye paths.
-const PHOTON_FEATURES: [Feature; 2] = [
+const PHOTON_FEATURES: [Omission; 2] = [
     ("has_differentials", "footprints of photons", "kernels have one size"),
     (
         "tells_caustics",
@@ -75,7 +75,7 @@ const PHOTON_FEATURES: [Feature; 2] = [
         "there is no final gather",
     ),
 ];
-const QUERY_FEATURES: [Feature; 2] = [
+const QUERY_FEATURES: [Omission; 2] = [
     (
         "nearest",
         "searches for the nearest photons",
@@ -140,8 +140,8 @@ impl Technique for PhotonMapper {
 
     fn skipped(&self) -> Vec<Skipped> {
         let pipelines = PhotonMapper::pipelines(self);
-        let off = |shader: &ShaderInfo, features: &[Feature]| skipped(&pipelines, shader.name, features);
-        let mut skipped = off(&path_shade::INFO, &path::FEATURES);
+        let off = |shader: &ShaderInfo, omissions: &[Omission]| skipped(&pipelines, shader.name, omissions);
+        let mut skipped = off(&path_shade::INFO, &SURFACE_FEATURES);
         skipped.extend(off(&photon_scatter::INFO, &PHOTON_FEATURES));
         skipped.extend(off(&photon_gather::INFO, &QUERY_FEATURES));
         skipped.extend(off(&photon_gather_packet::INFO, &QUERY_FEATURES));
@@ -217,7 +217,7 @@ mod tests {
             .iter()
             .filter(|c| c.name.starts_with("has_"))
         {
-            let said = path::FEATURES.iter().chain(&PHOTON_FEATURES);
+            let said = SURFACE_FEATURES.iter().chain(&PHOTON_FEATURES);
             assert!(
                 said.into_iter().any(|(name, ..)| *name == constant.name),
                 "{}",
