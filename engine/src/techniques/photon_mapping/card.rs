@@ -4,15 +4,18 @@ use std::collections::BTreeMap;
 
 use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer};
 use crate::Result;
+use crate::accel::photon_map::device::MapBuilder;
 use crate::card::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::path_shade;
 use crate::gpu::shaders::techniques::photon_mapping::{
-    photon_append, photon_emit, photon_gather, photon_gather_packet, photon_scatter,
+    photon_append, photon_boxes, photon_emit, photon_gather, photon_gather_packet, photon_leaf_size, photon_leaves,
+    photon_scatter,
 };
 use crate::gpu::{Buffer, PipelineInfo};
+use crate::kernels::{RadixSort, Scan};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::{SettingsDecl, TypedSettings};
 use crate::techniques::path::card as path;
@@ -27,7 +30,14 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS],
     bias: BIAS,
     needs: &[],
-    kernels: &[&path::KERNELS, &KERNELS],
+    kernels: &[
+        &path::KERNELS,
+        &KERNELS,
+        &DEVICE_MAP_KERNELS,
+        &MapBuilder::KERNELS,
+        &RadixSort::KERNELS,
+        &Scan::KERNELS,
+    ],
     path_set: PathSet::ALL,
     refusals,
     settings: SettingsDecl::of::<PhotonSettings>(),
@@ -65,6 +75,9 @@ const KERNELS: [&ShaderInfo; 4] = [
     &photon_append::INFO,
     &photon_gather::INFO,
 ];
+
+/// The same where the device builds the map, beside those of its tree.
+const DEVICE_MAP_KERNELS: [&ShaderInfo; 3] = [&photon_boxes::INFO, &photon_leaf_size::INFO, &photon_leaves::INFO];
 
 /// What the specialization constants of photons' scattering and of queries stand for, beside those of eye paths.
 const PHOTON_FEATURES: [Omission; 2] = [
