@@ -276,8 +276,9 @@ fn limit_text(lack: &Lack) -> Option<String> {
 }
 
 /// Device features shown of every device, by their Vulkan names.
-const FEATURES: [&str; 10] = [
+const FEATURES: [&str; 11] = [
     "geometryShader",
+    "shaderClipDistance",
     "shaderInt64",
     "shaderFloat64",
     "shaderBufferInt64Atomics",
