@@ -1,4 +1,4 @@
-// Walks through a density grid: free flight by delta tracking and transmittance by ratio tracking, with a majorant for each block of cells.
+// Walks through a density grid, cell by cell, on the way of one ray ("grid walks"; those of walk/wave.glsl go ray by ray): free flight by delta tracking and transmittance by ratio tracking, with a majorant for each block of cells.
 //
 // Sources: Woodcock et al., "Techniques Used in the GEM Code for Monte Carlo Neutronics Calculations" (1965); ratio tracking of Novak,
 // Selle and Jarosz, "Residual Ratio Tracking for Estimating Attenuation in Participating Media" (2014); stepping through blocks of
@@ -13,17 +13,17 @@
 #include "transport/medium.glsl"
 #include "transport/random.glsl"
 
-// Iterations of a walk in one dispatch: blocks left and tentative collisions. Software drivers end loops in silence after 65,535 of all lanes.
+// Iterations of a grid walk in one dispatch: blocks left and tentative collisions. Software drivers end loops in silence after 65,535 of all lanes.
 const uint GRID_WALK_QUOTA = 2048u;
 // Transmittances below this are decided by roulette, with this chance to go on.
 const float RATIO_ROULETTE_BELOW = 0.1;
 const float RATIO_ROULETTE_SURVIVAL = 0.5;
 // Least component of a direction, as a share of the largest one.
-const float WALK_COMPONENT_MIN = 1e-18;
+const float GRID_COMPONENT_MIN = 1e-18;
 
-const uint WALK_LEFT = 0u;      // at the end of the segment
-const uint WALK_STOPPED = 1u;   // by the quota
-const uint WALK_COLLIDED = 2u;
+const uint GRID_LEFT = 0u;      // at the end of the segment
+const uint GRID_STOPPED = 1u;   // by the quota
+const uint GRID_COLLIDED = 2u;
 
 struct GridWalk {
     float entry;   // distance along the ray from which the others count, so that steps are not lost beside a long way to the grid
@@ -37,14 +37,14 @@ struct GridWalk {
     uint nulls;    // tentative collisions that were none
 };
 
-uvec4 walk_draw(uvec4 key, uint draw) { return pcg4d(pcg4d(key) + uvec4(draw, 0u, 0u, 0u)); }
+uvec4 grid_draw(uvec4 key, uint draw) { return pcg4d(pcg4d(key) + uvec4(draw, 0u, 0u, 0u)); }
 
 GridWalk begin_grid_walk(SceneMedium m, vec3 origin, vec3 direction, float t, float t_end) {
     GridWalk w;
     w.origin = direction_to_cells(m, origin) + m.offset;
     w.direction = direction_to_cells(m, direction);
     vec3 a = abs(w.direction);
-    float least = max(a.x, max(a.y, a.z)) * WALK_COMPONENT_MIN;
+    float least = max(a.x, max(a.y, a.z)) * GRID_COMPONENT_MIN;
     w.inverse = mix(vec3(1.0), vec3(-1.0), lessThan(w.direction, vec3(0.0))) / max(a, vec3(least));
     vec3 t0 = -w.origin * w.inverse;
     vec3 t1 = (vec3(m.cells) - w.origin) * w.inverse;
@@ -68,7 +68,7 @@ uint next_tentative_collision(SceneMedium m, float scale, float depth, inout Gri
     vec3 ahead = max(vec3(step), vec3(0.0));
     while (w.t < w.t_end) {
         if (iterations == 0u) {
-            return WALK_STOPPED;
+            return GRID_STOPPED;
         }
         --iterations;
         majorant = m.majorant * fetch_majorant(m, w.block);
@@ -78,7 +78,7 @@ uint next_tentative_collision(SceneMedium m, float scale, float depth, inout Gri
         float through = (leave - w.t) * majorant * scale;
         if (depth < through) {
             w.t = min(w.t + depth / (majorant * scale), leave);
-            return WALK_COLLIDED;
+            return GRID_COLLIDED;
         }
         depth -= through;
         w.t = leave;
@@ -88,56 +88,56 @@ uint next_tentative_collision(SceneMedium m, float scale, float depth, inout Gri
             break;
         }
     }
-    return WALK_LEFT;
+    return GRID_LEFT;
 }
 
 // Density at the walk's place as a share of its block's majorant at density 1.
-float walk_density(SceneMedium m, GridWalk w) { return density_in_cells(m, w.origin + w.t * w.direction); }
+float grid_density(SceneMedium m, GridWalk w) { return density_in_cells(m, w.origin + w.t * w.direction); }
 
 // Flies on until a real collision, the end or the quota; a flight that `passes` has no real ones, but is weighted by the transmittance
 // (ratio tracking). Adds what the medium emits on the way, seen through `throughput`.
 uint delta_tracking(SceneMedium m, uvec4 key, vec3 throughput, bool passes, inout GridWalk w, inout vec3 bands, inout vec3 weight, inout vec3 emitted) {
     uint iterations = GRID_WALK_QUOTA;
     while (true) {
-        uvec4 bits = walk_draw(key, w.draw++);
+        uvec4 bits = grid_draw(key, w.draw++);
         float majorant;
         uint state = next_tentative_collision(m, 1.0, -log(1.0 - unit_float(bits.x)), w, iterations, majorant);
-        if (state != WALK_COLLIDED) {
+        if (state != GRID_COLLIDED) {
             return state;
         }
-        float share = walk_density(m, w) / majorant;
+        float share = grid_density(m, w) / majorant;
         emitted += throughput * weight * m.emission * share;
         vec3 real = min(m.sigma_t * share, vec3(1.0));
         if (passes) {
             weight *= 1.0 - real;
         } else if (sample_null_collision(real, m.sigma_s * share, unit_float(bits.y), bands, weight)) {
-            return WALK_COLLIDED;
+            return GRID_COLLIDED;
         }
         ++w.nulls;
     }
-    return WALK_LEFT;
+    return GRID_LEFT;
 }
 
-// Multiplies `weight` by an estimate of the transmittance to the end; WALK_STOPPED when `iterations` have been used up.
+// Multiplies `weight` by an estimate of the transmittance to the end; GRID_STOPPED when `iterations` have been used up.
 uint ratio_tracking(SceneMedium m, uvec4 key, float scale, inout GridWalk w, inout uint iterations, inout vec3 weight) {
     while (true) {
-        uvec4 bits = walk_draw(key, w.draw++);
+        uvec4 bits = grid_draw(key, w.draw++);
         float majorant;
         uint state = next_tentative_collision(m, scale, -log(1.0 - unit_float(bits.x)), w, iterations, majorant);
-        if (state != WALK_COLLIDED) {
+        if (state != GRID_COLLIDED) {
             return state;
         }
         ++w.nulls;
-        weight *= 1.0 - min(m.sigma_t * (walk_density(m, w) / majorant), vec3(1.0));
+        weight *= 1.0 - min(m.sigma_t * (grid_density(m, w) / majorant), vec3(1.0));
         if (max(weight.x, max(weight.y, weight.z)) < RATIO_ROULETTE_BELOW) {
             if (unit_float(bits.y) >= RATIO_ROULETTE_SURVIVAL) {
                 weight = vec3(0.0);
-                return WALK_LEFT;
+                return GRID_LEFT;
             }
             weight /= RATIO_ROULETTE_SURVIVAL;
         }
     }
-    return WALK_LEFT;
+    return GRID_LEFT;
 }
 
 #endif

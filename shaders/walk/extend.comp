@@ -9,6 +9,7 @@
 layout(local_size_x = 64) in;
 
 #include "walk/candidates.glsl"
+#include "walk/media.glsl"
 
 void main() {
     uint place = gl_GlobalInvocationID.x;

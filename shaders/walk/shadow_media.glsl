@@ -1,23 +1,23 @@
 // Shadow rays in scenes with media: boundaries are passed, every other surface blocks.
 //
-// Homogeneous media in closed form, grids by ratio tracking: unbiased. A ray that has met too many surfaces, or whose traversal or walk a quota
+// Homogeneous media in closed form, grids by ratio tracking: unbiased. A ray that has met too many surfaces, or whose traversal or grid walk a quota
 // stops, stalls the wave and goes on from where it is.
 #ifndef CLERESTORY_WALK_SHADOW_MEDIA_GLSL
 #define CLERESTORY_WALK_SHADOW_MEDIA_GLSL
 
 #include "transport/bodies.glsl"
+#include "transport/media_features.glsl"
 #include "transport/media_tracking.glsl"
 #include "walk/candidates.glsl"
+#include "walk/media.glsl"
 
 layout(constant_id = 10) const bool HAS_ABSORPTION = true;  // absorbing solids
-layout(constant_id = 20) const bool HAS_GRIDS = true;
-layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
 
 // Surfaces met in one dispatch. With alpha, a traversal's iterations add up over the lanes.
 const uint SHADOW_SURFACES = 8u;
 const uint SHADOW_SURFACES_ALPHA = 2u;
-// Random numbers of a walk; those of the next begin behind them.
-const uint WALK_SHIFT = 16u;
+// Random numbers of a walk through a grid, as a power of two; those of the next begin behind them.
+const uint GRID_WALK_SHIFT = 16u;
 // Stands for the round in the key of shadow rays' random numbers, so that those of ways do not return.
 const uint SHADOW_KEY = 0x40000000u;
 
@@ -29,15 +29,15 @@ ShadowRay first_ray(uint place, uint rays) {
     return load_shadow_ray(place);
 }
 
-ShadowState begin_ray(uint place, uint rays, float t_max, uint walks) {
+ShadowState begin_ray(uint place, uint rays, float t_max, uint grid_walks) {
     ShadowStart from = walk_shadow_starts[place];
     bool airlight = (rays & FLAG_AIRLIGHT) != 0u;
-    return ShadowState(vec3(1.0), airlight ? 0.0 : from.start, no_hit(t_max), airlight ? from.airlight_interior : from.sampled_interior, walks,
-                       rays);
+    return ShadowState(vec3(1.0), airlight ? 0.0 : from.start, no_hit(t_max), airlight ? from.airlight_interior : from.sampled_interior,
+                       grid_walks, rays);
 }
 
 // The next surface of a ray to which the way has been searched: passes a boundary, ends elsewhere. True when the ray has ended, its transmittance
-// known; WALK_STOPPED in `outcome` where a walk has to go on.
+// known; GRID_STOPPED in `outcome` where a walk through a grid has to go on.
 bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, out uint outcome) {
     bool met = state.hit.triangle != NO_HIT;
     Crossing crossing = Crossing(s.t_max < FAR_AWAY ? state.interior : OUTSIDE, OUTSIDE, false);
@@ -47,7 +47,7 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
     if (met && !crossing.boundary) {
         state.transmittance = vec3(0.0);
     }
-    outcome = WALK_LEFT;
+    outcome = GRID_LEFT;
     float scale = length(s.direction);
     uint medium = medium_inside(crossing.interior, push.surrounding);
     if (medium != NO_MEDIUM && state.transmittance != vec3(0.0)) {
@@ -56,24 +56,24 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
             state.transmittance *= transmittance(m.sigma_t, max(state.hit.t - state.start, 0.0) * scale);
         } else if (HAS_GRIDS) {
             GridWalk walk = begin_grid_walk(m, s.origin, s.direction, state.start, state.hit.t);
-            walk.draw = state.walks << WALK_SHIFT;
-            ++state.walks;
+            walk.draw = state.grid_walks << GRID_WALK_SHIFT;
+            ++state.grid_walks;
             uvec4 key = uvec4(walk_sequence(s.slot), walk_index(s.slot), SHADOW_KEY + status.rounds, push.key.seed);
             outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
             COUNT_MEDIUM(density_lookups, walk.nulls)
             float reached = resumed_start(state.start, walk.entry + walk.t);
             // The search that goes on from the surface itself would miss it.
-            outcome = outcome == WALK_STOPPED && reached >= state.hit.t ? WALK_LEFT : outcome;
-            state.start = outcome == WALK_STOPPED ? reached : state.start;
+            outcome = outcome == GRID_STOPPED && reached >= state.hit.t ? GRID_LEFT : outcome;
+            state.start = outcome == GRID_STOPPED ? reached : state.start;
         }
     }
     // A solid that absorbs has no medium inside, whose walk could stop: this is the whole way through it.
-    if (HAS_ABSORPTION && crossing.interior != OUTSIDE && outcome == WALK_LEFT && state.transmittance != vec3(0.0)) {
+    if (HAS_ABSORPTION && crossing.interior != OUTSIDE && outcome == GRID_LEFT && state.transmittance != vec3(0.0)) {
         state.transmittance *= transmittance(load_material(crossing.interior).absorption, max(state.hit.t - state.start, 0.0) * scale);
     }
-    bool ended = outcome == WALK_LEFT && (!met || state.transmittance == vec3(0.0));
+    bool ended = outcome == GRID_LEFT && (!met || state.transmittance == vec3(0.0));
     if (!ended) {
-        if (outcome == WALK_LEFT) {
+        if (outcome == GRID_LEFT) {
             state.start = past_surface(state.hit.t);
             state.interior = crossing.beyond;
         }
@@ -118,11 +118,11 @@ void trace_shadow_rays_through_media(uint queue_place) {
                 if (rays != 0u) {
                     COUNT_MEDIUM(second_rays, 1u)
                     s = first_ray(place, rays);
-                    state = begin_ray(place, rays, s.t_max, state.walks);
+                    state = begin_ray(place, rays, s.t_max, state.grid_walks);
                 }
                 state.rays = rays;
             }
-            stopped = outcome == WALK_STOPPED;
+            stopped = outcome == GRID_STOPPED;
         }
     }
     if (state.rays == 0u) {

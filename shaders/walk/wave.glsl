@@ -24,7 +24,8 @@ const uint STALLED_ARRIVAL = 3u;  // a stage between arrival and scattering
 
 const uint FLAG_ALIVE = 1u;
 const uint FLAG_WAITING = 2u;  // something waits at the place
-// In scenes with media, which shadow rays a place has: to light scattered once on the way there, and to light sampled at its end.
+// In scenes with media, which shadow rays a place that waits has: to light scattered once on the way there (walk_airlight_rays), and to light
+// sampled at its end (walk_waiting_out). One that has neither is passed over. walk/hand_on.glsl sets what a shadow ray takes.
 const uint FLAG_AIRLIGHT = 4u;
 const uint FLAG_SAMPLED = 8u;
 
@@ -70,6 +71,35 @@ struct ShadowRay {
     uint bounce;        // scattering events with the one at the light
 };
 
+// There is nothing left for the shading stage.
+const uint EVENT_HANDLED = 1u;
+
+struct MediumState {
+    vec3 bands;   // as in transport/medium.glsl
+    float start;  // distance along the ray up to which the walk has come; negative by what the offset of its origin left out
+};
+
+struct MediumEvent {
+    vec3 weight;  // of the throughput on the way to the surface
+    uint flags;   // EVENT_HANDLED, FLAG_AIRLIGHT
+};
+
+// What is known of a place's shadow rays where they start: written by the stage that sends them, in scenes with media.
+struct ShadowStart {
+    uint sampled_interior;   // material of the body that the ray begins in, or OUTSIDE
+    uint airlight_interior;
+    float start;             // of the sampled ray, as in ShadowState
+};
+
+struct ShadowState {
+    vec3 transmittance;
+    float start;  // as in MediumState, in lengths of the ray's direction
+    Hit hit;
+    uint interior;
+    uint grid_walks;  // so far
+    uint rays;        // those still to follow: FLAG_AIRLIGHT, FLAG_SAMPLED; the first one is under way
+};
+
 layout(set = 0, binding = 0, scalar) restrict buffer WaveStatusBlock {
     uint item_groups[3];     // indirect arguments: one invocation a place
     uint chunk_groups[3];    // one a chunk
@@ -101,6 +131,28 @@ layout(set = 0, binding = 13, scalar) restrict writeonly buffer WalkFlagsOut { u
 layout(set = 0, binding = 14, scalar) restrict buffer WalkResume { uint walk_resume[]; };
 layout(set = 0, binding = 15, scalar) restrict buffer WalkChunks { uvec2 walk_chunks[]; };  // walks alive, waiting places
 
+// Those that follow are there in scenes with media alone; in others some other buffer is bound, and nothing may be read or written.
+// The way of walks that go on, by slot: read by extend.comp from the second bounce on, written by every stage that lets a walk go on.
+layout(set = 0, binding = 16, scalar) restrict buffer WalkMediumStates { MediumState walk_medium_states[]; };
+layout(set = 0, binding = 17, scalar) restrict buffer WalkMediumEvents { MediumEvent walk_medium_events[]; };  // by place
+layout(set = 0, binding = 18, scalar) restrict buffer WalkShadowStarts { ShadowStart walk_shadow_starts[]; };  // by place
+layout(set = 0, binding = 19, scalar) restrict buffer WalkAirlightRays { ShadowRay walk_airlight_rays[]; };    // by place
+layout(set = 0, binding = 20, scalar) restrict buffer WalkShadowStates { ShadowState walk_shadow_states[]; };  // by place in the waiting queue
+// 64-bit counters, low word first.
+layout(set = 0, binding = 21, scalar) restrict buffer WalkMediumCounters {
+    uint collisions[2];
+    uint null_collisions[2];
+    uint density_lookups[2];
+    uint second_rays[2];  // of places that have one already
+} medium_counters;
+
+#define COUNT_MEDIUM(COUNTER, AMOUNT) { \
+    uint counted_amount = AMOUNT; \
+    if (counted_amount > 0u && atomicAdd(medium_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
+        atomicAdd(medium_counters.COUNTER[1], 1u); \
+    } \
+}
+
 WalkState load_walk(uint slot) {
     int first = int(WALK_STATE_QUARTERS * slot);
     vec4 q0 = uintBitsToFloat(texelFetch(walk_states_in, first));
@@ -130,14 +182,7 @@ void store_waiting(uint place, uvec4 q0, uvec4 q1, uvec4 q2) {
     walk_waiting_out[first + 2u] = q2;
 }
 
-void store_shadow_ray(uint place, ShadowRay ray) {
-    store_waiting(place, uvec4(floatBitsToUint(ray.origin), floatBitsToUint(ray.t_max)), uvec4(floatBitsToUint(ray.direction), ray.slot),
-                  uvec4(floatBitsToUint(ray.contribution), ray.bounce));
-}
-
 // The slot at a place: in the first bounce, the place.
 uint load_slot(uint place) { return status.rounds == 0u ? place : texelFetch(walk_queue_in, int(place)).x; }
-
-#include "walk/media.glsl"
 
 #endif

@@ -12,6 +12,7 @@ use clerestory::scene::SceneProfile;
 use clerestory::techniques;
 use clerestory_tests::shaders::{layout_probe, out_of_bounds, uniform_probe};
 use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
+
 /// A device that has these limits of descriptors.
 fn gpu_of_limits(descriptors: DescriptorLimits) -> Gpu {
     gpu_with(&GpuOptions {
@@ -247,6 +248,50 @@ fn a_uniform_buffer_beyond_the_limit_is_refused() {
 }
 
 #[test]
+fn workgroups_are_limited_along_each_axis() {
+    let limits = [9, 8, 7];
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            max_workgroups: Some(limits),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    assert_eq!(gpu.caps().max_workgroups, limits);
+    let words = gpu.buffer(&BufferDesc::storage("words", 64, Category::Work)).unwrap();
+    let pipeline = gpu.compute_pipeline::<out_of_bounds::Kernel>(&()).unwrap();
+    let mut recorder = gpu.recorder("groups").unwrap();
+    recorder
+        .pass("groups", |pass| {
+            let mut dispatch = |groups| {
+                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+                let set = out_of_bounds::Set0 { words: words.view() };
+                pass.dispatch(&pipeline, &[&set], &Default::default(), groups)
+            };
+            dispatch(limits)?;
+            let names = [
+                "maxComputeWorkGroupCount[0]",
+                "maxComputeWorkGroupCount[1]",
+                "maxComputeWorkGroupCount[2]",
+            ];
+            for (axis, name) in names.into_iter().enumerate() {
+                let mut groups = [1; 3];
+                groups[axis] = limits[axis] + 1;
+                match dispatch(groups) {
+                    Err(Error::LimitExceeded { limit_name, limit, .. }) => {
+                        assert_eq!((limit_name, limit), (name, u64::from(limits[axis])));
+                    }
+                    other => panic!("{name}: {other:?}"),
+                }
+            }
+            Ok(())
+        })
+        .unwrap();
+    recorder.submit().unwrap().wait().unwrap();
+    assert_no_messages(&gpu);
+}
+
+#[test]
 fn the_path_tracer_says_what_a_device_of_the_least_limits_lacks() {
     let descriptors = DescriptorLimits {
         // What Vulkan promises on every device.
@@ -309,17 +354,10 @@ fn four_descriptor_sets_are_enough_for_every_technique() {
             .iter()
             .find(|scene| (technique.refusals)(&SceneProfile::of(scene)).is_empty());
         let scene = able.expect("a scene that it can render");
-        // What is made on devices that have all it takes, and only on those, is not looked at.
-        let settings = if technique.settings.has("map_build") {
-            serde_json::json!({ "map_build": "host" })
-        } else {
-            serde_json::Value::Null
-        };
         let options = RenderOptions {
             technique: Some(technique.id.into()),
             size: [8, 8],
             spp: 1,
-            settings: settings.into(),
             ..RenderOptions::default()
         };
         let rendered = render(&gpu, scene, &options).unwrap();

@@ -50,12 +50,17 @@ fn height(floor: &str) -> Option<usize> {
 
 /// The first names after each `crate::`, those in braces included.
 fn modules_used(source: &str) -> BTreeSet<String> {
+    names_after("crate::", source)
+}
+
+/// The first names after each `prefix`, those in braces included.
+fn names_after(prefix: &str, source: &str) -> BTreeSet<String> {
     let code: String = source
         .lines()
         .filter(|line| !line.trim_start().starts_with("//"))
         .collect();
     let mut used = BTreeSet::new();
-    for after in code.split("crate::").skip(1) {
+    for after in code.split(prefix).skip(1) {
         let name = |text: &str| {
             text.trim()
                 .chars()
@@ -140,9 +145,51 @@ fn uses_are_found_in_all_their_forms() {
     assert_eq!(floors_included("#include \"film/a.glsl\"\n").len(), 1);
 }
 
+/// Methods that may use another one's code and kernels: photon mapping's eye paths are the path tracer's.
+const METHODS_BESIDE: [[&str; 2]; 1] = [["photon_mapping", "path"]];
+
+#[test]
+fn methods_do_not_know_each_other() {
+    let root = repository().join("engine/src/techniques");
+    let methods: BTreeSet<String> = std::fs::read_dir(&root)
+        .expect("folder")
+        .map(|entry| entry.expect("entry").path())
+        .filter(|path| path.is_dir())
+        .filter_map(|path| Some(path.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    assert!(methods.len() > 3, "{methods:?}");
+    let mut faults = Vec::new();
+    let mut allowed = BTreeSet::new();
+    for method in &methods {
+        let files = [
+            (files(&root.join(method), &["rs"]), "techniques::"),
+            (
+                files(&repository().join("shaders/techniques").join(method), &["glsl", "comp"]),
+                "#include \"techniques/",
+            ),
+        ];
+        for (files, prefix) in files {
+            for path in files {
+                let used = names_after(prefix, &std::fs::read_to_string(&path).expect("source"));
+                for other in used.iter().filter(|name| *name != method && methods.contains(*name)) {
+                    let pair = [method.as_str(), other.as_str()];
+                    match METHODS_BESIDE.iter().position(|known| *known == pair) {
+                        Some(known) => _ = allowed.insert(known),
+                        None => faults.push(format!("{}: {other}", path.display())),
+                    }
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "methods use others:\n{}", faults.join("\n"));
+    assert_eq!(allowed.len(), METHODS_BESIDE.len(), "a pair is not needed any more");
+    let found = names_after("techniques::", "use crate::techniques::{Card, path::Wave, preview};");
+    assert!(found.contains("path") && found.contains("preview"), "{found:?}");
+}
+
 /// What methods named `record` must not do, since a host's command buffer may be what they record into: submit, wait, move data by the
-/// host, allocate.
-const NOT_WHILE_RECORDING: [&str; 10] = [
+/// host, allocate, compile.
+const NOT_WHILE_RECORDING: [&str; 11] = [
     ".submit(",
     ".submit_with(",
     ".wait(",
@@ -153,6 +200,7 @@ const NOT_WHILE_RECORDING: [&str; 10] = [
     "gpu.upload(",
     "gpu.buffer(",
     ".buffer_with(",
+    ".compute_pipeline(",
 ];
 
 /// The bodies of functions named `record` or `record_…`, formatted as rustfmt does, with their names.

@@ -4,11 +4,12 @@
 //! f64 test alone.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
-use clerestory::accel::trace::wide_counter;
 use clerestory::accel::{Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::shaders::accel::trace_rays;
 use clerestory::gpu::shaders::sets::IndexSet;
-use clerestory::gpu::{Category, DeviceKind, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute};
+use clerestory::gpu::{
+    Category, DeviceKind, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute, wide_counter,
+};
 use clerestory_hard_cases::misses;
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;

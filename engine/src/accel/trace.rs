@@ -20,7 +20,9 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
 use crate::gpu::shaders::sets::IndexSet;
-use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings, wide_counter,
+};
 use crate::{Error, Result};
 
 /// Most rays of one call.
@@ -28,11 +30,6 @@ pub const MAX_RAYS: usize = 1 << 31;
 
 /// Dispatches of one submission, so that none takes seconds.
 const DISPATCHES_PER_SUBMISSION: u32 = 1024;
-
-/// A counter of the kernels: two words, the low one first.
-pub fn wide_counter([low, high]: [u32; 2]) -> u64 {
-    u64::from(high) << 32 | u64::from(low)
-}
 
 /// What rays met, and the work it took.
 #[derive(Debug, Clone, Default)]
@@ -447,7 +444,7 @@ impl RayTracer {
     /// Dispatches that go through `count` rays. Of a queue's none but the last leaves a workgroup with less than its quota.
     fn dispatches(&self, count: u32) -> u32 {
         match &self.kernel {
-            Kernel::RayPerThread(kernel) => kernel.groups_for(count).div_ceil(self.gpu.caps().max_workgroups),
+            Kernel::RayPerThread(kernel) => kernel.groups_for(count).div_ceil(self.gpu.caps().max_workgroups[0]),
             Kernel::Queue(threads, _) => {
                 let crew = u64::from(threads.groups) * u64::from(threads.fetches);
                 u64::from(count.div_ceil(threads.batch)).div_ceil(crew) as u32
@@ -467,7 +464,7 @@ impl RayTracer {
         };
         match &self.kernel {
             Kernel::RayPerThread(kernel) => {
-                let most = u64::from(self.gpu.caps().max_workgroups) * u64::from(kernel.group_size());
+                let most = u64::from(self.gpu.caps().max_workgroups[0]) * u64::from(kernel.group_size());
                 let ray_count = u64::from(count - *first).min(most) as u32;
                 let set = trace_rays::Set0 {
                     trace_rays: buffers.rays.view(),

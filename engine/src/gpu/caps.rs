@@ -88,8 +88,8 @@ pub struct Caps {
     pub max_workgroup_size: [u32; 3],
     /// `maxComputeWorkGroupInvocations`.
     pub max_workgroup_invocations: u32,
-    /// `maxComputeWorkGroupCount[0]`.
-    pub max_workgroups: u32,
+    /// `maxComputeWorkGroupCount`, along each axis.
+    pub max_workgroups: [u32; 3],
     /// `maxPushConstantsSize`, bytes.
     pub max_push_constants: u32,
     /// Vendor id, device id and pipeline cache UUID: the key of the pipeline cache.
@@ -213,6 +213,9 @@ impl Caps {
         }
         if let Some(bytes) = lesser.heap_bytes {
             self.device_heap = self.device_heap.min(bytes);
+        }
+        if let Some(groups) = lesser.max_workgroups {
+            self.max_workgroups = [0, 1, 2].map(|axis| self.max_workgroups[axis].min(groups[axis]));
         }
         if let Some(bits) = lesser.timestamp_valid_bits {
             self.timestamp_valid_bits = self.timestamp_valid_bits.min(bits);
@@ -338,7 +341,7 @@ impl Caps {
             max_shared_memory: limits.max_compute_shared_memory_size,
             max_workgroup_size: limits.max_compute_work_group_size,
             max_workgroup_invocations: limits.max_compute_work_group_invocations,
-            max_workgroups: limits.max_compute_work_group_count[0],
+            max_workgroups: limits.max_compute_work_group_count,
             max_push_constants: limits.max_push_constants_size,
             cache_key: format!(
                 "{:04x}-{:04x}-{:08x}-{uuid}",

@@ -13,6 +13,7 @@ use ash::vk;
 use super::device::{Gpu, Inner};
 use super::interface::{Capability, FragmentShader, GeometryShader, ShaderInfo, SpecConstants, Stage, VertexShader};
 use super::layout::{PipelineObjects, ShaderModule, specialization_data, stage_flags};
+use super::pipeline::PipelineInfo;
 use crate::{Error, Result};
 
 /// Which triangles are dropped; front faces are counter-clockwise in the picture (y downwards).
@@ -128,6 +129,15 @@ impl<V, F, G> Clone for GraphicsPipeline<V, F, G> {
     }
 }
 
+impl<V, F, G> GraphicsPipeline<V, F, G> {
+    /// What it was made of: its shaders in the order of the stages.
+    pub fn info(&self) -> Vec<PipelineInfo> {
+        let inner = &self.inner;
+        let stages = inner.shaders.iter().zip(&inner.specs);
+        stages.map(|(shader, spec)| PipelineInfo::of(shader, spec)).collect()
+    }
+}
+
 impl<V, F, G> std::fmt::Debug for GraphicsPipeline<V, F, G> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut tuple = f.debug_tuple("GraphicsPipeline");
@@ -143,6 +153,8 @@ pub(super) struct GraphicsInner {
     /// In the order of the stages.
     pub shaders: Vec<&'static ShaderInfo>,
     pub attachments: Attachments,
+    /// Constants of each shader.
+    specs: Vec<Vec<(u32, u32)>>,
 }
 
 impl GraphicsInner {
@@ -184,10 +196,19 @@ impl Gpu {
         let attachments = desc.colors.len() as u32;
         let mut objects = PipelineObjects::new(&self.inner, &shaders, attachments)?;
         let name = shaders[0].name;
-        objects.set_pipeline(make(&self.inner, &shaders, objects.layout, desc)?, name);
+        let specs: Vec<_> = shaders
+            .iter()
+            .map(|shader| match shader.stage {
+                Stage::Geometry => desc.geometry.values(),
+                Stage::Fragment => desc.fragment.values(),
+                _ => desc.vertex.values(),
+            })
+            .collect();
+        objects.set_pipeline(make(&self.inner, &shaders, &specs, objects.layout, desc)?, name);
         let inner = GraphicsInner {
             objects,
             shaders,
+            specs,
             attachments: Attachments {
                 colors: desc.colors.to_vec(),
                 depth: desc.depth,
@@ -312,6 +333,7 @@ fn check_attachments(gpu: &Inner, name: &str, colors: &[vk::Format], view_mask: 
 fn make<V: VertexShader, F: FragmentShader, G: GeometryStage>(
     gpu: &Inner,
     shaders: &[&'static ShaderInfo],
+    specs: &[Vec<(u32, u32)>],
     layout: vk::PipelineLayout,
     desc: &GraphicsDesc<'_, V, F, G>,
 ) -> Result<vk::Pipeline> {
@@ -319,14 +341,7 @@ fn make<V: VertexShader, F: FragmentShader, G: GeometryStage>(
         .iter()
         .map(|shader| ShaderModule::new(gpu, shader.name, shader.spirv))
         .collect::<Result<Vec<_>>>()?;
-    let constants: Vec<_> = shaders
-        .iter()
-        .map(|shader| match shader.stage {
-            Stage::Geometry => specialization_data(&desc.geometry.values()),
-            Stage::Fragment => specialization_data(&desc.fragment.values()),
-            _ => specialization_data(&desc.vertex.values()),
-        })
-        .collect();
+    let constants: Vec<_> = specs.iter().map(|spec| specialization_data(spec)).collect();
     let specializations: Vec<_> = constants
         .iter()
         .map(|(entries, data)| vk::SpecializationInfo::default().map_entries(entries).data(data))

@@ -59,7 +59,7 @@ impl PipelineObjects {
             ..
         } = desc;
         let (gpu, name) = (&self.gpu, names.first().copied().unwrap_or_default());
-        for set in 0..bindings.keys().map(|(set, _)| set + 1).max().unwrap_or(0) {
+        for set in 0..bindings.keys().map(|(set, _)| set.saturating_add(1)).max().unwrap_or(0) {
             let list: Vec<_> = bindings
                 .range((set, 0)..=(set, u32::MAX))
                 .map(|((_, binding), kind)| {
@@ -190,7 +190,7 @@ impl Wanted {
         let kinds = &desc.bindings;
         let count = |of: &[BindingKind]| kinds.values().filter(|kind| of.contains(kind)).count() as u32;
         Self {
-            sets: kinds.keys().map(|(set, _)| set + 1).max().unwrap_or(0),
+            sets: kinds.keys().map(|(set, _)| set.saturating_add(1)).max().unwrap_or(0),
             storage_buffers: count(&[BindingKind::StorageBuffer]),
             uniform_buffers: count(&[BindingKind::UniformBuffer]),
             storage_images: count(&[BindingKind::StorageImage]),

@@ -31,6 +31,7 @@ mod memory;
 mod options;
 #[cfg(any(feature = "wgsl", feature = "hot-reload"))]
 mod own_kernel;
+mod pace;
 mod pipeline;
 mod pipeline_cache;
 mod recorded;
@@ -49,6 +50,7 @@ mod texels;
 mod timing;
 mod tracker;
 mod transfer;
+mod wide_counter;
 
 pub use ash;
 pub use barrier::{
@@ -71,6 +73,7 @@ pub use memory::{AllocationInfo, Category, MemoryReport};
 pub use options::{DeviceSelection, GpuOptions, Lesser, Validation};
 #[cfg(any(feature = "wgsl", feature = "hot-reload"))]
 pub use own_kernel::{OwnBinding, OwnKernel, OwnResource};
+pub(crate) use pace::Pace;
 pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorded::Recorded;
 pub use recorder::{Pass, Recorder};
@@ -79,3 +82,4 @@ pub use submission::Submission;
 pub use surface::{Presented, Surface};
 pub use texels::TexelView;
 pub use timing::{Drawn, PassTiming, Timings};
+pub use wide_counter::wide_counter;

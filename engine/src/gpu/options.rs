@@ -118,6 +118,8 @@ pub struct Lesser {
     pub timestamp_valid_bits: Option<u32>,
     /// At most these optional features are enabled.
     pub features: Option<OptionalFeatures>,
+    /// At most as many workgroups of a dispatch, along each axis.
+    pub max_workgroups: Option<[u32; 3]>,
     /// At most as many bytes in the device's heaps.
     pub heap_bytes: Option<u64>,
 }

@@ -74,6 +74,20 @@ pub struct PipelineInfo {
     pub specialization: Vec<(&'static str, u32)>,
 }
 
+impl PipelineInfo {
+    /// Of a shader, and the values of its constants by number.
+    pub(super) fn of(shader: &'static ShaderInfo, spec: &[(u32, u32)]) -> Self {
+        let name = |id: u32| {
+            let known = shader.spec_constants.iter().find(|constant| constant.id == id);
+            known.map_or("", |constant| constant.name)
+        };
+        Self {
+            shader: shader.name,
+            specialization: spec.iter().map(|(id, bits)| (name(*id), *bits)).collect(),
+        }
+    }
+}
+
 pub(super) struct PipelineInner {
     pub objects: PipelineObjects,
     pub info: &'static ShaderInfo,
@@ -147,17 +161,7 @@ impl<K> ComputePipeline<K> {
 
     /// What it was made of.
     pub fn info(&self) -> PipelineInfo {
-        let info = self.inner.info;
-        let name = |id: u32| {
-            info.spec_constants
-                .iter()
-                .find(|constant| constant.id == id)
-                .map_or("", |constant| constant.name)
-        };
-        PipelineInfo {
-            shader: info.name,
-            specialization: self.inner.spec.iter().map(|(id, bits)| (name(*id), *bits)).collect(),
-        }
+        PipelineInfo::of(self.inner.info, &self.inner.spec)
     }
 }
 

@@ -450,14 +450,19 @@ impl Pass<'_> {
 
     /// Fails for more workgroups than the device dispatches.
     pub(super) fn check_groups(&self, shader: &str, groups: [u32; 3]) -> Result<()> {
-        let limit = self.recorder.gpu.caps().max_workgroups;
-        match groups.iter().find(|count| **count > limit) {
+        const NAMES: [&str; 3] = [
+            "maxComputeWorkGroupCount[0]",
+            "maxComputeWorkGroupCount[1]",
+            "maxComputeWorkGroupCount[2]",
+        ];
+        let limits = self.recorder.gpu.caps().max_workgroups;
+        match (0..3).find(|axis| groups[*axis] > limits[*axis]) {
             None => Ok(()),
-            Some(count) => Err(Error::LimitExceeded {
+            Some(axis) => Err(Error::LimitExceeded {
                 name: shader.into(),
-                value: u64::from(*count),
-                limit_name: "maxComputeWorkGroupCount",
-                limit: u64::from(limit),
+                value: u64::from(groups[axis]),
+                limit_name: NAMES[axis],
+                limit: u64::from(limits[axis]),
             }),
         }
     }

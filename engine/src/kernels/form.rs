@@ -4,7 +4,7 @@
 //! device takes.
 
 use crate::gpu::shaders::constants::SCAN_ITEMS;
-use crate::gpu::{Caps, ComputePipeline, DeviceKind, SOFTWARE_LOOP_CAP};
+use crate::gpu::{Caps, ComputePipeline, DeviceKind, PipelineInfo, SOFTWARE_LOOP_CAP};
 use crate::{Error, Result};
 
 /// Iterations that the loop over a block takes at most, on any device: half of what software drivers allow, as the tests that end loops and
@@ -217,6 +217,15 @@ pub(super) fn serial_groups() -> u32 {
 pub(super) enum Variant<P, S> {
     Plain(ComputePipeline<P>),
     Subgroup(ComputePipeline<S>),
+}
+
+impl<P, S> Variant<P, S> {
+    pub fn info(&self) -> PipelineInfo {
+        match self {
+            Self::Plain(kernel) => kernel.info(),
+            Self::Subgroup(kernel) => kernel.info(),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::gpu::shaders::kernels::{
     radix_count_serial, radix_count_subgroup, radix_scan, radix_scatter_serial, radix_scatter_subgroup,
 };
 use crate::gpu::shaders::sets::{RadixSerialSet, RadixSubgroupSet};
-use crate::gpu::{Caps, ComputePipeline, DeviceKind, Gpu, Pass};
+use crate::gpu::{Caps, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo};
 
 /// Pipelines for one width of digits.
 #[derive(Debug)]
@@ -172,6 +172,14 @@ impl Plan {
             scan,
             kernels,
         })
+    }
+
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let [count, scatter] = match &self.kernels {
+            Kernels::Serial { count, scatter } => [count.info(), scatter.info()],
+            Kernels::Subgroup { count, scatter } => [count.info(), scatter.info()],
+        };
+        vec![count, self.scan.info(), scatter]
     }
 
     /// Words of scratch memory for up to `capacity` keys.

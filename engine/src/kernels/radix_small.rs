@@ -7,7 +7,7 @@ use super::stream::Count;
 use crate::Result;
 use crate::gpu::shaders::constants::STREAM_COUNT_ON_DEVICE;
 use crate::gpu::shaders::kernels::radix_small as kernel;
-use crate::gpu::{Buffer, Caps, ComputePipeline, DeviceKind, Gpu, Pass};
+use crate::gpu::{Buffer, Caps, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo};
 
 /// Keys at most, where shared memory allows: with more, one workgroup takes longer than many do with their barriers.
 const MAX_KEYS: u32 = 2048;
@@ -56,6 +56,10 @@ impl SmallSort {
             capacity: up_to,
         })?;
         Ok(Some(Self { up_to, pipeline }))
+    }
+
+    pub fn info(&self) -> PipelineInfo {
+        self.pipeline.info()
     }
 
     /// Keys at most.

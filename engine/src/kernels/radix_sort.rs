@@ -17,9 +17,13 @@ use super::radix_small::SmallSort;
 use super::stream::{self, Count, MAX_COUNT, Prepare};
 use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::kernels::radix_scan;
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::kernels::{
+    radix_count_serial, radix_count_subgroup, radix_scan, radix_scatter_serial, radix_scatter_subgroup, radix_small,
+    stream_prepare,
+};
 use crate::gpu::shaders::types::StreamPlan;
-use crate::gpu::{Buffer, Category, Gpu, Pass, TexelView};
+use crate::gpu::{Buffer, Category, Gpu, Pass, PipelineInfo, TexelView};
 use crate::{Error, Result};
 
 /// Width of keys.
@@ -110,6 +114,17 @@ pub struct RadixSort {
 }
 
 impl RadixSort {
+    /// The kernels that a sort may take, on whatever device.
+    pub const KERNELS: [&'static ShaderInfo; 7] = [
+        &stream_prepare::INFO,
+        &radix_small::INFO,
+        &radix_count_serial::INFO,
+        &radix_count_subgroup::INFO,
+        &radix_scan::INFO,
+        &radix_scatter_serial::INFO,
+        &radix_scatter_subgroup::INFO,
+    ];
+
     /// Makes the pipelines.
     ///
     /// # Errors
@@ -142,6 +157,13 @@ impl RadixSort {
             small,
             plans,
         })
+    }
+
+    /// The kernels with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let small = self.small.as_ref().map(SmallSort::info);
+        let all = std::iter::once(self.prepare.info()).chain(small);
+        all.chain(self.plans.iter().flat_map(Plan::pipelines)).collect()
     }
 
     /// What it sorts.

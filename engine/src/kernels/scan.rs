@@ -10,10 +10,13 @@ use super::form::{Form, Teams, Variant};
 use super::operation::Operation;
 use super::stream::{self, Count, Prepare, Stream};
 use crate::card::{Role, Row, sources};
+use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::constants::STREAM_HEADER_WORDS;
-use crate::gpu::shaders::kernels::{scan_apply, scan_apply_subgroup, scan_reduce, scan_reduce_subgroup, scan_totals};
+use crate::gpu::shaders::kernels::{
+    scan_apply, scan_apply_subgroup, scan_reduce, scan_reduce_subgroup, scan_totals, stream_prepare,
+};
 use crate::gpu::shaders::sets::{ScanApplySet, ScanReduceSet};
-use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass};
+use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::{Error, Result};
 
 /// What to scan, and how.
@@ -62,6 +65,16 @@ pub(super) struct ScanTotals {
 }
 
 impl Scan {
+    /// The kernels that a scan may take, on whatever device.
+    pub const KERNELS: [&'static ShaderInfo; 6] = [
+        &stream_prepare::INFO,
+        &scan_reduce::INFO,
+        &scan_reduce_subgroup::INFO,
+        &scan_totals::INFO,
+        &scan_apply::INFO,
+        &scan_apply_subgroup::INFO,
+    ];
+
     /// Makes the pipelines.
     ///
     /// # Errors
@@ -92,6 +105,13 @@ impl Scan {
             })?)
         };
         Ok(Self { options, first, apply })
+    }
+
+    /// The kernels with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let mut all = self.first.pipelines();
+        all.push(self.apply.info());
+        all
     }
 
     /// Bytes of scratch memory for up to `capacity` elements.
@@ -175,6 +195,10 @@ impl ScanTotals {
                 ..Default::default()
             })?,
         })
+    }
+
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        vec![self.prepare.info(), self.reduce.info(), self.totals.info()]
     }
 
     pub fn scratch_bytes(&self, capacity: u32) -> u64 {

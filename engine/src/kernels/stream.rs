@@ -9,7 +9,8 @@ use crate::gpu::shaders::constants::{STREAM_COUNT_ON_DEVICE, STREAM_HEADER_WORDS
 use crate::gpu::shaders::kernels::stream_prepare;
 use crate::gpu::shaders::types::StreamPlan;
 use crate::gpu::{
-    Access, Buffer, BufferBarrier, BufferView, ComputePipeline, Gpu, Pass, compute_to_indirect, rw_compute_to_compute,
+    Access, Buffer, BufferBarrier, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo, compute_to_indirect,
+    rw_compute_to_compute,
 };
 use crate::{Error, Result};
 
@@ -154,6 +155,10 @@ pub(super) struct Stream<'a> {
 }
 
 impl Prepare {
+    pub fn info(&self) -> PipelineInfo {
+        self.pipeline.info()
+    }
+
     pub fn new(gpu: &Gpu) -> Result<Self> {
         let pipeline = gpu.compute_pipeline(&())?;
         Ok(Self { pipeline })

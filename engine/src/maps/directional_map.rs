@@ -20,7 +20,7 @@ use crate::gpu::shaders::maps::{directional_border, directional_coarser, directi
 use crate::gpu::shaders::sets::DirectionalMapSet;
 use crate::gpu::shaders::types::MapLevel;
 use crate::gpu::{
-    Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, compute_to_transfer, rw_compute_to_compute,
+    Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, compute_to_transfer, rw_compute_to_compute,
     transfer_to_compute,
 };
 use crate::{Error, Result};
@@ -199,6 +199,11 @@ impl DirectionalMap {
     pub fn level(&self, level: u32) -> Result<MapLevel> {
         let beyond = || Error::setting("level", level, format!("is not among {}", self.levels.len()));
         self.levels.get(level as usize).copied().ok_or_else(beyond)
+    }
+
+    /// The kernels of its levels and borders, with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        vec![self.coarser.info(), self.borders.info()]
     }
 
     /// The specialization constants for kernels that look this map up.

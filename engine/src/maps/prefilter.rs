@@ -18,7 +18,7 @@ use super::directional_map::DirectionalMap;
 use crate::card::{Role, Row, sources};
 use crate::gpu::shaders::constants::PREFILTER_TEXELS_PER_INVOCATION;
 use crate::gpu::shaders::maps::prefilter_ggx as kernel;
-use crate::gpu::{ComputePipeline, Gpu, Pass};
+use crate::gpu::{ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::{Error, Result};
 use glam::{DVec3, DVec4, UVec2};
 use std::f64::consts::TAU;
@@ -115,6 +115,11 @@ impl PrefilterGgx {
             directional_border: constants.border,
         })?;
         Ok(Self { constants, pipeline })
+    }
+
+    /// The kernel with its specialization.
+    pub fn info(&self) -> PipelineInfo {
+        self.pipeline.info()
     }
 
     /// Records the filtering of level `from` of `source` into level `to` of `target`, by a lobe of width α (the square of the material's roughness); the border is left to

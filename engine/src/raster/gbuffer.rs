@@ -9,7 +9,7 @@ use crate::gpu::shaders::sets::RasterSet;
 use crate::gpu::shaders::types::RasterView;
 use crate::gpu::{
     Access, Buffer, BufferBarrier, BufferDesc, Category, ColorTarget, DepthTarget, Gpu, Image, ImageBarrier, ImageDesc,
-    ImagePart, Pass, Recorder, Targets, TexelView,
+    ImagePart, Pass, PipelineInfo, Recorder, Targets, TexelView,
 };
 use crate::{Error, Result};
 
@@ -135,6 +135,11 @@ impl GBuffer {
     /// Pixels across and down.
     pub fn size(&self) -> [u32; 2] {
         self.size
+    }
+
+    /// The shaders that draw it, with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.pipeline.info()
     }
 
     /// One of the pictures; `None` when it was not asked for. After [`GBuffer::record`] it is in layout `COLOR_ATTACHMENT_OPTIMAL`.

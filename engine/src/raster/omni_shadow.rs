@@ -41,7 +41,7 @@ use crate::gpu::shaders::constants::{SHADOW_CUBE, SHADOW_FOLD, SHADOW_MOVE_MAX, 
 use crate::gpu::shaders::raster::omni_shadow_look_up as kernel;
 use crate::gpu::shaders::sets::OmniShadowSet;
 use crate::gpu::shaders::types::ShadowQuery;
-use crate::gpu::{Access, Area, Buffer, BufferBarrier, BufferDesc, Category, Gpu, Recorder, Timings};
+use crate::gpu::{Access, Area, Buffer, BufferBarrier, BufferDesc, Category, Gpu, PipelineInfo, Recorder, Timings};
 use crate::maps::cube::{CUBE_FACES, cube_decode, cube_encode};
 use crate::maps::octahedron::OctahedronLayout;
 use crate::maps::topology::octahedron_wrap;
@@ -220,6 +220,11 @@ impl OmniShadowMaps {
     /// What they are.
     pub fn desc(&self) -> OmniShadowDesc {
         self.desc
+    }
+
+    /// The shaders that draw them, with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.gbuffer.pipelines()
     }
 
     /// Bytes of the maps and of the pictures that they are drawn in.

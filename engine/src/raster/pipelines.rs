@@ -15,7 +15,7 @@ use crate::gpu::shaders::raster::{
     surface_vert, surface_view_vert, surface_world_vert,
 };
 use crate::gpu::shaders::sets::RasterSet;
-use crate::gpu::{Caps, GeometryStage, Gpu, GraphicsDesc, GraphicsPipeline, NoGeometry, Render};
+use crate::gpu::{Caps, GeometryStage, Gpu, GraphicsDesc, GraphicsPipeline, NoGeometry, PipelineInfo, Render};
 use crate::maps::cube::CUBE_FACES;
 use crate::maps::octahedron::OctahedronLayout;
 use crate::{Error, Result};
@@ -197,6 +197,23 @@ impl Pipeline {
                 Self::Paraboloids(make(gpu, desc, vertex, ())?, level)
             }
         })
+    }
+
+    /// The shaders with their specialization.
+    pub fn info(&self) -> Vec<PipelineInfo> {
+        match self {
+            Self::Plain(pipeline) | Self::MaskInRectangles(pipeline, _) => pipeline.info(),
+            Self::Views(pipeline) => pipeline.info(),
+            Self::Instances(pipeline, _) => pipeline.info(),
+            Self::Geometry(pipeline) => pipeline.info(),
+            Self::ClipDistances(pipeline) => pipeline.info(),
+            Self::Split(pipeline) => pipeline.info(),
+            Self::Halves(pipeline) => pipeline.info(),
+            Self::Outlines(pipeline) => pipeline.info(),
+            Self::Mask(pipeline) => pipeline.info(),
+            Self::Unsplit(pipeline, _) => pipeline.info(),
+            Self::Paraboloids(pipeline, _) => pipeline.info(),
+        }
     }
 
     /// Draws all triangles in the views from `first_view` on.

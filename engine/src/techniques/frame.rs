@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use super::{Skipped, Technique, View};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
-use crate::gpu::{Buffer, BufferDesc, Category, DeviceKind, Gpu, PipelineInfo, Recorder, Timings};
+use crate::gpu::{Buffer, BufferDesc, Category, Gpu, Pace, PipelineInfo, Recorder, Timings};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::PathSet;
@@ -29,8 +29,6 @@ use crate::{Error, Result};
 const FRAMES_MAX: u32 = 32;
 /// Samples of a step on software devices, about.
 const STEP_SAMPLES: u64 = 1 << 18;
-/// Device time that a step may take where a driver watches.
-const STEP_SECONDS: f64 = 0.25;
 
 /// What a picture is drawn of.
 #[derive(Debug, Clone, Copy)]
@@ -128,8 +126,7 @@ pub struct Accumulated<M> {
     done: u32,
     /// What frames share has been drawn.
     begun: bool,
-    /// Device time of a frame in the last step.
-    seconds_a_frame: Option<f64>,
+    pace: Pace,
     /// Frames since it was made.
     frames: u64,
 }
@@ -163,7 +160,7 @@ impl<M: FrameMethod> Accumulated<M> {
             radiance: gpu.buffer(&BufferDesc::storage("frame", bytes, Category::Film))?,
             done: 0,
             begun: false,
-            seconds_a_frame: None,
+            pace: Pace::new(gpu.caps().kind, FRAMES_MAX),
             frames: 0,
         })
     }
@@ -190,13 +187,8 @@ impl<M: FrameMethod> Accumulated<M> {
         if self.frames == 0 {
             return 1;
         }
-        // Software drivers end nothing, and there the steps are the same on every run.
-        if self.gpu.caps().kind == DeviceKind::Cpu {
-            let frames = STEP_SAMPLES / (u64::from(width) * u64::from(height));
-            return frames.clamp(1, u64::from(FRAMES_MAX)) as u32;
-        }
-        let seconds = self.seconds_a_frame.filter(|seconds| *seconds > 0.0);
-        seconds.map_or(1, |seconds| ((STEP_SECONDS / seconds) as u32).clamp(1, FRAMES_MAX))
+        let unwatched = STEP_SAMPLES / (u64::from(width) * u64::from(height));
+        self.pace.units(1, unwatched.min(u64::from(FRAMES_MAX)) as u32)
     }
 
     fn submit(&mut self, frames: u32) -> Result<Timings> {
@@ -235,7 +227,9 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
             .as_ref()
             .map_or(timings.seconds(), |_| clock.elapsed().as_secs_f64());
         // The first step also compiles.
-        self.seconds_a_frame = (self.frames > 0).then(|| seconds / f64::from(frames));
+        if self.frames > 0 {
+            self.pace.submitted(seconds, u64::from(frames));
+        }
         self.begun = true;
         self.done += frames;
         self.frames += u64::from(frames);

@@ -18,7 +18,7 @@
 //! 2. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
 
 pub mod ambient;
-mod features;
+mod device_needs;
 pub mod frame;
 pub mod path;
 pub mod photon_mapping;
@@ -39,7 +39,7 @@ use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
 pub use crate::card::Bias;
-pub use features::{Lack, lacks, offers};
+pub use device_needs::{Lack, lacks, offers};
 pub use frame::{Accumulated, Frame, FrameMethod, FrameTarget};
 pub use path::{PathTracer, PathTracerSettings};
 
@@ -205,7 +205,7 @@ impl Card {
         view: &View<'_>,
         settings: &Settings,
     ) -> Result<Box<dyn Technique>> {
-        features::check(gpu.caps(), self)?;
+        device_needs::check(gpu.caps(), self)?;
         let mut reasons = (self.refusals)(scene.profile());
         reasons.extend(self.path_set_refusal(settings));
         let settings = &self.without_path_set(settings);

@@ -23,6 +23,7 @@ pub mod warp;
 pub use gpu_scene::GpuScene;
 pub use path_set::PathSet;
 pub use surface_spec::surface_spec;
+pub(crate) use surface_spec::{COMPENSATION, METAL_LOBES, SURFACE_FEATURES};
 
 #[cfg(test)]
 pub(crate) mod testing;

@@ -26,3 +26,51 @@ macro_rules! surface_spec {
     }};
 }
 pub use surface_spec;
+
+/// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
+/// is off where nothing else is known.
+pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 19] = [
+    ("has_metal", METAL_LOBES, "no material is metal"),
+    (
+        "has_conductor",
+        "exact conductors",
+        "no metal has a complex index of refraction",
+    ),
+    (
+        "has_specular_layer",
+        "dielectric reflection",
+        "no material reflects specularly",
+    ),
+    ("has_transmission", "transmission", "no material transmits"),
+    ("has_multiple_scattering", COMPENSATION, "no material is metal"),
+    ("has_textures", "texture look-ups", "no material has a texture"),
+    ("has_shading_normals", "shading normals", "no mesh interpolates normals"),
+    ("has_normal_maps", "normal maps", "no material has one"),
+    ("has_vertex_colors", "vertex colours", "no mesh has them"),
+    ("has_absorption", "absorption in solids", "no solid absorbs"),
+    ("has_environment", "environment light", "the scene has none"),
+    ("has_area_lights", "area lights", "no material emits"),
+    ("has_unlit", "unlit surfaces", "no material is unlit"),
+    ("has_alpha", "alpha tests", "no material has alpha"),
+    ("write_aovs", "albedo, normal and depth", "they were not asked for"),
+    (
+        "has_punctual_lights",
+        "point, spot and directional lights",
+        "the scene has none",
+    ),
+    ("has_media", "participating media", "the scene has none"),
+    (
+        "has_path_automaton",
+        "path expressions",
+        "the path set is a range of bounces and lobes",
+    ),
+    (
+        "has_lobe_labels",
+        "telling overlapping lobes apart",
+        "the path set goes on alike after each, or the scene has but one",
+    ),
+];
+/// What reports call the lobes of metals.
+pub(crate) const METAL_LOBES: &str = "metal lobes";
+/// What they call the compensation of rough metals.
+pub(crate) const COMPENSATION: &str = "multiple-scattering compensation";

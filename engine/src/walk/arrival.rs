@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::gpu::shaders::sets::WaveSet;
-use crate::gpu::{BufferView, Recorder};
+use crate::gpu::{BufferView, Pass, Recorder};
 
 /// A stage between arrival and scattering, for instance one that asks a map of photons.
 pub trait ArrivalStage {
@@ -12,6 +12,30 @@ pub trait ArrivalStage {
     /// # Errors
     /// Those of recording.
     fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()>;
+
+    /// Sets what the stage counts to zero, in the first pass of a wave.
+    ///
+    /// # Errors
+    /// Those of recording.
+    fn reset(&self, _pass: &mut Pass<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    /// Copies what the stage counts to where the host reads it, at the end of a submission.
+    ///
+    /// # Errors
+    /// Those of recording.
+    fn read_back(&self, _pass: &mut Pass<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    /// Makes what [`record_stopped`](ArrivalStage::record_stopped) takes, before anything of it is recorded.
+    ///
+    /// # Errors
+    /// As [`Gpu::compute_pipeline`](crate::gpu::Gpu::compute_pipeline).
+    fn prepare_stopped(&self) -> Result<()> {
+        Ok(())
+    }
 
     /// Records what the places that it has stopped at still lack, from a part on, as much of it as a watchdog has time for; the part to go
     /// on with, in a submission of its own.

@@ -2,9 +2,10 @@
 //!
 //! A [`Walker`] follows a wave of walks to their ends. Its owner says by [`WalkStages`] where walks start, what happens where their rays arrive
 //! and what is done with what waits by place: shadow rays, for which the walker has a stage of its own, or deposits. The rest is the walker's: closest
-//! hits with alpha and media, compaction of the queues, rays that a quota stopped, and submissions as long as a watchdog allows.
+//! hits with alpha and media, compaction of the queues, rays that a quota stopped, and submissions of at least one bounce of all walks under way, of more as
+//! far as a watchdog allows.
 //!
-//! Wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013). Kernels include `walk/wave.glsl` and `walk/draws.glsl`;
+//! Wavefront form after Laine, Karras and Aila, "Megakernels Considered Harmful" (HPG 2013). Kernels include `walk/wave.glsl`, `walk/hand_on.glsl` and `walk/draws.glsl`;
 //! the working memory is descriptor set 0, [`WaveSet`]. `tests/tests/embedding/walk.rs` is a technique of a host's own.
 //!
 //! Guarantees: queues keep their order, so that memory is the same bits on every run, whatever the number of threads, the size of waves and the
@@ -12,7 +13,6 @@
 
 mod arrival;
 mod compaction;
-mod pace;
 mod stall;
 mod trace;
 mod walker;

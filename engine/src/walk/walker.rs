@@ -5,16 +5,14 @@ use std::time::Instant;
 
 use super::arrival::{ArrivalStage, Places, StoppedPlaces};
 use super::compaction::Compaction;
-use super::pace::Pace;
 use super::stall::StallWatch;
 use super::trace::{RAY_QUOTA, TracePipelines, ray_quota};
 use super::wave::{MediumCounts, Status, WaveBuffers, group_counts, indirect};
 use crate::Result;
-use crate::accel::trace::wide_counter;
 use crate::gpu::shaders::constants::{STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
-use crate::gpu::{Access, Gpu, Pass, PipelineInfo, Recorder, Timings};
+use crate::gpu::{Access, Gpu, Pace, Pass, PipelineInfo, Recorder, Timings, wide_counter};
 use crate::transport::GpuScene;
 
 /// How a walker goes about it. None of it changes what walks compute.
@@ -22,12 +20,12 @@ use crate::transport::GpuScene;
 pub struct WalkOptions {
     /// What its passes are called before the colon.
     pub name: &'static str,
-    /// Walks have shadow rays, so that the kernel for them is made.
+    /// Walks have shadow rays, so that the kernel for them is made; they wait by place ([`WaveNeeds::waiting`](super::WaveNeeds::waiting)).
     pub shadows: bool,
     /// Loop iterations after which a ray goes on in a later dispatch; see [`ray_quota`].
     pub ray_quota: u32,
     /// Bounces recorded into one command buffer, at most: about as many as most walks have. Devices that a driver watches get as many as take a fraction of a
-    /// second, by what the last submission took.
+    /// second, by what the last submission took, but one at least, of all walks: fewer slots make it shorter.
     pub bounces: usize,
 }
 
@@ -42,7 +40,8 @@ impl Default for WalkOptions {
     }
 }
 
-/// What the owner of walks does with them, stage by stage. The walker records the closest hits before [`record_scatter`](WalkStages::record_scatter)
+/// What the owner of walks does with them, stage by stage. Kernels hand on shadow rays and walks by `walk/hand_on.glsl`, which does what scenes with media
+/// take besides. The walker records the closest hits before [`record_scatter`](WalkStages::record_scatter)
 /// and the compaction of the queues behind it; every method leaves [`stage_barrier`](super::stage_barrier) behind what it records.
 pub trait WalkStages {
     /// Records what goes first in a submission, whatever its wave is.
@@ -128,6 +127,8 @@ pub struct Walker {
     gpu: Gpu,
     scene: Arc<GpuScene>,
     options: WalkOptions,
+    /// Of a submission, at most.
+    bounces: u32,
     /// Loop iterations of a ray in one dispatch.
     quota: u32,
     trace: TracePipelines,
@@ -159,18 +160,22 @@ impl Walker {
     /// A walker with its kernels; the first wave compiles them.
     ///
     /// # Errors
-    /// [`Error::MissingFeature`](crate::Error::MissingFeature) for a device with too few descriptors, [`Error::OutOfMemory`](crate::Error::OutOfMemory),
-    /// and as [`ray_quota`].
+    /// [`Error::Setting`](crate::Error::Setting) for memory that was made without something that the scene or the options need
+    /// ([`WaveNeeds`](super::WaveNeeds)), [`Error::MissingFeature`](crate::Error::MissingFeature) for a device with too few descriptors,
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), and as [`ray_quota`].
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, buffers: WaveBuffers, options: WalkOptions) -> Result<Self> {
+        buffers.needs().check(scene.profile().media.any(), options.shadows)?;
         let quota = ray_quota(gpu, &scene, options.ray_quota)?;
+        let bounces = u32::try_from(options.bounces).unwrap_or(u32::MAX).max(1);
         Ok(Self {
             trace: TracePipelines::new(gpu, &scene, quota, options.shadows, false)?,
             resume: None,
             compaction: Compaction::new(gpu)?,
-            pace: Pace::new(gpu.caps().kind, options.bounces),
+            pace: Pace::new(gpu.caps().kind, bounces),
             gpu: gpu.clone(),
             scene,
             options,
+            bounces,
             quota,
             buffers,
         })
@@ -254,6 +259,7 @@ impl Walker {
             places: status.active_count,
             stopped: status.unfinished,
         };
+        arrival.prepare_stopped()?;
         let mut part = Some(0);
         while let Some(first) = part {
             let mut recorder = self.gpu.recorder(&format!("{} arrivals", self.options.name))?;
@@ -292,6 +298,7 @@ impl Walker {
                     media.reset(pass)?;
                 }
                 stages.reset(pass)?;
+                stages.arrival().map_or(Ok(()), |arrival| arrival.reset(pass))?;
             }
             pass.memory_barrier(
                 Access::TRANSFER_WRITE | Access::COMPUTE,
@@ -307,7 +314,7 @@ impl Walker {
             let bounce = self.bounce(key, status.rounds as usize % 2);
             bounce.record_shadow_by(&mut recorder, resume)?;
         }
-        for index in 0..self.pace.bounces(status.active_count) {
+        for index in 0..self.pace.units(status.active_count, self.bounces) as usize {
             let bounce = self.bounce(key, (status.rounds as usize + index) % 2);
             let resumed = resume.filter(|_| stalled == STALLED_EXTEND && index == 0);
             // An arrival stage that was stopped has gone on already.
@@ -329,6 +336,7 @@ impl Walker {
             if let Some(media) = &self.buffers.media {
                 pass.copy(media.counters.view(), media.readback.view())?;
             }
+            stages.arrival().map_or(Ok(()), |arrival| arrival.read_back(pass))?;
             stages.read_back(pass)
         })?;
         let clock = Instant::now();

@@ -1,6 +1,5 @@
 //! Working memory of a wave: queues, and what stages hand to each other. GLSL: `walk/wave.glsl`, which says how it is laid out.
 
-use crate::accel::trace::wide_counter;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, WAITING_QUARTERS, WALK_GROUP};
 use crate::gpu::shaders::sets::WaveSet;
@@ -8,7 +7,7 @@ use crate::gpu::shaders::types::{
     GatheredLight, Hit, MediumEvent, MediumState, ShadowRay, ShadowStart, ShadowState, WalkState,
 };
 use crate::gpu::shaders::walk::{compact_scan, shadow};
-use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, DeviceKind, Gpu, Pass, TexelView};
+use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, DeviceKind, Gpu, Pass, TexelView, wide_counter};
 use crate::{Error, Result};
 
 /// Most walks in flight.
@@ -25,15 +24,36 @@ pub(super) type Status = compact_scan::WaveStatusBlock;
 
 type MediumCounters = shadow::WalkMediumCounters;
 
-/// Which memory a wave needs beside that of all.
-#[derive(Debug, Clone, Copy)]
+/// Which memory a wave needs beside that of all. [`Walker::new`](super::Walker::new) refuses what a scene or its own options need more of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WaveNeeds {
     /// Something may wait by place: shadow rays, or whatever is kept of a place.
     pub waiting: bool,
-    /// Walks go through participating media.
+    /// Walks go through participating media: [`MediaUse::any`](crate::scene::MediaUse::any) of the scene, whatever the owner of the walks makes of
+    /// them.
     pub media: bool,
-    /// In media, a place may have a second shadow ray, to light scattered on the way there.
+    /// In media, a place may have a second shadow ray, to light scattered on the way there; one that waits, like all.
     pub airlight: bool,
+}
+
+impl WaveNeeds {
+    /// Refuses memory that lacks what walks in a scene with media, or with shadow rays, read and write.
+    pub(super) fn check(self, has_media: bool, has_shadows: bool) -> Result<()> {
+        let refuse = |name, cause: &str| Err(Error::setting(name, false, cause));
+        if has_media && !self.media {
+            return refuse("media", "is not enough: the scene has participating media");
+        }
+        if has_shadows && !self.waiting {
+            return refuse(
+                "waiting",
+                "is not enough: the walks have shadow rays, which wait by place",
+            );
+        }
+        if self.airlight && !(self.waiting && self.media) {
+            return refuse("waiting", "or `media` is not enough for `airlight`");
+        }
+        Ok(())
+    }
 }
 
 /// Exact counts of what happened in media.
@@ -63,6 +83,7 @@ pub struct WaveBuffers {
     chunks: Buffer,
     pub(super) readback: Buffer,
     pub(super) media: Option<MediaBuffers>,
+    needs: WaveNeeds,
     slots: u32,
 }
 
@@ -90,7 +111,7 @@ pub fn slots_of_device(gpu: &Gpu) -> u32 {
     let slot_bytes = size_of::<WalkState>().max(WAITING_BYTES) as u64;
     let by_range = gpu.caps().max_storage_buffer_range / slot_bytes;
     let by_texels = gpu.caps().max_texel_buffer_elements * TEXEL_BYTES / slot_bytes;
-    let by_groups = u64::from(gpu.caps().max_workgroups) * u64::from(WALK_GROUP);
+    let by_groups = u64::from(gpu.caps().max_workgroups[0]) * u64::from(WALK_GROUP);
     let slots = by_range.min(by_texels).min(by_groups).min(u64::from(SLOTS_MAX)) as u32;
     slots - slots % WALK_GROUP
 }
@@ -172,6 +193,7 @@ impl WaveBuffers {
                 size_of::<Status>() as u64,
             ))?,
             media: needs.media.then(|| MediaBuffers::new(gpu, slots, needs)).transpose()?,
+            needs,
             slots,
         })
     }
@@ -179,6 +201,11 @@ impl WaveBuffers {
     /// Walks that fit.
     pub fn slots(&self) -> u32 {
         self.slots
+    }
+
+    /// What it has memory for.
+    pub fn needs(&self) -> WaveNeeds {
+        self.needs
     }
 
     /// What walks have gathered: a [`GatheredLight`] a slot.

@@ -11,25 +11,14 @@
 
 layout(local_size_x = 64) in;
 
-layout(constant_id = 20) const bool HAS_GRIDS = true;        // media with a density grid
-layout(constant_id = 21) const bool HAS_HOMOGENEOUS = true;
-layout(constant_id = 22) const bool HAS_AIRLIGHT = true;     // equi-angular samples
+layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular samples
 
 #include "transport/features.glsl"
-#include "walk/wave.glsl"
+#include "transport/media_features.glsl"
 #include "transport/path_set.glsl"
-
-layout(push_constant, scalar) uniform Push {
-    vec3 scene_lower;
-    uint path_set;          // PathSet, packed
-    vec3 scene_upper;
-    float roulette_cap;     // largest probability to go on
-    WalkKey key;            // sequences are pixels, places in them samples
-    uint roulette_start;    // first bounce at which Russian roulette may end a path
-    uint surrounding;       // index of the medium outside of all bodies, or NO_MEDIUM
-    uint accepting;         // states of the automaton in which light counts, a bit each
-    uint successors[15];    // of each state
-} push;
+#include "techniques/path/path_bounce.glsl"
+#include "walk/hand_on.glsl"
+#include "walk/media.glsl"
 
 #include "walk/draws.glsl"
 #include "transport/light_choice.glsl"
@@ -90,14 +79,14 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
     return true;
 }
 
-// Light that a collision at `from`, t from the start of the way, scatters into the path. True where there is some.
-bool sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
+// Light that a collision at `from`, t from the start of the way, scatters into the path. The flags of the place where there is some, or 0.
+uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
     vec2 choice = bounce_sample(slot, path.bounce, DIMENSION_LIGHT);
     vec2 u = bounce_sample(slot, path.bounce, DIMENSION_LIGHT_POINT);
     vec2 within = HAS_ENVIRONMENT ? bounce_sample(slot, path.bounce, DIMENSION_LIGHT_WITHIN) : vec2(0.0);
     LightSample light = sample_light(from, choice.x, u, within, push.scene_lower, push.scene_upper);
     if (light.radiance == vec3(0.0)) {
-        return false;
+        return 0u;
     }
     float phase = phase_function(m.phase, m.phase_parameter, path.direction, light.direction);
     float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, phase) : 1.0;
@@ -113,10 +102,7 @@ bool sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, S
     } else {
         shadow_segment(SurfacePoint(from, vec3(0.0)), vec3(0.0), light.point, light.normal, ray.origin, ray.direction);
     }
-    store_shadow_ray(place, ray);
-    walk_shadow_starts[place].sampled_interior = way.interior;
-    walk_shadow_starts[place].start = 0.0;
-    return true;
+    return store_shadow_ray(place, ray, way.interior, 0.0);
 }
 
 // The path's new direction at a collision; false when it ends.
@@ -129,16 +115,7 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     path.origin = at;
     path.direction = wi;
     path.bounce += 1u;
-    if (path.bounce >= push.roulette_start) {
-        vec3 t = path.throughput * path.eta_scale;
-        float survival = min(max(t.x, max(t.y, t.z)), push.roulette_cap);
-        // Also ends a path whose throughput is not a number.
-        if (!(lobe.y < survival)) {
-            return false;
-        }
-        path.throughput /= survival;
-    }
-    return path.throughput != vec3(0.0);
+    return path_roulette(path, lobe.y) && path.throughput != vec3(0.0);
 }
 
 void main() {
@@ -167,7 +144,7 @@ void main() {
     vec3 weight = vec3(1.0);
     vec3 emitted = vec3(0.0);
     uint flags = 0u;
-    uint outcome = WALK_LEFT;
+    uint outcome = GRID_LEFT;
     SceneMedium m;
     float t = 0.0;  // of a collision, from the start of the way
     float reached = 0.0;  // by a walk that stopped
@@ -209,7 +186,7 @@ void main() {
                 t = flight.t;
                 weight = flight.weight;
                 state.bands = flight.bands;
-                outcome = flight.collides ? WALK_COLLIDED : WALK_LEFT;
+                outcome = flight.collides ? GRID_COLLIDED : GRID_LEFT;
             }
         } else if (HAS_GRIDS) {
             uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
@@ -218,33 +195,33 @@ void main() {
             t = (walk.entry - way.start) + walk.t;
             reached = resumed_start(way.start, walk.entry + walk.t);
             // The search that goes on from the surface itself would miss it.
-            outcome = outcome == WALK_STOPPED && reached >= way.end ? WALK_LEFT : outcome;
+            outcome = outcome == GRID_STOPPED && reached >= way.end ? GRID_LEFT : outcome;
             COUNT_MEDIUM(null_collisions, walk.nulls)
-            COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == WALK_COLLIDED ? 1u : 0u))
+            COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == GRID_COLLIDED ? 1u : 0u))
         }
-        COUNT_MEDIUM(collisions, outcome == WALK_COLLIDED ? 1u : 0u)
+        COUNT_MEDIUM(collisions, outcome == GRID_COLLIDED ? 1u : 0u)
         if (counted && emitted != vec3(0.0)) {
             walk_gathered[slot].radiance += emitted;
         }
     }
-    if (HAS_ABSORPTION && way.interior != OUTSIDE && outcome == WALK_LEFT) {
+    if (HAS_ABSORPTION && way.interior != OUTSIDE && outcome == GRID_LEFT) {
         weight *= exp(-load_material(way.interior).absorption * (way.end - max(way.start, 0.0)));
     }
     bool handled = true;
     bool alive = false;
     uint interior = way.interior;
-    if (outcome == WALK_COLLIDED) {
+    if (outcome == GRID_COLLIDED) {
         path.throughput *= weight;
         if (path.throughput != vec3(0.0)) {
             vec3 at = place_on_way(path, way, t);
-            if (lighting && sample_collision_light(slot, place, path, bands, m, way, at, t)) {
-                flags |= FLAG_SAMPLED | FLAG_WAITING;
+            if (lighting) {
+                flags |= sample_collision_light(slot, place, path, bands, m, way, at, t);
             }
             alive = scatter(slot, m, at, path);
             automaton = after;
             state.start = 0.0;
         }
-    } else if (outcome == WALK_STOPPED) {
+    } else if (outcome == GRID_STOPPED) {
         path.throughput *= weight;
         state.start = reached;
         alive = path.throughput != vec3(0.0);

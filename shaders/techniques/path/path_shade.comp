@@ -14,18 +14,8 @@ layout(local_size_x = 64) in;
 #include "transport/bsdf_label.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/path_set.glsl"
-#include "walk/wave.glsl"
-
-layout(push_constant, scalar) uniform Push {
-    vec3 scene_lower;
-    uint path_set;          // PathSet, packed
-    vec3 scene_upper;
-    float roulette_cap;     // largest probability to go on
-    WalkKey key;            // sequences are pixels, places in them samples
-    uint roulette_start;    // first bounce at which Russian roulette may end a path
-    uint accepting;         // states of the automaton in which light counts, a bit each
-    uint successors[15];    // of each state
-} push;
+#include "techniques/path/path_bounce.glsl"
+#include "walk/hand_on.glsl"
 
 #include "walk/draws.glsl"
 
@@ -40,8 +30,8 @@ float way_left_out(Surface s, vec3 origin, vec3 direction) {
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
 
-// Shades the hit of the path in a slot; true when the path goes on. What it meets is added to `radiance`.
-bool shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uint flags) {
+// Shades the hit of the path in a slot. What it meets is added to `radiance`; `flags` say what waits at the place, and whether the path goes on.
+void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uint flags) {
     Hit hit = load_hit(place);
     uint state = 0u;
     if (HAS_PATH_AUTOMATON) {
@@ -58,7 +48,7 @@ bool shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
             float weight = emission_weight(path.pdf, environment_light_pdf(e, local));
             radiance += path.throughput * environment_radiance(e, local) * weight;
         }
-        return false;
+        return;
     }
 
     Arrival a = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
@@ -96,7 +86,7 @@ bool shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     bool ends = arrival_is_unlit(a) || !path_set_continues(push.path_set, path.bounce);
     ends = ends || (HAS_PATH_AUTOMATON && mask == 0u);
     if (ends) {
-        return false;
+        return;
     }
     ScatteringFrame frame = scattering_frame(a, normal);
     uint bounce = path.bounce;
@@ -131,12 +121,8 @@ bool shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
                     float way = distance(s.point.position, light.point.position);
                     ray_to_light.contribution = absorbed(ray_to_light.contribution, passed, way);
                 }
-                store_shadow_ray(place, ray_to_light);
-                if (HAS_MEDIA) {
-                    walk_shadow_starts[place].sampled_interior = passed;
-                    walk_shadow_starts[place].start = -way_left_out(s, start, wi) / length(ray_to_light.direction);
-                }
-                flags |= HAS_MEDIA ? FLAG_WAITING | FLAG_SAMPLED : FLAG_WAITING;
+                float left_out = HAS_MEDIA ? way_left_out(s, start, wi) / length(ray_to_light.direction) : 0.0;
+                flags |= store_shadow_ray(place, ray_to_light, passed, -left_out);
             }
         }
     }
@@ -153,7 +139,7 @@ bool shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     vec3 wi = frame_to_world(frame, scattered.wi);
     path.throughput *= scattered.weight;
     if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi) || path.throughput == vec3(0.0)) {
-        return false;
+        return;
     }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
         float eta = frame.wo.z > 0.0 ? bsdf.eta : 1.0 / bsdf.eta;
@@ -161,26 +147,16 @@ bool shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : around;
     }
     path.bounce = bounce + 1u;
-    if (path.bounce >= push.roulette_start) {
-        vec3 t = path.throughput * path.eta_scale;
-        float survival = min(max(t.x, max(t.y, t.z)), push.roulette_cap);
-        // Also ends a path whose throughput is not a number.
-        if (!(lobe.y < survival)) {
-            return false;
-        }
-        path.throughput /= survival;
+    if (!path_roulette(path, lobe.y)) {
+        return;
     }
     path.origin = departure(a, wi, path.throughput);
     path.direction = normalize(wi);
-    if (HAS_MEDIA) {
-        walk_medium_states[slot].start = -way_left_out(s, path.origin, path.direction);
-    }
     path.pdf = scattered.pdf;
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);
     }
-    walk_states_out[slot] = path;
-    return true;
+    flags |= store_walk(slot, path, HAS_MEDIA ? -way_left_out(s, path.origin, path.direction) : 0.0);
 }
 
 void main() {
@@ -200,9 +176,7 @@ void main() {
         flags = (event.flags & FLAG_AIRLIGHT) != 0u ? FLAG_AIRLIGHT | FLAG_WAITING : 0u;
         path.throughput *= event.weight;
     }
-    if (shade(slot, place, path, radiance, flags)) {
-        flags |= FLAG_ALIVE;
-    }
+    shade(slot, place, path, radiance, flags);
     if (radiance != vec3(0.0)) {
         walk_gathered[slot].radiance += radiance;
     }

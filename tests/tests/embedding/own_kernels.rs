@@ -183,6 +183,24 @@ fn mistakes_in_wgsl_have_their_place() {
             matches!(&refused, Err(Error::Binding { binding, .. }) if binding == "picture"),
             "{refused:?}"
         );
+        let sets = gpu.caps().descriptors.bound_sets;
+        for (set, number) in [(u32::MAX, 0), (sets, 0), (0, u32::MAX), (0, 1000)] {
+            let far = format!(
+                "@group({set}u) @binding({number}u) var<storage, read_write> far: array<u32>;
+                @compute @workgroup_size(1) fn main() {{ far[0] = 1u; }}"
+            );
+            let refused = OwnKernel::wgsl(gpu, "far", &far);
+            assert!(
+                matches!(&refused, Err(Error::Binding { binding, .. }) if binding == "far"),
+                "{set}, {number}: {refused:?}"
+            );
+        }
+        let last = format!(
+            "@group({}) @binding(999) var<storage, read_write> far: array<u32>;
+            @compute @workgroup_size(1) fn main() {{ far[0] = 1u; }}",
+            sets.min(4) - 1
+        );
+        OwnKernel::wgsl(gpu, "last", &last).unwrap();
         let large = "@compute @workgroup_size(4096, 4096) fn main() {}";
         let refused = OwnKernel::wgsl(gpu, "large", large);
         assert!(

@@ -4,14 +4,14 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use clerestory::gpu::shaders::types::GatheredLight;
-use clerestory::gpu::{ComputePipeline, DeviceKind, Recorder};
-use clerestory::scene::{Material, Scene};
+use clerestory::gpu::{ComputePipeline, DeviceKind, Gpu, Recorder};
+use clerestory::scene::{Material, Medium, Scene};
 use clerestory::transport::{GpuScene, surface_spec};
 use clerestory::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveNeeds, WaveSet, stage_barrier,
 };
 use clerestory::{Error, Result};
-use clerestory_tests::render::{floor, upload};
+use clerestory_tests::render::{cuboid, floor, upload};
 use clerestory_tests::shaders::{walk_sky_light, walk_start};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
@@ -93,62 +93,89 @@ fn occlusion(x: f64) -> f64 {
     corner(half - x, half) - corner(-half - x, half) - corner(half - x, -half) + corner(-half - x, -half)
 }
 
+/// A layer of fog high above the ceiling: extinction in 1/m, between two heights, m.
+const FOG: [f64; 3] = [0.4, 2.0, 4.0];
+
+/// Half a side of it, m; and rays that go up as steeply as this leave it at its top.
+const FOG_SIDE: f32 = 60.0;
+const STEEP: f64 = 0.1;
+
+/// The same floor and ceiling below the fog.
+fn scene_with_fog() -> Scene {
+    let mut scene = scene();
+    scene.media.push(Medium {
+        sigma_a: Vec3::splat(FOG[0] as f32),
+        ..Medium::default()
+    });
+    let boundary = scene.add_material(Material {
+        boundary: true,
+        interior: Some(0),
+        ..Material::default()
+    });
+    let [low, high] = [FOG[1], FOG[2]].map(|height| height as f32);
+    let corner = |side: f32, height| Vec3::new(side, height, side);
+    scene.place(cuboid("fog", boundary, corner(-FOG_SIDE, low), corner(FOG_SIDE, high)));
+    scene
+}
+
+/// What the walks of the host's technique gather, whose numbers were counted, with so many bounces a submission.
+fn gather(gpu: &Gpu, scene: &Arc<GpuScene>, bounces: usize) -> Vec<[f32; 3]> {
+    let start = gpu.compute_pipeline::<walk_start::Kernel>(&()).unwrap();
+    let has_media = scene.profile().media.any();
+    let spec = surface_spec!(walk_sky_light, scene, {
+        has_alpha: false,
+        has_media,
+        ..Default::default()
+    });
+    let scatter = gpu.compute_pipeline::<walk_sky_light::Kernel>(&spec).unwrap();
+    let walks = WALKS * POINTS.len() as u32;
+    let needs = WaveNeeds {
+        waiting: true,
+        media: has_media,
+        airlight: false,
+    };
+    let buffers = WaveBuffers::new(gpu, walks, needs).unwrap();
+    let options = WalkOptions {
+        name: "sky light",
+        bounces,
+        ..WalkOptions::default()
+    };
+    let mut walker = Walker::new(gpu, Arc::clone(scene), buffers, options).unwrap();
+    let key = WalkKey {
+        first_sequence: 0,
+        first_index: 0,
+        indices: WALKS,
+        seed: 11,
+    };
+    let mut stages = Ambient {
+        scene,
+        start: &start,
+        scatter: &scatter,
+        key,
+        walks,
+    };
+    let walked = walker.run(key, walks, &mut stages).unwrap();
+    // Each meets the floor, sends a shadow ray, and goes on once.
+    assert_eq!((walked.rays, walked.waited), (2 * u64::from(walks), u64::from(walks)));
+    assert_eq!(walked.stalls, 0);
+    let passes = walked.timings.iter().map(|timings| timings.count("sky light: shadow"));
+    let expected: &[usize] = if bounces == 1 { &[1, 1] } else { &[4] };
+    // Other devices are given less at first.
+    if gpu.caps().kind == DeviceKind::Cpu {
+        assert_eq!(passes.collect::<Vec<_>>(), expected);
+    }
+    let gathered = gpu.read::<GatheredLight>(walker.buffers().gathered(), walks as usize);
+    let refused = walker.run(key, walks + 1, &mut stages).unwrap_err();
+    assert!(matches!(&refused, Error::Setting { .. }), "{refused}");
+    gathered.unwrap().iter().map(|light| light.radiance).collect()
+}
+
 #[test]
 fn walks_of_the_hosts_own_gather_ambient_light_as_the_form_factor_has_it() {
     with_gpu(|gpu| {
         let scene = upload(gpu, &scene());
-        let start = gpu.compute_pipeline::<walk_start::Kernel>(&()).unwrap();
-        let spec = surface_spec!(walk_sky_light, scene, {
-            has_alpha: false,
-            has_media: false,
-            ..Default::default()
-        });
-        let scatter = gpu.compute_pipeline::<walk_sky_light::Kernel>(&spec).unwrap();
-        let walks = WALKS * POINTS.len() as u32;
-        let needs = WaveNeeds {
-            waiting: true,
-            media: false,
-            airlight: false,
-        };
-        let mut seen = Vec::new();
         // One bounce a submission, and all in one.
-        for bounces in [1, 4] {
-            let buffers = WaveBuffers::new(gpu, walks, needs).unwrap();
-            let options = WalkOptions {
-                name: "sky light",
-                bounces,
-                ..WalkOptions::default()
-            };
-            let mut walker = Walker::new(gpu, Arc::clone(&scene), buffers, options).unwrap();
-            let key = WalkKey {
-                first_sequence: 0,
-                first_index: 0,
-                indices: WALKS,
-                seed: 11,
-            };
-            let mut stages = Ambient {
-                scene: &scene,
-                start: &start,
-                scatter: &scatter,
-                key,
-                walks,
-            };
-            let walked = walker.run(key, walks, &mut stages).unwrap();
-            // Each meets the floor, sends a shadow ray, and goes on once.
-            assert_eq!((walked.rays, walked.waited), (2 * u64::from(walks), u64::from(walks)));
-            assert_eq!(walked.stalls, 0);
-            let passes = walked.timings.iter().map(|timings| timings.count("sky light: shadow"));
-            let expected: &[usize] = if bounces == 1 { &[1, 1] } else { &[4] };
-            // Other devices are given less at first.
-            if gpu.caps().kind == DeviceKind::Cpu {
-                assert_eq!(passes.collect::<Vec<_>>(), expected);
-            }
-            let gathered = gpu.read::<GatheredLight>(walker.buffers().gathered(), walks as usize);
-            let radiance: Vec<[f32; 3]> = gathered.unwrap().iter().map(|light| light.radiance).collect();
-            seen.push(radiance);
-            let refused = walker.run(key, walks + 1, &mut stages).unwrap_err();
-            assert!(matches!(&refused, Error::Setting { .. }), "{refused}");
-        }
+        let seen = [1, 4].map(|bounces| gather(gpu, &scene, bounces));
         assert!(seen[0] == seen[1], "submissions show");
         for (x, walks) in POINTS.iter().zip(seen[0].chunks(WALKS as usize)) {
             // Any hit and closest hit must agree on every walk.
@@ -163,6 +190,71 @@ fn walks_of_the_hosts_own_gather_ambient_light_as_the_form_factor_has_it() {
             // Four points, each beyond 4.9 deviations once in a million.
             let z = (open - expected) / deviation;
             assert!(z.abs() < 4.9, "at {x} m {open} is open instead of {expected}, z {z}");
+        }
+    });
+}
+
+#[test]
+fn shadow_rays_of_the_hosts_own_are_weakened_by_fog() {
+    with_gpu(|gpu| {
+        let seen = gather(gpu, &upload(gpu, &scene_with_fog()), 1);
+        let mut open = 0;
+        for walk in &seen {
+            let [light, free, up] = walk.map(f64::from);
+            if free > 0.0 && up > STEEP {
+                open += 1;
+                let expected = ALBEDO * (-FOG[0] * (FOG[2] - FOG[1]) / up).exp();
+                // Exponents of up to eight, of distances to the rounding of f32.
+                assert!(
+                    (light - expected).abs() <= 1e-4 * expected,
+                    "{light} instead of {expected}"
+                );
+            } else {
+                let most = if free > 0.0 { ALBEDO } else { 0.0 };
+                assert!((0.0..=most).contains(&light), "{light} of {most}");
+            }
+        }
+        assert!(open > seen.len() / 2, "{open} of {} are open", seen.len());
+    });
+}
+
+#[test]
+fn memory_that_lacks_what_walks_need_is_refused() {
+    with_gpu(|gpu| {
+        let [clear, fogged] = [scene(), scene_with_fog()].map(|scene| upload(gpu, &scene));
+        let make = |scene: &Arc<GpuScene>, shadows, [waiting, media, airlight]: [bool; 3]| {
+            let needs = WaveNeeds {
+                waiting,
+                media,
+                airlight,
+            };
+            let options = WalkOptions {
+                shadows,
+                ..WalkOptions::default()
+            };
+            let buffers = WaveBuffers::new(gpu, 64, needs).unwrap();
+            assert_eq!(buffers.needs(), needs);
+            Walker::new(gpu, Arc::clone(scene), buffers, options)
+        };
+        let refused = [
+            (&fogged, true, [true, false, false], "media"),
+            (&fogged, false, [false, false, false], "media"),
+            (&clear, true, [false, false, false], "waiting"),
+            (&fogged, true, [false, true, false], "waiting"),
+            (&fogged, false, [false, true, true], "waiting"),
+        ];
+        for (scene, shadows, needs, at_fault) in refused {
+            match make(scene, shadows, needs).err() {
+                Some(Error::Setting { name, cause, .. }) => assert_eq!(name, at_fault, "{cause}"),
+                other => panic!("{needs:?}: {other:?}"),
+            }
+        }
+        for (scene, shadows, needs) in [
+            (&clear, false, [false, false, false]),
+            (&clear, true, [true, false, false]),
+            (&fogged, true, [true, true, true]),
+        ] {
+            make(scene, shadows, needs).unwrap();
         }
     });
 }

@@ -4,6 +4,7 @@ use clerestory::Error;
 use clerestory::accel::Aabb;
 use clerestory::accel::photon_map::compact_bvh::CompactBvh;
 use clerestory::accel::photon_map::complete_bvh::{LEAF_BIT, QueryCounters, RootDescriptor};
+use clerestory::accel::photon_map::device::MapBuilder;
 use clerestory::gpu::{GpuOptions, Lesser, OptionalFeatures};
 use clerestory::techniques::photon_mapping::kernel::{
     PhotonRecord, PhotonWords, kernel_weight, pack_photon, photon_ends_leaf, unpack_photon,
@@ -256,4 +257,58 @@ fn devices_without_numbers_of_64_bits_leave_maps_to_the_host() {
     let [auto, host] = [MapBuild::Auto, MapBuild::Host]
         .map(|build| map_contents(&gpu, &records, 1.0, build).unwrap_or_else(|error| panic!("{error}")));
     assert!(auto == host);
+}
+
+#[test]
+fn maps_that_the_device_has_no_room_for_are_the_hosts_to_build() {
+    // So few workgroups reach some hundred records.
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            max_workgroups: Some([4; 3]),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    if !gpu.caps().float64 {
+        return;
+    }
+    let random = &mut Random(17);
+    let points = cloud(random, 3000);
+    let records = records(random, &points, [0.05, 0.05]);
+    let refused = map_contents(&gpu, &records, 1.0, MapBuild::Device).err();
+    assert!(matches!(refused, Some(Error::LimitExceeded { .. })), "{refused:?}");
+    let [auto, host] = [MapBuild::Auto, MapBuild::Host]
+        .map(|build| map_contents(&gpu, &records, 1.0, build).unwrap_or_else(|error| panic!("{error}")));
+    assert!(auto == host);
+}
+
+#[test]
+fn maps_take_no_more_memory_than_they_must_where_there_is_no_more() {
+    const COUNT: u32 = 400_000;
+    const MARGIN: u64 = 1 << 16;
+    let random = &mut Random(18);
+    let points = cloud(random, COUNT as usize);
+    let records = records(random, &points, [0.01, 0.01]);
+    let input = size_of_val(&records[..]) as u64;
+    let with_heap = |heap_bytes| {
+        gpu_with(&GpuOptions {
+            lesser: Lesser {
+                heap_bytes,
+                ..Lesser::default()
+            },
+            ..GpuOptions::default()
+        })
+    };
+    let builder = match with_heap(None) {
+        gpu if gpu.caps().float64 => MapBuilder::new(&gpu).unwrap(),
+        _ => return,
+    };
+    // The map, with the records in its order.
+    let bytes = |count: u32| builder.buffers(count).unwrap().bytes() + input * u64::from(count) / u64::from(COUNT);
+    // The host reads records through as much memory again.
+    let heap = 2 * input + bytes(COUNT) + MARGIN;
+    assert!(input + bytes(COUNT + COUNT / 4) > heap, "there is room for more");
+    let map = map_contents(&with_heap(Some(heap)), &records, 1e9, MapBuild::Device);
+    let map = map.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(map.records.len(), COUNT as usize);
 }

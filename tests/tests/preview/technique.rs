@@ -1,5 +1,6 @@
 //! The preview as a technique: its frames add up to the path tracer's picture of its light paths, but for what its bias names.
 
+use clerestory::gpu::Category;
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{Camera, Environment, LightKind, Material, Scene};
 use clerestory::{Error, techniques};
@@ -198,6 +199,55 @@ fn scenes_whose_light_it_would_leave_out_are_refused() {
             };
             let error = renderer.start(&options).err().expect("a refusal").to_string();
             assert!(error.contains(word), "{word}: {error}");
+        }
+    });
+}
+
+#[test]
+fn lights_without_a_place_have_no_shadow_maps() {
+    with_gpu(|gpu| {
+        let directional = LightKind::Directional {
+            direction: Vec3::NEG_Y,
+            irradiance: Vec3::splat(2.0),
+        };
+        let point = LightKind::Point {
+            position: Vec3::new(-0.8, 1.2, 0.6),
+            intensity: Vec3::ONE,
+        };
+        // Sides of maps tell how many there are.
+        for (lights, maps) in [
+            (vec![directional], 0),
+            (vec![directional, point], 1),
+            (vec![point, directional, point], 2),
+        ] {
+            let mut scene = block();
+            for light in &lights {
+                scene.add_light("light", *light);
+            }
+            let renderer = Renderer::new(gpu, &scene).unwrap();
+            let started = |side: u32| {
+                let options = RenderOptions {
+                    technique: Some("preview".into()),
+                    size: SIZE,
+                    settings: json!({ "shadow_side": side }).into(),
+                    ..RenderOptions::default()
+                };
+                let before = gpu.memory_report().of(Category::Light);
+                let rendering = renderer.start(&options).unwrap();
+                (gpu.memory_report().of(Category::Light) - before, rendering)
+            };
+            let (small, _) = started(256);
+            let (large, _) = started(512);
+            assert_eq!(large - small, maps * 4 * (512 * 512 - 256 * 256), "{maps} maps");
+            let report = rendered(&renderer, "preview", Value::Null, 1).report;
+            let is_drawn = report
+                .pipelines
+                .iter()
+                .any(|p| p.shader == "raster/surface_octant.vert");
+            assert_eq!(is_drawn, maps > 0, "{maps} maps");
+            assert!(report.pipelines.iter().any(|p| p.shader == "raster/surface.frag"));
+            let is_said = report.skipped.iter().any(|skipped| skipped.what == "shadow maps");
+            assert_eq!(is_said, maps == 0, "{maps} maps");
         }
     });
 }

@@ -221,7 +221,7 @@ impl DeviceInfo {
             "  compute      {} invocations a workgroup, {} shared, {} workgroups, {} of push constants",
             caps.max_workgroup_invocations,
             output::bytes(u64::from(caps.max_shared_memory)),
-            caps.max_workgroups,
+            caps.max_workgroups[0],
             output::bytes(u64::from(caps.max_push_constants))
         ));
         lines.push(if caps.timestamp_period > 0.0 {
@@ -276,8 +276,9 @@ fn limit_text(lack: &Lack) -> Option<String> {
 }
 
 /// Device features shown of every device, by their Vulkan names.
-const FEATURES: [&str; 10] = [
+const FEATURES: [&str; 11] = [
     "geometryShader",
+    "shaderClipDistance",
     "shaderInt64",
     "shaderFloat64",
     "shaderBufferInt64Atomics",

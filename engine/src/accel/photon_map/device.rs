@@ -15,6 +15,7 @@ use super::complete_bvh::INDEX_BITS;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
 use crate::card::{Role, Row, sources};
 use crate::gpu::ash::vk;
+use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::accel::{lbvh_codes, lbvh_grid, map_begin, map_blocks, map_pairs, map_split};
 use crate::gpu::shaders::constants::{LBVH_BOX_QUARTERS, MAP_BLOCK, MAP_GROUP_SIZE, MAP_LEVELS};
 use crate::gpu::shaders::types::{CompactRoot, LbvhState, MapTreeLevel, MapTreeState};
@@ -92,6 +93,16 @@ impl MapBuffers {
 }
 
 impl MapBuilder {
+    /// The kernels that are its own; it has those of [`RadixSort::KERNELS`] and [`Scan::KERNELS`] besides.
+    pub const KERNELS: [&'static ShaderInfo; 6] = [
+        &lbvh_grid::INFO,
+        &lbvh_codes::INFO,
+        &map_blocks::INFO,
+        &map_begin::INFO,
+        &map_split::INFO,
+        &map_pairs::INFO,
+    ];
+
     /// Makes the pipelines.
     ///
     /// # Errors
@@ -119,24 +130,21 @@ impl MapBuilder {
         })
     }
 
-    /// The kernels that are its own.
+    /// The kernels with their specialization, those of the sort and of the scan among them.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let [places, blocks] = &self.blocks;
-        vec![
-            self.grid.info(),
-            self.codes.info(),
-            places.info(),
-            blocks.info(),
-            self.begin.info(),
-            self.split.info(),
-            self.pairs.info(),
-        ]
+        let mut all = vec![self.grid.info(), self.codes.info()];
+        all.extend(self.sort.pipelines());
+        all.extend([places.info(), blocks.info(), self.begin.info(), self.split.info()]);
+        all.extend(self.ranks.pipelines());
+        all.push(self.pairs.info());
+        all
     }
 
     /// The most boxes that the device can build over, memory allowing.
     pub fn max_boxes(&self) -> u32 {
         let caps = self.gpu.caps();
-        let dispatched = u64::from(caps.max_workgroups) * u64::from(MAP_GROUP_SIZE);
+        let dispatched = u64::from(caps.max_workgroups[0]) * u64::from(MAP_GROUP_SIZE);
         // Boxes of places and blocks are the most texels: two a box, and a third of it besides.
         let texels = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
         let indexed = 1 << INDEX_BITS;

@@ -53,6 +53,9 @@ use super::recorder::Pass;
 use super::texels::TexelView;
 use crate::{Error, Result};
 
+/// Numbers of bindings in a set, as WebGPU has it by default: drivers keep a table up to the greatest number there is.
+const BINDINGS_MAX: u32 = 1000;
+
 /// A compute kernel made from source text. Cloning shares it.
 #[derive(Clone)]
 pub struct OwnKernel {
@@ -175,7 +178,8 @@ impl OwnKernel {
     /// source gives them. Storage of 64-bit numbers and subgroup operations are there where the device has them.
     ///
     /// # Errors
-    /// [`Error::KernelSource`] for a mistake, with its place; [`Error::Binding`] for a binding of a kind that is not taken;
+    /// [`Error::KernelSource`] for a mistake, with its place; [`Error::Binding`] for a binding of a kind that is not taken, or in a set that the device
+    /// does not bind, or with a number from 1000 on;
     /// [`Error::MissingFeature`] for what the device lacks; [`Error::OutOfMemory`].
     #[cfg(feature = "wgsl")]
     pub fn wgsl(gpu: &Gpu, name: &str, source: &str) -> Result<Self> {
@@ -351,6 +355,31 @@ fn overlap(a: &BufferView<'_>, b: &BufferView<'_>) -> bool {
 
 fn check_limits(gpu: &Inner, name: &str, module: &Module) -> Result<()> {
     check_workgroup(gpu, name, module.local_size)?;
+    let sets = gpu.caps.descriptors.bound_sets;
+    for binding in &module.bindings {
+        let refuse = |cause: String| {
+            Err(Error::Binding {
+                kernel: name.into(),
+                binding: binding.name.clone(),
+                cause,
+            })
+        };
+        if binding.set >= sets {
+            let cause = format!(
+                "is in descriptor set {}; the device binds {sets}, from 0 on",
+                binding.set
+            );
+            return refuse(cause);
+        }
+        if binding.binding >= BINDINGS_MAX {
+            let cause = format!(
+                "has number {}, and the last one is {}",
+                binding.binding,
+                BINDINGS_MAX - 1
+            );
+            return refuse(cause);
+        }
+    }
     let lacks = |feature: String, instead: String| Error::MissingFeature {
         feature,
         needed_by: name.into(),

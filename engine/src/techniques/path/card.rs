@@ -13,9 +13,9 @@ use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
 use crate::settings::{SettingsDecl, TypedSettings};
 use crate::techniques::path::{PathTracer, PathTracerSettings};
-use crate::techniques::skipped::{Feature, skipped};
+use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
-use crate::transport::PathSet;
+use crate::transport::{COMPENSATION, METAL_LOBES, PathSet, SURFACE_FEATURES};
 
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
@@ -67,51 +67,6 @@ pub(in crate::techniques) const KERNELS: [&ShaderInfo; 9] = [
     &path_resolve::INFO,
 ];
 
-/// What the specialization constants of the shading stage stand for.
-pub(in crate::techniques) const FEATURES: [Feature; 19] = [
-    ("has_metal", METAL, "no material is metal"),
-    (
-        "has_conductor",
-        "exact conductors",
-        "no metal has a complex index of refraction",
-    ),
-    (
-        "has_specular_layer",
-        "dielectric reflection",
-        "no material reflects specularly",
-    ),
-    ("has_transmission", "transmission", "no material transmits"),
-    ("has_multiple_scattering", COMPENSATION, "no material is metal"),
-    ("has_textures", "texture look-ups", "no material has a texture"),
-    ("has_shading_normals", "shading normals", "no mesh interpolates normals"),
-    ("has_normal_maps", "normal maps", "no material has one"),
-    ("has_vertex_colors", "vertex colours", "no mesh has them"),
-    ("has_absorption", "absorption in solids", "no solid absorbs"),
-    ("has_environment", "environment light", "the scene has none"),
-    ("has_area_lights", "area lights", "no material emits"),
-    ("has_unlit", "unlit surfaces", "no material is unlit"),
-    ("has_alpha", "alpha tests", "no material has alpha"),
-    ("write_aovs", "albedo, normal and depth", "they were not asked for"),
-    (
-        "has_punctual_lights",
-        "point, spot and directional lights",
-        "the scene has none",
-    ),
-    ("has_media", "participating media", "the scene has none"),
-    (
-        "has_path_automaton",
-        "path expressions",
-        "the path set is a range of bounces and lobes",
-    ),
-    (
-        "has_lobe_labels",
-        "telling overlapping lobes apart",
-        "the path set goes on alike after each, or the scene has but one",
-    ),
-];
-const METAL: &str = "metal lobes";
-const COMPENSATION: &str = "multiple-scattering compensation";
-
 impl Technique for PathTracer {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         PathTracer::step(self, samples)
@@ -157,8 +112,8 @@ impl Technique for PathTracer {
     }
 
     fn skipped(&self) -> Vec<Skipped> {
-        let mut skipped = skipped(&PathTracer::pipelines(self), path_shade::INFO.name, &FEATURES);
-        let metal = !skipped.iter().any(|skipped| skipped.what == METAL);
+        let mut skipped = skipped(&PathTracer::pipelines(self), path_shade::INFO.name, &SURFACE_FEATURES);
+        let metal = !skipped.iter().any(|skipped| skipped.what == METAL_LOBES);
         if metal && !PathTracer::settings(self).multiple_scattering {
             let compensation = skipped.iter_mut().find(|skipped| skipped.what == COMPENSATION);
             if let Some(compensation) = compensation {
@@ -217,16 +172,19 @@ mod tests {
     #[test]
     fn features_are_constants_of_the_shading_stage() {
         let constants: Vec<&str> = path_shade::INFO.spec_constants.iter().map(|c| c.name).collect();
-        for (i, (name, ..)) in FEATURES.iter().enumerate() {
+        for (i, (name, ..)) in SURFACE_FEATURES.iter().enumerate() {
             assert!(constants.contains(name), "{name} is none of {constants:?}");
             assert!(
-                FEATURES[..i].iter().all(|(other, ..)| other != name),
+                SURFACE_FEATURES[..i].iter().all(|(other, ..)| other != name),
                 "{name} is there twice"
             );
         }
         // And nothing that is left out goes unsaid.
         for name in constants.iter().filter(|name| name.starts_with("has_")) {
-            assert!(FEATURES.iter().any(|(known, ..)| known == name), "{name} is not said");
+            assert!(
+                SURFACE_FEATURES.iter().any(|(known, ..)| known == name),
+                "{name} is not said"
+            );
         }
     }
 }

@@ -38,9 +38,6 @@ use crate::transport::GpuScene;
 use crate::walk::{ArrivalStage, WalkOptions, Walker, WaveBuffers, WaveNeeds, default_slots, slots_of_device};
 use glam::DVec3;
 
-/// Bounces recorded into one command buffer, at most; a wave that needs more is submitted again.
-const BOUNCES_PER_SUBMISSION: usize = 12;
-
 /// Exact counts of what the device did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[non_exhaustive]
@@ -101,10 +98,11 @@ impl PathTracer {
         let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
         let frame = CameraFrame::new(camera, size)?;
         let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
+        let has_media = scene.profile().media.any();
         let needs = WaveNeeds {
             waiting: scene.has_lights(),
-            media: scene.profile().media.any(),
-            airlight: settings.equiangular && scene.has_punctual_lights(),
+            media: has_media,
+            airlight: has_media && settings.equiangular && scene.has_punctual_lights(),
         };
         // Beside what reading the film takes.
         let band = film.bands().iter().map(|band| u64::from(band.pixels())).max();
@@ -117,9 +115,9 @@ impl PathTracer {
         })?;
         let options = WalkOptions {
             name: "path",
-            shadows: true,
+            shadows: needs.waiting,
             ray_quota: settings.ray_quota,
-            bounces: BOUNCES_PER_SUBMISSION,
+            ..WalkOptions::default()
         };
         let walker = Walker::new(gpu, Arc::clone(&scene), buffers, options)?;
         Ok(Self {

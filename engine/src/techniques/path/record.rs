@@ -7,7 +7,7 @@ use crate::Result;
 use crate::film::GpuFilm;
 use crate::gpu::shaders::constants::{NO_MEDIUM, OUTSIDE};
 use crate::gpu::shaders::sets::{PathAovSet, WaveSet};
-use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resolve, path_shade};
+use crate::gpu::shaders::techniques::path::{path_camera, path_resolve, path_shade};
 use crate::gpu::{Access, Buffer, Recorder};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
@@ -33,6 +33,23 @@ impl EyeStages<'_> {
     fn aov_set(&self) -> PathAovSet<'_> {
         PathAovSet {
             path_aovs: self.aovs.view(),
+        }
+    }
+
+    /// What the stages of a bounce are told, both the same.
+    fn push(&self) -> path_shade::Push {
+        let (scene, settings) = (self.scene, self.settings);
+        let [lower, upper] = scene.bounds().map(|corner| corner.to_array());
+        path_shade::Push {
+            scene_lower: lower,
+            path_set: settings.path_set.packed(),
+            scene_upper: upper,
+            roulette_cap: settings.roulette_cap,
+            key: self.wave.key(settings.seed),
+            roulette_start: settings.roulette_start,
+            surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
+            accepting: settings.path_set.accepting(),
+            successors: settings.path_set.successors(),
         }
     }
 }
@@ -82,39 +99,16 @@ impl WalkStages for EyeStages<'_> {
 
     /// What happens on the way through media, and where paths have arrived.
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
-        let (p, settings) = (self.pipelines, self.settings);
-        let (scene, items) = (self.scene.scene_set(), bounce.places.items);
-        let [lower, upper] = self.scene.bounds().map(|corner| corner.to_array());
-        let key = self.wave.key(settings.seed);
+        let p = self.pipelines;
+        let (scene, items, push) = (self.scene.scene_set(), bounce.places.items, self.push());
         if let Some(medium) = &p.medium {
-            let push = path_medium::Push {
-                scene_lower: lower,
-                path_set: settings.path_set.packed(),
-                scene_upper: upper,
-                roulette_cap: settings.roulette_cap,
-                key,
-                roulette_start: settings.roulette_start,
-                surrounding: self.scene.surrounding().unwrap_or(NO_MEDIUM),
-                accepting: settings.path_set.accepting(),
-                successors: settings.path_set.successors(),
-            };
             recorder.pass("path: medium", |pass| {
-                let media = self.scene.media_set();
+                let (media, push) = (self.scene.media_set(), bytemuck::cast(push));
                 pass.dispatch_indirect(medium, &[&bounce.wave, &scene, &media], &push, items)?;
                 stage_barrier(pass);
                 Ok(())
             })?;
         }
-        let push = path_shade::Push {
-            scene_lower: lower,
-            path_set: settings.path_set.packed(),
-            scene_upper: upper,
-            roulette_cap: settings.roulette_cap,
-            key,
-            roulette_start: settings.roulette_start,
-            accepting: settings.path_set.accepting(),
-            successors: settings.path_set.successors(),
-        };
         recorder.pass("path: shade", |pass| {
             pass.dispatch_indirect(&p.shade, &[&bounce.wave, &scene, &self.aov_set()], &push, items)?;
             stage_barrier(pass);

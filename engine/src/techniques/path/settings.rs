@@ -3,7 +3,7 @@
 use crate::settings::AboveTo;
 use crate::transport::path_set::PathSet;
 use crate::transport::random::SamplerKind;
-use crate::walk::SLOTS_MAX;
+use crate::walk::{RAY_QUOTA, SLOTS_MAX};
 
 crate::settings! {
     /// Settings of the path tracer.
@@ -33,7 +33,7 @@ crate::settings! {
         ///
         /// A traversal makes progress only with a quota above twice the depth of the deepest tree, and must stay below
         /// [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
-        pub ray_quota: u32 = 32_768, in 128..=60_000, unit "loop iterations";
+        pub ray_quota: u32 = RAY_QUOTA, in 128..=60_000, unit "loop iterations";
     }
     unlisted {
         /// Seed of the random numbers. A [`View`](crate::techniques::View) gives its own.

@@ -4,21 +4,24 @@ use std::collections::BTreeMap;
 
 use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer};
 use crate::Result;
+use crate::accel::photon_map::device::MapBuilder;
 use crate::card::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::path_shade;
 use crate::gpu::shaders::techniques::photon_mapping::{
-    photon_append, photon_emit, photon_gather, photon_gather_packet, photon_scatter,
+    photon_append, photon_boxes, photon_emit, photon_gather, photon_gather_packet, photon_leaf_size, photon_leaves,
+    photon_scatter,
 };
 use crate::gpu::{Buffer, PipelineInfo};
+use crate::kernels::{RadixSort, Scan};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::{SettingsDecl, TypedSettings};
 use crate::techniques::path::card as path;
-use crate::techniques::skipped::{Feature, skipped};
+use crate::techniques::skipped::{Omission, skipped};
 use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
-use crate::transport::PathSet;
+use crate::transport::{PathSet, SURFACE_FEATURES};
 
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
@@ -27,7 +30,14 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS],
     bias: BIAS,
     needs: &[],
-    kernels: &[&path::KERNELS, &KERNELS],
+    kernels: &[
+        &path::KERNELS,
+        &KERNELS,
+        &DEVICE_MAP_KERNELS,
+        &MapBuilder::KERNELS,
+        &RadixSort::KERNELS,
+        &Scan::KERNELS,
+    ],
     path_set: PathSet::ALL,
     refusals,
     settings: SettingsDecl::of::<PhotonSettings>(),
@@ -49,7 +59,8 @@ pub(in crate::techniques) const CARD: Card = Card {
     },
 };
 
-fn refusals(profile: &SceneProfile) -> Vec<String> {
+/// Why a scene cannot be modelled.
+pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
     if profile.media.any() {
         vec!["the scene has participating media, and photon maps hold surfaces only".into()]
     } else {
@@ -65,8 +76,11 @@ const KERNELS: [&ShaderInfo; 4] = [
     &photon_gather::INFO,
 ];
 
+/// The same where the device builds the map, beside those of its tree.
+const DEVICE_MAP_KERNELS: [&ShaderInfo; 3] = [&photon_boxes::INFO, &photon_leaf_size::INFO, &photon_leaves::INFO];
+
 /// What the specialization constants of photons' scattering and of queries stand for, beside those of eye paths.
-const PHOTON_FEATURES: [Feature; 2] = [
+const PHOTON_FEATURES: [Omission; 2] = [
     ("has_differentials", "footprints of photons", "kernels have one size"),
     (
         "tells_caustics",
@@ -74,7 +88,7 @@ const PHOTON_FEATURES: [Feature; 2] = [
         "there is no final gather",
     ),
 ];
-const QUERY_FEATURES: [Feature; 2] = [
+const QUERY_FEATURES: [Omission; 2] = [
     (
         "nearest",
         "searches for the nearest photons",
@@ -139,8 +153,8 @@ impl Technique for PhotonMapper {
 
     fn skipped(&self) -> Vec<Skipped> {
         let pipelines = PhotonMapper::pipelines(self);
-        let off = |shader: &ShaderInfo, features: &[Feature]| skipped(&pipelines, shader.name, features);
-        let mut skipped = off(&path_shade::INFO, &path::FEATURES);
+        let off = |shader: &ShaderInfo, omissions: &[Omission]| skipped(&pipelines, shader.name, omissions);
+        let mut skipped = off(&path_shade::INFO, &SURFACE_FEATURES);
         skipped.extend(off(&photon_scatter::INFO, &PHOTON_FEATURES));
         skipped.extend(off(&photon_gather::INFO, &QUERY_FEATURES));
         skipped.extend(off(&photon_gather_packet::INFO, &QUERY_FEATURES));
@@ -216,7 +230,7 @@ mod tests {
             .iter()
             .filter(|c| c.name.starts_with("has_"))
         {
-            let said = path::FEATURES.iter().chain(&PHOTON_FEATURES);
+            let said = SURFACE_FEATURES.iter().chain(&PHOTON_FEATURES);
             assert!(
                 said.into_iter().any(|(name, ..)| *name == constant.name),
                 "{}",

@@ -145,7 +145,13 @@ impl DeviceMaps {
         if !self.memory.as_ref().is_some_and(enough) {
             self.memory = None;
             let most = self.builder.max_boxes().max(count);
-            self.memory = Some(self.memory_of(count.saturating_add(count / 4).min(most))?);
+            // More than are there now, so that the next pass has room as well.
+            let roomy = count.saturating_add(count / 4).min(most);
+            let made = match self.memory_of(roomy) {
+                Err(Error::OutOfMemory { .. }) if roomy > count => self.memory_of(count),
+                made => made,
+            };
+            self.memory = Some(made?);
         }
         Ok(())
     }

@@ -5,7 +5,6 @@ use std::sync::OnceLock;
 use super::map::PhotonMap;
 use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
-use crate::accel::trace::wide_counter;
 use crate::card::{Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
@@ -15,7 +14,9 @@ use crate::gpu::shaders::constants::{
 use crate::gpu::shaders::sets::{PhotonMapSet, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
 use crate::gpu::shaders::types::AskSettings;
-use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
+use crate::gpu::{
+    Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP, wide_counter,
+};
 use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
 use crate::{Error, Result};
@@ -64,7 +65,9 @@ pub(super) struct Gather {
     linear: Linear,
     /// Records of a dispatch that goes through all of them.
     quota: u32,
+    /// Of a wave, and where the host reads them.
     counters: Buffer,
+    counters_readback: Buffer,
     gather_states: u32,
     caustic_states: u32,
     bounces: [u32; 2],
@@ -135,14 +138,14 @@ impl Gather {
         let (gather_states, caustic_states) = gathering_states(settings, eye);
         let bytes = size_of::<Counters>() as u64;
         let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
-        // Memory may hold what another buffer left.
-        gpu.upload(&counters, 0, &[Counters::default()])?;
+        let counters_readback = gpu.buffer(&BufferDesc::readback("gather counters", bytes))?;
         Ok(Self {
             queue,
             query,
             linear,
             quota: settings.query_quota,
             counters,
+            counters_readback,
             gather_states,
             caustic_states,
             bounces: [set.min_bounces(), set.max_bounces().unwrap_or(u32::MAX)],
@@ -177,10 +180,9 @@ impl Gather {
         }
     }
 
-    /// Counts since they were read last.
-    pub fn take_counts(&self) -> Result<GatherCounts> {
-        let counters = self.gpu.read::<Counters>(self.counters.view(), 1)?[0];
-        self.gpu.upload(&self.counters, 0, &[Counters::default()])?;
+    /// Counts of the last wave.
+    pub fn counts(&self) -> Result<GatherCounts> {
+        let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
         Ok(GatherCounts {
             queries: u64::from(counters.queries),
             photons: wide_counter(counters.photons),
@@ -246,6 +248,24 @@ impl ArrivalStage for GatherStage<'_> {
         })
     }
 
+    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.update(self.gather.counters.view(), &[Counters::default()])
+    }
+
+    fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.copy(self.gather.counters.view(), self.gather.counters_readback.view())
+    }
+
+    fn prepare_stopped(&self) -> Result<()> {
+        if let Linear::Records(spec, made) = &self.gather.linear
+            && made.get().is_none()
+        {
+            let linear = self.gather.gpu.compute_pipeline(spec.as_ref())?;
+            made.get_or_init(|| linear);
+        }
+        Ok(())
+    }
+
     fn record_stopped(
         &self,
         recorder: &mut Recorder,
@@ -254,7 +274,7 @@ impl ArrivalStage for GatherStage<'_> {
         part: u64,
     ) -> Result<Option<u64>> {
         let gather = self.gather;
-        let Linear::Records(spec, made) = &gather.linear else {
+        let Linear::Records(_, made) = &gather.linear else {
             return Err(Error::Overflow {
                 kernel: "photon_gather".into(),
                 what: "steps of a query for neighbours".into(),
@@ -264,13 +284,10 @@ impl ArrivalStage for GatherStage<'_> {
                     .into(),
             });
         };
-        let linear = match made.get() {
-            Some(linear) => linear,
-            None => {
-                let linear = gather.gpu.compute_pipeline(spec.as_ref())?;
-                made.get_or_init(|| linear)
-            }
-        };
+        let linear = made.get().ok_or_else(|| Error::Internal {
+            what: "photon map".into(),
+            fault: "has stopped queries without the kernel for them".into(),
+        })?;
         let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
         let parts = LinearParts::new(gather.quota, self.map.count, stopped);
         let (mut part, mut taken) = (part, 0);

@@ -156,19 +156,29 @@ impl MapMaker {
 
     /// A map of the first `count` of `records`, in a scene of that area, m². Photons stay on the device where it is the one that builds.
     pub fn make(&mut self, gpu: &Gpu, records: &TexelView, count: u32, scene_area: f64) -> Result<Made> {
-        // Maps of nothing are the host's.
-        if let Self::Device { maps, or_host } = self
-            && count > 0
-        {
-            match maps.build(records, count, scene_area) {
-                Ok((map, submission)) => return Ok(Made::ByDevice(map, Box::new(submission))),
-                Err(Error::LimitExceeded { .. } | Error::OutOfMemory { .. }) if *or_host => {}
-                Err(error) => return Err(error),
-            }
+        if let Some((map, submission)) = self.by_device(records, count, scene_area)? {
+            return Ok(Made::ByDevice(map, Box::new(submission)));
         }
         let words: Vec<PhotonWords> = gpu.read(records.buffer().view(), count as usize)?;
         let built = MapContents::build(&words, scene_area)?;
         Ok(Made::ByHost(built.upload(gpu)?, built.figures()))
+    }
+
+    /// A map that the device builds; none where it is the host's to build.
+    fn by_device(
+        &mut self,
+        records: &TexelView,
+        count: u32,
+        scene_area: f64,
+    ) -> Result<Option<(PhotonMap, Submission)>> {
+        match self {
+            // Maps of nothing are the host's.
+            Self::Device { maps, or_host } if count > 0 => match maps.build(records, count, scene_area) {
+                Err(Error::LimitExceeded { .. } | Error::OutOfMemory { .. }) if *or_host => Ok(None),
+                built => built.map(Some),
+            },
+            _ => Ok(None),
+        }
     }
 
     /// What the last map by the device says of itself, once its submission was waited for.
@@ -188,10 +198,9 @@ impl MapMaker {
 
     /// As [`MapMaker::make`], and reads the map back.
     pub fn contents(&mut self, gpu: &Gpu, records: &TexelView, count: u32, scene_area: f64) -> Result<MapContents> {
-        if let Self::Device { maps, .. } = self
-            && count > 0
+        if let (Some((map, submission)), Self::Device { maps, .. }) =
+            (self.by_device(records, count, scene_area)?, &*self)
         {
-            let (map, submission) = maps.build(records, count, scene_area)?;
             submission.wait()?;
             return maps.contents(&map, scene_area);
         }

@@ -17,12 +17,12 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::card::refusals;
 use super::gather::{Gather, GatherCounts};
 use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
 use super::settings::{MapBuild, PhotonSettings};
 use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
-use crate::Result;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo, Submission};
@@ -32,6 +32,7 @@ use crate::techniques::path::PathCounters;
 use crate::techniques::{PathTracer, PathTracerSettings};
 use crate::transport::GpuScene;
 use crate::walk::ArrivalStage;
+use crate::{Error, Result};
 
 /// Exact counts, and what the host's share took.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
@@ -99,8 +100,8 @@ impl PhotonMapper {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a path set
-    /// that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for queries or queues of subgroups on
+    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with
+    /// participating media and for a path set that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for queries or queues of subgroups on
     /// a device without votes or ballots, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
         gpu: &Gpu,
@@ -110,6 +111,13 @@ impl PhotonMapper {
         settings: PhotonSettings,
     ) -> Result<Self> {
         settings.check()?;
+        let reasons = refusals(scene.profile());
+        if !reasons.is_empty() {
+            return Err(Error::Unsupported {
+                technique: "photon".into(),
+                reasons,
+            });
+        }
         let eye_paths = settings.eye_paths()?;
         let eye_settings = PathTracerSettings {
             path_set: eye_paths,
@@ -274,9 +282,11 @@ impl PhotonMapper {
                 let figures = photons.maker.figures(self.scene.surface_area())?;
                 figures.into_iter().for_each(|figures| self.counts.note(figures));
             }
-            let counts = photons.gather.take_counts()?;
-            self.counts.gather.queries += counts.queries;
-            self.counts.gather.photons += counts.photons;
+            if step.is_some() {
+                let counts = photons.gather.counts()?;
+                self.counts.gather.queries += counts.queries;
+                self.counts.gather.photons += counts.photons;
+            }
         }
         let Some(mut step) = step else {
             return Ok(None);

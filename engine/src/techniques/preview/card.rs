@@ -1,8 +1,12 @@
 //! The raster preview as a technique.
 
+use super::drawing::LIGHTS_MAX;
 use super::{PreviewMethod, PreviewSettings, live};
 use crate::card::{Role, Row, sources};
-use crate::gpu::shaders::techniques::preview::{preview_display, preview_shade};
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::maps::{directional_border, directional_coarser, prefilter_ggx};
+use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert, surface_vert};
+use crate::gpu::shaders::techniques::preview::preview_shade;
 use crate::raster::SHADOW_MAPS_MAX;
 use crate::scene::SceneProfile;
 use crate::settings::SettingsDecl;
@@ -15,7 +19,22 @@ const BIAS: Bias = Bias::Biased(
      filtered by round lobes",
 );
 
-const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT"];
+/// Clip distances cut the octants of shadow maps, as the default layout has them.
+const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"];
+
+/// What a picture may take with default settings, of whatever scene.
+const KERNELS: [&ShaderInfo; 7] = [
+    &preview_shade::INFO,
+    &surface_vert::INFO,
+    &surface_octant_vert::INFO,
+    &surface_frag::INFO,
+    &directional_coarser::INFO,
+    &directional_border::INFO,
+    &prefilter_ggx::INFO,
+];
+
+/// Why there is nothing of a scene with media.
+pub(super) const NO_MEDIA: &str = "participating media are not shown";
 
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
@@ -24,7 +43,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     rows: &[ROWS, live::ROWS],
     bias: BIAS,
     needs: NEEDS,
-    kernels: &[&[&preview_shade::INFO, &preview_display::INFO]],
+    kernels: &[&KERNELS],
     path_set: PathSet::UP_TO_DIRECT,
     refusals,
     settings: SettingsDecl::of::<PreviewSettings>(),
@@ -36,7 +55,8 @@ pub(in crate::techniques) const CARD: Card = Card {
 };
 
 fn refusals(profile: &SceneProfile) -> Vec<String> {
-    let lights = profile.lights.point + profile.lights.spot + profile.lights.directional;
+    let placed = profile.lights.point + profile.lights.spot;
+    let lights = placed + profile.lights.directional;
     let shines = profile.has_area_lights() || profile.has_unlit;
     let all = [
         (
@@ -48,10 +68,14 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
             "nothing is seen through materials that transmit".into(),
         ),
         (profile.alpha.blend, "partial alpha is drawn opaque".into()),
-        (profile.media.any(), "participating media are not shown".into()),
+        (profile.media.any(), NO_MEDIA.into()),
         (
-            lights > SHADOW_MAPS_MAX as usize,
-            format!("it has {lights} lights, and there are shadow maps for {SHADOW_MAPS_MAX}"),
+            placed > SHADOW_MAPS_MAX as usize,
+            format!("{placed} lights have a place, and there are shadow maps for {SHADOW_MAPS_MAX}"),
+        ),
+        (
+            lights > LIGHTS_MAX as usize,
+            format!("it has {lights} lights, of which {LIGHTS_MAX} are drawn"),
         ),
     ];
     all.into_iter()

@@ -1,6 +1,7 @@
 //! What draws a picture of a scene: a G-buffer, lights, and the kernel that shades what is seen.
 
-use super::lights::{PreviewLights, PreviewShadows};
+use super::card::NO_MEDIA;
+use super::lights::{LightRoom, PreviewLights, PreviewShadows};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use crate::gpu::{Area, Gpu, PipelineInfo, Recorder};
 use crate::raster::{GBuffer, GBufferDesc, Layering, OmniShadowMaps, Surfaces, View};
@@ -24,18 +25,18 @@ impl Drawing {
         gpu: &Gpu,
         scene: &GpuScene,
         size: [u32; 2],
-        lights: u32,
+        lights: LightRoom,
         shadows: Option<PreviewShadows>,
         has_probes: bool,
     ) -> Result<Self> {
-        if lights > LIGHTS_MAX {
+        if lights.all > LIGHTS_MAX {
             let cause = format!("are more than {LIGHTS_MAX}");
-            return Err(Error::setting("lights", lights, cause));
+            return Err(Error::setting("lights", lights.all, cause));
         }
         if scene.profile().media.any() {
             return Err(Error::Unsupported {
                 technique: "preview".into(),
-                reasons: vec!["the scene has participating media, which a preview of surfaces does not show".into()],
+                reasons: vec![NO_MEDIA.into()],
             });
         }
         let surfaces = scene.surfaces();
@@ -84,9 +85,12 @@ impl Drawing {
         })
     }
 
-    /// The shading kernel.
+    /// What draws surfaces and shadow maps, and shades.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        vec![self.shade.info()]
+        let mut all = self.gbuffer.pipelines();
+        all.extend(self.lights.shadows().into_iter().flat_map(OmniShadowMaps::pipelines));
+        all.extend(self.shade.pipelines());
+        all
     }
 
     /// Bytes of its pictures and of the shadow maps.

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::method::PreviewSettings;
 use crate::gpu::shaders::constants::{PREVIEW_NO_SHADOW, PROBE_LEVELS_MAX};
 use crate::gpu::shaders::types::SceneLight;
 use crate::gpu::{Access, Buffer, BufferBarrier, BufferDesc, Category, DeviceKind, Gpu, Recorder, SOFTWARE_LOOP_CAP};
@@ -29,24 +30,22 @@ pub struct PreviewShadows {
 
 impl Default for PreviewShadows {
     fn default() -> Self {
-        Self {
-            layout: ShadowLayout::Octahedron,
-            side: 512,
-            width: 2,
-        }
+        PreviewSettings::default().shadows()
     }
 }
 
 impl PreviewShadows {
     /// Refuses filters that no look-up takes, and more lights than passes or the software driver's loops allow.
-    fn check(&self, gpu: &Gpu, lights: u32) -> Result<()> {
+    fn check(&self, gpu: &Gpu, room: LightRoom) -> Result<()> {
         check_width(self.width, self.side)?;
-        if lights > SHADOW_MAPS_MAX {
+        let LightRoom { all: lights, placed } = room;
+        if placed > SHADOW_MAPS_MAX {
             let cause = format!("are more than the {SHADOW_MAPS_MAX} that may have shadow maps");
-            return Err(Error::setting("lights", lights, cause));
+            return Err(Error::setting("lights", placed, cause));
         }
         // All loops of an invocation count together.
-        let iterations = u64::from(lights) * (1 + filter_iterations(self.width)) + PROBE_ITERATIONS;
+        let filters = u64::from(placed) * filter_iterations(self.width);
+        let iterations = u64::from(lights) + filters + PROBE_ITERATIONS;
         if gpu.caps().kind == DeviceKind::Cpu && iterations > u64::from(SOFTWARE_LOOP_CAP) {
             let width = self.width;
             let cause = format!(
@@ -55,6 +54,33 @@ impl PreviewShadows {
             return Err(Error::setting("lights", lights, cause));
         }
         Ok(())
+    }
+}
+
+/// How many lights there is room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct LightRoom {
+    pub all: u32,
+    /// Those of them that may have a place, and then a shadow map.
+    pub placed: u32,
+}
+
+impl LightRoom {
+    /// For these lights, in whatever order and place.
+    pub fn of(lights: &[LightKind]) -> Self {
+        let placed = lights.iter().filter(|light| place_of(light).is_some());
+        Self {
+            all: lights.len() as u32,
+            placed: placed.count() as u32,
+        }
+    }
+}
+
+/// Where a light's shadow map is seen from, metres; `None` for lights without one.
+fn place_of(light: &LightKind) -> Option<Vec3> {
+    match light {
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(*position),
+        LightKind::Directional { .. } => None,
     }
 }
 
@@ -69,24 +95,29 @@ pub struct PreviewLights {
 }
 
 impl PreviewLights {
-    pub(super) fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, most: u32, shadows: Option<PreviewShadows>) -> Result<Self> {
+    pub(super) fn new(
+        gpu: &Gpu,
+        surfaces: &Surfaces<'_>,
+        room: LightRoom,
+        shadows: Option<PreviewShadows>,
+    ) -> Result<Self> {
         if let Some(wanted) = shadows {
-            wanted.check(gpu, most)?;
+            wanted.check(gpu, room)?;
         }
         let maps = |wanted: PreviewShadows| {
             let desc = OmniShadowDesc {
                 layout: wanted.layout,
                 side: wanted.side,
-                maps: most,
+                maps: room.placed,
             };
             OmniShadowMaps::new(gpu, surfaces, desc)
         };
-        let bytes = u64::from(most.max(1)) * size_of::<SceneLight>() as u64;
+        let bytes = u64::from(room.all.max(1)) * size_of::<SceneLight>() as u64;
         Ok(Self {
-            most,
+            most: room.all,
             count: 0,
             records: gpu.buffer(&BufferDesc::storage("preview lights", bytes, Category::Light))?,
-            shadows: shadows.filter(|_| most > 0).map(maps).transpose()?,
+            shadows: shadows.filter(|_| room.placed > 0).map(maps).transpose()?,
             width: shadows.map_or(0, |wanted| wanted.width),
         })
     }
@@ -134,11 +165,9 @@ impl PreviewLights {
         for light in lights {
             let mut record = light_record(light);
             record.spare = [PREVIEW_NO_SHADOW, 0];
-            if let (LightKind::Point { position, .. } | LightKind::Spot { position, .. }, Some(_)) =
-                (light, &self.shadows)
-            {
+            if let (Some(place), Some(_)) = (place_of(light), &self.shadows) {
                 record.spare[0] = places.len() as u32;
-                places.push(*position);
+                places.push(place);
             }
             records.push(record);
         }

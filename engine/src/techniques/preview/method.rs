@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::drawing::Drawing;
-use super::lights::PreviewShadows;
+use super::lights::{LightRoom, PreviewShadows};
 use super::probe::{LightProbe, LightProbeDesc};
 use super::shade::{PreviewPart, Target};
 use crate::Result;
@@ -37,6 +37,25 @@ crate::settings! {
     }
 }
 
+impl PreviewSettings {
+    /// What they say of shadow maps.
+    pub fn shadows(&self) -> PreviewShadows {
+        PreviewShadows {
+            layout: self.shadow_layout,
+            side: self.shadow_side,
+            width: self.shadow_width,
+        }
+    }
+
+    /// What they say of the environment's probe.
+    pub fn probe(&self) -> LightProbeDesc {
+        LightProbeDesc {
+            side: self.probe_side,
+            finest: self.probe_finest,
+        }
+    }
+}
+
 /// Raster preview of a scene, a sample of every pixel a frame.
 #[derive(Debug)]
 pub struct PreviewMethod {
@@ -56,18 +75,10 @@ impl PreviewMethod {
     /// serve; [`Error::Unsupported`](crate::Error::Unsupported) for participating media; [`Error::LimitExceeded`](crate::Error::LimitExceeded) for
     /// sizes; [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, size: [u32; 2], settings: PreviewSettings) -> Result<Self> {
-        let lights = scene.lights_without_area().len() as u32;
-        let shadows = (lights > 0).then_some(PreviewShadows {
-            layout: settings.shadow_layout,
-            side: settings.shadow_side,
-            width: settings.shadow_width,
-        });
-        let desc = LightProbeDesc {
-            side: settings.probe_side,
-            finest: settings.probe_finest,
-        };
+        let lights = LightRoom::of(&scene.lights_without_area());
+        let shadows = (lights.placed > 0).then_some(settings.shadows());
         let environment = scene.read_environment(gpu)?;
-        let probe = environment.map(|environment| LightProbe::of_environment(gpu, desc, &environment));
+        let probe = environment.map(|environment| LightProbe::of_environment(gpu, settings.probe(), &environment));
         let probe = probe.transpose()?;
         Ok(Self {
             drawing: Drawing::new(gpu, &scene, size, lights, shadows, probe.is_some())?,
@@ -127,15 +138,25 @@ impl FrameMethod for PreviewMethod {
     }
 
     fn pipelines(&self) -> Vec<PipelineInfo> {
-        self.drawing.pipelines()
+        let mut all: Vec<PipelineInfo> = Vec::new();
+        let probe = self.probe.iter().flat_map(LightProbe::pipelines);
+        for pipeline in self.drawing.pipelines().into_iter().chain(probe) {
+            // Maps of one kind share theirs.
+            if !all.contains(&pipeline) {
+                all.push(pipeline);
+            }
+        }
+        all
     }
 
     fn skipped(&self) -> Vec<Skipped> {
-        let profile = self.scene.profile();
-        let places = profile.lights.point + profile.lights.spot;
         let all = [
             (self.probe.is_none(), "light probe", "the scene has no environment"),
-            (places == 0, "shadow maps", "no light has a place"),
+            (
+                self.drawing.lights.shadows().is_none(),
+                "shadow maps",
+                "no light has a place",
+            ),
         ];
         let missing = all.into_iter().filter(|(is_missing, ..)| *is_missing);
         missing.map(|(_, what, why)| Skipped { what, why }).collect()

@@ -39,6 +39,7 @@ pub use probe::{LightProbe, LightProbeDesc};
 pub use shade::{PARTS_MAX, PreviewPart};
 
 use self::drawing::Drawing;
+use self::lights::LightRoom;
 use self::shade::Target;
 use crate::film::{Picture, PixelFormat};
 use crate::gpu::shaders::techniques::preview::preview_display;
@@ -100,10 +101,15 @@ impl Preview {
                 limit,
             });
         }
+        // Any of the lights that hosts give may have a place.
+        let room = LightRoom {
+            all: desc.lights,
+            placed: desc.lights,
+        };
         Ok(Self {
             gpu: gpu.clone(),
             desc,
-            drawing: Drawing::new(gpu, scene, size, desc.lights, desc.shadows, desc.has_probes)?,
+            drawing: Drawing::new(gpu, scene, size, room, desc.shadows, desc.has_probes)?,
             display: gpu.compute_pipeline(&())?,
             radiance: gpu.buffer(&BufferDesc::storage("preview radiance", bytes, Category::Film))?,
         })

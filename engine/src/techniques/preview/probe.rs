@@ -17,9 +17,11 @@
 
 use glam::{DMat3, UVec2};
 
+use super::method::PreviewSettings;
 use crate::gpu::shaders::constants::PROBE_LEVELS_MAX;
 use crate::gpu::{
-    Access, BufferBarrier, Gpu, Pass, Recorder, compute_to_transfer, rw_compute_to_compute, transfer_to_compute,
+    Access, BufferBarrier, Gpu, Pass, PipelineInfo, Recorder, compute_to_transfer, rw_compute_to_compute,
+    transfer_to_compute,
 };
 use crate::maps::directional_map::DirectionalMap;
 use crate::maps::prefilter::{PrefilterGgx, ggx_solid_angle};
@@ -47,7 +49,7 @@ pub struct LightProbeDesc {
 
 impl Default for LightProbeDesc {
     fn default() -> Self {
-        Self { side: 256, finest: 128 }
+        PreviewSettings::default().probe()
     }
 }
 
@@ -212,6 +214,13 @@ impl LightProbe {
     /// The lobe's width of each level.
     pub fn alphas(&self) -> &[f32] {
         &self.alphas
+    }
+
+    /// The kernels that fill it, with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let mut all = self.map.pipelines();
+        all.push(self.filter.info());
+        all
     }
 
     /// Bytes of both maps.

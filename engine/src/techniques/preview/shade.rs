@@ -104,9 +104,11 @@ impl Shade {
         })
     }
 
-    /// The kernel with its specialization.
-    pub fn info(&self) -> PipelineInfo {
-        self.pipeline.info()
+    /// The kernel with its specialization, and those of the map that stands for a probe.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let mut all = vec![self.pipeline.info()];
+        all.extend(self.dark.pipelines());
+        all
     }
 
     /// Records the shading of a G-buffer that was just drawn. Earlier uses of the target by compute shaders are waited for; afterwards it is

@@ -10,11 +10,12 @@ use crate::{Error, Result};
 use super::Card;
 
 /// A feature's Vulkan name, and whether a device has it enabled.
-type Feature = (&'static str, fn(&Caps) -> bool);
+type DeviceFeature = (&'static str, fn(&Caps) -> bool);
 
 /// What [`Card::needs`] may name.
-const FEATURES: [Feature; 16] = [
+const FEATURES: [DeviceFeature; 17] = [
     ("geometryShader", |caps| caps.geometry_shader),
+    ("shaderClipDistance", |caps| caps.max_clip_distances > 0),
     ("shaderInt64", |caps| caps.int64),
     ("shaderFloat64", |caps| caps.float64),
     ("shaderBufferInt64Atomics", |caps| caps.int64_atomics),
@@ -71,7 +72,9 @@ pub fn lacks(caps: &Caps, technique: &Card) -> Vec<Lack> {
         for exceeded in caps.exceeded_by(shader) {
             let (worst, names) = limits.entry(exceeded.name).or_insert((exceeded, Vec::new()));
             worst.wanted = worst.wanted.max(exceeded.wanted);
-            names.push(shader.name);
+            if !names.contains(&shader.name) {
+                names.push(shader.name);
+            }
         }
     }
     all.extend(limits.into_values().map(|(limit, kernels)| Lack {
