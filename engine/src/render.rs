@@ -240,6 +240,11 @@ impl Renderer {
         })
     }
 
+    /// The device.
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
     /// The scene on the device.
     pub fn gpu_scene(&self) -> &Arc<GpuScene> {
         &self.gpu_scene

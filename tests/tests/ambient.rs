@@ -10,7 +10,9 @@ use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{Camera, Environment, Material, Scene};
+use clerestory::settings::Settings;
 use clerestory::techniques::ambient::Ambient;
+use clerestory::techniques::preview::PreviewSettings;
 use clerestory::techniques::{Frame, FrameMethod, FrameTarget, by_id};
 use clerestory::transport::GpuScene;
 use clerestory_hard_cases::{Subject, subjects};
@@ -156,14 +158,25 @@ fn what_else_shines_is_refused() {
             assert!(matches!(error, Error::Unsupported { .. }), "{error}");
             assert!(error.to_string().contains(word), "{error}");
         }
-        let options = RenderOptions {
-            technique: Some("ambient".into()),
-            settings: serde_json::json!({"path_set": "LDE"}).into(),
-            ..RenderOptions::default()
-        };
         let renderer = Renderer::new(gpu, &blocks()).expect("scene");
-        let error = renderer.start(&options).err().expect("a refusal").to_string();
+        let refused = |settings: Settings| {
+            let options = RenderOptions {
+                technique: Some("ambient".into()),
+                settings,
+                ..RenderOptions::default()
+            };
+            renderer.start(&options).err().expect("a refusal").to_string()
+        };
+        let error = refused(serde_json::json!({"path_set": "LDE"}).into());
         assert!(error.contains("no others"), "{error}");
+        // It has no settings, and takes those of no other technique.
+        let error = refused(serde_json::json!({"bogus": 1}).into());
+        assert!(
+            error.contains("setting bogus: 1") && error.contains("there is none"),
+            "{error}"
+        );
+        let error = refused(Settings::of(PreviewSettings::default()));
+        assert!(error.contains("are not the technique's"), "{error}");
     });
 }
 
@@ -202,6 +215,21 @@ fn frames_are_recorded_by_themselves() {
         assert_eq!(values(&own, "radiance"), first);
         assert_ne!(picture(1), first);
         assert_eq!(picture(0), first);
+        // What would be written past its end is refused, whatever the numbers.
+        for size in [[SIZE[0], SIZE[1] + 1], [1 << 16, 1 << 16], [u32::MAX, 2], [0, 7]] {
+            let mut recorder = gpu.recorder("host").expect("recorder");
+            let frame = Frame {
+                camera: &scene.cameras[0],
+                seed: 3,
+                number: 0,
+            };
+            let target = FrameTarget {
+                radiance: &buffer,
+                size,
+            };
+            let refused = method.record(&mut recorder, &frame, &target);
+            assert!(matches!(refused, Err(Error::Setting { .. })), "{size:?}: {refused:?}");
+        }
     });
 }
 
@@ -266,7 +294,7 @@ fn adding_it_touched_its_folders_its_test_its_experiment_and_the_list() {
         } else if name == LIST {
             let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
             let naming: Vec<&str> = code.filter(|line| names_it(line)).map(str::trim).collect();
-            assert_eq!(naming, ["pub mod ambient;", "ambient::CARD,"]);
+            assert_eq!(naming, ["ambient,"]);
         } else {
             assert!(
                 WRITTEN.contains(&name.as_str()) || !names_it(&text),

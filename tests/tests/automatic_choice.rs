@@ -1,17 +1,18 @@
 //! Automatic choice on a device: predictions against what comes out, and reasons where nothing can be chosen.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
 use clerestory::film::{CompareOptions, NonFiniteSamples, Picture, PixelFormat, Step, compare};
-use clerestory::gpu::{Buffer, PipelineInfo};
+use clerestory::gpu::{Buffer, Gpu, PipelineInfo};
 use clerestory::plan::{ErrorModel, Goal, plan, plan_among, relative_mse_by_variance, relative_mse_of_pair};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::Camera;
-use clerestory::settings::SettingsDecl;
-use clerestory::techniques::{self, Bias, Card, PathTracerSettings, Skipped, Technique};
-use clerestory::transport::PathSet;
+use clerestory::settings::{Settings, SettingsDecl};
+use clerestory::techniques::{self, Bias, Card, Foresight, FrameTarget, PathTracerSettings, Skipped, Technique, View};
+use clerestory::transport::{GpuScene, PathSet};
 use clerestory::{Error, Result, scene};
 use clerestory_tests::with_gpu;
 
@@ -124,7 +125,11 @@ fn what_cannot_be_chosen_says_why() {
 }
 
 /// A technique of a host's own that errs: the path tracer's pictures, too bright by a twentieth.
-struct Bright(Box<dyn Technique>);
+struct Bright {
+    path: Box<dyn Technique>,
+    /// Samples a pixel beyond which it has no room.
+    most: u32,
+}
 
 const BRIGHT: Card = Card {
     id: "bright",
@@ -135,52 +140,70 @@ const BRIGHT: Card = Card {
     refusals: |_| Vec::new(),
     settings: SettingsDecl::of::<PathTracerSettings>(),
     variants: &[],
+    foresight: Foresight::PLAIN,
     rows: &[],
     kernels: &[],
-    create: |gpu, scene, view, settings| {
-        let path = techniques::by_id("path")?;
-        Ok(Box::new(Bright((path.create)(gpu, scene, view, settings)?)))
-    },
+    create: |gpu, scene, view, settings| bright(gpu, scene, view, settings, u32::MAX),
 };
+
+fn bright(
+    gpu: &Gpu,
+    scene: Arc<GpuScene>,
+    view: &View<'_>,
+    settings: &Settings,
+    most: u32,
+) -> Result<Box<dyn Technique>> {
+    let path = (techniques::by_id("path")?.create)(gpu, scene, view, settings)?;
+    Ok(Box::new(Bright { path, most }))
+}
 
 impl Technique for Bright {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        self.0.step(samples)
+        if samples > self.most {
+            return Err(Error::Overflow {
+                kernel: "bright".into(),
+                what: "samples".into(),
+                needed: samples.into(),
+                capacity: self.most.into(),
+                instead: "choose another technique".into(),
+            });
+        }
+        self.path.step(samples)
     }
 
     fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        let (picture, non_finite) = self.0.picture()?;
+        let (picture, non_finite) = self.path.picture()?;
         let values = picture.main_layer()?.values().iter().map(|value| value * 1.05);
         let bright = Picture::from_radiance(picture.width(), picture.height(), values.collect())?;
         Ok((bright, non_finite))
     }
 
     fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        self.0.display(target, exposure, format)
+        self.path.display(target, exposure, format)
     }
 
     fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        self.0.set_camera(camera)
+        self.path.set_camera(camera)
     }
 
     fn path_set(&self) -> PathSet {
-        self.0.path_set()
+        self.path.path_set()
     }
 
     fn settings(&self) -> serde_json::Value {
-        self.0.settings()
+        self.path.settings()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
-        self.0.counters()
+        self.path.counters()
     }
 
     fn pipelines(&self) -> Vec<PipelineInfo> {
-        self.0.pipelines()
+        self.path.pipelines()
     }
 
     fn skipped(&self) -> Vec<Skipped> {
-        self.0.skipped()
+        self.path.skipped()
     }
 }
 
@@ -261,6 +284,93 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
         let both = among(&[&BRIGHT, techniques::by_id("path").unwrap()], 0.02);
         assert_eq!(both.choice().technique, "path", "{both:?}");
         assert!(both.candidates[0].reason.contains("the goal of 2 %"), "{both:?}");
+    });
+}
+
+/// Beyond the first samples, and beyond the first round.
+const SHORT: [Card; 2] = [
+    Card {
+        create: |gpu, scene, view, settings| bright(gpu, scene, view, settings, 1),
+        ..BRIGHT
+    },
+    Card {
+        create: |gpu, scene, view, settings| bright(gpu, scene, view, settings, 4),
+        ..BRIGHT
+    },
+];
+
+const HUNGRY: Card = Card {
+    id: "hungry",
+    create: |_, _, _, _| {
+        Err(Error::OutOfMemory {
+            memory: "device",
+            name: "maps".into(),
+            bytes: 1 << 50,
+            cause: "there is less".into(),
+        })
+    },
+    ..BRIGHT
+};
+
+/// Of other light paths than are asked for.
+const ELSEWHERE: Card = Card {
+    id: "elsewhere",
+    path_set: PathSet::EMITTED,
+    settings: SettingsDecl::NONE,
+    create: |_, _, _, _| panic!("made in spite of its paths"),
+    ..BRIGHT
+};
+
+const FRAMES: Card = Card {
+    id: "frames",
+    foresight: Foresight::FRAMES,
+    create: |_, _, _, _| panic!("made in spite of its size"),
+    ..BRIGHT
+};
+
+#[test]
+fn what_cannot_be_made_is_no_end_of_the_choice() {
+    with_gpu(|gpu| {
+        let renderer = Renderer::new(gpu, &scene::load("builtin:cornell-box?source=point").unwrap()).unwrap();
+        let options = RenderOptions {
+            technique: None,
+            settings: serde_json::json!({ "path_set": "direct", "sampler": "sobol" }).into(),
+            ..options()
+        };
+        let among = |cards: &[&Card]| plan_among(&renderer, cards, &options, goal(0.1), &mut || true);
+        let path = techniques::by_id("path").unwrap();
+        let plan = among(&[&HUNGRY, &ELSEWHERE, &SHORT[0], path]).unwrap();
+        assert_eq!((plan.choice().technique, plan.choice().reason.as_str()), ("path", ""));
+        for (candidate, words) in plan
+            .candidates
+            .iter()
+            .zip(["out of device memory", "light paths", "bright: samples"])
+        {
+            assert!(candidate.reason.contains(words), "{words}: {candidate:?}");
+        }
+        // One that fails as its pilots go on, however good they were; and nothing else is left.
+        let error = among(&[&SHORT[1]]).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+        assert!(error.to_string().contains("bright: samples"), "{error}");
+    });
+}
+
+#[test]
+fn frames_too_large_for_the_device_are_no_candidates() {
+    with_gpu(|gpu| {
+        let renderer = Renderer::new(gpu, &scene::load("builtin:cornell-box").unwrap()).unwrap();
+        let side = 1 << 14;
+        let rows = gpu.caps().max_storage_buffer_range / FrameTarget::bytes([side, 1]) + 1;
+        let large = RenderOptions {
+            size: [side, rows as u32],
+            ..options()
+        };
+        // The first that can is tried, and nothing more.
+        let cards = [&FRAMES, techniques::by_id("path").unwrap()];
+        let plan = plan_among(&renderer, &cards, &large, goal(0.5), &mut || false).unwrap();
+        let reason = &plan.candidates[0].reason;
+        assert!(reason.contains("maxStorageBufferRange"), "{reason}");
+        assert_eq!(plan.choice().technique, "path");
     });
 }
 

@@ -8,7 +8,7 @@ use std::process::{Command, Output, Stdio};
 use clerestory::film::exr;
 use clerestory::gpu::{Access, Gpu, GpuOptions, PipelineInfo, Recorder};
 use clerestory::settings::SettingsDecl;
-use clerestory::techniques::{Accumulated, Bias, Card, Frame, FrameMethod, FrameTarget};
+use clerestory::techniques::{Accumulated, Bias, Card, Foresight, Frame, FrameMethod, FrameTarget};
 use clerestory::transport::PathSet;
 use clerestory_tools::experiments::render_sweep::{self, Places};
 use clerestory_tools::experiments::sweep::Cards;
@@ -264,6 +264,7 @@ static PLAIN: Card = Card {
     refusals: |_| Vec::new(),
     settings: SettingsDecl::NONE,
     variants: &[],
+    foresight: Foresight::FRAMES,
     create: |gpu, _, view, _| Accumulated::boxed(gpu, view, Plain),
 };
 

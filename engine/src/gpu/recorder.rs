@@ -96,6 +96,11 @@ impl Recorder {
         }
     }
 
+    /// Passes that can still be recorded.
+    pub fn passes_left(&self) -> usize {
+        MAX_PASSES - self.recorded.passes.len()
+    }
+
     /// Records a pass: a debug label, a timestamp pair and a crash marker around what `record` does.
     ///
     /// # Errors

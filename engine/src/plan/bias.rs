@@ -4,8 +4,10 @@
 //! pixel: the noise of all four drops out, whatever it is like within a picture (photons that several pixels share included). The mean of both
 //! ways to pair them is the same as the squared difference of the means less both variances. Between two stages of the same two renderings,
 //! (a₄ − a₁)(b₄ − b₁) likewise gives the square of how far the expected picture moves.
-//! The standard error is that of sums over square tiles, wider than what neighbouring pixels share. It counts the bias's own unevenness over the
-//! picture as noise, and so errs to the safe side: bias² + 2 standard errors lies below the true one in at most 1 of 40 pictures.
+//! The standard error is that of sums over square tiles. It counts the bias's own unevenness over the picture as noise, and so errs to the safe
+//! side: bias² + 2 standard errors lies below the true one in at most 1 of 40 pictures, as long as tiles, 64 of them, are wider than what neighbouring
+//! pixels share. Noise that more of the picture shares makes the standard error too small: photons' kernels that are seen wider than an eighth of
+//! the picture, and frames that have one place within the pixel for all of them, whose edges err alike.
 
 use super::noise::{channel_of_pair, same_size};
 use crate::Result;
@@ -25,7 +27,7 @@ const MARGIN: f64 = 2.0;
 pub struct BiasEstimate {
     /// Mean of bias² ∕ (radiance² + offset) over pixels and channels. Unbiased, so that it may come out below 0.
     pub square: f64,
-    /// Its standard error.
+    /// Its standard error, by tiles: too small where tiles share their noise.
     pub deviation: f64,
     /// Whether most of it lies where the technique is the brighter one.
     pub brighter: bool,

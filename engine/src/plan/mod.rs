@@ -5,15 +5,16 @@
 //! noise ([`ErrorModel`]). A technique that cannot model the scene, that the device cannot run, or whose pictures hold other light paths
 //! than those asked for is never chosen, and [`Plan::candidates`] says why.
 //!
-//! Bias is judged as well ([`Candidate::judged_by`] says by what). Both pilots of a technique against two of the path tracer, of other seeds, give
-//! the square of its bias without the noise of either ([`relative_bias_of_pairs`]):
+//! Bias is judged as well ([`Candidate::judged_by`] says by what). Both pilots of a technique against two of the reference, an unbiased technique, of
+//! other seeds, give the square of its bias without the noise of either ([`relative_bias_of_pairs`]):
 //!
 //! - of a **biased** technique it stays as it is, and one that may exceed the error asked for is refused with that figure;
-//! - of a **consistent** one it falls as a power of its samples, which two numbers of samples measure ([`BiasModel`]). Where the path tracer's
-//!   noise hides it, or misses paths, the technique is judged by how far its own pictures still move ([`relative_drift_of_pairs`]);
-//! - the **path tracer** itself never finds what lights without area give by way of mirrors and smooth glass. In scenes that have both, it
-//!   is held against a consistent technique as if biased, and where there is none, it comes last, and [`Candidate::misses`] and
-//!   [`Plan::shortfall`] name the lights.
+//! - of a **consistent** one it falls as a power of its samples, which two numbers of samples measure ([`BiasModel`]), or its card's
+//!   [`Law`](crate::techniques::Law) says where they do not. Where the reference's noise hides it, or where the reference misses paths, the technique is
+//!   judged by how far its own pictures still move ([`relative_drift_of_pairs`]), if its settings let them;
+//! - an **unbiased** one may miss some paths of a scene, as its card's [`Foresight`](crate::techniques::Foresight) says: the path tracer never finds what lights
+//!   without area give by way of mirrors and smooth glass. It is then held against a consistent technique as if biased, and where there is none,
+//!   it comes last, and [`Candidate::misses`] and [`Plan::shortfall`] name the lights.
 //!
 //! The predicted error is √(bias² + noise²). Pilots take one first round of each candidate with the compilation of its kernels, and then at
 //! most 15 % of the time predicted, or two seconds where no time is to be kept. What they find is the same in every run for as many rounds;
@@ -23,11 +24,12 @@
 //! those of a machine that does nothing else.
 
 mod bias;
-mod judge;
+mod judgement;
 mod model;
 mod noise;
 mod paths;
-mod pilot;
+mod rounds;
+mod trial;
 mod verdict;
 
 use std::time::{Duration, Instant};
@@ -43,8 +45,9 @@ use crate::render::{RenderOptions, Renderer};
 use crate::techniques::{self, Bias, Card};
 use crate::transport::PathSet;
 use crate::{Error, Result};
-use judge::REFERENCE;
-use pilot::{Asked, PILOT_SHARE, Trial, rounds};
+use judgement::reference_trial;
+use rounds::{PILOT_SHARE, run_rounds};
+use trial::{Asked, Trial};
 use verdict::{score, shortfall};
 
 /// What is asked for.
@@ -86,7 +89,8 @@ pub struct Candidate {
     pub noise: f64,
     /// Predicted root of the relative squared bias; `None` where nothing is known of it.
     pub bias: Option<f64>,
-    /// What that is at most, but for one case in 40.
+    /// What that is at most by the noise of the pilots, but for one case in 40, if it falls by the law in `judged_by`. How well the law is known does not
+    /// count: where kernels' edges err more than what they blur, it falls more slowly than the law of blur, which is taken where pilots show none.
     pub bias_at_most: Option<f64>,
     /// What the bias was found by, and the law by which it falls; empty for what has none.
     pub judged_by: String,
@@ -96,7 +100,7 @@ pub struct Candidate {
     pub seconds: f64,
 }
 
-/// The pilots that biased and consistent techniques were held against.
+/// The reference: pilots of an unbiased technique that others were held against.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct Reference {
@@ -118,7 +122,7 @@ pub struct Plan {
     pub chosen: usize,
     /// Everything that could have been chosen, and why it could not.
     pub candidates: Vec<Candidate>,
-    /// What others were judged by; `None` where nothing could.
+    /// What others were held against; `None` where there was nothing.
     pub reference: Option<Reference>,
     /// Seconds that the pilots took, with the compilation of their kernels.
     pub pilot_seconds: f64,
@@ -156,7 +160,7 @@ impl Plan {
 ///
 /// # Errors
 /// [`Error::Setting`] for a goal that is none; [`Error::Unsupported`] when no technique can render the scene as asked, with every
-/// reason; otherwise as [`Renderer::start`] and [`Rendering::step`](crate::render::Rendering::step).
+/// reason, limits of the device and its memory included; otherwise as [`Renderer::start`] and [`Rendering::step`](crate::render::Rendering::step).
 pub fn plan(
     renderer: &Renderer,
     options: &RenderOptions,
@@ -207,41 +211,52 @@ pub fn plan_among(
         trials.push(trial);
     }
     if trials.iter().all(Option::is_none) {
-        let reason = |candidate: &Candidate| format!("{}: {}", candidate.technique, candidate.reason);
-        return Err(Error::Unsupported {
-            technique: "automatic choice".into(),
-            reasons: candidates.iter().map(reason).collect(),
-        });
+        return Err(none_can(&candidates));
     }
-    // Someone has to judge what is biased.
-    let is_biased = |trial: &Trial<'_>| trial.card.bias != Bias::Unbiased;
-    if trials.iter().flatten().any(is_biased) && !trials.iter().flatten().any(|trial| trial.card.id == REFERENCE) {
-        let card = techniques::by_id(REFERENCE)?;
-        let mut judge = Candidate::of(card, "judge", merged(serde_json::json!({}), &fixed, card));
-        trials.push(Trial::judge(&asked, card, &mut judge)?);
+    // What is biased is held against something.
+    let is_unbiased = |trial: &Trial<'_>| trial.card.bias == Bias::Unbiased;
+    if !trials.iter().flatten().any(is_unbiased) {
+        for card in techniques::all().iter().filter(|card| card.bias == Bias::Unbiased) {
+            let mut candidate = Candidate::of(card, "reference", merged(serde_json::json!({}), &fixed, card));
+            if let Some(trial) = Trial::start_reference(&asked, card, &mut candidate)? {
+                trials.push(Some(trial));
+                break;
+            }
+        }
     }
-    rounds(&mut trials, &asked, start, proceed)?;
+    run_rounds(&mut trials, &asked, start, proceed)?;
     let pilot_seconds = start.elapsed().as_secs_f64();
-    // A judge that is no candidate stands at the end, beyond all of them.
+    // A reference that is no candidate stands at the end, beyond all of them.
     for (candidate, trial) in candidates.iter_mut().zip(&trials) {
         if let Some(trial) = trial {
             trial.predict(candidate, goal, pilot_seconds);
         }
     }
     let score = |index: &usize| score(&candidates[*index], goal);
-    let tried = (0..candidates.len()).filter(|index| trials[*index].is_some());
-    let chosen = tried.min_by(|a, b| score(a).total_cmp(&score(b))).unwrap_or(0);
+    let able = |index: &usize| trials[*index].as_ref().is_some_and(Trial::can_be_chosen);
+    let able = (0..candidates.len()).filter(able);
+    let Some(chosen) = able.min_by(|a, b| score(a).total_cmp(&score(b))) else {
+        return Err(none_can(&candidates));
+    };
     let shortfall = shortfall(&candidates[chosen], goal, pilot_seconds);
     Ok(Plan {
         goal,
         chosen,
-        reference: judge::reference(&trials).map(Trial::as_reference),
+        reference: reference_trial(&trials).map(Trial::as_reference),
         pilot_seconds,
         pilot_share: pilot_seconds / (pilot_seconds + candidates[chosen].seconds),
         pilot_share_limit: PILOT_SHARE,
         shortfall,
         candidates,
     })
+}
+
+fn none_can(candidates: &[Candidate]) -> Error {
+    let reason = |candidate: &Candidate| format!("{}: {}", candidate.technique, candidate.reason);
+    Error::Unsupported {
+        technique: "automatic choice".into(),
+        reasons: candidates.iter().map(reason).collect(),
+    }
 }
 
 fn check(goal: Goal) -> Result<()> {
@@ -331,12 +346,15 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/noise.rs::pairs_know_their_error",
         "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",
         "engine/src/plan/model.rs::biases_fall_as_they_were_seen_to",
+        "engine/src/plan/model.rs::pictures_that_cannot_move_show_no_bias",
         "engine/src/plan/bias.rs::known_biases_are_recovered",
         "engine/src/plan/bias.rs::noise_is_seldom_taken_for_bias",
-        "engine/src/plan/paths.rs::caustics_of_lights_without_area_are_said_to_be_missed",
+        "engine/src/techniques/path/unseen.rs::caustics_of_lights_without_area_are_said_to_be_missed",
         "engine/src/plan/verdict.rs::what_cannot_be_had_is_said",
         "tests/tests/automatic_choice.rs::predictions_come_true",
         "tests/tests/automatic_choice.rs::what_cannot_be_chosen_says_why",
+        "tests/tests/automatic_choice.rs::what_cannot_be_made_is_no_end_of_the_choice",
+        "tests/tests/automatic_choice.rs::frames_too_large_for_the_device_are_no_candidates",
         "tests/tests/automatic_choice.rs::a_bias_beyond_the_goal_is_refused_with_its_figure",
         "tests/tests/automatic_choice.rs::the_path_tracer_does_not_win_by_what_it_misses",
     ],
@@ -357,7 +375,7 @@ mod tests {
 
     #[test]
     fn fixed_settings_leave_fewer_candidates() {
-        let path = [techniques::by_id(REFERENCE).unwrap()];
+        let path = [techniques::by_id("path").unwrap()];
         let free = candidates(&path, &Value::Null);
         assert!(free.len() > 1, "{free:?}");
         let settings = serde_json::json!({ "sampler": "pcg", "path_set": "direct" });

@@ -5,7 +5,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::range::Allowed;
-use super::{shown, typed_number};
+use super::{Settings, shown, typed_number};
 use crate::{Error, Result};
 
 /// A setting, for help.
@@ -61,7 +61,10 @@ pub trait TypedSettings: std::fmt::Debug + Clone + Default + PartialEq + Send + 
         for (name, value) in object {
             if !settings.set(name, value)? {
                 let known: Vec<_> = Self::infos().iter().map(|info| info.name).collect();
-                let cause = format!("is for no setting of that name; there is: {}", known.join(", "));
+                let cause = match known.is_empty() {
+                    true => "is for no setting of that name; there is none".into(),
+                    false => format!("is for no setting of that name; there is: {}", known.join(", ")),
+                };
                 return Err(Error::setting(name, shown(value), cause));
             }
         }
@@ -75,7 +78,7 @@ pub trait TypedSettings: std::fmt::Debug + Clone + Default + PartialEq + Send + 
 pub struct SettingsDecl {
     infos: fn() -> Vec<SettingInfo>,
     defaults: fn() -> Value,
-    check: fn(&Value) -> Result<()>,
+    check: fn(&Settings) -> Result<()>,
 }
 
 impl SettingsDecl {
@@ -87,7 +90,7 @@ impl SettingsDecl {
         Self {
             infos: T::infos,
             defaults: || T::default().to_json(),
-            check: |json| T::from_json(json).map(|_| ()),
+            check: |settings| settings.read::<T>().map(|_| ()),
         }
     }
 
@@ -116,7 +119,15 @@ impl SettingsDecl {
     /// # Errors
     /// As [`TypedSettings::from_json`].
     pub fn check(&self, json: &Value) -> Result<()> {
-        (self.check)(json)
+        self.check_given(&json.clone().into())
+    }
+
+    /// Refuses settings that [`Settings::read`] refuses for the type of this declaration.
+    ///
+    /// # Errors
+    /// As [`Settings::read`].
+    pub fn check_given(&self, settings: &Settings) -> Result<()> {
+        (self.check)(settings)
     }
 }
 

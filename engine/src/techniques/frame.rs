@@ -16,6 +16,7 @@
 
 use std::collections::BTreeMap;
 
+use super::foresight::frame_fits;
 use super::{Skipped, Technique, View};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
@@ -25,7 +26,7 @@ use crate::scene::camera_frame::CameraFrame;
 use crate::transport::PathSet;
 use crate::{Error, Result};
 
-/// Frames of a step, at most: a recorder has room for 1024 passes.
+/// Frames of a step, at most; fewer where their passes fill a recorder.
 const FRAMES_MAX: u32 = 32;
 /// Samples of a step on software devices, about.
 const STEP_SAMPLES: u64 = 1 << 18;
@@ -56,7 +57,7 @@ impl FrameTarget<'_> {
         size_of::<[f32; 3]>() as u64 * size[0] as u64 * size[1] as u64
     }
 
-    /// Refuses a target of another size than `size`, or one that is too small for it.
+    /// Refuses a target of another size than `size`, for which the method was made, and what [`pixels`](Self::pixels) refuses.
     ///
     /// # Errors
     /// [`Error::Setting`].
@@ -65,16 +66,31 @@ impl FrameTarget<'_> {
             let cause = format!("is not the {size:?} that the method was made for");
             return Err(Error::setting("size", format!("{:?}", self.size), cause));
         }
-        let (bytes, found) = (Self::bytes(size), self.radiance.bytes());
+        self.pixels().map(|_| ())
+    }
+
+    /// How many pixels the picture has: every method asks this, or [`check`](Self::check), before it records what writes them.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a buffer that is too small for them, and for none or 2³² pixels and more.
+    pub fn pixels(&self) -> Result<u32> {
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        let Some(pixels) = u32::try_from(pixels).ok().filter(|pixels| *pixels > 0) else {
+            let cause = "has no pixels, or 2^32 and more";
+            return Err(Error::setting("size", format!("{:?}", self.size), cause));
+        };
+        let (bytes, found) = (Self::bytes(self.size), self.radiance.bytes());
         if found < bytes {
             let cause = format!("has {found} bytes; the picture needs {bytes}");
             return Err(Error::setting("target", self.radiance.name(), cause));
         }
-        Ok(())
+        Ok(pixels)
     }
 }
 
 /// Draws one picture a frame. [`Accumulated`] makes a [`Technique`] of it.
+///
+/// What `begin` and one `record` take together must be less than the 1024 passes of a [`Recorder`], since [`Accumulated`] adds one of its own.
 pub trait FrameMethod: Send {
     /// Records what frames share, such as shadow maps: before the first, and again when lights or surfaces have moved.
     ///
@@ -85,7 +101,8 @@ pub trait FrameMethod: Send {
         Ok(())
     }
 
-    /// Records one picture: one sample of every pixel. Barriers before and after: see the [module](self).
+    /// Records one picture: one sample of every pixel. Barriers before and after: see the [module](self). [`FrameTarget::pixels`] or
+    /// [`FrameTarget::check`] refuses targets that it must not write.
     ///
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used or a target of a wrong size; [`Error::MissingBarrier`] in debug builds.
@@ -127,6 +144,8 @@ pub struct Accumulated<M> {
     /// What frames share has been drawn.
     begun: bool,
     pace: Pace,
+    /// Most passes of a frame so far, the film's included.
+    passes_a_frame: usize,
     /// Frames since it was made.
     frames: u64,
 }
@@ -140,16 +159,8 @@ impl<M: FrameMethod> Accumulated<M> {
     pub fn new(gpu: &Gpu, view: &View<'_>, method: M) -> Result<Self> {
         let film = GpuFilm::new(gpu, view.size, false)?;
         CameraFrame::new(view.camera, view.size)?;
+        frame_fits(gpu.caps(), view.size)?;
         let bytes = FrameTarget::bytes(view.size);
-        let limit = gpu.caps().max_storage_buffer_range;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "frame".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
         Ok(Self {
             gpu: gpu.clone(),
             method,
@@ -161,6 +172,7 @@ impl<M: FrameMethod> Accumulated<M> {
             done: 0,
             begun: false,
             pace: Pace::new(gpu.caps().kind, FRAMES_MAX),
+            passes_a_frame: 0,
             frames: 0,
         })
     }
@@ -191,7 +203,8 @@ impl<M: FrameMethod> Accumulated<M> {
         self.pace.units(1, unwatched.min(u64::from(FRAMES_MAX)) as u32)
     }
 
-    fn submit(&mut self, frames: u32) -> Result<Timings> {
+    /// Draws `frames` frames, or as many as one recorder has room for, and says how many these were.
+    fn submit(&mut self, frames: u32) -> Result<(u32, Timings)> {
         let mut recorder = self.gpu.recorder("frames")?;
         if !self.begun {
             self.method.begin(&mut recorder)?;
@@ -200,17 +213,21 @@ impl<M: FrameMethod> Accumulated<M> {
             radiance: &self.radiance,
             size: self.film.size(),
         };
-        for number in self.done..self.done + frames {
+        let mut drawn = 0;
+        while drawn < frames && (drawn == 0 || recorder.passes_left() >= self.passes_a_frame) {
+            let left = recorder.passes_left();
             let frame = Frame {
                 camera: &self.camera,
                 seed: self.seed,
-                number,
+                number: self.done + drawn,
             };
             self.method.record(&mut recorder, &frame, &target)?;
             // Waits for the frame, and leaves the target to the next one.
             self.film.record_frame(&mut recorder, &self.radiance)?;
+            self.passes_a_frame = self.passes_a_frame.max(left - recorder.passes_left());
+            drawn += 1;
         }
-        recorder.submit()?.wait()
+        Ok((drawn, recorder.submit()?.wait()?))
     }
 }
 
@@ -219,9 +236,9 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
         if self.done >= samples {
             return Ok(None);
         }
-        let frames = self.frames_for_step().min(samples - self.done);
+        let wanted = self.frames_for_step().min(samples - self.done);
         let clock = std::time::Instant::now();
-        let timings = self.submit(frames)?;
+        let (frames, timings) = self.submit(wanted)?;
         let seconds = timings
             .untimed
             .as_ref()

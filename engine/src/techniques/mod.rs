@@ -9,7 +9,7 @@
 //! # How to add one
 //!
 //! `CONTRIBUTING.md` says it in one page, with [`ambient`] as the example: a folder here and one of the same name in `shaders/techniques/`, a test, an
-//! experiment, and the module's two lines in this file. In a host there is nothing to list:
+//! experiment, and the module's name in this file's list. In a host there is nothing to list:
 //! [`Renderer::start_technique`](crate::render::Renderer::start_technique) takes a [`Card`] as it is.
 //!
 //! 1. A frame method: a type with pipelines, specialized to [`GpuScene::profile`], that implements [`FrameMethod`]. A progressive technique: a type with settings,
@@ -17,13 +17,26 @@
 //!    need is left out, and said by `skipped`.
 //! 2. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
 
-pub mod ambient;
 mod device_needs;
+mod foresight;
 pub mod frame;
-pub mod path;
-pub mod photon_mapping;
-pub mod preview;
 mod skipped;
+
+/// Declares the modules of techniques, and [`ALL`] of their cards: each has a constant `CARD`.
+macro_rules! methods {
+    ($($module:ident),* $(,)?) => {
+        $(pub mod $module;)*
+
+        const ALL: &[Card] = &[$($module::CARD),*];
+    };
+}
+
+methods! {
+    path,
+    photon_mapping,
+    preview,
+    ambient,
+}
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,7 +45,7 @@ use crate::card::Row;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
-use crate::gpu::{Buffer, Gpu, PipelineInfo};
+use crate::gpu::{Buffer, Caps, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::{Settings, SettingsDecl};
 use crate::transport::{GpuScene, PathSet};
@@ -40,6 +53,7 @@ use crate::{Error, Result};
 
 pub use crate::card::Bias;
 pub use device_needs::{Lack, lacks, offers};
+pub use foresight::{Foresight, Law};
 pub use frame::{Accumulated, Frame, FrameMethod, FrameTarget};
 pub use path::{PathTracer, PathTracerSettings};
 
@@ -68,6 +82,8 @@ pub struct Card {
     /// Settings that an automatic choice tries ([`plan`](mod@crate::plan)): all of them give the same expected picture. The first are the
     /// defaults.
     pub variants: &'static [Variant],
+    /// What pilot pictures do not show of it; [`Foresight::PLAIN`], or [`Foresight::FRAMES`] for a frame method, unless it has more to say.
+    pub foresight: Foresight,
     /// Makes the technique. Whoever wants one calls [`Card::prepare`], which looks at device and scene first.
     pub create: Create,
 }
@@ -164,12 +180,7 @@ pub struct Skipped {
 
 /// Every technique of the engine.
 pub fn all() -> &'static [Card] {
-    &[
-        path::card::CARD,
-        photon_mapping::card::CARD,
-        preview::card::CARD,
-        ambient::CARD,
-    ]
+    ALL
 }
 
 /// The technique of that id.
@@ -205,17 +216,31 @@ impl Card {
         view: &View<'_>,
         settings: &Settings,
     ) -> Result<Box<dyn Technique>> {
-        device_needs::check(gpu.caps(), self)?;
-        let mut reasons = (self.refusals)(scene.profile());
+        let settings = self.admit(gpu.caps(), scene.profile(), settings)?;
+        (self.create)(gpu, scene, view, &settings)
+    }
+
+    /// Refuses what [`Card::prepare`] refuses before anything is made. Returns the settings for [`Card::create`].
+    pub(crate) fn admit(&self, caps: &Caps, profile: &SceneProfile, settings: &Settings) -> Result<Settings> {
+        device_needs::check(caps, self)?;
+        let mut reasons = (self.refusals)(profile);
         reasons.extend(self.path_set_refusal(settings));
-        let settings = &self.without_path_set(settings);
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
                 technique: self.id.into(),
                 reasons,
             });
         }
-        (self.create)(gpu, scene, view, settings)
+        let settings = self.without_path_set(settings);
+        self.settings.check_given(&settings)?;
+        Ok(settings)
+    }
+
+    /// The light paths of its pictures with these settings, as far as a path set among them can be read.
+    pub(crate) fn path_set_with(&self, settings: &Settings) -> PathSet {
+        let json = settings.to_json();
+        let named = json.get(PATH_SET).and_then(|text| text.as_str()?.parse().ok());
+        named.unwrap_or(self.path_set)
     }
 
     /// Settings without a path set that says no more than the technique's own does, for one that has no such setting.

@@ -8,11 +8,11 @@ use clerestory::gpu::shaders::types::{FilmPixel, TwoFloat};
 use clerestory::gpu::{
     Access, Buffer, BufferDesc, Category, ComputePipeline, EnabledFeatures, Gpu, PipelineInfo, Recorder,
 };
-use clerestory::render::{RenderOptions, Renderer};
+use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::Camera;
 use clerestory::settings::{Settings, SettingsDecl};
 use clerestory::techniques::{
-    Accumulated, Bias, Card, Frame, FrameMethod, FrameTarget, PathTracerSettings, Skipped, Technique,
+    Accumulated, Bias, Card, Foresight, Frame, FrameMethod, FrameTarget, PathTracerSettings, Skipped, Technique, View,
 };
 use clerestory::transport::PathSet;
 use clerestory::transport::random::{pcg4d, unit_float};
@@ -54,6 +54,7 @@ const EVEN: Card = Card {
     },
     settings: SettingsDecl::of::<EvenSettings>(),
     variants: &[],
+    foresight: Foresight::PLAIN,
     create: |gpu, _, view, settings| {
         let settings: EvenSettings = settings.read()?;
         Ok(Box::new(Even {
@@ -68,6 +69,8 @@ const EVEN: Card = Card {
 /// A frame method as a host would write it: pictures whose pixels are their places and a random number.
 struct Places {
     pipeline: ComputePipeline<host_frame::Kernel>,
+    /// Passes of a frame beside the one that draws.
+    idle: u32,
     begun: u64,
     drawn: u64,
 }
@@ -78,16 +81,20 @@ const PLACES: Card = Card {
     path_set: PathSet::EMITTED,
     refusals: |_| Vec::new(),
     settings: SettingsDecl::NONE,
-    create: |gpu, _, view, _| {
-        let method = Places {
-            pipeline: gpu.compute_pipeline(&())?,
-            begun: 0,
-            drawn: 0,
-        };
-        Accumulated::boxed(gpu, view, method)
-    },
+    foresight: Foresight::FRAMES,
+    create: |gpu, _, view, _| places_with(gpu, view, 0),
     ..EVEN
 };
+
+fn places_with(gpu: &Gpu, view: &View<'_>, idle: u32) -> Result<Box<dyn Technique>> {
+    let method = Places {
+        pipeline: gpu.compute_pipeline(&())?,
+        idle,
+        begun: 0,
+        drawn: 0,
+    };
+    Accumulated::boxed(gpu, view, method)
+}
 
 impl FrameMethod for Places {
     fn begin(&mut self, _: &mut Recorder) -> Result<()> {
@@ -97,7 +104,10 @@ impl FrameMethod for Places {
 
     fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
         self.drawn += 1;
-        let [width, height] = target.size;
+        let (pixels, [width, height]) = (target.pixels()?, target.size);
+        for _ in 0..self.idle {
+            recorder.pass("places: nothing", |_| Ok(()))?;
+        }
         let push = host_frame::Push {
             width,
             height,
@@ -108,7 +118,7 @@ impl FrameMethod for Places {
             let set = host_frame::Set0 {
                 radiance: target.radiance.view(),
             };
-            let groups = self.pipeline.groups_over(width * height);
+            let groups = self.pipeline.groups_over(pixels);
             pass.dispatch(&self.pipeline, &[&set], &push, groups)
         })
     }
@@ -316,6 +326,35 @@ fn a_frame_method_of_the_hosts_own_is_a_technique_like_others() {
             .iter()
             .any(|pipeline| pipeline.shader == add_frame::INFO.name)
     );
+    assert_no_messages(&gpu);
+}
+
+/// 32 frames of a step would take more passes than a recorder has.
+#[test]
+fn frames_of_many_passes_take_more_steps() {
+    const MANY: Card = Card {
+        create: |gpu, _, view, _| places_with(gpu, view, 39),
+        ..PLACES
+    };
+    let gpu = gpu();
+    let scene = clerestory::scene::load("builtin:cornell-box").unwrap();
+    let renderer = Renderer::new(&gpu, &scene).unwrap();
+    let picture = |card: &Card| {
+        let options = RenderOptions {
+            size: [3, 2],
+            spp: 70,
+            ..RenderOptions::default()
+        };
+        let mut rendering = renderer.start_technique(card, &options).unwrap();
+        while rendering.step().unwrap().is_some() {}
+        rendering.finish().unwrap()
+    };
+    let (many, few) = (picture(&MANY), picture(&PLACES));
+    assert_eq!((many.report.samples, many.report.counters["frames"]), ([70, 70], 70));
+    let values = |rendered: &Rendered| rendered.picture.layer("radiance").unwrap().values().to_vec();
+    assert_eq!(values(&many), values(&few));
+    let idle = many.report.passes.iter().find(|pass| pass.name == "places: nothing");
+    assert_eq!(idle.map(|pass| pass.count), Some(39 * 70));
     assert_no_messages(&gpu);
 }
 

@@ -9,7 +9,7 @@ use crate::gpu::shaders::techniques::ambient::ambient as kernel;
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
 use crate::scene::{EnvironmentUse, camera_frame::CameraFrame};
 use crate::settings::SettingsDecl;
-use crate::techniques::{Accumulated, Bias, Card, Frame, FrameMethod, FrameTarget, Variant, reasons};
+use crate::techniques::{Accumulated, Bias, Card, Foresight, Frame, FrameMethod, FrameTarget, Variant, reasons};
 use crate::transport::{GpuScene, PathSet, surface_spec};
 
 const ROW: Row = Row {
@@ -44,6 +44,7 @@ pub(super) const CARD: Card = Card {
     },
     settings: SettingsDecl::NONE,
     variants: &[Variant::DEFAULTS],
+    foresight: Foresight::FRAMES,
     create: |gpu, scene, view, _| Accumulated::boxed(gpu, view, Ambient::new(gpu, scene)?),
 };
 
@@ -71,13 +72,12 @@ impl FrameMethod for Ambient {
     fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
         let [lower, upper] = self.0.bounds().map(|corner| corner.to_array());
         let camera = CameraFrame::new(frame.camera, target.size)?.rays(target.size);
-        let (frame, seed, radiance) = (frame.number, frame.seed, target.radiance.view());
-        let groups = self.1.groups_over(target.size[0] * target.size[1]);
+        let (frame, seed, radiance, pixels) = (frame.number, frame.seed, target.radiance.view(), target.pixels()?);
         #[rustfmt::skip]
         let push = kernel::Push { camera, frame, seed, lower, upper };
         recorder.pass("ambient: shade", |pass| {
             let (set, index, scene) = (kernel::Set0 { radiance }, self.0.index_set(), self.0.scene_set());
-            pass.dispatch(&self.1, &[&set, &index, &scene], &push, groups)
+            pass.dispatch(&self.1, &[&set, &index, &scene], &push, self.1.groups_over(pixels))
         })
     }
 

@@ -12,9 +12,10 @@ use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, ex
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
 use crate::settings::{SettingsDecl, TypedSettings};
+use crate::techniques::path::unseen::unseen_by_eye_paths;
 use crate::techniques::path::{PathTracer, PathTracerSettings};
 use crate::techniques::skipped::skipped;
-use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
+use crate::techniques::{Bias, Card, Foresight, Skipped, Technique, Variant};
 use crate::transport::{COMPENSATION, METAL_LOBES, PathSet, SURFACE_FEATURES};
 
 /// The catalogue's entry.
@@ -46,6 +47,10 @@ pub(in crate::techniques) const CARD: Card = Card {
             settings: || serde_json::json!({ "roulette_start": 1 }),
         },
     ],
+    foresight: Foresight {
+        misses: unseen_by_eye_paths,
+        ..Foresight::PLAIN
+    },
     create: |gpu, scene, view, settings| {
         let mut settings: PathTracerSettings = settings.read()?;
         settings.seed = view.seed;

@@ -16,10 +16,12 @@ pub(super) mod card;
 mod pipelines;
 mod record;
 mod settings;
+mod unseen;
 mod wave;
 
 use std::sync::Arc;
 
+pub(super) use self::card::CARD;
 use self::pipelines::{Pipelines, camera_pipeline};
 use self::record::{EyeStages, record_resolve};
 pub use self::settings::PathTracerSettings;

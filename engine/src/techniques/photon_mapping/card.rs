@@ -17,10 +17,10 @@ use crate::gpu::shaders::techniques::photon_mapping::{
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::kernels::{RadixSort, Scan};
 use crate::scene::{Camera, SceneProfile};
-use crate::settings::{SettingsDecl, TypedSettings};
+use crate::settings::{Settings, SettingsDecl, TypedSettings};
 use crate::techniques::path::card as path;
 use crate::techniques::skipped::{Omission, skipped};
-use crate::techniques::{Bias, Card, Skipped, Technique, Variant};
+use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant};
 use crate::transport::{PathSet, SURFACE_FEATURES};
 
 /// The catalogue's entry.
@@ -45,6 +45,10 @@ pub(in crate::techniques) const CARD: Card = Card {
         name: "defaults",
         settings: || serde_json::json!({}),
     }],
+    foresight: Foresight {
+        law,
+        ..Foresight::PLAIN
+    },
     create: |gpu, scene, view, settings| {
         let mut settings: PhotonSettings = settings.read()?;
         settings.seed = view.seed;
@@ -58,6 +62,24 @@ pub(in crate::techniques) const CARD: Card = Card {
         )?))
     },
 };
+
+/// With reduction α, kernels' area falls as passes^(α − 1). What they blur is off by as much, and the variance falls as passes^(−α).
+///
+/// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011, §4.
+fn law(settings: &Settings) -> Result<Law> {
+    let settings: PhotonSettings = settings.read()?;
+    let reduction = f64::from(settings.reduction);
+    Ok(Law {
+        slope: reduction,
+        bias_exponent: if settings.kernels_shrink() {
+            2.0 * (1.0 - reduction)
+        } else {
+            0.0
+        },
+        samples_a_pass: settings.samples_per_pass,
+        shares_noise: true,
+    })
+}
 
 /// Why a scene cannot be modelled.
 pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
@@ -211,6 +233,24 @@ const ROWS: &[Row] = &[Row {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn laws_follow_the_settings() {
+        let of = |settings: serde_json::Value| law(&settings.into()).unwrap();
+        let usual = of(serde_json::json!({}));
+        assert!((usual.bias_exponent - 2.0 / 3.0).abs() < 1e-6 && (usual.slope - 2.0 / 3.0).abs() < 1e-6);
+        assert_eq!(usual.samples_a_pass, 1);
+        let settings = serde_json::json!({ "reduction": 0.5, "samples_per_pass": 8, "neighbors": 100 });
+        let law = of(settings);
+        assert_eq!((law.bias_exponent, law.slope, law.samples_a_pass), (1.0, 0.5, 8));
+        // What does not shrink does not move.
+        for settings in [
+            serde_json::json!({ "reduction": 1 }),
+            serde_json::json!({ "neighbors": 2 }),
+        ] {
+            assert_eq!(of(settings).bias_exponent, 0.0);
+        }
+    }
 
     #[test]
     fn features_are_constants_of_their_kernels() {

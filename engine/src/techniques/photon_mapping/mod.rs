@@ -2,7 +2,7 @@
 
 pub mod kernel;
 
-pub(super) mod card;
+mod card;
 mod device_map;
 mod gather;
 mod map;
@@ -11,6 +11,7 @@ mod queue;
 mod settings;
 mod tracer;
 
+pub(super) use card::CARD;
 pub use gather::GatherCounts;
 pub use map::{MapContents, map_contents};
 pub use mapper::{MappedPhoton, MapperCounts, PhotonMapper};

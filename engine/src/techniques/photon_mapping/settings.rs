@@ -17,6 +17,8 @@ const RADIUS_SHARE: f64 = 1.0 / 100.0;
 const UNIT_SHARE: f64 = 1.0 / 9.0;
 /// Least photons under a kernel about a point: the last one only says how wide it is.
 const NEIGHBORS_MIN: u32 = 2;
+/// Passes that neighbours must not yet be the least after, to count as shrinking.
+const MANY_PASSES: u32 = 1024;
 /// Neighbours are looked for as far as this many times their number would lie.
 const NEIGHBORS_MARGIN: f64 = 4.0;
 /// Nodes and records of a query, at most: loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
@@ -147,6 +149,11 @@ impl PhotonSettings {
     pub(super) fn neighbors_in(&self, pass: u32) -> u32 {
         let kept = shrinkage(pass, f64::from(self.reduction)).powi(2);
         ((f64::from(self.neighbors) * kept).round() as u32).max(NEIGHBORS_MIN)
+    }
+
+    /// Whether kernels shrink from pass to pass, for many passes.
+    pub(super) fn kernels_shrink(&self) -> bool {
+        self.reduction < 1.0 && (self.neighbors == 0 || self.neighbors_in(MANY_PASSES) > NEIGHBORS_MIN)
     }
 
     /// Kernels of a pass, in a scene of that diagonal, m, and that area, m².

@@ -10,7 +10,7 @@ use crate::gpu::shaders::techniques::preview::preview_shade;
 use crate::raster::SHADOW_MAPS_MAX;
 use crate::scene::SceneProfile;
 use crate::settings::SettingsDecl;
-use crate::techniques::{Accumulated, Bias, Card, Variant};
+use crate::techniques::{Accumulated, Bias, Card, Foresight, Variant};
 use crate::transport::PathSet;
 
 /// The causes, as the module's documentation has them.
@@ -48,6 +48,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     refusals,
     settings: SettingsDecl::of::<PreviewSettings>(),
     variants: &[Variant::DEFAULTS],
+    foresight: Foresight::FRAMES,
     create: |gpu, scene, view, settings| {
         let settings: PreviewSettings = settings.read()?;
         Accumulated::boxed(gpu, view, PreviewMethod::new(gpu, scene, view.size, settings)?)

@@ -24,7 +24,7 @@
 //! so that edges and what is out of focus come right as frames add up; the environment is its probe. It refuses scenes whose light it would leave out:
 //! those where surfaces shine, those with media, and those where light passes through surfaces.
 
-pub(super) mod card;
+mod card;
 mod drawing;
 mod lights;
 mod live;
@@ -32,6 +32,7 @@ mod method;
 pub mod probe;
 mod shade;
 
+pub(super) use card::CARD;
 pub use lights::{PreviewLights, PreviewShadows};
 pub use live::LiveProbe;
 pub use method::{PreviewMethod, PreviewSettings};

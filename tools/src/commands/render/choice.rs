@@ -16,8 +16,9 @@ pub struct ChoiceReport<'a> {
     plan: &'a Plan,
     /// Seconds of pilots and picture together.
     seconds: f64,
-    /// Root of the relative MSE that the picture's own spread stands for. Stratified samples have less.
-    error_by_variance: f64,
+    /// Root of the relative MSE by noise alone that the picture's own spread stands for. Stratified samples have less, those that share a map of photons
+    /// more; a bias does not show in it.
+    noise_by_variance: f64,
     /// Root of the relative MSE against the reference, when there is one.
     error_against_reference: Option<f64>,
 }
@@ -28,7 +29,7 @@ impl<'a> ChoiceReport<'a> {
         Ok(Self {
             plan,
             seconds: plan.pilot_seconds + rendered.report.render_seconds,
-            error_by_variance: relative_mse_by_variance(&rendered.picture, RELATIVE_MSE_OFFSET)?.sqrt(),
+            noise_by_variance: relative_mse_by_variance(&rendered.picture, RELATIVE_MSE_OFFSET)?.sqrt(),
             error_against_reference: error.map(|error| error.metrics.relative_mse.sqrt()),
         })
     }
@@ -38,7 +39,11 @@ impl<'a> ChoiceReport<'a> {
         let choice = self.plan.choice();
         let error = match self.error_against_reference {
             Some(error) => format!("{error:.4} against the reference"),
-            None => format!("{:.4} or less by the picture's own spread", self.error_by_variance),
+            // Only noise shows in a picture by itself.
+            None => format!(
+                "not measured, noise about {:.4} by the picture's own spread",
+                self.noise_by_variance
+            ),
         };
         format!(
             "predicted: error {:.4}, {:.2} s; outcome: error {error}, {:.2} s, of which pilots {:.2} s",

@@ -1,18 +1,19 @@
-//! Pilot pictures: two small ones of each candidate with independent seeds, refined round by round.
+//! A technique on trial: two small pilot pictures with independent seeds, refined round by round.
 //!
-//! Seeds and rounds decide what they find, to the bit; how many rounds there are, and what a sample costs, the clock.
+//! Seeds and rounds decide what they find, to the bit; what a sample costs, the clock.
 
 use std::time::{Duration, Instant};
 
-use super::judge::{self, Judgement, REFERENCE};
+use super::judgement::Judgement;
 use super::model::{CostModel, ErrorModel};
 use super::noise::{Truth, noise_of_pair};
-use super::paths::{same_picture, unseen_by_eye_paths};
+use super::paths::same_picture;
 use super::{Candidate, Goal, Reference};
 use crate::film::Picture;
 use crate::film::metrics::RELATIVE_MSE_OFFSET;
 use crate::render::{RenderOptions, Renderer, Rendering};
-use crate::techniques::{Bias, Card};
+use crate::settings::Settings;
+use crate::techniques::{Bias, Card, Law};
 use crate::transport::PathSet;
 use crate::{Error, Result};
 
@@ -21,21 +22,11 @@ const PILOT_PIXELS: f64 = 16_384.0;
 /// Shortest side of a pilot picture, pixels, where the picture itself has as many.
 const PILOT_SIDE: u32 = 8;
 /// Samples a pixel of the pilots, one round after the other.
-const ROUNDS: [u32; 4] = [4, 16, 64, 256];
-/// Share of the predicted time that pilots may take.
-pub const PILOT_SHARE: f64 = 0.15;
+pub const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 /// Relative MSE of a black picture, which is all that pilots without light know.
 const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
-/// Beyond the relative MSE of what has met light.
-const UNLIT_COST: f64 = f64::MAX;
-/// Beyond every other cost: of what cannot be chosen.
-const IMPOSSIBLE_COST: f64 = f64::INFINITY;
 /// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
 const SMALL: u32 = 4;
-/// Seconds of rounds that pilots may take whatever the picture costs, where no time is to be kept.
-const FREE_SECONDS: f64 = 2.0;
-/// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
-const HOPELESS: f64 = 2.0;
 /// Distance of the pilots' seeds from the picture's and from each other.
 const SEED_STEP: u32 = 0x9E37_79B9;
 
@@ -55,17 +46,21 @@ pub struct Trial<'a> {
     pub spp: u32,
     /// Whether its pilots have met any light; without it nothing is known of the error.
     pub lit: bool,
+    /// How its error falls by theory.
+    pub law: Law,
     pub judgement: Judgement,
-    /// Whether it is there to judge others alone.
-    judges_only: bool,
+    /// Whether it can be chosen, and is not there for others to be held against alone.
+    pub is_candidate: bool,
+    /// Why its pilots could not go on; empty while they can.
+    pub failure: String,
     pilots: [Rendering; 2],
-    error: ErrorModel,
-    cost: CostModel,
+    pub error: ErrorModel,
+    pub cost: CostModel,
     /// Share of a pilot sample's time that does not depend on the number of pixels.
     fixed: f64,
     /// Seconds of its last round, and of all.
-    round_seconds: f64,
-    all_seconds: f64,
+    pub round_seconds: f64,
+    pub all_seconds: f64,
 }
 
 /// What all trials have in common.
@@ -78,7 +73,7 @@ pub struct Asked<'a> {
 
 impl Asked<'_> {
     /// Pixels of the picture itself.
-    fn pixels(&self) -> f64 {
+    pub fn pixels(&self) -> f64 {
         f64::from(self.options.size[0]) * f64::from(self.options.size[1])
     }
 }
@@ -93,7 +88,43 @@ impl<'a> Trial<'a> {
     /// Begins pilots, and compiles their kernels with a first sample; `None`, with the reason, for what cannot be chosen. `index` keeps the
     /// seeds of biased techniques apart from those that they are held against.
     pub fn start(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate, index: usize) -> Result<Option<Self>> {
+        match Self::begin(asked, card, candidate, index) {
+            Ok(trial) => Ok(trial),
+            Err(error) => {
+                candidate.reason = reason_of(error)?;
+                Ok(None)
+            }
+        }
+    }
+
+    /// Of an unbiased technique that is no candidate, for others to be held against.
+    pub fn start_reference(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate) -> Result<Option<Self>> {
+        let trial = Self::start(asked, card, candidate, 0)?;
+        Ok(trial.map(|trial| Self {
+            is_candidate: false,
+            ..trial
+        }))
+    }
+
+    fn begin(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate, index: usize) -> Result<Option<Self>> {
         let Asked { renderer, options, .. } = *asked;
+        let (caps, profile) = (renderer.gpu().caps(), renderer.gpu_scene().profile());
+        let settings: Settings = candidate.settings.clone().into();
+        // What can be told before anything is made: kernels, maps of lights and filtered environments may take long.
+        let admitted = card.admit(caps, profile, &settings)?;
+        let mut has_paths = |paths: &PathSet| {
+            let same = same_picture(profile, paths, &asked.paths);
+            if !same {
+                candidate.reason = format!("its pictures hold the light paths {:?}", paths.to_string());
+            }
+            same
+        };
+        if !has_paths(&card.path_set_with(&settings)) {
+            return Ok(None);
+        }
+        (card.foresight.fits)(caps, options.size)?;
+        let law = (card.foresight.law)(&admitted)?;
+        let misses = (card.foresight.misses)(profile, renderer.lights(), &asked.paths)?;
         let size = pilot_size(options.size);
         let first_seed = match card.bias {
             Bias::Unbiased => 1,
@@ -102,7 +133,7 @@ impl<'a> Trial<'a> {
         let begin = |seed_steps: u32, size: [u32; 2]| {
             let pilot = RenderOptions {
                 technique: Some(card.id.into()),
-                settings: candidate.settings.clone().into(),
+                settings: settings.clone(),
                 size,
                 spp: 1,
                 seed: options.seed.wrapping_add(seed_steps.wrapping_mul(SEED_STEP)),
@@ -112,24 +143,10 @@ impl<'a> Trial<'a> {
             };
             renderer.start_technique(card, &pilot)
         };
-        let mut first = match begin(first_seed, size) {
-            Ok(first) => first,
-            Err(error @ (Error::Unsupported { .. } | Error::MissingFeature { .. })) => {
-                candidate.reason = error.to_string();
-                return Ok(None);
-            }
-            Err(error) => return Err(error),
-        };
-        let profile = renderer.gpu_scene().profile();
-        if !same_picture(profile, &first.path_set(), &asked.paths) {
-            candidate.reason = format!("its pictures hold the light paths {:?}", first.path_set().to_string());
+        let mut first = begin(first_seed, size)?;
+        if !has_paths(&first.path_set()) {
             return Ok(None);
         }
-        let misses = if card.id == REFERENCE {
-            unseen_by_eye_paths(profile, renderer.lights(), &asked.paths)?
-        } else {
-            None
-        };
         run(&mut first)?;
         // The second one finds its kernels compiled, as the picture itself will.
         let from = Instant::now();
@@ -150,12 +167,11 @@ impl<'a> Trial<'a> {
             spp: 1,
             lit: false,
             judgement: Judgement::default(),
-            judges_only: false,
+            is_candidate: true,
+            failure: String::new(),
             pilots: [first, second],
-            error: match card.bias {
-                Bias::Consistent(_) => ErrorModel::of_shrinking_kernels(),
-                Bias::Unbiased | Bias::Biased(_) => ErrorModel::default(),
-            },
+            error: ErrorModel::falling(law.slope),
+            law,
             cost: CostModel { start, sample: 0.0 },
             fixed: 0.0,
             round_seconds: 0.0,
@@ -175,16 +191,15 @@ impl<'a> Trial<'a> {
         Ok(Some(trial))
     }
 
-    /// One of the reference technique that is no candidate.
-    pub fn judge(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate) -> Result<Option<Self>> {
-        let trial = Self::start(asked, card, candidate, 0)?;
-        Ok(trial.map(|trial| Self {
-            judges_only: true,
-            ..trial
-        }))
+    /// Refines both pilots to `spp` samples a pixel; what keeps them from it is [`failure`](Self::failure) from then on. `pixels` are those of the picture itself.
+    pub fn go_on(&mut self, spp: u32, pixels: f64) -> Result<()> {
+        if let Err(error) = self.round(spp, pixels) {
+            self.failure = reason_of(error)?;
+        }
+        Ok(())
     }
 
-    /// Refines both pilots to `spp` samples a pixel; `pixels` are those of the picture itself.
+    /// A round of both pilots to `spp` samples a pixel; `pixels` are those of the picture itself.
     fn round(&mut self, spp: u32, pixels: f64) -> Result<()> {
         let from = Instant::now();
         for pilot in &mut self.pilots {
@@ -198,9 +213,10 @@ impl<'a> Trial<'a> {
         for picture in &pictures {
             self.lit |= picture.main_layer()?.values().iter().any(|value| *value != 0.0);
         }
-        let truth = match self.card.bias {
-            Bias::Consistent(_) => Truth::Pixel,
-            Bias::Unbiased | Bias::Biased(_) => Truth::Neighbourhood,
+        let truth = if self.law.shares_noise {
+            Truth::Pixel
+        } else {
+            Truth::Neighbourhood
         };
         self.error.add(
             spp,
@@ -224,7 +240,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Samples a pixel for the goal, when the pilots have taken `spent` seconds.
-    fn samples(&self, goal: Goal, spent: f64) -> u32 {
+    pub fn samples(&self, goal: Goal, spent: f64) -> u32 {
         let for_error = goal.error.map(|error| match self.lit {
             // What cannot reach it is shown with as many as noise alone would take.
             true => self.reach(error).unwrap_or_else(|| self.error.samples(error * error)),
@@ -249,7 +265,7 @@ impl<'a> Trial<'a> {
     }
 
     /// Relative MSE expected of that many samples a pixel, by noise alone.
-    fn relative_mse(&self, samples: u32) -> f64 {
+    pub fn relative_mse(&self, samples: u32) -> f64 {
         if self.lit {
             self.error.relative_mse(f64::from(samples))
         } else {
@@ -257,10 +273,15 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// Whether it is a candidate whose pilots did not fail.
+    pub fn can_be_chosen(&self) -> bool {
+        self.is_candidate && self.failure.is_empty()
+    }
+
     /// Whether it can still be chosen, for all that is known of its bias.
-    fn is_possible(&self, goal: Goal) -> bool {
+    pub fn is_possible(&self, goal: Goal) -> bool {
         let reaches = || goal.error.is_none_or(|error| self.reach(error).is_some());
-        !self.judges_only && (self.judgement.may_be_seen || !self.lit || self.judgement.bias.is_some() && reaches())
+        self.can_be_chosen() && (self.judgement.may_be_seen || !self.lit || self.judgement.bias.is_some() && reaches())
     }
 
     /// Writes what the pilots have found to the candidate.
@@ -285,15 +306,30 @@ impl<'a> Trial<'a> {
             let reaches = goal.error.is_none_or(|error| self.reach(error).is_some());
             candidate.reason = self.judgement.refusal(goal.error, reaches).unwrap_or_default();
         }
+        if !self.failure.is_empty() {
+            candidate.reason.clone_from(&self.failure);
+        }
     }
 
-    /// What judges others with: technique, samples a pixel, noise.
+    /// What others are held against: technique, samples a pixel, noise.
     pub fn as_reference(&self) -> Reference {
         Reference {
             technique: self.card.id,
             pilot_spp: self.spp,
             pilot_noise: self.noise().sqrt(),
         }
+    }
+}
+
+/// Why a technique cannot be chosen, of an error that is its own; whatever else goes wrong ends the choice.
+fn reason_of(error: Error) -> Result<String> {
+    match error {
+        Error::Unsupported { .. }
+        | Error::MissingFeature { .. }
+        | Error::LimitExceeded { .. }
+        | Error::OutOfMemory { .. }
+        | Error::Overflow { .. } => Ok(error.to_string()),
+        other => Err(other),
     }
 }
 
@@ -318,93 +354,6 @@ fn round_of_another_size(mut pilot: Rendering) -> Result<f64> {
 /// Works until all samples that were asked for are there.
 fn run(rendering: &mut Rendering) -> Result<()> {
     while rendering.step()?.is_some() {}
-    Ok(())
-}
-
-/// Further rounds for what can still be chosen, and for what judges it, as long as they cost little beside the picture itself. Every trial is
-/// judged in the end.
-pub fn rounds(
-    trials: &mut [Option<Trial<'_>>],
-    asked: &Asked<'_>,
-    start: Instant,
-    proceed: &mut dyn FnMut() -> bool,
-) -> Result<()> {
-    let goal = asked.goal;
-    for (&last, &spp) in ROUNDS.iter().zip(&ROUNDS[1..]) {
-        judge(trials, goal)?;
-        let spent = start.elapsed().as_secs_f64();
-        let predicted = |trial: &Trial<'_>| trial.cost.seconds(f64::from(trial.samples(goal, spent)));
-        // Under a time alone all take equally long, and the one with the smaller error is the better one.
-        let cost = |trial: &Trial<'_>| match goal.error {
-            _ if !trial.is_possible(goal) => IMPOSSIBLE_COST,
-            Some(_) => predicted(trial),
-            // What has met no light is the last choice, but goes on as long as nothing else has.
-            None if trial.lit => trial.relative_mse(trial.samples(goal, spent)),
-            None => UNLIT_COST,
-        };
-        let able = || trials.iter().flatten().filter(|trial| !trial.judges_only);
-        let best = able().map(&cost).fold(f64::INFINITY, f64::min);
-        let picture = able().map(predicted).fold(f64::INFINITY, f64::min);
-        let rounds: f64 = trials.iter().flatten().map(|trial| trial.all_seconds).sum();
-        let share = PILOT_SHARE * (picture + spent);
-        let allowed = match goal.time {
-            Some(_) => share - spent,
-            None => share.max(FREE_SECONDS) - rounds,
-        };
-        let blind = goal.time.is_none() && trials.iter().flatten().all(|trial| !trial.lit);
-        // All that can still be chosen, or else the best alone; and what judges them.
-        let affordable = [HOPELESS, 1.0].into_iter().find_map(|factor| {
-            let mut on: Vec<bool> = trials
-                .iter()
-                .map(|trial| {
-                    trial
-                        .as_ref()
-                        .is_some_and(|t| t.spp == last && cost(t) <= factor * best)
-                })
-                .collect();
-            let judged = trials
-                .iter()
-                .zip(&on)
-                .any(|(trial, on)| *on && trial.as_ref().is_some_and(|t| t.card.bias != Bias::Unbiased));
-            let reference = judge::reference(trials);
-            for (trial, on) in trials.iter().zip(&mut on) {
-                if let (Some(trial), Some(reference)) = (trial, reference)
-                    && std::ptr::eq(trial, reference)
-                {
-                    *on |= judged && trial.spp == last && trial.misses.is_empty();
-                }
-            }
-            // A round has four times the samples of all before it.
-            let next: f64 = trials
-                .iter()
-                .zip(&on)
-                .filter(|(_, on)| **on)
-                .filter_map(|(trial, _)| trial.as_ref())
-                .map(|t| t.round_seconds * 4.0)
-                .sum();
-            (next <= allowed || blind).then_some(on)
-        });
-        let Some(going_on) = affordable else { return Ok(()) };
-        for (trial, on) in trials.iter_mut().zip(going_on) {
-            if let Some(trial) = trial.as_mut().filter(|_| on) {
-                if !proceed() {
-                    return judge(trials, goal);
-                }
-                trial.round(spp, asked.pixels())?;
-            }
-        }
-    }
-    judge(trials, goal)
-}
-
-fn judge(trials: &mut [Option<Trial<'_>>], goal: Goal) -> Result<()> {
-    let judgements = judge::judgements(trials, goal.error)?;
-    for (trial, judgement) in trials.iter_mut().zip(judgements) {
-        if let Some(trial) = trial {
-            trial.error.set_unseen(judgement.unseen);
-            trial.judgement = judgement;
-        }
-    }
     Ok(())
 }
 

@@ -1,18 +1,16 @@
 //! What is known of a technique's bias, and by what.
 //!
-//! An unbiased technique has none. Others are held against two independent pilots of the path tracer. A consistent one is also asked how far its
-//! own pictures still move as it works on; that counts where the path tracer cannot find all paths, or where its noise hides what its pilots
-//! would show. What the path tracer cannot find makes it a biased technique of its own: it is held against a consistent one's pilots.
+//! An unbiased technique that misses nothing has none, and is the reference: others are held against two independent pilots of it. A consistent one is
+//! also asked how far its own pictures still move as it works on; that counts where the reference misses paths, or where its noise hides
+//! what its pilots would show. What an unbiased technique misses makes it a biased one: it is held against a consistent one's pilots.
 
 use super::bias::{BiasEstimate, relative_bias_of_pairs, relative_drift_of_pairs};
 use super::model::BiasModel;
-use super::pilot::Trial;
+use super::trial::Trial;
 use crate::Result;
 use crate::film::metrics::RELATIVE_MSE_OFFSET;
 use crate::techniques::Bias;
 
-/// The technique whose pilots judge others.
-pub const REFERENCE: &str = "path";
 /// Pilot rounds of a consistent technique that show how its bias falls, and by how far its pictures move.
 const CONSISTENT_ROUNDS: usize = 3;
 
@@ -81,18 +79,22 @@ pub fn percent(share: f64) -> String {
     format!("{text} %")
 }
 
-/// The pilots that others are held against: of the reference technique, those with the most samples and then the least noise.
-pub fn reference<'a, 't>(trials: &'a [Option<Trial<'t>>]) -> Option<&'a Trial<'t>> {
+/// The trial that others are held against: of the unbiased ones that which misses nothing, has the most samples, and then the least noise.
+pub fn reference_trial<'a, 't>(trials: &'a [Option<Trial<'t>>]) -> Option<&'a Trial<'t>> {
     let able = trials
         .iter()
         .flatten()
-        .filter(|trial| trial.card.id == REFERENCE && trial.lit);
-    able.min_by(|a, b| b.spp.cmp(&a.spp).then(a.noise().total_cmp(&b.noise())))
+        .filter(|trial| trial.card.bias == Bias::Unbiased && trial.lit);
+    able.min_by(|a, b| {
+        let misses = |trial: &Trial<'_>| !trial.misses.is_empty();
+        let more = || b.spp.cmp(&a.spp).then(a.noise().total_cmp(&b.noise()));
+        misses(a).cmp(&misses(b)).then_with(more)
+    })
 }
 
 /// Of every trial, in order. `error` is the one that is asked for.
 pub fn judgements(trials: &[Option<Trial<'_>>], error: Option<f64>) -> Result<Vec<Judgement>> {
-    let reference = reference(trials);
+    let reference = reference_trial(trials);
     let consistent = trials
         .iter()
         .flatten()
@@ -101,13 +103,13 @@ pub fn judgements(trials: &[Option<Trial<'_>>], error: Option<f64>) -> Result<Ve
     trials
         .iter()
         .map(|trial| match trial {
-            Some(trial) => judge(trial, reference, consistent, error),
+            Some(trial) => judgement_of(trial, reference, consistent, error),
             None => Ok(Judgement::default()),
         })
         .collect()
 }
 
-fn judge(
+fn judgement_of(
     trial: &Trial<'_>,
     reference: Option<&Trial<'_>>,
     consistent: Option<&Trial<'_>>,
@@ -128,7 +130,7 @@ fn judge(
             Some(consistent) => {
                 let found = against(trial, consistent)?;
                 Ok(Judgement {
-                    bias: found.last().map(|(spp, found)| BiasModel::constant(*spp, *found)),
+                    bias: found.last().map(|(_, found)| BiasModel::constant(*found)),
                     by: format!(
                         "{}, of {} samples a pixel: it misses {}",
                         consistent.card.id, consistent.spp, trial.misses
@@ -140,29 +142,29 @@ fn judge(
         },
         Bias::Biased(_) => {
             // Where the reference misses light, a consistent technique stands in for it.
-            let Some(judge) = reference.filter(|reference| reference.misses.is_empty()).or(consistent) else {
+            let Some(other) = reference.filter(|reference| reference.misses.is_empty()).or(consistent) else {
                 return Ok(Judgement::unknown(
                     "there is no technique here to hold it against",
                     false,
                 ));
             };
-            let found = against(trial, judge)?;
+            let found = against(trial, other)?;
             let last = found.last().map(|(_, found)| *found).unwrap_or_default();
             Ok(Judgement {
-                bias: found.last().map(|(spp, found)| BiasModel::constant(*spp, *found)),
-                by: format!("{}, of {} samples a pixel", judge.card.id, judge.spp),
+                bias: found.last().map(|(_, found)| BiasModel::constant(*found)),
+                by: format!("{}, of {} samples a pixel", other.card.id, other.spp),
                 // Neither within the goal nor beyond it.
                 may_be_seen: error.is_some_and(|e| last.square < e * e && last.upper() > e * e),
                 unseen: 0.0,
             })
         }
-        Bias::Consistent(_) => judge_consistent(trial, reference),
+        Bias::Consistent(_) => judgement_of_consistent(trial, reference),
     }
 }
 
-fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<Judgement> {
+fn judgement_of_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<Judgement> {
     let moved = moved(trial)?;
-    let own = BiasModel::settling(&moved);
+    let own = BiasModel::settling(&trial.law, &moved);
     let spp = f64::from(trial.spp);
     let may_be_seen = trial.stages.len() < CONSISTENT_ROUNDS;
     let mut has_unseen = false;
@@ -178,7 +180,7 @@ fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<
         last.is_resolved() || own.as_ref().is_none_or(|own| last.upper() <= own.upper(spp))
     };
     if let Some((found, reference)) = by_reference.filter(|(found, _)| !has_unseen && told_apart(found)) {
-        let bias = BiasModel::falling(&found);
+        let bias = BiasModel::falling(&trial.law, &found);
         let law = bias.map_or_else(String::new, |bias| law(&bias));
         return Ok(Judgement {
             bias,
@@ -213,6 +215,17 @@ fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<
             may_be_seen,
             unseen: 0.0,
         },
+        None if trial.law.bias_exponent <= 0.0 => Judgement::unknown(
+            &format!("with these settings it stays, so that its own pictures do not show it, and {why}"),
+            may_be_seen,
+        ),
+        None if trial.spp <= trial.law.samples_a_pass => Judgement::unknown(
+            &format!(
+                "its own pictures of up to {} samples a pixel are of one pass, and {why}",
+                trial.spp
+            ),
+            may_be_seen,
+        ),
         None if moved.is_empty() => Judgement::unknown("there was no time for pictures of two budgets", may_be_seen),
         None => Judgement::unknown(
             &format!(
@@ -225,13 +238,14 @@ fn judge_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> Result<
 }
 
 fn law(bias: &BiasModel) -> String {
-    format!("bias falls as samples^(-{:.2})", bias.exponent() / 2.0)
+    let falls = if bias.is_assumed() { "is taken to fall" } else { "falls" };
+    format!("bias {falls} as samples^(-{:.2})", bias.exponent() / 2.0)
 }
 
 /// What an unbiased technique's pilots have not met: they are darker than a consistent one's, by more than that one still moves. `None` where
 /// nothing shows it.
 fn unseen(consistent: &Trial<'_>, unbiased: &Trial<'_>) -> Result<Option<f64>> {
-    let Some(own) = BiasModel::settling(&moved(consistent)?) else {
+    let Some(own) = BiasModel::settling(&consistent.law, &moved(consistent)?) else {
         return Ok(None);
     };
     let found = against(consistent, unbiased)?
@@ -243,8 +257,8 @@ fn unseen(consistent: &Trial<'_>, unbiased: &Trial<'_>) -> Result<Option<f64>> {
 }
 
 /// Bias of each of a trial's stages against the last one of another technique.
-fn against(trial: &Trial<'_>, judge: &Trial<'_>) -> Result<Vec<(u32, BiasEstimate)>> {
-    let Some(last) = judge.stages.last() else {
+fn against(trial: &Trial<'_>, other: &Trial<'_>) -> Result<Vec<(u32, BiasEstimate)>> {
+    let Some(last) = other.stages.last() else {
         return Ok(Vec::new());
     };
     let [p, q] = &last.pictures;
@@ -277,14 +291,11 @@ mod tests {
             ["3.1 %", "2 %", "12 %", "0.45 %", "10 %"]
         );
         let of = |square, deviation| Judgement {
-            bias: Some(BiasModel::constant(
-                64,
-                BiasEstimate {
-                    square,
-                    deviation,
-                    brighter: true,
-                },
-            )),
+            bias: Some(BiasModel::constant(BiasEstimate {
+                square,
+                deviation,
+                brighter: true,
+            })),
             ..Judgement::default()
         };
         let seen = of(0.031 * 0.031, 1e-6);
