@@ -308,7 +308,7 @@ fn four_descriptor_sets_are_enough_for_every_technique() {
         let able = scenes
             .iter()
             .find(|scene| (technique.refusals)(&SceneProfile::of(scene)).is_empty());
-        let scene = able.expect("a scene that it can render");
+        let scene = able.unwrap_or_else(|| panic!("`addresses` needs a scene that `{}` can render", technique.id));
         // What is made on devices that have all it takes, and only on those, is not looked at.
         let settings = if technique.settings.has("map_build") {
             serde_json::json!({ "map_build": "host" })

@@ -210,5 +210,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/raster/gbuffer.rs::hard_cases_are_seen_as_rays_meet_them",
     ],
     experiment: "clerestory index --peers",
+    api: &["clerestory::accel::bvh2::Bvh2"],
+    settings: &[
+        "clerestory::accel::bvh2::Bvh2Settings",
+        "clerestory render --index bvh2",
+    ],
     ..Row::of(file!())
 }];

@@ -89,7 +89,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/offset/tests.rs::position_lies_within_its_rounding_bound",
         "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
     ],
-    experiment: "clerestory report ray-offsets",
+    api: &["clerestory::accel::offset"],
     ..Row::of(file!())
 }];
 

@@ -82,7 +82,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/lbvh/tests.rs::restructured_trees_are_valid_and_cost_no_more",
         "engine/src/accel/lbvh/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
     ],
-    experiment: "clerestory report tree-quality",
+    api: &["clerestory::accel::optimise::optimise"],
+    settings: &[
+        "clerestory::accel::optimise::Optimisation",
+        "clerestory render --index lbvh-high",
+    ],
     ..Row::of(file!())
 }];
 

@@ -511,7 +511,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
             "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
         ],
-        experiment: "clerestory report persistent-threads kd-threads",
+        api: &["clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
@@ -529,7 +530,11 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
             "tests/tests/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
         ],
-        experiment: "clerestory report persistent-threads kd-threads",
+        api: &["clerestory::accel::trace::RayTracer"],
+        settings: &[
+            "clerestory::accel::trace::TraceSettings",
+            "clerestory::accel::trace::PersistentThreads",
+        ],
         ..Row::of(file!())
     },
 ];

@@ -170,7 +170,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
         "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
     ],
-    experiment: "clerestory report sample-sums",
+    api: &["clerestory::film::Accumulator"],
     ..Row::of(file!())
 }];
 

@@ -271,7 +271,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
         "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
     ],
-    experiment: "clerestory report error-against-time",
+    api: &["clerestory::film::compare", "clerestory::film::ErrorReport"],
+    settings: &["clerestory::film::CompareOptions", "clerestory compare a.exr b.exr"],
     ..Row::of(file!())
 }];
 

@@ -177,6 +177,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/z_test.rs::a_bias_of_one_per_cent_is_found",
     ],
     experiment: "clerestory agreement",
+    api: &["clerestory::film::ZTest"],
     ..Row::of(file!())
 }];
 

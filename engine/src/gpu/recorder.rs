@@ -531,6 +531,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/gpu_floor.rs::write_after_read_and_wrong_scope_are_hazards",
         "tests/tests/layers.rs::the_recorder_catches_a_missing_barrier_between_dispatches",
     ],
-    experiment: "clerestory report barriers",
+    api: &["clerestory::gpu::Recorder", "clerestory::gpu::Pass"],
+    settings: &["clerestory::gpu::GpuOptions"],
     ..Row::of(file!())
 }];

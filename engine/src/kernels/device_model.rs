@@ -311,7 +311,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/kernels/device_model.rs::chains_visit_every_place_before_they_come_back",
         "tests/tests/kernels/device_model.rs::timed_runs_have_walked_copied_and_counted_what_was_asked",
     ],
-    experiment: "clerestory report device-model",
+    api: &["clerestory::kernels::device_model::DeviceModel"],
     ..Row::of(file!())
 }];
 

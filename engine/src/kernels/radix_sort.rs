@@ -341,6 +341,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/kernels/many_sorts.rs::sorts_of_random_sizes_and_patterns_are_as_by_std",
     ],
     experiment: "clerestory bench --sort --peers",
+    api: &["clerestory::kernels::RadixSort", "clerestory::kernels::radix_sort"],
+    settings: &["clerestory::kernels::RadixSortOptions"],
     ..Row::of(file!())
 }];
 

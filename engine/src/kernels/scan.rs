@@ -254,5 +254,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/kernels/stream.rs::every_element_is_in_one_block",
     ],
     experiment: "clerestory bench --sort",
+    api: &[
+        "clerestory::kernels::Scan",
+        "clerestory::kernels::ReduceWords",
+        "clerestory::kernels::ReduceBox",
+        "clerestory::kernels::scan",
+    ],
+    settings: &["clerestory::kernels::ScanOptions"],
     ..Row::of(file!())
 }];

@@ -342,6 +342,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/box_lobes.rs::constant_radiance_is_constant_through_every_lobe",
         "tests/tests/directional_maps.rs::lobes_are_their_twins",
     ],
-    experiment: "clerestory report map-glossiness",
+    api: &[
+        "clerestory::maps::box_lobe::box_lobe",
+        "clerestory::maps::box_lobe::ring_lobe",
+    ],
     ..Row::of(file!())
 }];

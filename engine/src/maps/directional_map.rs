@@ -448,6 +448,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
         "engine/src/maps/tests/glossy.rs::levels_keep_the_integral",
     ],
-    experiment: "clerestory report map-levels map-borders",
+    api: &["clerestory::maps::directional_map::DirectionalMap"],
     ..Row::of(file!())
 }];

@@ -66,6 +66,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/printed.rs::a_longitude_of_a_quotient_folds_half_turns",
         "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
     ],
-    experiment: "clerestory report map-density map-error map-choice",
+    api: &[
+        "clerestory::maps::lat_long::lat_long_encode",
+        "clerestory::maps::lat_long::lat_long_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to lat-long"],
     ..Row::of(file!())
 }];

@@ -51,6 +51,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
         "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
-    experiment: "clerestory report map-density map-choice",
+    api: &[
+        "clerestory::maps::nusselt::nusselt_encode",
+        "clerestory::maps::nusselt::nusselt_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to nusselt"],
     ..Row::of(file!())
 }];

@@ -72,7 +72,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/packed_direction.rs::the_nearest_of_four_is_two_thirds_as_far_off",
         "tests/tests/twins/maps.rs::levels_borders_and_words_agree_with_their_twins",
     ],
-    experiment: "clerestory report map-density",
+    api: &[
+        "clerestory::maps::packed_direction::pack_octahedral",
+        "clerestory::maps::packed_direction::unpack_octahedral",
+    ],
     ..Row::of(file!())
 }];
 

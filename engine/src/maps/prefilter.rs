@@ -183,6 +183,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/glossy.rs::filtered_maps_are_integrals_of_the_lobe",
         "engine/src/maps/tests/glossy.rs::lobes_have_the_width_that_is_said",
     ],
-    experiment: "clerestory report map-glossiness",
+    api: &[
+        "clerestory::maps::prefilter::PrefilterGgx",
+        "clerestory::maps::prefilter::prefilter_ggx",
+    ],
     ..Row::of(file!())
 }];

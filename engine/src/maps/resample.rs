@@ -201,5 +201,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tools/tests/maps.rs::scenes_look_the_same_after_a_round_trip",
     ],
     experiment: "clerestory maps sky.hdr sky.exr --to octahedron",
+    api: &["clerestory::maps::resample::resample"],
+    settings: &[
+        "clerestory::maps::resample::ResampleSettings",
+        "clerestory maps sky.hdr sky.exr --to octahedron",
+    ],
     ..Row::of(file!())
 }];

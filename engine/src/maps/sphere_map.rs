@@ -64,6 +64,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
         "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
-    experiment: "clerestory report map-density map-error map-choice",
+    api: &[
+        "clerestory::maps::sphere_map::sphere_map_encode",
+        "clerestory::maps::sphere_map::sphere_map_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to sphere"],
     ..Row::of(file!())
 }];

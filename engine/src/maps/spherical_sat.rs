@@ -366,6 +366,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/box_lobes.rs::borders_hold_the_largest_box",
         "engine/src/maps/tests/box_lobes.rs::lobes_on_folds_and_edges_are_as_good_as_elsewhere",
     ],
-    experiment: "clerestory report map-glossiness",
+    api: &["clerestory::maps::spherical_sat::SphericalSat"],
+    settings: &[
+        "clerestory::maps::spherical_sat::SatNumbers",
+        "clerestory::maps::spherical_sat::SatRange",
+    ],
     ..Row::of(file!())
 }];

@@ -343,6 +343,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
         "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
     ],
-    experiment: "clerestory report map-rendering",
+    api: &["clerestory::raster::OctantCut", "clerestory::raster::GBuffer"],
+    settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],
     ..Row::of(file!())
 }];

@@ -380,6 +380,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/obj.rs::faces_materials_and_coordinates_are_read",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::load"],
     ..Row::of(file!())
 }];
 

@@ -476,6 +476,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/profile.rs::what_is_absent_costs_no_byte",
         "tests/tests/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
     ],
-    experiment: "clerestory report scene-profile",
+    api: &["clerestory::scene::SceneProfile"],
     ..Row::of(file!())
 }];

@@ -81,6 +81,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/twin_texture.rs::look_ups_agree_with_their_twins",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::texture"],
     ..Row::of(file!())
 }];
 

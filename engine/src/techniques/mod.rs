@@ -1,4 +1,4 @@
-//! Techniques: what turns a scene on the device into a picture.
+//! Floor 6: techniques. What turns a scene on the device into a picture.
 //!
 //! [`all`] lists the engine's own. Each says what it needs of a device, which scenes it can model (and refuses the others with the
 //! reason), which light paths its picture contains, and whether and how it is biased.

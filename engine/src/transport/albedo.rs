@@ -214,6 +214,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/bsdf/tests.rs::white_furnace",
         "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
     ],
-    experiment: "clerestory report multiple-scattering",
+    settings: &["multiple_scattering"],
+    api: &["clerestory::transport::albedo"],
     ..Row::of(file!())
 }];

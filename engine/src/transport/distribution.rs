@@ -145,7 +145,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/distribution.rs::cells_follow_their_probability",
         "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
     ],
-    experiment: "clerestory report light-sampling",
+    api: &["clerestory::transport::distribution"],
     ..Row::of(file!())
 }];
 

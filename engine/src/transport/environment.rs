@@ -119,6 +119,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
     ],
     experiment: "clerestory agreement --scene box-city-sky",
+    api: &["clerestory::transport::environment"],
     ..Row::of(file!())
 }];
 

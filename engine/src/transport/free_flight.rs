@@ -129,7 +129,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
     sources: &[sources::JENSEN_CHRISTENSEN_1998.whole()],
     bias: Some(Bias::Consistent("the step")),
     tests: &["engine/src/transport/free_flight.rs::marched_flights_are_biased_by_their_step"],
-    experiment: "clerestory report free-flight",
+    api: &[
+        "clerestory::transport::free_flight::marched_free_flight",
+        "clerestory::transport::free_flight::adaptively_marched_free_flight",
+    ],
     ..Row::of(file!())
 }];
 

@@ -77,6 +77,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/samplers.rs::visible_normals_follow_their_density",
     ],
     experiment: "clerestory agreement --scene cornell-frosted,ring-rough",
+    api: &["clerestory::transport::ggx"],
     ..Row::of(file!())
 }];
 

@@ -114,7 +114,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
         "engine/src/transport/phase.rs::samples_follow_their_density",
     ],
-    experiment: "clerestory report phase-functions",
+    api: &["clerestory::transport::phase"],
     ..Row::of(file!())
 }];
 

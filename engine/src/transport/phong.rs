@@ -60,6 +60,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
     ],
     experiment: "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
+    api: &["clerestory::transport::phong"],
     ..Row::of(file!())
 }];
 

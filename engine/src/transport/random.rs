@@ -159,7 +159,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
             "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
         ],
-        experiment: "clerestory report samplers",
+        settings: &["sampler"],
+        api: &["clerestory::transport::random"],
         ..Row::of(file!())
     },
     Row {
@@ -175,6 +176,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/random.rs::floats_stay_below_one",
         ],
         experiment: "clerestory agreement",
+        settings: &["sampler"],
+        api: &["clerestory::transport::random"],
         ..Row::of(file!())
     },
 ];

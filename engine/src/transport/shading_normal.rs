@@ -43,7 +43,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_lose_energy_only",
         "engine/src/scene/normal_map.rs::flat_maps_keep_the_normal",
     ],
-    experiment: "clerestory report shading-normals",
+    api: &["clerestory::transport::shading_normal"],
     ..Row::of(file!())
 }];
 

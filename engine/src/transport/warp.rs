@@ -91,7 +91,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/samplers.rs::warps_keep_areas",
         "tests/tests/samplers.rs::pairs_fill_the_square_evenly",
     ],
-    experiment: "clerestory report convergence",
+    api: &["clerestory::transport::warp"],
     ..Row::of(file!())
 }];
 

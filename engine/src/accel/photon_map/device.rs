@@ -406,7 +406,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/photon/maps.rs::device_maps_of_scenes_are_the_twins_and_pictures_are_equal",
         "tests/tests/photon/maps.rs::devices_without_numbers_of_64_bits_leave_maps_to_the_host",
     ],
-    experiment: "clerestory report photon-frame",
+    api: &["clerestory::accel::photon_map::device::MapBuilder"],
+    settings: &["map_build"],
     ..Row::of(file!())
 }];
 

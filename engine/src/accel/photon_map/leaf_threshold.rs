@@ -31,7 +31,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "One size for the whole map, from a mean over the scene's surfaces.",
     sources: &[sources::FABIANOWSKI_2011.at("§6.1.3")],
     tests: &["engine/src/accel/photon_map/leaf_threshold.rs::leaf_sizes_follow_the_cover_of_the_scene"],
-    experiment: "clerestory report leaf-sizes",
+    api: &["clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size"],
     ..Row::of(file!())
 }];
 

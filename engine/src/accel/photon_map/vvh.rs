@@ -130,6 +130,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Built at leisure by full sweeps: too slow for a map that is made anew each pass.",
     sources: &[sources::FABIANOWSKI_2011.at("§6.1.1")],
     tests: &["engine/src/accel/photon_map/tests.rs::sweeps_are_valid_and_beat_the_linear_tree"],
-    experiment: "clerestory report map-quality",
+    api: &["clerestory::accel::photon_map::vvh::sweep_tree"],
     ..Row::of(file!())
 }];

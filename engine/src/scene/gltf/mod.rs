@@ -235,5 +235,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/gltf/tests/malformed.rs::every_truncation_is_an_error",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::gltf::load", "clerestory::scene::load"],
     ..Row::of(file!())
 }];

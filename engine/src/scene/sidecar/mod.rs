@@ -431,5 +431,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::sidecar::Sidecar"],
     ..Row::of(file!())
 }];

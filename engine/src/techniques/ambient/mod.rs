@@ -22,7 +22,7 @@ const ROW: Row = Row {
     path_set: Some("bounces=0..1,lobes=diffuse+reflection+transmission"),
     bias: Some(Bias::Unbiased),
     tests: &["tests/tests/ambient.rs::pictures_are_the_path_tracers"],
-    experiment: "clerestory report ambient",
+    api: &["clerestory::techniques::ambient::Ambient"],
     ..Row::of(file!())
 };
 

@@ -180,14 +180,7 @@ const ROWS: &[Row] = &[Row {
         sources::VEACH_1997.at("chapters 9 and 10"),
         sources::LAINE_2013.whole(),
     ],
-    shaders: &[
-        "shaders/techniques/path/path_camera.comp",
-        "shaders/walk/extend.comp",
-        "shaders/techniques/path/path_medium.comp",
-        "shaders/techniques/path/path_shade.comp",
-        "shaders/walk/shadow.comp",
-        "shaders/techniques/path/path_resolve.comp",
-    ],
+    shaders: &["shaders/techniques/path/", "shaders/walk/"],
     path_set: Some("all"),
     bias: Some(Bias::Unbiased),
     tests: &[
@@ -206,8 +199,13 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/hard_cases.rs::techniques_take_the_cases_between_as_documented",
         "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
     ],
-    experiment: "clerestory report error-against-time",
-    ..Row::of(file!())
+    experiment: "clerestory agreement",
+    api: &["clerestory::techniques::PathTracer"],
+    settings: &[
+        "clerestory::techniques::PathTracerSettings",
+        "clerestory render --technique path",
+    ],
+    ..Row::of("engine/src/techniques/path/mod.rs")
 }];
 
 #[cfg(test)]

@@ -384,7 +384,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
             "tests/tests/photon/traps.rs::thin_walls_let_no_photon_through",
         ],
-        experiment: "clerestory report photon-kernels photon-convergence",
+        settings: &["radius", "reduction", "shape"],
         ..Row::of(file!())
     },
     Row {
@@ -395,7 +395,7 @@ pub(crate) const ROWS: &[Row] = &[
         sources: &[sources::JENSEN_2001.at("§7"), sources::FABIANOWSKI_2011.at("§3.4.2.1")],
         shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
         tests: &["tests/tests/photon/settings.rs::nearest_neighbours_agree_with_the_path_tracer"],
-        experiment: "clerestory report photon-kernels photon-nearest photon-ring",
+        settings: &["neighbors", "radius"],
         ..Row::of(file!())
     },
     Row {
@@ -410,7 +410,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::even_light_is_estimated_without_bias",
             "tests/tests/photon/settings.rs::every_shape_agrees_with_the_path_tracer",
         ],
-        experiment: "clerestory report photon-statistics photon-kernels",
+        settings: &["shape", "spread"],
         ..Row::of(file!())
     },
     Row {
@@ -425,18 +425,18 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/flux.rs::the_picture_has_the_flux_of_the_map",
             "tests/tests/photon/determinism.rs::threads_never_show",
         ],
-        experiment: "clerestory report photon-frame photon-queues",
+        settings: &["query"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-ST-6",
         name: "queries of the photon map, a subgroup's together",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Needs subgroup votes; visits what any point of the subgroup asks for.",
+        limits: "Needs subgroup votes; visits what any point of the subgroup asks for, and so meets the quota sooner, which with `neighbors` is an error.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
         shaders: &["shaders/techniques/photon_mapping/photon_gather_packet.comp"],
         tests: &["tests/tests/photon/settings.rs::points_that_ask_together_see_the_same"],
-        experiment: "clerestory report photon-kernels photon-queues",
+        settings: &["query"],
         ..Row::of(file!())
     },
 ];

@@ -91,6 +91,14 @@ const ROWS: &[Row] = &[Row {
         "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
         "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",
     ],
-    experiment: "clerestory report preview-picture",
-    module: "engine/src/techniques/preview/mod.rs",
+    api: &[
+        "clerestory::techniques::preview::Preview",
+        "clerestory::techniques::preview::PreviewMethod",
+    ],
+    settings: &[
+        "clerestory::techniques::preview::PreviewSettings",
+        "clerestory::techniques::preview::PreviewDesc",
+        "clerestory render --technique preview",
+    ],
+    ..Row::of("engine/src/techniques/preview/mod.rs")
 }];

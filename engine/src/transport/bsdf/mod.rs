@@ -283,6 +283,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
         ],
         experiment: "clerestory agreement --scene furnace-metal,furnace-glass",
+        settings: &["separable_masking"],
+        api: &["clerestory::transport::bsdf"],
         ..Row::of(file!())
     },
     Row {
@@ -300,7 +302,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::white_furnace",
             "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
         ],
-        experiment: "clerestory report coupled-reflection",
+        api: &["clerestory::transport::bsdf"],
         ..Row::of(file!())
     },
 ];

@@ -397,7 +397,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/path_tracer.rs::path_sets_are_a_partition",
         "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
     ],
-    experiment: "clerestory report path-sets",
+    api: &["clerestory::transport::PathSet"],
+    settings: &["clerestory render --path-set direct"],
     ..Row::of(file!())
 }];
 
