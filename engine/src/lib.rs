@@ -25,11 +25,10 @@
 //! 7. [`render`], which ties them together.
 //! 8. [`plan`], which chooses among them.
 //!
-//! [`catalogue`] gathers the rows ([`card`]) that say where each published method lives; [`settings`], [`error`], [`fingerprint`] and [`srgb`] serve
+//! [`catalogue`] has the rows that say where each published method lives; [`settings`], [`error`], [`fingerprint`] and [`srgb`] serve
 //! all floors.
 
 pub mod accel;
-pub mod card;
 pub mod catalogue;
 pub mod error;
 pub mod film;

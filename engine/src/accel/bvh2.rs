@@ -20,7 +20,7 @@ use super::{
     Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
 };
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;

@@ -13,7 +13,7 @@
 //! distance is not skipped. Limits: within the offset distance of an edge at which surfaces fold more sharply towards the ray, the start can lie
 //! behind the neighbour; a needle thinner than some 10⁻⁵ of its length has no dependable normal.
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 

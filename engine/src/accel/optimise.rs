@@ -20,7 +20,7 @@ pub use treelets::MAX_TREELET;
 use super::Aabb;
 use super::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use super::leaf_rule::{LeafRule, half_area};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use leaves::{choose, with_leaves};
 
 /// How much to do.

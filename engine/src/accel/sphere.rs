@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Where a ray is closest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]

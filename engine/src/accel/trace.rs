@@ -15,7 +15,7 @@ pub use settings::{Execution, PersistentThreads, Query, TraceSettings};
 
 use super::kd::KdCounters;
 use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};

@@ -20,7 +20,7 @@
 pub mod wald;
 
 use super::Ray;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec3, Vec3};
 

@@ -1,19 +1,21 @@
 //! The catalogue: the rows of all modules, so that a reader finds where a publication lives in the code.
 //!
-//! A row ([`Row`]) stands beside its module; those of techniques come with their [`Card`], the others by the list in `modules.rs`.
+//! A row ([`Row`], which lower floors use as they do errors) stands beside its module; those of techniques come with their [`Card`], the others by the list in `modules.rs`.
 //! [`PREFIXES`] says which publication the ids of each prefix follow; where two of them describe one thing, their rows point at one
 //! implementation. Guarantee: the tests below check that the module, shaders, every test and every public path of a row exist, that
 //! something measures it, and that rows and sources are sound. `clerestory list` shows the rows and writes `docs/catalogue.md`.
 
 mod modules;
+pub(crate) mod row;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-pub use crate::card::{Bias, Cite, Role, Row, Source};
 use crate::techniques::{self, Card};
+pub(crate) use row::Bias;
+pub use row::{Cite, Role, Row, Source, sources};
 
 /// Prefixes of ids, in the order of the catalogue, each with what its ids follow.
 pub const PREFIXES: [(&str, &str); 6] = [

@@ -1,6 +1,6 @@
 //! The modules that have rows, but for those of techniques, which come with their cards: one line a module.
 
-use crate::card::Row;
+use crate::catalogue::Row;
 
 /// Their rows.
 pub(super) const MODULES: &[&[Row]] = &[

@@ -1,7 +1,6 @@
 //! The rows name what is there, and the checks find what is not.
 
 use super::*;
-use crate::card::sources;
 use crate::transport::PathSet;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

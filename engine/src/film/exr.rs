@@ -15,7 +15,7 @@ use exr::prelude::*;
 use super::picture::{DEPTH, Metadata, NORMAL, POSITION, Picture, RADIANCE};
 use crate::Error as EngineError;
 use crate::Result as EngineResult;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Samples (values, not pixels) that a file may hold in all; a header asking for more is refused before anything is allocated.
 const MAX_SAMPLES: usize = 1 << 29;

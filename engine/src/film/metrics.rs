@@ -10,7 +10,7 @@ pub use super::z_test::{ZTest, z_test};
 
 use super::picture::{Layer, Picture};
 use super::tone::ToneMap;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// ε of the relative MSE, in squared units of the reference's radiance.

@@ -18,7 +18,7 @@ use super::recorded::Recorded;
 use super::resources::FrameResources;
 use super::submission::{self, Submission};
 use super::tracker::Tracker;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// Passes that one recorder can hold.

@@ -10,7 +10,7 @@
 
 use std::time::Instant;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::kernels::{model_chain, model_copy, model_queue};
 use crate::gpu::{
     Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, compute_to_transfer, rw_compute_to_compute,

@@ -6,7 +6,7 @@
 use super::form::{Form, Variant};
 use super::scan::{ScanOptions, ScanTotals};
 use super::stream::{self, Count};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::kernels::{partition, partition_subgroup};
 use crate::gpu::shaders::sets::PartitionSet;
 use crate::gpu::{Buffer, BufferView, Gpu, Pass};

@@ -15,7 +15,7 @@ use super::form::Form;
 use super::radix_plan::{Plan, Tuning};
 use super::radix_small::SmallSort;
 use super::stream::{self, Count, MAX_COUNT, Prepare};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::kernels::radix_scan;
 use crate::gpu::shaders::types::StreamPlan;

@@ -9,7 +9,7 @@
 use super::form::{Form, Teams, Variant};
 use super::operation::Operation;
 use super::stream::{self, Count, Prepare, Stream};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::STREAM_HEADER_WORDS;
 use crate::gpu::shaders::kernels::{scan_apply, scan_apply_subgroup, scan_reduce, scan_reduce_subgroup, scan_totals};
 use crate::gpu::shaders::sets::{ScanApplySet, ScanReduceSet};

@@ -14,7 +14,7 @@
 use super::Parametrization;
 use super::directional_map::answer_of;
 use super::spherical_sat::{SatImage, SphericalSat, half_width_at};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::Pass;
 use crate::gpu::shaders::maps::sat_lobe;
 use crate::gpu::shaders::types::{LobeBox, LobeQuery};

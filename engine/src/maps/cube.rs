@@ -5,7 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Number of faces.
 pub const CUBE_FACES: u32 = 6;

@@ -11,7 +11,7 @@
 //! the twin of a look-up is [`MapImage::look_up`], that of a level [`MapImage::coarser`].
 
 use super::{MapImage, Parametrization};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     DIRECTIONAL_CUBE, DIRECTIONAL_EQUAL_AREA, DIRECTIONAL_LAT_LONG, DIRECTIONAL_NUSSELT, DIRECTIONAL_OCTAHEDRON,
     DIRECTIONAL_OCTAHEDRON_RECTANGULAR, DIRECTIONAL_PARABOLOID, DIRECTIONAL_SPHERE,

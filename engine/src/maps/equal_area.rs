@@ -6,7 +6,7 @@
 
 use super::octahedron::octahedron_signs;
 use super::turn::{turn_vector, vector_turn};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 

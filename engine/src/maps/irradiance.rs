@@ -11,7 +11,7 @@
 //! [`PrefilterGgx`](super::prefilter::PrefilterGgx), times π, where texels have one direction each.
 
 use super::{MapImage, MapPoint, Parametrization, Texel};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 use glam::{DVec2, DVec3, UVec2};
 

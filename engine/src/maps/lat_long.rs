@@ -4,7 +4,7 @@
 //! arguments, which keeps its precision at the poles; the periodic seam is in longitude. Twin of `maps/lat_long.glsl`.
 
 use super::turn::{turn_vector, vector_turn};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 

@@ -4,7 +4,7 @@
 //! are without bound at the horizon. Twin of `maps/nusselt.glsl`.
 
 use super::disc;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Coordinates on the unit disc of a unit direction with z ≥ 0.

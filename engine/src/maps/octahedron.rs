@@ -8,7 +8,7 @@
 //! Twin of `maps/octahedron.glsl`.
 
 use super::spherical::{Polygon, derivatives_of_projection};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// ±1 by sign; +1 for both zeros.

@@ -6,7 +6,7 @@
 //! 5.2·10⁻⁴ for 13, 1.3·10⁻⁴ for 15, 6.5·10⁻⁵ for 16. Packing is in f32 as on the device. Twin of `maps/packed_direction.glsl`.
 
 use super::octahedron::octahedron_decode;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// The greatest angle between a direction and what comes back from [`pack_octahedral`] with that many bits, rad: that of half a step in

@@ -4,7 +4,7 @@
 //! it the stereographic projection, which keeps angles. The back divides by 1 − z, as the front by 1 + z. Twin of `maps/paraboloid.glsl`.
 
 use super::disc;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Layer, 1 for z < 0, and coordinates on the unit disc of a unit direction.

@@ -15,7 +15,7 @@
 
 use super::MapImage;
 use super::directional_map::DirectionalMap;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::PREFILTER_TEXELS_PER_INVOCATION;
 use crate::gpu::shaders::maps::prefilter_ggx as kernel;
 use crate::gpu::{ComputePipeline, Gpu, Pass};

@@ -9,7 +9,7 @@
 //! less; it is the caller's to compare ([`MapImage::integral`]).
 
 use super::{MapImage, MapPoint, Parametrization, Texel};
-use crate::card::{Role, Row};
+use crate::catalogue::{Role, Row};
 use crate::{Error, Result};
 use glam::{DMat3, DVec2, DVec3, UVec2};
 use rayon::prelude::*;

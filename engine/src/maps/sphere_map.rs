@@ -5,7 +5,7 @@
 //! only its shape degrades, without bound at the rim, which is (0, 0, −1) all round. Twin of `maps/sphere_map.glsl`.
 
 use super::disc;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Coordinates on the unit disc of a unit direction; (1, 0) for (0, 0, −1).

@@ -20,7 +20,7 @@
 use super::directional_map::{DirectionalMap, answer};
 use super::lat_long::lat_long_pole_density;
 use super::{MapImage, Parametrization};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{SAT_FIXED, SAT_FLOAT, SAT_TWO_FLOAT};
 use crate::gpu::shaders::maps::{sat_columns, sat_look_up, sat_rows};
 use crate::gpu::shaders::sets::SphericalSatSet;

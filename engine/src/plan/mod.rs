@@ -38,7 +38,7 @@ pub use bias::{BiasEstimate, relative_bias_of_pairs, relative_drift_of_pairs};
 pub use model::{BiasModel, CostModel, ErrorModel};
 pub use noise::{relative_mse_by_variance, relative_mse_of_pair};
 
-use crate::card::{Role, Row};
+use crate::catalogue::{Role, Row};
 use crate::render::{RenderOptions, Renderer};
 use crate::techniques::{self, Bias, Card};
 use crate::transport::PathSet;

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::View;
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::Area;
 use crate::maps::octahedron::{OctahedronLayout, octant_matrix};
 

@@ -13,7 +13,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 
 /// Corners that the cut of a triangle along three planes makes at most: of 8 polygons, or 15 triangles. `max_vertices` of
 /// `raster/surface_split.geom`.

@@ -35,7 +35,7 @@
 use glam::{DVec3, IVec2, UVec2, Vec3};
 
 use super::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_CUBE, SHADOW_FOLD, SHADOW_MOVE_MAX, SHADOW_OCTAHEDRON, SHADOW_ROUNDING};
 use crate::gpu::shaders::raster::omni_shadow_look_up as kernel;

@@ -6,7 +6,7 @@ use super::output::Output;
 use super::surfaces::{SurfaceFeatures, Surfaces};
 use super::tessellation::MAX_LEVEL;
 use super::view::View;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::VertexShader;
 use crate::gpu::shaders::raster::{

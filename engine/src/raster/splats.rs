@@ -10,7 +10,7 @@
 use glam::{DVec2, DVec3, UVec2, Vec3};
 
 use crate::accel::MAX_COORDINATE;
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{SPLAT_NOTHING, SPLAT_SAME_SURFACE};
 use crate::gpu::shaders::raster::{splat_points, splat_pull, splat_push};
 use crate::gpu::shaders::types::{SplatLevel, SplatTexel, Surfel};

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 
 /// The most pieces along an edge.
 pub const MAX_LEVEL: u32 = 64;

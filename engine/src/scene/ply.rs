@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::{Material, Mesh, Scene, files};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::srgb::linear_from_srgb;
 use crate::{Error, Result};
 

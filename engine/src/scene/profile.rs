@@ -8,7 +8,7 @@ use std::fmt;
 use glam::{DVec3, Vec3};
 
 use super::{AlphaMode, Image, LightKind, Material, Medium, Phase, Scene, Texture};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// How alpha is used by the materials that are placed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::Mesh;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 struct Corners<'a> {
     mesh: &'a Mesh,

@@ -28,7 +28,7 @@ mod skipped;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::card::Row;
+use crate::catalogue::Row;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
@@ -38,7 +38,7 @@ use crate::settings::{Settings, SettingsDecl};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
-pub use crate::card::Bias;
+pub use crate::catalogue::row::Bias;
 pub use features::{Lack, lacks, offers};
 pub use frame::{Accumulated, Frame, FrameMethod, FrameTarget};
 pub use path::{PathTracer, PathTracerSettings};
@@ -50,7 +50,7 @@ pub struct Card {
     /// One sentence.
     pub summary: &'static str,
     /// Its rows of the [`catalogue`](crate::catalogue), of it and of its parts, a list a file. The first is the technique's own
-    /// ([`Role::Technique`](crate::card::Role::Technique)); a host's card may have none.
+    /// ([`Role::Technique`](crate::catalogue::Role::Technique)); a host's card may have none.
     pub rows: &'static [&'static [Row]],
     /// Bias.
     pub bias: Bias,

@@ -13,7 +13,7 @@
 
 use super::fresnel::{fresnel_dielectric, fresnel_f0, schlick_weight};
 use super::ggx::{ALPHA_MIN, ggx_g1, ggx_g2, ggx_sample_visible};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;

@@ -5,7 +5,7 @@
 //! probability is exactly the share of random numbers that choose it, and no entry with a positive weight is lost however small it
 //! is. Guarantee: at most 24 steps. Twin of `transport/distribution.glsl`.
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::{Error, Result};
 use glam::{DVec2, UVec2};
 

@@ -6,7 +6,7 @@
 //! `transport/environment.glsl`.
 
 use super::distribution::{build_distribution_2d, distribution_probability_2d, distribution_sample_2d};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::scene::Environment;
 use crate::{Error, Result};
 use glam::{DVec2, DVec3, UVec2};

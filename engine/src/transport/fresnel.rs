@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Reflectance at normal incidence for a relative index of refraction.
 pub fn fresnel_f0(eta: f64) -> f64 {

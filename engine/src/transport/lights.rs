@@ -5,7 +5,7 @@
 //! `transport/lights.glsl`.
 
 use super::warp::square_to_triangle;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::scene::LightKind;
 use glam::{DVec2, DVec3};

@@ -4,7 +4,7 @@
 //! Formulation of Light Transport" (2019); Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media" (2012).
 //! Guarantees: weights are finite, and unbiased for each band whatever the bands' probabilities. Distances in metres, coefficients in m⁻¹.
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::DVec3;
 

@@ -6,7 +6,7 @@
 //! `transport/phase.glsl`.
 
 use super::warp::{UNIFORM_SPHERE_PDF, direction_below_pole, orthonormal_basis};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::scene::Phase;
 use glam::DVec3;
 

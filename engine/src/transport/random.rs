@@ -5,7 +5,7 @@
 //! with the hash constants of Vegdahl (2021). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
 //! values lie on the 2⁻²⁴ grid of [0, 1). Twin of `transport/random.glsl`, bit for bit.
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{SAMPLER_PCG, SAMPLER_SOBOL, SEQUENCE_KEY};
 use glam::{DVec2, UVec3, UVec4};
 

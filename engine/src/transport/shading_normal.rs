@@ -6,7 +6,7 @@
 //! normal| is integrated over a part of its domain. Reciprocity is lost, as with every shading normal. Twin of
 //! `transport/shading_normal.glsl`.
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::DVec3;
 

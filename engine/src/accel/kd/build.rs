@@ -13,7 +13,7 @@ use super::probability::{Heuristic, InteriorOrigin};
 use super::{KdSettings, MAX_DEPTH};
 use crate::accel::Aabb;
 use crate::accel::input::bounds_of;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::Vec3;
 use rayon::prelude::*;
 

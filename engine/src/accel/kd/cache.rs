@@ -4,7 +4,7 @@
 //! and, with a leaf that waits, how much is visited; never a hit.
 
 use crate::accel::input::check_range;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 

@@ -13,7 +13,7 @@
 use std::f64::consts::PI;
 
 use super::bounds::Bounds;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::DVec3;
 
 /// The measure of how probable a visit is.

@@ -9,7 +9,7 @@ use super::KdTree;
 use super::tree::KdKind;
 use crate::accel::Ray;
 use crate::accel::bvh2::traverse::BoxTest;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// What a restart takes for its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,7 +14,7 @@ use crate::accel::bvh2::FINISHED;
 use crate::accel::bvh2::traverse::BoxTest;
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
 use crate::accel::{CandidateFilter, Hit, Ray};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 

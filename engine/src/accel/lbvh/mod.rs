@@ -18,7 +18,7 @@ pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
 pub use device_buffers::LbvhBuffers;
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Rows of the catalogue.
 pub(crate) const ROWS: &[Row] = &[Row {

@@ -14,7 +14,7 @@ use super::complete_bvh::{
 };
 use crate::accel::Aabb;
 use crate::accel::box_tree::TreeFault;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 

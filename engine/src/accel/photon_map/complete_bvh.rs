@@ -8,7 +8,7 @@
 
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};

@@ -13,7 +13,7 @@
 
 use super::complete_bvh::INDEX_BITS;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::{lbvh_codes, lbvh_grid, map_begin, map_blocks, map_pairs, map_split};
 use crate::gpu::shaders::constants::{LBVH_BOX_QUARTERS, MAP_BLOCK, MAP_GROUP_SIZE, MAP_LEVELS};

@@ -4,7 +4,7 @@
 //! kernels as their areas cover the scene's; leaves of a fixed share of that number cost about the least. The constant of
 //! proportionality is printed there as 8; the leaf sizes and counts of its own table need 1/16 to 1/8.
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Share of a point's kernels that a leaf holds.
 pub const LEAF_SHARE: f64 = 0.125;

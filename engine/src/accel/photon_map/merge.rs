@@ -10,7 +10,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use crate::accel::lbvh::SortedCodes;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Two neighbours whose codes differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

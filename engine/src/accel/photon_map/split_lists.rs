@@ -9,7 +9,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 use crate::accel::lbvh::SortedCodes;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// A node of one level: a range of places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use crate::accel::morton::doubled_centre;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Most inner nodes on a way from the root.
 pub const MAX_SWEEP_DEPTH: u32 = 64;

@@ -8,7 +8,7 @@
 
 use super::TriangleHit;
 use crate::accel::Ray;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::Vec3;
 
 /// A triangle made ready: nine numbers and an axis, of which the plane's four are read first.

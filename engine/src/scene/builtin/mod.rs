@@ -25,7 +25,7 @@ mod volumes;
 
 pub use parameters::{Parameter, ParameterKind};
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use parameters::Values;

@@ -24,7 +24,7 @@ use std::path::Path;
 use ::gltf::json::{self, Index, Root};
 
 use super::{Note, Scene};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// Extensions that are carried over.

@@ -12,7 +12,7 @@ mod spectra;
 use glam::DVec3;
 
 use super::ConductorIor;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use spectra::Spectrum;
 
 impl Spectrum {

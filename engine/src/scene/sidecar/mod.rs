@@ -39,7 +39,7 @@ use serde::Deserialize;
 use medium::MediumTable;
 
 use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, builtin, metals};
-use crate::card::{Role, Row};
+use crate::catalogue::{Role, Row};
 use crate::{Error, Result};
 
 /// Greatest number of texels of an environment map.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::techniques::ambient::ambient as kernel;
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
 use crate::scene::{EnvironmentUse, camera_frame::CameraFrame};

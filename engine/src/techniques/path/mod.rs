@@ -25,7 +25,7 @@ use self::record::{EyeStages, record_resolve};
 pub use self::settings::PathTracerSettings;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::Result;
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
 use crate::gpu::shaders::constants::WALK_GROUP;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer};
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;

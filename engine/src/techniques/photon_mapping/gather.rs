@@ -6,7 +6,7 @@ use super::map::PhotonMap;
 use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
 use crate::accel::trace::wide_counter;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_SET_DEAD, PATH_SET_STATE_BITS,

@@ -13,7 +13,7 @@ mod room_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
     PHOTON_BOUNCE_SHIFT, PHOTON_DIFFUSED_BIT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,

@@ -4,7 +4,7 @@
 //! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
 
 use super::settings::MapQueue;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, QUEUE_BLOCKS, QUEUE_COMPACTED, QUEUE_SLOTS, WALK_GROUP};
 use crate::gpu::shaders::sets::{GatherQueue, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_queue_blocks, photon_queue_flags};

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::kernel::KernelSettings;
 use super::settings::PhotonSettings;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{PHOTON_QUARTERS, WALK_GROUP};

@@ -1,7 +1,7 @@
 //! The raster preview as a technique.
 
 use super::{PreviewMethod, PreviewSettings, live};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::techniques::preview::{preview_display, preview_shade};
 use crate::raster::SHADOW_MAPS_MAX;
 use crate::scene::SceneProfile;

@@ -13,7 +13,7 @@ use glam::Vec3;
 use super::probe::{LightProbe, LightProbeDesc};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use super::{Preview, PreviewLights};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::{Area, Gpu, Recorder};
 use crate::maps::octahedron::OctahedronLayout;
 use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Surfaces, View};

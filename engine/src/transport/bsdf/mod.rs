@@ -27,7 +27,7 @@ use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
 use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants;
 
 /// The diffuse base.

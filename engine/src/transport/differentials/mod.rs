@@ -18,7 +18,7 @@ pub mod path_differentials;
 pub(crate) mod testing;
 
 use super::warp::orthonormal_basis;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};

@@ -9,7 +9,7 @@
 use super::{
     Differentials, emission_differentials, reflect_differentials, refract_differentials, transfer_differentials,
 };
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::DVec3;
 use std::f64::consts::PI;
 

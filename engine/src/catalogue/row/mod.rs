@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn modules_are_named_from_the_root() {
-        assert_eq!(Row::of(file!()).module, "engine/src/card/mod.rs");
+        assert_eq!(Row::of(file!()).module, "engine/src/catalogue/row/mod.rs");
         assert_eq!(from_root("/home/me/engine/src/film/exr.rs"), "engine/src/film/exr.rs");
         // A host's own file stays as it is.
         assert_eq!(from_root("src/even.rs"), "src/even.rs");
