@@ -14,12 +14,21 @@
 //! # }
 //! ```
 //!
-//! The modules are floors, and each uses only those below it: [`gpu`] (Vulkan, thin), [`kernels`] (sort, scan
-//! and the like), [`scene`] and [`film`], [`accel`] (spatial indexes) and [`maps`] (maps of directions), [`raster`] (rasterization), [`transport`] (what light does), [`walk`] (its ways through a scene, ray by ray), [`techniques`], [`render`], which ties them together, and [`plan`], which chooses among them. [`catalogue`] gathers the rows ([`card`]) that say where each
-//! published method lives.
+//! The modules are floors, and each uses only those below it. From below:
+//!
+//! 1. [`gpu`]: Vulkan, thin.
+//! 2. [`kernels`], sort, scan and the like; [`scene`] and [`film`].
+//! 3. [`accel`], spatial indexes, and [`maps`], maps of directions; above them [`raster`], rasterization.
+//! 4. [`transport`]: what light does.
+//! 5. [`walk`]: its ways through a scene, ray by ray.
+//! 6. [`techniques`]: what turns a scene into a picture.
+//! 7. [`render`], which ties them together.
+//! 8. [`plan`], which chooses among them.
+//!
+//! [`catalogue`] has the rows that say where each published method lives; [`settings`], [`error`], [`fingerprint`] and [`srgb`] serve
+//! all floors.
 
 pub mod accel;
-pub mod card;
 pub mod catalogue;
 pub mod error;
 pub mod film;

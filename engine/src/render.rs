@@ -1,4 +1,4 @@
-//! Floor 6: a scene, a technique, a camera and a film, tied together.
+//! Floor 7: a scene, a technique, a camera and a film, tied together.
 //!
 //! [`render`] is the whole way in one call; [`Renderer`] keeps a scene on the device for several pictures, and [`Rendering`] refines one
 //! step by step, so that a host can show progress, stop at any time and keep what is there.

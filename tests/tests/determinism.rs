@@ -1,8 +1,9 @@
 //! Same scene, settings, seed and driver: the same bits, however the work is cut up and whoever does it.
 
 use clerestory::gpu::Gpu;
-use clerestory::scene::{Environment, Material, Mesh, Scene};
-use clerestory::techniques::PathTracerSettings;
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory::scene::{Environment, Material, Mesh, Scene, SceneProfile};
+use clerestory::techniques::{self, PathTracerSettings};
 use clerestory::transport::random::SamplerKind;
 use clerestory_tests::child::hash_in_child;
 use clerestory_tests::random::Random;
@@ -83,6 +84,40 @@ fn how_the_work_is_cut_up_never_shows() {
                 truth.bits(),
                 "another seed or sampler is another picture"
             );
+        }
+    });
+}
+
+#[test]
+fn every_technique_gives_the_same_bits_again() {
+    with_gpu(|gpu| {
+        // A scene for each of them, in the order of how much is in it.
+        let scenes = [
+            "builtin:cornell-box",
+            "builtin:cornell-box?source=point",
+            "builtin:triangle-soup?n=300",
+        ]
+        .map(builtin);
+        for card in techniques::all() {
+            let can = |scene: &&Scene| (card.refusals)(&SceneProfile::of(scene)).is_empty();
+            let scene = scenes.iter().find(can);
+            let scene = scene.unwrap_or_else(|| panic!("`scenes` needs one that `{}` can render", card.id));
+            let bits = || -> Vec<u32> {
+                let options = RenderOptions {
+                    technique: Some(card.id.into()),
+                    size: SIZE,
+                    spp: 2,
+                    seed: 3,
+                    ..RenderOptions::default()
+                };
+                let rendered = Renderer::new(gpu, scene).and_then(|renderer| renderer.render(&options));
+                let picture = rendered.unwrap_or_else(|error| panic!("{}: {error}", card.id)).picture;
+                let radiance = picture.layer("radiance").expect("layer");
+                radiance.values().iter().map(|value| value.to_bits()).collect()
+            };
+            let first = bits();
+            assert!(first.iter().any(|bits| f32::from_bits(*bits) > 0.0), "{}", card.id);
+            assert!(first == bits(), "{}", card.id);
         }
     });
 }

@@ -353,7 +353,7 @@ fn four_descriptor_sets_are_enough_for_every_technique() {
         let able = scenes
             .iter()
             .find(|scene| (technique.refusals)(&SceneProfile::of(scene)).is_empty());
-        let scene = able.expect("a scene that it can render");
+        let scene = able.unwrap_or_else(|| panic!("`addresses` needs a scene that `{}` can render", technique.id));
         let options = RenderOptions {
             technique: Some(technique.id.into()),
             size: [8, 8],

@@ -15,10 +15,11 @@ fn fault(case: &HardCase, subject: &Subject, outcome: &Outcome) -> Option<String
         (Verdict::Pass, _) => true,
         // What a technique refuses it says beforehand of the scene that the case shows; one that shows a part of the light may refuse another of
         // the case's scenes.
-        (Verdict::Degrades, Subject::Technique { info, .. }) if outcome.refused => {
+        (Verdict::Refused, Subject::Technique { info, .. }) => {
             let shown = (case.picture)().map(|scene| (info.refusals)(&SceneProfile::of(&scene)));
             subject.limits().is_some() || shown.is_ok_and(|reasons| !reasons.is_empty())
         }
+        (Verdict::Refused, _) => false,
         (Verdict::Degrades, _) => {
             let documented = case.documented_of(subject).map(str::to_owned);
             outcome.reason.is_some() && (outcome.reason == documented || outcome.reason == subject.limits())

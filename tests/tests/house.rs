@@ -30,9 +30,7 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
 }
 
 /// The floors from below; those of one line stand side by side and do not know each other.
-const FLOORS: [&[&str]; 10] = [
-    // What rows say, beside the floors: every one uses it, and it none of them.
-    &["card"],
+const FLOORS: [&[&str]; 9] = [
     &["gpu"],
     &["kernels", "scene", "film"],
     &["accel", "maps"],

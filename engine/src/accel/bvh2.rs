@@ -20,7 +20,7 @@ use super::{
     Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
 };
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -210,5 +210,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/raster/gbuffer.rs::hard_cases_are_seen_as_rays_meet_them",
     ],
     experiment: "clerestory index --peers",
+    api: &["clerestory::accel::bvh2::Bvh2"],
+    settings: &[
+        "clerestory::accel::bvh2::Bvh2Settings",
+        "clerestory render --index bvh2",
+    ],
     ..Row::of(file!())
 }];

@@ -1,4 +1,4 @@
-//! Spatial indexes and their traversal: what a ray meets first, and whether it meets anything.
+//! Floor 3: spatial indexes and their traversal. What a ray meets first, and whether it meets anything.
 //!
 //! Every index implements [`RayIndex`]: it is built on the CPU or holds what a device build read back, offers the texels that the
 //! kernels bind as set 1, and carries the twin of its traversal. All indexes report the same hit for the same ray, bit for bit on one

@@ -13,7 +13,7 @@
 //! distance is not skipped. Limits: within the offset distance of an edge at which surfaces fold more sharply towards the ray, the start can lie
 //! behind the neighbour; a needle thinner than some 10⁻⁵ of its length has no dependable normal.
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 
@@ -89,7 +89,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/offset/tests.rs::position_lies_within_its_rounding_bound",
         "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
     ],
-    experiment: "clerestory report ray-offsets",
+    api: &["clerestory::accel::offset"],
     ..Row::of(file!())
 }];
 

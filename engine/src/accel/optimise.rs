@@ -20,7 +20,7 @@ pub use treelets::MAX_TREELET;
 use super::Aabb;
 use super::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use super::leaf_rule::{LeafRule, half_area};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use leaves::{choose, with_leaves};
 
 /// How much to do.
@@ -82,7 +82,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/lbvh/tests.rs::restructured_trees_are_valid_and_cost_no_more",
         "engine/src/accel/lbvh/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
     ],
-    experiment: "clerestory report tree-quality",
+    api: &["clerestory::accel::optimise::optimise"],
+    settings: &[
+        "clerestory::accel::optimise::Optimisation",
+        "clerestory render --index lbvh-high",
+    ],
     ..Row::of(file!())
 }];
 

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Where a ray is closest to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +52,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/sphere.rs::approach_matches_the_definition",
         "engine/src/accel/sphere.rs::spheres_are_hit_from_outside_inside_and_behind_and_touched_once",
     ],
-    experiment: "clerestory report sphere-tests",
+    api: &[
+        "clerestory::accel::sphere::intersect_sphere",
+        "clerestory::accel::sphere::closest_approach",
+    ],
     ..Row::of(file!())
 }];
 

@@ -15,7 +15,7 @@ pub use settings::{Execution, PersistentThreads, Query, TraceSettings};
 
 use super::kd::KdCounters;
 use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
@@ -508,7 +508,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
             "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
         ],
-        experiment: "clerestory report persistent-threads kd-threads",
+        api: &["clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
@@ -526,7 +527,11 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
             "tests/tests/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
         ],
-        experiment: "clerestory report persistent-threads kd-threads",
+        api: &["clerestory::accel::trace::RayTracer"],
+        settings: &[
+            "clerestory::accel::trace::TraceSettings",
+            "clerestory::accel::trace::PersistentThreads",
+        ],
         ..Row::of(file!())
     },
 ];

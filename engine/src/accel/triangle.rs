@@ -20,7 +20,7 @@
 pub mod wald;
 
 use super::Ray;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec3, Vec3};
 
@@ -177,7 +177,7 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Not watertight: rays can pass between triangles that share an edge.",
         sources: &[sources::MOLLER_TRUMBORE_1997.whole()],
         tests: &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
-        experiment: "clerestory report triangle-tests",
+        api: &["clerestory::accel::triangle::moller_trumbore"],
         ..Row::of(file!())
     },
     Row {
@@ -192,6 +192,10 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
         ],
         experiment: "clerestory bench",
+        api: &[
+            "clerestory::accel::triangle::intersect_triangle",
+            "clerestory::accel::triangle::ray_shear",
+        ],
         ..Row::of(file!())
     },
 ];

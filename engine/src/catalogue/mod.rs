@@ -1,26 +1,48 @@
 //! The catalogue: the rows of all modules, so that a reader finds where a publication lives in the code.
 //!
-//! A row ([`Row`]) stands beside its module; those of techniques come with their [`Card`], the others by the list in `modules.rs`.
-//! Ids with the prefixes `BG-`, `DP-`, `OEM-`, `PM-` and `MET-` are those of the five research documents that the engine follows (visibility
-//! and media, photon mapping, metals and reflections); where two documents describe one thing, their rows point at one implementation. Ids with
-//! the prefix `CL-` are the engine's own, for published methods outside of those documents. Guarantee: the tests below check that the
-//! module, shaders, every test and every row's experiment exist, that rows and sources are sound, and that `docs/catalogue.md` and
-//! `third_party_notes/sources.md` are [`markdown`] and [`sources_markdown`].
+//! A row ([`Row`], which lower floors use as they do errors) stands beside its module; those of techniques come with their [`Card`], the others by the list in `modules.rs`.
+//! [`PREFIXES`] says which publication the ids of each prefix follow; where two of them describe one thing, their rows point at one
+//! implementation. Guarantee: the tests below check that the module, shaders, every test and every public path of a row exist, that
+//! something measures it, and that rows and sources are sound. `clerestory list` shows the rows and writes `docs/catalogue.md`.
 
 mod modules;
-mod pages;
+pub(crate) mod row;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-pub use crate::card::{Bias, Cite, Role, Row, Source};
 use crate::techniques::{self, Card};
-pub use pages::{markdown, sources_markdown};
+pub(crate) use row::Bias;
+pub use row::{Cite, Role, Row, Source, sources};
 
-/// Prefixes of ids, in the order of the catalogue.
-const PREFIXES: [&str; 6] = ["BG-", "DP-", "OEM-", "PM-", "MET-", "CL-"];
+/// Prefixes of ids, in the order of the catalogue, each with what its ids follow.
+pub const PREFIXES: [(&str, &str); 6] = [
+    (
+        "BG-",
+        "background (transport, path tracing, shadow maps, ray indexes) of T. Engelhardt's thesis on visibility from a point, 2013",
+    ),
+    (
+        "DP-",
+        "directional parametrizations of the same thesis: maps of the sphere",
+    ),
+    (
+        "OEM-",
+        "octahedron environment maps of the same thesis, and how they are drawn and looked up",
+    ),
+    (
+        "PM-",
+        "B. Fabianowski's thesis \"Interactive Manycore Photon Mapping\", 2011: PM-B parallel building blocks, PM-CA caches of kd-trees, \
+         PM-DE density estimation, PM-F foundations, PM-I intersections, PM-KD kd-trees, PM-MAP photon maps, PM-PD photon differentials, \
+         PM-PH photons, PM-ST stages, PM-SYS the whole, PM-TR traversal, PM-VOL media, PM-X execution",
+    ),
+    (
+        "MET-",
+        "a doctoral thesis on metals and reflections on graphics hardware: MET-B basics of scattering, MET-F Fresnel terms",
+    ),
+    ("CL-", "the engine's own, and methods published elsewhere"),
+];
 
 /// All rows, ordered by document and id.
 pub fn all() -> &'static [Row] {
@@ -66,7 +88,7 @@ pub fn citations() -> Vec<(Source, Vec<(&'static str, &'static str)>)> {
 
 /// Where an id stands: by its prefix, then by its words and numbers, so that `PM-MAP-10` comes after `PM-MAP-9`.
 fn order(id: &str) -> (usize, Vec<(u64, String)>) {
-    let prefix = PREFIXES.iter().position(|prefix| id.starts_with(prefix));
+    let prefix = PREFIXES.iter().position(|(prefix, _)| id.starts_with(prefix));
     let mut parts: Vec<(u64, String)> = Vec::new();
     for c in id.chars() {
         match (c.to_digit(10), parts.last_mut()) {

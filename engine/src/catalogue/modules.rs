@@ -1,6 +1,6 @@
 //! The modules that have rows, but for those of techniques, which come with their cards: one line a module.
 
-use crate::card::Row;
+use crate::catalogue::Row;
 
 /// Their rows.
 pub(super) const MODULES: &[&[Row]] = &[
@@ -10,7 +10,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::kd::probability::ROWS,
     crate::accel::kd::shifted_restart::ROWS,
     crate::accel::kd::traverse::ROWS,
-    crate::accel::lbvh::radix_tree::ROWS,
+    crate::accel::lbvh::ROWS,
     crate::accel::offset::ROWS,
     crate::accel::optimise::ROWS,
     crate::accel::photon_map::clustered::ROWS,

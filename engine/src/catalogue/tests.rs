@@ -1,7 +1,6 @@
 //! The rows name what is there, and the checks find what is not.
 
 use super::*;
-use crate::card::sources;
 use crate::transport::PathSet;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -27,7 +26,11 @@ fn ids_are_unique_and_have_a_known_prefix() {
     let mut seen = BTreeSet::new();
     for row in all() {
         assert!(seen.insert(row.id), "{} twice", row.id);
-        assert!(PREFIXES.iter().any(|prefix| row.id.starts_with(prefix)), "{}", row.id);
+        assert!(
+            PREFIXES.iter().any(|(prefix, _)| row.id.starts_with(prefix)),
+            "{}",
+            row.id
+        );
         assert!(!row.name.is_empty(), "{}", row.id);
     }
     let ids = ["PM-MAP-9", "PM-MAP-10", "MET-B1", "CL-GGX"].map(order);
@@ -153,33 +156,167 @@ fn fault_of_test(test: &str) -> Option<String> {
     Some(format!("no test {name} in {file}; it is in {elsewhere:?}"))
 }
 
-/// What is wrong with the command that measures a system.
-fn fault_of_experiment(id: &str, command: &str) -> Option<String> {
+/// What is wrong with the command that measures a system beside the experiments.
+fn fault_of_command(command: &str) -> Option<String> {
     let words: Vec<&str> = command.split_whitespace().collect();
     let program = match words[..] {
-        [] => return Some("no experiment".into()),
+        [] => return None,
+        ["clerestory", "report", ..] => return Some("experiments name what they measure in their `systems`".into()),
         // A command is a file or a folder.
         ["clerestory", command, ..] => format!("tools/src/commands/{command}"),
         [program, ..] => program.into(),
     };
     let file = format!("{program}.rs");
-    if !repository().join(&program).exists() && !repository().join(file).is_file() {
-        return Some(format!("no program {program}"));
+    let is_there = repository().join(&program).exists() || repository().join(file).is_file();
+    (!is_there).then(|| format!("no program {program}"))
+}
+
+/// The ids that the `systems` of all experiments name, each with the experiment.
+fn measured() -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    let folder = std::fs::read_dir(repository().join("tools/experiments")).expect("experiments");
+    for file in folder.map(|entry| entry.expect("entry").path()) {
+        let text = std::fs::read_to_string(&file).unwrap_or_default();
+        let Some((_, after)) = text.split_once("\nsystems = [") else {
+            continue;
+        };
+        let ids = after.split(']').next().unwrap_or_default();
+        let ids = ids
+            .split(',')
+            .map(|id| id.trim().trim_matches('"'))
+            .filter(|id| !id.is_empty());
+        found.extend(ids.map(|id| (id.to_owned(), file.display().to_string())));
     }
-    let ["clerestory", "report", ref names @ ..] = words[..] else {
-        return None;
+    found
+}
+
+/// Whether a public path of this crate is there: every module on the way is public, and the last declares or re-exports the item.
+fn is_public(path: &str) -> bool {
+    let mut names: Vec<&str> = path.split("::").collect();
+    let item = names.pop().unwrap_or_default();
+    let mut modules = names.into_iter();
+    if modules.next() != Some("clerestory") {
+        return false;
+    }
+    let read = |path: &Path| std::fs::read_to_string(path).unwrap_or_default();
+    let mut folder = repository().join("engine/src");
+    let mut text = read(&folder.join("lib.rs"));
+    for module in modules {
+        if !text.lines().any(|line| line == format!("pub mod {module};")) {
+            return false;
+        }
+        let file = folder.join(format!("{module}.rs"));
+        folder.push(module);
+        text = read(&if file.is_file() { file } else { folder.join("mod.rs") });
+    }
+    let names = |text: &str| {
+        let mut words = text.split(|c: char| !(c.is_alphanumeric() || c == '_'));
+        words.any(|word| word == item)
     };
-    names.iter().find_map(|name| {
-        let file = format!("tools/experiments/{name}.toml");
-        let text = std::fs::read_to_string(repository().join(&file)).unwrap_or_default();
-        let mut systems = text.lines().filter(|line| line.starts_with("systems = ["));
-        let found = systems.any(|line| line.contains(&format!("\"{id}\"")));
-        (!found).then(|| format!("{file} does not measure it"))
-    })
+    let declares = |line: &str| {
+        let kinds = ["struct", "enum", "trait", "const fn", "fn", "type", "mod"];
+        let rest = kinds.iter().find_map(|kind| line.strip_prefix(&format!("pub {kind} ")));
+        rest.is_some_and(|rest| rest.split(|c: char| !(c.is_alphanumeric() || c == '_')).next() == Some(item))
+    };
+    let mut uses = text.split("\npub use ").skip(1);
+    text.lines().any(declares) || uses.any(|text| names(text.split(';').next().unwrap_or_default()))
 }
 
 #[test]
-fn modules_tests_and_experiments_exist() {
+fn public_paths_that_are_not_there_are_found_out() {
+    for path in [
+        "clerestory::kernels::RadixSort",
+        "clerestory::plan::plan",
+        "clerestory::transport::ggx",
+    ] {
+        assert!(is_public(path), "{path}");
+    }
+    for path in [
+        "clerestory::kernels::Radix",
+        "clerestory::kernels::radix_sort::RadixSort",
+        "clerestory::accel::ray_index",
+        "kernels::RadixSort",
+        "clerestory",
+    ] {
+        assert!(!is_public(path), "{path}");
+    }
+}
+
+/// The card of the technique that a row is a part of.
+fn technique_of(row: &Row) -> Option<&'static Card> {
+    let whole = match row.role {
+        Role::PartOf(of) => return technique_of(find(of)?),
+        _ => row.id,
+    };
+    techniques::all()
+        .iter()
+        .find(|card| row_of(card).is_some_and(|row| row.id == whole))
+}
+
+#[test]
+fn what_hosts_call_and_set_is_there() {
+    let mut faults = Vec::new();
+    for row in all() {
+        let must_be_called = !matches!(row.role, Role::PartOf(_));
+        if must_be_called && row.api.is_empty() {
+            faults.push(format!("{}: nothing to call", row.id));
+        }
+        let is_path = |text: &&&str| text.starts_with("clerestory::");
+        let paths = row.api.iter().chain(row.settings.iter().filter(is_path));
+        faults.extend(
+            paths
+                .filter(|path| !is_public(path))
+                .map(|path| format!("{}: no public {path}", row.id)),
+        );
+        // The program's tests read the command lines.
+        for name in row.settings.iter().filter(|text| !text.starts_with("clerestory")) {
+            if !technique_of(row).is_some_and(|card| card.settings.has(name)) {
+                faults.push(format!("{}: no setting {name}", row.id));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Every kernel of a card is among its row's shaders, which name files and folders.
+#[test]
+fn rows_of_techniques_have_the_kernels_of_their_cards() {
+    for card in techniques::all() {
+        let row = row_of(card).expect("row");
+        for kernel in card.kernels.concat() {
+            let file = format!("shaders/{}", kernel.name);
+            let mut named = row.shaders.iter();
+            assert!(
+                named.any(|shaders| if shaders.ends_with('/') {
+                    file.starts_with(shaders)
+                } else {
+                    *shaders == file
+                }),
+                "{}: {file}",
+                row.id
+            );
+        }
+    }
+}
+
+#[test]
+fn every_row_is_measured_and_nothing_else() {
+    let measured = measured();
+    assert!(measured.len() > 150, "{}", measured.len());
+    for (id, experiment) in &measured {
+        assert!(find(id).is_some_and(|row| row.id == id), "{experiment}: no row {id}");
+    }
+    for row in all() {
+        assert!(
+            !row.experiment.is_empty() || measured.iter().any(|(id, _)| id == row.id),
+            "no experiment names {} in its `systems`, and it has no command",
+            row.id
+        );
+    }
+}
+
+#[test]
+fn modules_tests_and_commands_exist() {
     let mut faults = Vec::new();
     for row in all() {
         if !(row.module.starts_with("engine/src/") && repository().join(row.module).is_file()) {
@@ -210,7 +347,7 @@ fn modules_tests_and_experiments_exist() {
                 .filter_map(|test| fault_of_test(test))
                 .map(|f| format!("{}: {f}", row.id)),
         );
-        faults.extend(fault_of_experiment(row.id, row.experiment).map(|f| format!("{}: {f}", row.id)));
+        faults.extend(fault_of_command(row.experiment).map(|f| format!("{}: {f}", row.id)));
     }
     assert!(
         faults.is_empty(),
@@ -228,12 +365,13 @@ fn tests_that_are_not_there_are_found_out() {
 }
 
 #[test]
-fn experiments_that_are_not_there_are_found_out() {
-    assert!(fault_of_experiment("CL-SUM", "").is_some());
-    assert!(fault_of_experiment("CL-SUM", "clerestory nothing").is_some());
-    assert!(fault_of_experiment("CL-SUM", "clerestory report no-such-experiment").is_some());
-    assert!(fault_of_experiment("CL-SUM", "clerestory report picture-formats").is_some());
-    assert!(fault_of_experiment("CL-SUM", "clerestory report sample-sums").is_none());
+fn commands_that_are_not_there_are_found_out() {
+    assert!(fault_of_command("clerestory nothing").is_some());
+    assert!(fault_of_command("clerestory report sample-sums").is_some());
+    assert!(fault_of_command("tools/nothing").is_some());
+    for sound in ["", "clerestory bench --sort", "tools/test"] {
+        assert_eq!(fault_of_command(sound), None);
+    }
 }
 
 #[test]
@@ -259,20 +397,6 @@ fn every_technique_has_a_row_with_its_path_set() {
     }
     let own = all().iter().filter(|row| row.role == Role::Technique);
     assert_eq!(own.count(), techniques::all().len());
-}
-
-#[test]
-fn the_pages_are_up_to_date() {
-    for (page, text, option) in [
-        ("docs/catalogue.md", markdown(), "--markdown"),
-        ("third_party_notes/sources.md", sources_markdown(), "--sources"),
-    ] {
-        let there = std::fs::read_to_string(repository().join(page)).unwrap_or_default();
-        assert!(
-            there == text,
-            "write it anew: cargo run -p clerestory-tools --bin clerestory -- list {option} > {page}"
-        );
-    }
 }
 
 /// Every file that has rows is in the list of modules or in a card's: a constant that nobody reads is a warning, but one too few in a

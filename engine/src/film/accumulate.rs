@@ -10,7 +10,7 @@
 //! Guarantees: deterministic for a fixed order of samples. One addition errs by at most 2⁻⁴⁶ of the operands' magnitudes, so n additions of
 //! one sign err by at most n · 2⁻⁴⁶ relative: 1.5e-8 for 10⁶ samples, below half an f32 ulp.
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 
 /// The unevaluated sum `hi + lo`, with |lo| at most half an ulp of `hi`.
@@ -170,7 +170,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
         "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
     ],
-    experiment: "clerestory report sample-sums",
+    api: &["clerestory::film::Accumulator"],
     ..Row::of(file!())
 }];
 

@@ -15,7 +15,7 @@ use exr::prelude::*;
 use super::picture::{DEPTH, Metadata, NORMAL, POSITION, Picture, RADIANCE};
 use crate::Error as EngineError;
 use crate::Result as EngineResult;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Samples (values, not pixels) that a file may hold in all; a header asking for more is refused before anything is allocated.
 const MAX_SAMPLES: usize = 1 << 29;
@@ -286,7 +286,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/hdr.rs::round_trip_errs_by_at_most_a_step_of_the_largest_channel",
         "engine/src/film/png.rs::a_written_file_reads_back_to_the_byte",
     ],
-    experiment: "clerestory report picture-formats",
+    api: &["clerestory::film::exr::write", "clerestory::film::exr::read"],
     ..Row::of(file!())
 }];
 

@@ -10,7 +10,7 @@ pub use super::z_test::{ZTest, z_test};
 
 use super::picture::{Layer, Picture};
 use super::tone::ToneMap;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// ε of the relative MSE, in squared units of the reference's radiance.
@@ -271,7 +271,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
         "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
     ],
-    experiment: "clerestory report error-against-time",
+    api: &["clerestory::film::compare", "clerestory::film::ErrorReport"],
+    settings: &["clerestory::film::CompareOptions", "clerestory compare a.exr b.exr"],
     ..Row::of(file!())
 }];
 

@@ -1,4 +1,4 @@
-//! Pictures: accumulation, files, tone curves, error metrics.
+//! Floor 2: pictures. Accumulation, files, tone curves, error metrics.
 
 pub mod accumulate;
 pub mod atomic;

@@ -6,7 +6,7 @@
 //! Guarantees: deterministic; values that are not finite are counted as rejected.
 
 use super::metrics::Sum;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// The share of accepted values with which a picture passes, as in Mitsuba 3's render tests: it leaves room for the few pixels whose rare bright
@@ -177,6 +177,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/z_test.rs::a_bias_of_one_per_cent_is_found",
     ],
     experiment: "clerestory agreement",
+    api: &["clerestory::film::ZTest"],
     ..Row::of(file!())
 }];
 

@@ -18,7 +18,7 @@ use super::recorded::Recorded;
 use super::resources::FrameResources;
 use super::submission::{self, Submission};
 use super::tracker::Tracker;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// Passes that one recorder can hold.
@@ -541,6 +541,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/gpu_floor.rs::write_after_read_and_wrong_scope_are_hazards",
         "tests/tests/layers.rs::the_recorder_catches_a_missing_barrier_between_dispatches",
     ],
-    experiment: "clerestory report barriers",
+    api: &["clerestory::gpu::Recorder", "clerestory::gpu::Pass"],
+    settings: &["clerestory::gpu::GpuOptions"],
     ..Row::of(file!())
 }];

@@ -10,7 +10,7 @@
 
 use std::time::Instant;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::kernels::{model_chain, model_copy, model_queue};
 use crate::gpu::{
     Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, compute_to_transfer, rw_compute_to_compute,
@@ -311,7 +311,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/kernels/device_model.rs::chains_visit_every_place_before_they_come_back",
         "tests/tests/kernels/device_model.rs::timed_runs_have_walked_copied_and_counted_what_was_asked",
     ],
-    experiment: "clerestory report device-model",
+    api: &["clerestory::kernels::device_model::DeviceModel"],
     ..Row::of(file!())
 }];
 

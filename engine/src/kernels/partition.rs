@@ -6,7 +6,7 @@
 use super::form::{Form, Variant};
 use super::scan::{ScanOptions, ScanTotals};
 use super::stream::{self, Count};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::kernels::{partition, partition_subgroup};
 use crate::gpu::shaders::sets::PartitionSet;
 use crate::gpu::{Buffer, BufferView, Gpu, Pass};
@@ -152,7 +152,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-B-2",
         name: "stream compaction",
         role: Role::Kernel,
-        limits: "Moves words of 32 bits or the numbers of elements, no longer records.",
+        limits: "Moves words of 32 bits or the numbers of elements: longer records are gathered by these numbers afterwards.",
         sources: &[sources::BLELLOCH_1990.whole()],
         shaders: &[
             "shaders/kernels/partition.comp",
@@ -160,13 +160,15 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         tests: &["tests/tests/kernels/blocks.rs::partitions_are_as_their_twins"],
         experiment: "clerestory bench --sort",
+        api: &["clerestory::kernels::Partition", "clerestory::kernels::compact"],
+        settings: &["clerestory::kernels::PartitionOptions"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-B-3",
         name: "split",
         role: Role::Kernel,
-        limits: "Moves words of 32 bits or the numbers of elements, no longer records.",
+        limits: "Moves words of 32 bits or the numbers of elements: longer records are gathered by these numbers afterwards.",
         sources: &[sources::BLELLOCH_1990.whole()],
         shaders: &[
             "shaders/kernels/partition.comp",
@@ -177,6 +179,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/kernels/blocks.rs::splits_by_bits_sort",
         ],
         experiment: "clerestory bench --sort",
+        api: &["clerestory::kernels::Partition", "clerestory::kernels::split"],
+        settings: &["clerestory::kernels::PartitionOptions"],
         ..Row::of(file!())
     },
 ];

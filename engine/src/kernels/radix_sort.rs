@@ -15,7 +15,7 @@ use super::form::Form;
 use super::radix_plan::{Plan, Tuning};
 use super::radix_small::SmallSort;
 use super::stream::{self, Count, MAX_COUNT, Prepare};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::kernels::{
@@ -363,6 +363,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/kernels/many_sorts.rs::sorts_of_random_sizes_and_patterns_are_as_by_std",
     ],
     experiment: "clerestory bench --sort --peers",
+    api: &["clerestory::kernels::RadixSort", "clerestory::kernels::radix_sort"],
+    settings: &["clerestory::kernels::RadixSortOptions"],
     ..Row::of(file!())
 }];
 

@@ -9,7 +9,7 @@
 use super::form::{Form, Teams, Variant};
 use super::operation::Operation;
 use super::stream::{self, Count, Prepare, Stream};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::constants::STREAM_HEADER_WORDS;
 use crate::gpu::shaders::kernels::{
@@ -278,5 +278,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/kernels/stream.rs::every_element_is_in_one_block",
     ],
     experiment: "clerestory bench --sort",
+    api: &[
+        "clerestory::kernels::Scan",
+        "clerestory::kernels::ReduceWords",
+        "clerestory::kernels::ReduceBox",
+        "clerestory::kernels::scan",
+    ],
+    settings: &["clerestory::kernels::ScanOptions"],
     ..Row::of(file!())
 }];

@@ -14,7 +14,7 @@
 use super::Parametrization;
 use super::directional_map::answer_of;
 use super::spherical_sat::{SatImage, SphericalSat, half_width_at};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::Pass;
 use crate::gpu::shaders::maps::sat_lobe;
 use crate::gpu::shaders::types::{LobeBox, LobeQuery};
@@ -342,6 +342,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/box_lobes.rs::constant_radiance_is_constant_through_every_lobe",
         "tests/tests/directional_maps.rs::lobes_are_their_twins",
     ],
-    experiment: "clerestory report map-glossiness",
+    api: &[
+        "clerestory::maps::box_lobe::box_lobe",
+        "clerestory::maps::box_lobe::ring_lobe",
+    ],
     ..Row::of(file!())
 }];

@@ -5,7 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Number of faces.
 pub const CUBE_FACES: u32 = 6;
@@ -78,6 +78,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
         "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
-    experiment: "clerestory report map-density map-error map-choice",
+    api: &[
+        "clerestory::maps::cube::cube_encode",
+        "clerestory::maps::cube::cube_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to cube"],
     ..Row::of(file!())
 }];

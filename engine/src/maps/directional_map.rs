@@ -11,7 +11,7 @@
 //! the twin of a look-up is [`MapImage::look_up`], that of a level [`MapImage::coarser`].
 
 use super::{MapImage, Parametrization};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     DIRECTIONAL_CUBE, DIRECTIONAL_EQUAL_AREA, DIRECTIONAL_LAT_LONG, DIRECTIONAL_NUSSELT, DIRECTIONAL_OCTAHEDRON,
     DIRECTIONAL_OCTAHEDRON_RECTANGULAR, DIRECTIONAL_PARABOLOID, DIRECTIONAL_SPHERE,
@@ -453,6 +453,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
         "engine/src/maps/tests/glossy.rs::levels_keep_the_integral",
     ],
-    experiment: "clerestory report map-levels map-borders",
+    api: &["clerestory::maps::directional_map::DirectionalMap"],
     ..Row::of(file!())
 }];

@@ -6,7 +6,7 @@
 
 use super::octahedron::octahedron_signs;
 use super::turn::{turn_vector, vector_turn};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -69,6 +69,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/seams.rs::look_ups_are_continuous_over_seams",
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
     ],
-    experiment: "clerestory report map-density map-error map-choice",
+    api: &[
+        "clerestory::maps::equal_area::equal_area_encode",
+        "clerestory::maps::equal_area::equal_area_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to equal-area"],
     ..Row::of(file!())
 }];

@@ -11,7 +11,7 @@
 //! [`PrefilterGgx`](super::prefilter::PrefilterGgx), times π, where texels have one direction each.
 
 use super::{MapImage, MapPoint, Parametrization, Texel};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 use glam::{DVec2, DVec3, UVec2};
 
@@ -174,6 +174,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/irradiance.rs::maps_of_irradiance_hold_it_for_every_normal",
         "tests/tests/directional_maps.rs::the_widest_lobe_is_irradiance",
     ],
-    experiment: "clerestory report map-error",
+    api: &[
+        "clerestory::maps::irradiance::irradiance_map",
+        "clerestory::maps::irradiance::IrradianceSource",
+    ],
     ..Row::of(file!())
 }];

@@ -4,7 +4,7 @@
 //! arguments, which keeps its precision at the poles; the periodic seam is in longitude. Twin of `maps/lat_long.glsl`.
 
 use super::turn::{turn_vector, vector_turn};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
@@ -66,6 +66,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/printed.rs::a_longitude_of_a_quotient_folds_half_turns",
         "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
     ],
-    experiment: "clerestory report map-density map-error map-choice",
+    api: &[
+        "clerestory::maps::lat_long::lat_long_encode",
+        "clerestory::maps::lat_long::lat_long_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to lat-long"],
     ..Row::of(file!())
 }];

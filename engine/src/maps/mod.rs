@@ -1,4 +1,4 @@
-//! Directional maps: the sphere of directions on one or more rectangles of texels.
+//! Floor 3: directional maps. The sphere of directions on one or more rectangles of texels.
 //!
 //! A [`Parametrization`] is one of the maps behind a common face: a direction is a layer and coordinates in \[0, 1\]² there. Each has a
 //! module of its own with the functions in the map's natural coordinates, whose GLSL twins have the same names. The third axis is the pole

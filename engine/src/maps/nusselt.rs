@@ -4,7 +4,7 @@
 //! are without bound at the horizon. Twin of `maps/nusselt.glsl`.
 
 use super::disc;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Coordinates on the unit disc of a unit direction with z ≥ 0.
@@ -51,6 +51,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
         "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
-    experiment: "clerestory report map-density map-choice",
+    api: &[
+        "clerestory::maps::nusselt::nusselt_encode",
+        "clerestory::maps::nusselt::nusselt_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to nusselt"],
     ..Row::of(file!())
 }];

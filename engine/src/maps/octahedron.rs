@@ -8,7 +8,7 @@
 //! Twin of `maps/octahedron.glsl`.
 
 use super::spherical::{Polygon, derivatives_of_projection};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// ±1 by sign; +1 for both zeros.
@@ -221,7 +221,12 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
             "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
         ],
-        experiment: "clerestory report map-density map-error map-choice",
+        api: &[
+            "clerestory::maps::octahedron::octahedron_encode",
+            "clerestory::maps::octahedron::octahedron_decode",
+            "clerestory::maps::Parametrization",
+        ],
+        settings: &["clerestory maps sky.hdr sky.exr --to octahedron"],
         ..Row::of(file!())
     },
     Row {
@@ -242,7 +247,12 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
             "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
         ],
-        experiment: "clerestory report map-density map-error map-choice",
+        api: &[
+            "clerestory::maps::octahedron::octahedron_rectangular_encode",
+            "clerestory::maps::octahedron::octahedron_rectangular_decode",
+            "clerestory::maps::Parametrization",
+        ],
+        settings: &["clerestory maps sky.hdr sky.exr --to octahedron-rectangular"],
         ..Row::of(file!())
     },
     Row {
@@ -260,7 +270,12 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
             "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
         ],
-        experiment: "clerestory report map-density map-error map-choice",
+        api: &[
+            "clerestory::maps::octahedron::octahedron_perspective_encode",
+            "clerestory::maps::octahedron::octahedron_perspective_decode",
+            "clerestory::maps::Parametrization",
+        ],
+        settings: &["clerestory maps sky.hdr sky.exr --to octahedron-c=2"],
         ..Row::of(file!())
     },
 ];

@@ -6,7 +6,7 @@
 //! 5.2·10⁻⁴ for 13, 1.3·10⁻⁴ for 15, 6.5·10⁻⁵ for 16. Packing is in f32 as on the device. Twin of `maps/packed_direction.glsl`.
 
 use super::octahedron::octahedron_decode;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// The greatest angle between a direction and what comes back from [`pack_octahedral`] with that many bits, rad: that of half a step in
@@ -72,7 +72,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/packed_direction.rs::the_nearest_of_four_is_two_thirds_as_far_off",
         "tests/tests/twins/maps.rs::levels_borders_and_words_agree_with_their_twins",
     ],
-    experiment: "clerestory report map-density",
+    api: &[
+        "clerestory::maps::packed_direction::pack_octahedral",
+        "clerestory::maps::packed_direction::unpack_octahedral",
+    ],
     ..Row::of(file!())
 }];
 

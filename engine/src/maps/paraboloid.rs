@@ -4,7 +4,7 @@
 //! it the stereographic projection, which keeps angles. The back divides by 1 − z, as the front by 1 + z. Twin of `maps/paraboloid.glsl`.
 
 use super::disc;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Layer, 1 for z < 0, and coordinates on the unit disc of a unit direction.
@@ -60,6 +60,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
         "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
-    experiment: "clerestory report map-density map-error map-choice",
+    api: &[
+        "clerestory::maps::paraboloid::paraboloid_encode",
+        "clerestory::maps::paraboloid::paraboloid_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to paraboloid"],
     ..Row::of(file!())
 }];

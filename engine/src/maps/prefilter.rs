@@ -15,7 +15,7 @@
 
 use super::MapImage;
 use super::directional_map::DirectionalMap;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::PREFILTER_TEXELS_PER_INVOCATION;
 use crate::gpu::shaders::maps::prefilter_ggx as kernel;
 use crate::gpu::{ComputePipeline, Gpu, Pass, PipelineInfo};
@@ -188,6 +188,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/glossy.rs::filtered_maps_are_integrals_of_the_lobe",
         "engine/src/maps/tests/glossy.rs::lobes_have_the_width_that_is_said",
     ],
-    experiment: "clerestory report map-glossiness",
+    api: &[
+        "clerestory::maps::prefilter::PrefilterGgx",
+        "clerestory::maps::prefilter::prefilter_ggx",
+    ],
     ..Row::of(file!())
 }];

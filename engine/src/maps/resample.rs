@@ -9,7 +9,7 @@
 //! less; it is the caller's to compare ([`MapImage::integral`]).
 
 use super::{MapImage, MapPoint, Parametrization, Texel};
-use crate::card::{Role, Row};
+use crate::catalogue::{Role, Row};
 use crate::{Error, Result};
 use glam::{DMat3, DVec2, DVec3, UVec2};
 use rayon::prelude::*;
@@ -201,5 +201,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tools/tests/maps.rs::scenes_look_the_same_after_a_round_trip",
     ],
     experiment: "clerestory maps sky.hdr sky.exr --to octahedron",
+    api: &["clerestory::maps::resample::resample"],
+    settings: &[
+        "clerestory::maps::resample::ResampleSettings",
+        "clerestory maps sky.hdr sky.exr --to octahedron",
+    ],
     ..Row::of(file!())
 }];

@@ -5,7 +5,7 @@
 //! only its shape degrades, without bound at the rim, which is (0, 0, −1) all round. Twin of `maps/sphere_map.glsl`.
 
 use super::disc;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::{DVec2, DVec3};
 
 /// Coordinates on the unit disc of a unit direction; (1, 0) for (0, 0, −1).
@@ -64,6 +64,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
         "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
-    experiment: "clerestory report map-density map-error map-choice",
+    api: &[
+        "clerestory::maps::sphere_map::sphere_map_encode",
+        "clerestory::maps::sphere_map::sphere_map_decode",
+        "clerestory::maps::Parametrization",
+    ],
+    settings: &["clerestory maps sky.hdr sky.exr --to sphere"],
     ..Row::of(file!())
 }];

@@ -20,7 +20,7 @@
 use super::directional_map::{DirectionalMap, answer};
 use super::lat_long::lat_long_pole_density;
 use super::{MapImage, Parametrization};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{SAT_FIXED, SAT_FLOAT, SAT_TWO_FLOAT};
 use crate::gpu::shaders::maps::{sat_columns, sat_look_up, sat_rows};
 use crate::gpu::shaders::sets::SphericalSatSet;
@@ -366,6 +366,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/box_lobes.rs::borders_hold_the_largest_box",
         "engine/src/maps/tests/box_lobes.rs::lobes_on_folds_and_edges_are_as_good_as_elsewhere",
     ],
-    experiment: "clerestory report map-glossiness",
+    api: &["clerestory::maps::spherical_sat::SphericalSat"],
+    settings: &[
+        "clerestory::maps::spherical_sat::SatNumbers",
+        "clerestory::maps::spherical_sat::SatRange",
+    ],
     ..Row::of(file!())
 }];

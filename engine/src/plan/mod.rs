@@ -1,4 +1,4 @@
-//! Automatic choice: which technique, with which settings and how many samples, meets an asked error or time.
+//! Floor 8: automatic choice. Which technique, with which settings and how many samples, meets an asked error or time.
 //!
 //! Nothing is known beforehand: each candidate renders small pilot pictures of the view at hand, twice with independent seeds. Their
 //! difference gives its noise ([`relative_mse_of_pair`]), their time its cost, and two or more numbers of samples the slope of its
@@ -40,7 +40,7 @@ pub use bias::{BiasEstimate, relative_bias_of_pairs, relative_drift_of_pairs};
 pub use model::{BiasModel, CostModel, ErrorModel};
 pub use noise::{relative_mse_by_variance, relative_mse_of_pair};
 
-use crate::card::{Role, Row};
+use crate::catalogue::{Role, Row};
 use crate::render::{RenderOptions, Renderer};
 use crate::techniques::{self, Bias, Card};
 use crate::transport::PathSet;
@@ -358,7 +358,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/automatic_choice.rs::a_bias_beyond_the_goal_is_refused_with_its_figure",
         "tests/tests/automatic_choice.rs::the_path_tracer_does_not_win_by_what_it_misses",
     ],
-    experiment: "clerestory report automatic-choice",
+    api: &["clerestory::plan::plan", "clerestory::plan::plan_among"],
+    settings: &[
+        "clerestory::plan::Goal",
+        "clerestory render --error 0.02",
+        "clerestory render --time 20s",
+    ],
     ..Row::of(file!())
 }];
 

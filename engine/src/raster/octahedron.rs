@@ -1,7 +1,7 @@
 //! The eight octants of the octahedron map as views: its encoding is linear in each of them.
 //!
-//! Source: T. Engelhardt and C. Dachsbacher, "Octahedron Environment Maps", VMV 2008; T. Engelhardt, "Efficient Visibility for Realistic
-//! Rendering", 2013, §7.1 and §7.2. There triangles are split by a geometry shader. Here, with the signs s of an octant in place of absolute
+//! Source: T. Engelhardt and C. Dachsbacher, "Octahedron Environment Maps", VMV 2008; T. Engelhardt, "Efficient From-Point Visibility
+//! for Global Illumination in Virtual Scenes with Participating Media", PhD thesis, KIT, 2013, §7.1 and §7.2. There triangles are split by a geometry shader. Here, with the signs s of an octant in place of absolute
 //! values, the map of a point p is a quotient of linear functions with the divisor W = s·p, the norm |x| + |y| + |z|: the rasterizer's own homogeneous
 //! coordinate, so that one matrix an octant and three clip distances s·p ≥ 0, component by component, render the map exactly. The other ways
 //! of [`OctantCut`](super::OctantCut) take the same views.
@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::View;
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::Area;
 use crate::maps::octahedron::{OctahedronLayout, octant_matrix};
 
@@ -73,6 +73,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/raster/directions.rs::views_project_as_the_maps_encode",
         "engine/src/maps/tests/printed.rs::matrices_of_octants_are_the_map",
     ],
-    experiment: "clerestory report map-rendering",
+    api: &["clerestory::raster::OctantCut", "clerestory::raster::GBuffer"],
+    settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],
     ..Row::of(file!())
 }];

@@ -1,7 +1,7 @@
 //! Polygons cut along the planes x = 0, y = 0 and z = 0, and the ways to render an octahedron map that rest on it.
 //!
-//! Source: T. Engelhardt, "Efficient Visibility for Realistic Rendering", PhD thesis, KIT, 2013, §7.2.1 and §7.3.2, of which these cuts differ:
-//! clip coordinates are homogeneous, with the norm |x| + |y| + |z| as the divisor, so that what is interpolated inside of an octant is
+//! Source: T. Engelhardt, "Efficient From-Point Visibility for Global Illumination in Virtual Scenes with Participating
+//! Media", PhD thesis, KIT, 2013, §7.2.1 and §7.3.2, of which these cuts differ: clip coordinates are homogeneous, with the norm |x| + |y| + |z| as the divisor, so that what is interpolated inside of an octant is
 //! right (the source's are divided already, and depth and attributes bend), and no more is emitted than there is.
 //!
 //! Guarantees. A cut is the same from both ends of an edge, and every octant's piece has the same corners on a plane as its neighbour's:
@@ -13,7 +13,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 
 /// Corners that the cut of a triangle along three planes makes at most: of 8 polygons, or 15 triangles. `max_vertices` of
 /// `raster/surface_split.geom`.
@@ -241,7 +241,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/raster/octants.rs::cuts_are_the_same_from_both_ends",
             "tests/tests/twins/raster.rs::pieces_of_octants_agree_with_their_twins",
         ],
-        experiment: "clerestory report map-rendering",
+        api: &["clerestory::raster::OctantCut", "clerestory::raster::GBuffer"],
+        settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],
         ..Row::of(file!())
     },
     Row {
@@ -258,7 +259,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
             "tests/tests/raster/cuts.rs::the_split_emits_least",
         ],
-        experiment: "clerestory report map-rendering",
+        api: &["clerestory::raster::OctantCut", "clerestory::raster::GBuffer"],
+        settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],
         ..Row::of(file!())
     },
     Row {
@@ -275,7 +277,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
             "tests/tests/twins/raster.rs::outlines_agree_with_their_twins",
         ],
-        experiment: "clerestory report map-rendering",
+        api: &["clerestory::raster::OctantCut", "clerestory::raster::GBuffer"],
+        settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],
         ..Row::of(file!())
     },
 ];

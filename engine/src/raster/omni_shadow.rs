@@ -35,7 +35,7 @@
 use glam::{DVec3, IVec2, UVec2, Vec3};
 
 use super::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_CUBE, SHADOW_FOLD, SHADOW_MOVE_MAX, SHADOW_OCTAHEDRON, SHADOW_ROUNDING};
 use crate::gpu::shaders::raster::omni_shadow_look_up as kernel;
@@ -531,6 +531,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
     shaders: &[
         "shaders/raster/omni_shadow.glsl",
         "shaders/raster/omni_shadow_look_up.comp",
+        "shaders/raster/surface_layer.vert",
+        "shaders/raster/surface_octant.vert",
+        "shaders/raster/surface.frag",
     ],
     bias: Some(Bias::Biased(
         "borders of shadows are those of texels; contact shadows begin `width + 1` texel diagonals late",
@@ -548,7 +551,13 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/preview/penumbra.rs::filtered_edges_are_ramps_about_the_edge",
         "tests/tests/twins/shadows.rs::shadow_maps_agree_with_their_twins",
     ],
-    experiment: "clerestory report shadow-maps",
+    api: &["clerestory::raster::OmniShadowMaps"],
+    settings: &[
+        "clerestory::raster::OmniShadowDesc",
+        "shadow_layout",
+        "shadow_side",
+        "shadow_width",
+    ],
     ..Row::of(file!())
 }];
 

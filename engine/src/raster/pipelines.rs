@@ -6,7 +6,7 @@ use super::output::Output;
 use super::surfaces::{SurfaceFeatures, Surfaces};
 use super::tessellation::MAX_LEVEL;
 use super::view::View;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::VertexShader;
 use crate::gpu::shaders::raster::{
@@ -360,6 +360,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
         "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
     ],
-    experiment: "clerestory report map-rendering",
+    api: &["clerestory::raster::OctantCut", "clerestory::raster::GBuffer"],
+    settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],
     ..Row::of(file!())
 }];

@@ -1,7 +1,7 @@
 //! Octahedron maps of points: every point goes to the texel of its centre, and holes are filled from coarser levels.
 //!
-//! Sources: T. Engelhardt, "Efficient Visibility for Realistic Rendering", PhD thesis, KIT, 2013, §7.4 (OEM-4f, octahedra for the shadows of
-//! virtual point lights); T. Ritschel et al., "Imperfect Shadow Maps for Efficient Computation of Indirect Illumination", SIGGRAPH Asia 2008
+//! Sources: T. Engelhardt, "Efficient From-Point Visibility for Global Illumination in Virtual Scenes with Participating
+//! Media", PhD thesis, KIT, 2013, §7.4 (OEM-4f, octahedra for the shadows of virtual point lights); T. Ritschel et al., "Imperfect Shadow Maps for Efficient Computation of Indirect Illumination", SIGGRAPH Asia 2008
 //! (splats, pull and push). Numbers come by a second run over the points in place of 64-bit atomics.
 //!
 //! Guarantees: deterministic, whatever the order of invocations; of equally near points the least number stays; no texel is empty after the
@@ -10,7 +10,7 @@
 use glam::{DVec2, DVec3, UVec2, Vec3};
 
 use crate::accel::MAX_COORDINATE;
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{SPLAT_NOTHING, SPLAT_SAME_SURFACE};
 use crate::gpu::shaders::raster::{splat_points, splat_pull, splat_push};
 use crate::gpu::shaders::types::{SplatLevel, SplatTexel, Surfel};
@@ -367,7 +367,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/raster/splats.rs::rooms_of_splats_are_closed_and_as_far_as_rays_go",
         "engine/src/raster/splats.rs::surfels_share_the_area_evenly",
     ],
-    experiment: "clerestory report map-rendering",
+    api: &["clerestory::raster::splats::SplatMap"],
     ..Row::of(file!())
 }];
 

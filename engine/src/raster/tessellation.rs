@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 
 /// The most pieces along an edge.
 pub const MAX_LEVEL: u32 = 64;
@@ -41,7 +41,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/raster/tessellation.rs::pieces_fill_the_triangle_and_share_their_edges",
         "tests/tests/twins/raster.rs::pieces_of_triangles_agree_with_their_twins",
     ],
-    experiment: "clerestory report map-rendering",
+    api: &[
+        "clerestory::raster::OctantCut",
+        "clerestory::raster::GBuffer",
+        "clerestory::raster::tessellation::tessellation_point",
+    ],
+    settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],
     ..Row::of(file!())
 }];
 

@@ -1,4 +1,4 @@
-//! The scene on the CPU: what the readers produce and everything above consumes.
+//! Floor 2: the scene on the CPU. What the readers produce and everything above consumes.
 //!
 //! Units are metres, radians and W·m⁻²·sr⁻¹ (radiance), W·sr⁻¹ (point and spot intensity), W·m⁻² (directional irradiance). World space is
 //! right-handed with +Y up, as in glTF 2.0; a camera looks along its local −Z.

@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::{Material, Mesh, Scene, files};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::srgb::linear_from_srgb;
 use crate::{Error, Result};
 
@@ -380,6 +380,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/obj.rs::faces_materials_and_coordinates_are_read",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::load"],
     ..Row::of(file!())
 }];
 

@@ -8,7 +8,7 @@ use std::fmt;
 use glam::{DVec3, Vec3};
 
 use super::{AlphaMode, Image, LightKind, Material, Medium, Phase, Scene, Texture};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// How alpha is used by the materials that are placed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -476,6 +476,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/profile.rs::what_is_absent_costs_no_byte",
         "tests/tests/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
     ],
-    experiment: "clerestory report scene-profile",
+    api: &["clerestory::scene::SceneProfile"],
     ..Row::of(file!())
 }];

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use glam::{Vec2, Vec3, Vec4};
 
 use super::Mesh;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 struct Corners<'a> {
     mesh: &'a Mesh,
@@ -154,7 +154,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/tangents.rs::tangents_follow_u_and_the_sign_follows_mirroring",
         "engine/src/scene/tangents.rs::disagreeing_corners_split_vertices",
     ],
-    experiment: "clerestory report tangents",
+    api: &["clerestory::scene::tangents::generate"],
     ..Row::of(file!())
 }];
 

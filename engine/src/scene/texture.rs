@@ -7,7 +7,7 @@
 use glam::{DVec2, DVec3, DVec4};
 
 use super::{Filter, Image, Texture, Wrap};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::TEXTURE_COORDINATE_LIMIT;
 use crate::srgb::linear_from_srgb;
 
@@ -81,6 +81,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/twin_texture.rs::look_ups_agree_with_their_twins",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::texture"],
     ..Row::of(file!())
 }];
 

@@ -1,4 +1,4 @@
-//! Techniques: what turns a scene on the device into a picture.
+//! Floor 6: techniques. What turns a scene on the device into a picture.
 //!
 //! [`all`] lists the engine's own. Each says what it needs of a device, which scenes it can model (and refuses the others with the
 //! reason), which light paths its picture contains, and whether and how it is biased.
@@ -41,7 +41,7 @@ methods! {
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::card::Row;
+use crate::catalogue::Row;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
@@ -51,7 +51,7 @@ use crate::settings::{Settings, SettingsDecl};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
-pub use crate::card::Bias;
+pub use crate::catalogue::row::Bias;
 pub use device_needs::{Lack, lacks, offers};
 pub use foresight::{Foresight, Law};
 pub use frame::{Accumulated, Frame, FrameMethod, FrameTarget};
@@ -64,7 +64,7 @@ pub struct Card {
     /// One sentence.
     pub summary: &'static str,
     /// Its rows of the [`catalogue`](crate::catalogue), of it and of its parts, a list a file. The first is the technique's own
-    /// ([`Role::Technique`](crate::card::Role::Technique)); a host's card may have none.
+    /// ([`Role::Technique`](crate::catalogue::Role::Technique)); a host's card may have none.
     pub rows: &'static [&'static [Row]],
     /// Bias.
     pub bias: Bias,

@@ -13,7 +13,7 @@
 
 use super::fresnel::{fresnel_dielectric, fresnel_f0, schlick_weight};
 use super::ggx::{ALPHA_MIN, ggx_g1, ggx_g2, ggx_sample_visible};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -214,6 +214,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/bsdf/tests.rs::white_furnace",
         "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
     ],
-    experiment: "clerestory report multiple-scattering",
+    settings: &["multiple_scattering"],
+    api: &["clerestory::transport::albedo"],
     ..Row::of(file!())
 }];

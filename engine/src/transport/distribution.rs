@@ -5,7 +5,7 @@
 //! probability is exactly the share of random numbers that choose it, and no entry with a positive weight is lost however small it
 //! is. Guarantee: at most 24 steps. Twin of `transport/distribution.glsl`.
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::{Error, Result};
 use glam::{DVec2, UVec2};
 
@@ -145,7 +145,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/distribution.rs::cells_follow_their_probability",
         "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
     ],
-    experiment: "clerestory report light-sampling",
+    api: &["clerestory::transport::distribution"],
     ..Row::of(file!())
 }];
 

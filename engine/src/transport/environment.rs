@@ -6,7 +6,7 @@
 //! `transport/environment.glsl`.
 
 use super::distribution::{build_distribution_2d, distribution_probability_2d, distribution_sample_2d};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::scene::Environment;
 use crate::{Error, Result};
 use glam::{DVec2, DVec3, UVec2};
@@ -119,6 +119,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
     ],
     experiment: "clerestory agreement --scene box-city-sky",
+    api: &["clerestory::transport::environment"],
     ..Row::of(file!())
 }];
 

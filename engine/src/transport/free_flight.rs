@@ -8,7 +8,7 @@
 //! bound, or bound on average. Distances in metres; extinction coefficients in m⁻¹, finite and not negative, by the distance along the ray.
 //! The path tracer's own tracking is in `transport/media_tracking.glsl`, by [`sample_null_collision`](super::medium::sample_null_collision).
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 
 /// exp(−Σ Δt σ(tᵢ)) over `steps` equal steps up to `t_max`, each looked up at `place` of its length: 1 at its end, ½ in its middle.
 ///
@@ -129,7 +129,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
     sources: &[sources::JENSEN_CHRISTENSEN_1998.whole()],
     bias: Some(Bias::Consistent("the step")),
     tests: &["engine/src/transport/free_flight.rs::marched_flights_are_biased_by_their_step"],
-    experiment: "clerestory report free-flight",
+    api: &[
+        "clerestory::transport::free_flight::marched_free_flight",
+        "clerestory::transport::free_flight::adaptively_marched_free_flight",
+    ],
     ..Row::of(file!())
 }];
 

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Reflectance at normal incidence for a relative index of refraction.
 pub fn fresnel_f0(eta: f64) -> f64 {
@@ -79,6 +79,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/transport/fresnel.glsl"],
         tests: &["engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric"],
         experiment: "clerestory agreement --scene cornell-metals,ring-mirror",
+        api: &["clerestory::transport::fresnel"],
         ..Row::of(file!())
     },
     Row {
@@ -90,6 +91,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/transport/fresnel.glsl"],
         tests: &["engine/src/transport/fresnel.rs::dielectric_equals_the_textbook_form_and_its_edges"],
         experiment: "clerestory agreement --scene cornell-glass",
+        api: &["clerestory::transport::fresnel"],
         ..Row::of(file!())
     },
 ];

@@ -8,7 +8,7 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 
 /// Below this the lobe is a Dirac delta: half vectors carry f32 errors of 1e-7, a part in 10⁴ of this width. The shader has it rounded;
 /// the albedo table is laid out by the exact value.
@@ -77,6 +77,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/samplers.rs::visible_normals_follow_their_density",
     ],
     experiment: "clerestory agreement --scene cornell-frosted,ring-rough",
+    api: &["clerestory::transport::ggx"],
     ..Row::of(file!())
 }];
 

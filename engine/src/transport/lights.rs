@@ -5,7 +5,7 @@
 //! `transport/lights.glsl`.
 
 use super::warp::square_to_triangle;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::scene::LightKind;
 use glam::{DVec2, DVec3};
@@ -92,6 +92,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/path_tracer.rs::path_sets_are_a_partition",
         ],
         experiment: "clerestory agreement --scene cornell-point,sphere-flake",
+        api: &["clerestory::transport::lights"],
         ..Row::of(file!())
     },
     Row {
@@ -109,6 +110,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
         ],
         experiment: "clerestory agreement --scene cornell-box,cornell-point",
+        api: &["clerestory::transport::lights"],
         ..Row::of(file!())
     },
 ];

@@ -4,7 +4,7 @@
 //! Formulation of Light Transport" (2019); Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media" (2012).
 //! Guarantees: weights are finite, and unbiased for each band whatever the bands' probabilities. Distances in metres, coefficients in m⁻¹.
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::DVec3;
 
@@ -178,7 +178,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/media/absorption.rs::emission_is_integrated_exactly",
             "tests/tests/media/furnace.rs::lossless_media_vanish",
         ],
-        experiment: "clerestory report error-in-media",
+        api: &["clerestory::transport::medium"],
         ..Row::of(file!())
     },
     Row {
@@ -209,6 +209,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/media/slab.rs::bands_of_a_chromatic_medium_are_those_of_grey_ones",
         ],
         experiment: "clerestory agreement --scene fog-box,smoke",
+        settings: &["equiangular"],
+        api: &["clerestory::transport::medium"],
         ..Row::of(file!())
     },
     Row {
@@ -226,7 +228,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/free_flight.rs::marched_transmittance_errs_by_the_step_and_in_the_middle_by_its_square",
             "engine/src/transport/free_flight.rs::ratio_tracking_is_unbiased_however_loose_the_majorant",
         ],
-        experiment: "clerestory report free-flight",
+        api: &["clerestory::transport::medium"],
         ..Row::of(file!())
     },
     Row {
@@ -241,7 +243,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
             "engine/src/transport/medium.rs::extremes_stay_finite",
         ],
-        experiment: "clerestory report free-flight",
+        api: &["clerestory::transport::medium"],
         ..Row::of(file!())
     },
     Row {
@@ -258,7 +260,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
             "tests/tests/media/heterogeneous.rs::emptiness_and_loose_majorants_cost_noise_only",
         ],
-        experiment: "clerestory report free-flight",
+        api: &["clerestory::transport::medium"],
         ..Row::of(file!())
     },
 ];

@@ -1,4 +1,4 @@
-//! What light does: reflectance, Fresnel, samplers, path sets, the scene on the device.
+//! Floor 4: what light does. Reflectance, Fresnel, samplers, path sets, the scene on the device.
 
 pub mod albedo;
 pub mod bsdf;

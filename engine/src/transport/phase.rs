@@ -6,7 +6,7 @@
 //! `transport/phase.glsl`.
 
 use super::warp::{UNIFORM_SPHERE_PDF, direction_below_pole, orthonormal_basis};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::scene::Phase;
 use glam::DVec3;
 
@@ -114,7 +114,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
         "engine/src/transport/phase.rs::samples_follow_their_density",
     ],
-    experiment: "clerestory report phase-functions",
+    api: &["clerestory::transport::phase"],
     ..Row::of(file!())
 }];
 

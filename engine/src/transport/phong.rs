@@ -6,7 +6,7 @@
 //! normal incidence only. Frame: z is the normal; `wo.z` > 0. Twin of `transport/phong.glsl`.
 
 use super::warp::{direction_below_pole, orthonormal_basis};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_1_PI;
 
@@ -60,6 +60,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
     ],
     experiment: "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
+    api: &["clerestory::transport::phong"],
     ..Row::of(file!())
 }];
 

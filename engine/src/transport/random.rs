@@ -5,7 +5,7 @@
 //! with the hash constants of Vegdahl (2021). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
 //! values lie on the 2⁻²⁴ grid of [0, 1). Twin of `transport/random.glsl`, bit for bit.
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{SAMPLER_PCG, SAMPLER_SOBOL, SEQUENCE_KEY};
 use glam::{DVec2, UVec3, UVec4};
 
@@ -159,7 +159,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
             "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
         ],
-        experiment: "clerestory report samplers",
+        settings: &["sampler"],
+        api: &["clerestory::transport::random"],
         ..Row::of(file!())
     },
     Row {
@@ -175,6 +176,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/random.rs::floats_stay_below_one",
         ],
         experiment: "clerestory agreement",
+        settings: &["sampler"],
+        api: &["clerestory::transport::random"],
         ..Row::of(file!())
     },
 ];

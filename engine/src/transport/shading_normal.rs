@@ -6,7 +6,7 @@
 //! normal| is integrated over a part of its domain. Reciprocity is lost, as with every shading normal. Twin of
 //! `transport/shading_normal.glsl`.
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::DVec3;
 
@@ -43,7 +43,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_lose_energy_only",
         "engine/src/scene/normal_map.rs::flat_maps_keep_the_normal",
     ],
-    experiment: "clerestory report shading-normals",
+    api: &["clerestory::transport::shading_normal"],
     ..Row::of(file!())
 }];
 

@@ -9,7 +9,7 @@ pub use crate::scene::normal_map::orthonormal_basis;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 
 /// Density of [`square_to_sphere`], sr⁻¹.
 pub const UNIFORM_SPHERE_PDF: f64 = 0.25 * FRAC_1_PI;
@@ -91,7 +91,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/samplers.rs::warps_keep_areas",
         "tests/tests/samplers.rs::pairs_fill_the_square_evenly",
     ],
-    experiment: "clerestory report convergence",
+    api: &["clerestory::transport::warp"],
     ..Row::of(file!())
 }];
 

@@ -1,4 +1,4 @@
-//! Light's walks through a scene on the device, ray by ray, in waves: eye paths, photons, and whatever a host or a technique begins.
+//! Floor 5: light's walks through a scene on the device, ray by ray, in waves: eye paths, photons, and whatever a host or a technique begins.
 //!
 //! A [`Walker`] follows a wave of walks to their ends. Its owner says by [`WalkStages`] where walks start, what happens where their rays arrive
 //! and what is done with what waits by place: shadow rays, for which the walker has a stage of its own, or deposits. The rest is the walker's: closest

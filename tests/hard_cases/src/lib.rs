@@ -2,7 +2,7 @@
 //!
 //! A case is judged on every subject that it concerns: each technique with each of its samplers ([`Easel`]), each ray index
 //! ([`INDEXES`]) and the scattering functions ([`LOBES`]). What is known is a closed form, a well-conditioned twin of the scene, a search
-//! through all triangles, or that an error names its place; never a picture of an earlier run. Verdicts: a case passes, degrades as
+//! through all triangles, or that an error names its place; never a picture of an earlier run. Verdicts: a case passes, is refused, degrades as
 //! [`HardCase::documented`] says and no further, or fails. Both the test suite and `clerestory stability` run this table.
 //!
 //! # How to add a case

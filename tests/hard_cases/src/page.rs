@@ -34,12 +34,14 @@ pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: i
     let mut page = format!(
         "# Stability\n\nHow every technique with each of its samplers, every ray index and the scattering functions (`lobes`, in f64) take the \
          hard cases. Written by `clerestory stability --markdown`, measured on {device}. Each cell has the figure that came nearest \
-         to its bound: *measured* of *allowed*; `–` where a case does not concern a subject. `clerestory stability CASE --json` has the \
+         to its bound: *measured* of *allowed*. **degrades** is what is documented, **refused** what a technique says beforehand that it cannot \
+         model, `–` stands where a case does not concern a subject. `clerestory stability CASE --json` has the \
          reasons too.\n\n| case | {} |\n|---|{}\n",
         subjects.join(" | "),
         "---|".repeat(subjects.len()),
     );
-    let mut reasons = Vec::new();
+    // Each with the cases that it is said of.
+    let mut reasons: Vec<(&String, &String, Vec<&str>)> = Vec::new();
     for (case, outcomes) in rows {
         page += &format!("| [{name}](#{name}) |", name = case.name);
         for outcome in outcomes {
@@ -50,15 +52,21 @@ pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: i
         }
         page.push('\n');
         for outcome in outcomes.iter().flatten() {
-            if let Some(reason) = &outcome.reason {
-                let line = format!("- {}, {}: {reason}\n", case.name, outcome.subject);
-                reasons.push(line);
+            let Some(reason) = &outcome.reason else { continue };
+            let said = reasons
+                .iter_mut()
+                .find(|(subject, known, _)| (*subject, *known) == (&outcome.subject, reason));
+            match said {
+                Some((_, _, cases)) => cases.push(case.name),
+                None => reasons.push((&outcome.subject, reason, vec![case.name])),
             }
         }
     }
     if !reasons.is_empty() {
         page += "\n## What does not pass, and what to do\n\n";
-        page += &reasons.concat();
+        for (subject, reason, cases) in reasons {
+            page += &format!("- {subject}, {}: {reason}\n", cases.join(", "));
+        }
     }
     page += "\n## The cases\n";
     for (case, _) in rows {
@@ -73,5 +81,9 @@ fn cell(outcome: &Outcome) -> String {
         Verdict::Pass => outcome.verdict.word().to_owned(),
         _ => format!("**{}**", outcome.verdict.word()),
     };
-    format!("{word}: {}", outcome.measured.replace('|', "\\|"))
+    if outcome.measured.is_empty() {
+        word
+    } else {
+        format!("{word}: {}", outcome.measured.replace('|', "\\|"))
+    }
 }

@@ -106,8 +106,10 @@ pub fn subjects() -> Vec<Subject> {
 pub enum Verdict {
     /// As it has to.
     Pass,
-    /// As documented, or refused with the reason.
+    /// As documented.
     Degrades,
+    /// The subject has refused the case beforehand, with its reasons.
+    Refused,
     /// Worse.
     Fails,
 }
@@ -118,6 +120,7 @@ impl Verdict {
         match self {
             Self::Pass => "pass",
             Self::Degrades => "degrades",
+            Self::Refused => "refused",
             Self::Fails => "FAILS",
         }
     }
@@ -132,12 +135,10 @@ pub struct Outcome {
     pub subject: String,
     /// The verdict.
     pub verdict: Verdict,
-    /// The figure that is worst for its bound.
+    /// The figure that is worst for its bound; empty where nothing was measured.
     pub measured: String,
     /// Why it does not pass and what can be done; `None` for what passes.
     pub reason: Option<String>,
-    /// True when the subject has refused the case beforehand, with its reasons.
-    pub refused: bool,
     /// Everything that was measured.
     pub figures: Vec<Figure>,
 }
@@ -176,7 +177,6 @@ fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Out
         verdict: Verdict::Fails,
         measured: String::new(),
         reason: None,
-        refused: false,
         figures: Vec::new(),
     };
     match judged {
@@ -204,9 +204,7 @@ fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Out
             }
         }
         Err(Error::Unsupported { reasons, .. }) => {
-            outcome.verdict = Verdict::Degrades;
-            outcome.refused = true;
-            outcome.measured = "refused".into();
+            outcome.verdict = Verdict::Refused;
             outcome.reason = Some(format!(
                 "{}; choose another technique or change the scene",
                 reasons.join("; ")

@@ -375,7 +375,7 @@ fn cards_of_the_hosts_own_are_judged_by_the_hard_cases() {
     // One that says that it holds all light is held to it.
     let case = clerestory_hard_cases::by_name("one-triangle").unwrap();
     let outcome = judge(&gpu, case, &Subject::of(&EVEN)[0]).unwrap();
-    assert!(outcome.refused, "{outcome:?}");
+    assert_eq!(outcome.verdict, Verdict::Refused, "{outcome:?}");
     static WITHOUT_REFUSALS: Card = Card {
         refusals: |_| Vec::new(),
         ..EVEN

@@ -89,7 +89,7 @@ impl AgreementReport {
         let without_spread = races.iter().filter(|race| !knows_seconds(race)).count();
         if without_spread > 0 {
             lines.push(format!(
-                "In {} the ± is that of the errors alone: these results, kept from an earlier report, have no spread of the seconds.",
+                "In {} the ± is that of the errors alone: no spread of the seconds was kept with these results.",
                 of(without_spread)
             ));
         }

@@ -151,3 +151,23 @@ fn check_validation(log: &ValidationLog) -> Outcome {
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What rows of the catalogue tell readers to type.
+    #[test]
+    fn command_lines_of_the_catalogue_are_understood() {
+        let mut seen = 0;
+        for row in clerestory::catalogue::all() {
+            let lines = row.settings.iter().chain([&row.experiment]);
+            for line in lines.filter(|line| line.starts_with("clerestory ")) {
+                let fault = Program::try_parse_from(line.split_whitespace()).err();
+                assert!(fault.is_none(), "{}: {line}: {fault:?}", row.id);
+                seen += 1;
+            }
+        }
+        assert!(seen > 20, "{seen}");
+    }
+}

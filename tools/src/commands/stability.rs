@@ -21,7 +21,7 @@ use crate::output::{self, Table};
 /// Runs the hard cases: extreme scales, slivers, grazing light, lights without power, media as thin as air … and says which pass
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A case passes, degrades as documented (or is refused with the reason), or fails; the figure beside the verdict is the one that came \
+A case passes, degrades as documented, is refused with the reason, or fails; the figure beside the verdict is the one that came \
 nearest to its bound. Exit code 4 when a case fails.
 
 Examples:

@@ -13,7 +13,7 @@ use super::probability::{Heuristic, InteriorOrigin};
 use super::{KdSettings, MAX_DEPTH};
 use crate::accel::Aabb;
 use crate::accel::input::bounds_of;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -372,6 +372,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/kd/tests.rs::a_wall_ends_in_a_leaf_without_volume",
         "engine/src/accel/kd/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
     ],
-    experiment: "clerestory report kd-heuristics",
+    api: &["clerestory::accel::kd::KdTree"],
+    settings: &["clerestory::accel::kd::KdSettings", "clerestory render --index kd"],
     ..Row::of(file!())
 }];

@@ -4,7 +4,7 @@
 //! and, with a leaf that waits, how much is visited; never a hit.
 
 use crate::accel::input::check_range;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 
@@ -135,55 +135,60 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-CA-1",
         name: "kd node cache I: the top of the tree in shared memory",
         role: Role::PartOf("PM-X-2"),
-        limits: "Only persistent threads that traverse kd-trees by a stack have it, and only as many levels as fit shared memory.",
+        limits: "Only persistent threads that traverse kd-trees by a stack have it, and for the top 10 levels at most (8 KiB).",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
-        experiment: "clerestory report kd-caches kd-rays",
+        api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-CA-2",
-        name: "node cache II: the same with boxes",
+        name: "kd node cache II: the top of the tree in shared memory, with boxes",
         role: Role::PartOf("PM-X-2"),
-        limits: "As node cache I, with fewer levels for the same memory.",
+        limits: "Exists with stack cache II alone, whose entries it gives their ends, and for the top 8 levels at most (8 KiB).",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
-        experiment: "clerestory report kd-caches kd-rays",
+        api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-CA-3",
-        name: "stack cache I: the last entry in registers",
+        name: "kd stack cache I: the last entry in registers",
         role: Role::PartOf("PM-X-2"),
         limits: "Only persistent threads that traverse kd-trees by a stack have it, for one entry.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
-        experiment: "clerestory report kd-caches kd-rays",
+        api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-CA-4",
-        name: "stack cache II: entries as bytes in registers",
+        name: "kd stack cache II: entries as bytes in registers",
         role: Role::PartOf("PM-X-2"),
         limits: "Eight entries at most, which name cached nodes alone: wants node cache II.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
-        experiment: "clerestory report kd-caches kd-rays",
+        api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-CA-5",
-        name: "stack cache III: a leaf that waits",
+        name: "kd stack cache III: a leaf that waits",
         role: Role::PartOf("PM-X-2"),
         limits: "Visits leaves that a hit would have spared.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
-        experiment: "clerestory report kd-caches kd-rays",
+        api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
@@ -197,18 +202,20 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         shaders: &["shaders/accel/trace_queue_vote.comp"],
         tests: &["tests/tests/kd.rs::votes_change_no_hit"],
-        experiment: "clerestory report kd-threads",
+        api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-CA-7",
-        name: "caches of nodes and of the last entry together",
+        name: "kd caches of nodes and of the last entry together",
         role: Role::PartOf("PM-X-2"),
         limits: "As its two caches.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
-        experiment: "clerestory report kd-caches kd-rays",
+        api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
 ];

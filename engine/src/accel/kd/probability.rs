@@ -13,7 +13,7 @@
 use std::f64::consts::PI;
 
 use super::bounds::Bounds;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::DVec3;
 
 /// The measure of how probable a visit is.
@@ -282,22 +282,27 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/kd/probability/tests.rs::the_closed_form_is_the_integral_of_solid_angles",
             "engine/src/accel/kd/probability/tests.rs::probabilities_are_those_of_the_reference_table",
         ],
-        experiment: "clerestory report kd-probability",
+        api: &[
+            "clerestory::accel::kd::probability::exact",
+            "clerestory::accel::kd::Heuristic",
+        ],
+        settings: &["clerestory::accel::kd::KdSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-KD-3",
-        name: "the same by 26 regions",
+        name: "probability of a visit from inside the scene by 26 regions",
         role: Role::PartOf("PM-KD-1"),
         limits: "The solid angle in each region is that at its centre, wrong where the node is near.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.1.2")],
         tests: &["engine/src/accel/kd/probability/tests.rs::probabilities_are_those_of_the_reference_table"],
-        experiment: "clerestory report kd-probability",
+        api: &["clerestory::accel::kd::Heuristic"],
+        settings: &["clerestory::accel::kd::KdSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-KD-4",
-        name: "the same by overlapping slabs (SIROH), incrementally",
+        name: "probability of a visit from inside the scene by overlapping slabs (SIROH), incrementally",
         role: Role::PartOf("PM-KD-1"),
         limits: "Solid angles are ratios of areas over overlapping slabs, which can exceed the surface area heuristic.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.1.3")],
@@ -305,7 +310,11 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/kd/probability/tests.rs::parts_handed_down_are_those_of_the_children",
             "engine/src/accel/kd/probability/tests.rs::every_heuristic_gives_the_scene_itself_one",
         ],
-        experiment: "clerestory report kd-heuristics",
+        api: &[
+            "clerestory::accel::kd::Heuristic",
+            "clerestory::accel::kd::probability::InteriorOrigin",
+        ],
+        settings: &["clerestory::accel::kd::KdSettings"],
         ..Row::of(file!())
     },
 ];

@@ -9,7 +9,7 @@ use super::KdTree;
 use super::tree::KdKind;
 use crate::accel::Ray;
 use crate::accel::bvh2::traverse::BoxTest;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// What a restart takes for its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,6 +119,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/accel/kd/shifted_restart_tests.rs::restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not",
     ],
-    experiment: "clerestory report kd-traversal",
+    api: &["clerestory::accel::kd::shifted_restart::ShiftedRestart"],
     ..Row::of(file!())
 }];

@@ -14,7 +14,7 @@ use crate::accel::bvh2::FINISHED;
 use crate::accel::bvh2::traverse::BoxTest;
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
 use crate::accel::{CandidateFilter, Hit, Ray};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
 
@@ -438,72 +438,97 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-TR-1",
         name: "traversal of kd-trees with a stack",
         role: Role::PartOf("PM-KD-1"),
-        limits: "Each ray keeps a stack of eight-byte entries, as many as the tree is deep.",
+        limits: "Kernels reserve 32 entries of eight bytes for each ray, however shallow the tree is.",
         sources: &[sources::WALD_2004.at("7.1")],
-        shaders: &["shaders/accel/kd.glsl"],
+        shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
-        experiment: "clerestory report kd-traversal kd-rays",
+        api: &[
+            "clerestory::accel::kd::KdTraversal",
+            "clerestory::accel::kd::Scheme",
+            "clerestory::accel::trace::RayTracer",
+        ],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-TR-3",
-        name: "the same without a stack, by a word of flags",
+        name: "traversal of kd-trees without a stack, by a word of flags",
         role: Role::PartOf("PM-KD-1"),
         limits: "Walks down from the root again after each leaf.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.2.2")],
-        shaders: &["shaders/accel/kd.glsl"],
+        shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
-        experiment: "clerestory report kd-traversal kd-rays",
+        api: &[
+            "clerestory::accel::kd::KdTraversal",
+            "clerestory::accel::kd::Scheme",
+            "clerestory::accel::trace::RayTracer",
+        ],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-TR-4",
-        name: "flags with push-down",
+        name: "traversal of kd-trees by a word of flags with push-down",
         role: Role::PartOf("PM-KD-1"),
-        limits: "Spares only the nodes above the smallest subtree that holds the ray.",
+        limits: "Restarts at the lowest node that holds all that is left of the ray, which a ray that leaves something near the root gains nothing by.",
         sources: &[sources::HORN_2007.whole()],
-        shaders: &["shaders/accel/kd.glsl"],
+        shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
-        experiment: "clerestory report kd-traversal kd-rays",
+        api: &[
+            "clerestory::accel::kd::KdTraversal",
+            "clerestory::accel::kd::Scheme",
+            "clerestory::accel::trace::RayTracer",
+        ],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-TR-5",
-        name: "flags with a short stack",
+        name: "traversal of kd-trees by a word of flags with a short stack",
         role: Role::PartOf("PM-KD-1"),
         limits: "Restarts where the short stack has run empty.",
         sources: &[sources::HORN_2007.whole()],
-        shaders: &["shaders/accel/kd.glsl"],
+        shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
-        experiment: "clerestory report kd-traversal kd-rays",
+        api: &[
+            "clerestory::accel::kd::KdTraversal",
+            "clerestory::accel::kd::Scheme",
+            "clerestory::accel::trace::RayTracer",
+        ],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-TR-6",
-        name: "flags with both",
+        name: "traversal of kd-trees by a word of flags with push-down and a short stack",
         role: Role::PartOf("PM-KD-1"),
         limits: "Restarts, below the root, where the short stack has run empty.",
         sources: &[sources::HORN_2007.whole()],
-        shaders: &["shaders/accel/kd.glsl"],
+        shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "engine/src/accel/kd/tests.rs::work_is_in_the_order_of_the_schemes",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
-        experiment: "clerestory report kd-traversal kd-rays",
+        api: &[
+            "clerestory::accel::kd::KdTraversal",
+            "clerestory::accel::kd::Scheme",
+            "clerestory::accel::trace::RayTracer",
+        ],
+        settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },
 ];

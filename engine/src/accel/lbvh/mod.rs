@@ -18,6 +18,50 @@ pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
 pub use device_buffers::LbvhBuffers;
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};
 
+use crate::catalogue::{Role, Row, sources};
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-LBVH",
+    name: "LBVH (linear BVH) as ray index: built on the host or on the device, and refitted",
+    role: Role::Kernel,
+    limits: "Rays visit more than in trees by the surface area unless it is optimised; refitting keeps the tree's shape, however things move.",
+    sources: &[sources::APETREI_2014.whole(), sources::KARRAS_2012.whole()],
+    shaders: &[
+        "shaders/accel/lbvh_grid.comp",
+        "shaders/accel/lbvh_codes.comp",
+        "shaders/accel/lbvh_hierarchy.comp",
+        "shaders/accel/lbvh_climb.comp",
+        "shaders/accel/lbvh_boxes.comp",
+        "shaders/accel/lbvh_emit.comp",
+        "shaders/accel/lbvh_retry.comp",
+        "shaders/accel/lbvh_refit.comp",
+        "shaders/accel/lbvh_refit_triangles.comp",
+    ],
+    tests: &[
+        "engine/src/accel/lbvh/tests.rs::trees_are_valid_on_hard_boxes",
+        "engine/src/accel/lbvh/tests.rs::the_order_of_climbing_never_shows",
+        "engine/src/accel/lbvh/tests.rs::hits_are_those_of_the_binned_tree",
+        "engine/src/accel/lbvh/tests.rs::refitted_trees_have_the_hits_of_new_ones",
+        "tests/tests/lbvh.rs::device_builds_are_the_twins_on_soups",
+        "tests/tests/lbvh.rs::device_builds_are_the_twins_on_hard_cases",
+        "tests/tests/lbvh.rs::trees_that_are_too_deep_are_made_again_as_the_hosts",
+        "tests/tests/lbvh.rs::device_refits_are_the_twins",
+    ],
+    experiment: "clerestory index --peers",
+    api: &[
+        "clerestory::accel::lbvh::build",
+        "clerestory::accel::lbvh::refit",
+        "clerestory::accel::lbvh::LbvhBuilder",
+    ],
+    settings: &[
+        "clerestory::accel::lbvh::LbvhSettings",
+        "clerestory render --index lbvh",
+        "clerestory render --index lbvh-device",
+    ],
+    ..Row::of(file!())
+}];
+
 #[cfg(test)]
 mod tests;
 

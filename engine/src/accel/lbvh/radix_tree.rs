@@ -13,7 +13,6 @@ use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use crate::accel::bvh2::{Bvh2Node, COUNT_BITS, leaf_word};
 use crate::accel::leaf_rule::half_area;
 use crate::accel::{Aabb, LeafRule};
-use crate::card::{Role, Row, sources};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
@@ -373,34 +372,3 @@ impl Builder<'_> {
         }
     }
 }
-
-/// Rows of the catalogue.
-pub(crate) const ROWS: &[Row] = &[Row {
-    id: "CL-LBVH",
-    name: "linear hierarchy as ray index, on the host and on the device, with refitting",
-    role: Role::Kernel,
-    limits: "Rays visit more than in trees by the surface area unless it is optimised; refitting keeps the tree's shape, however things move.",
-    sources: &[sources::APETREI_2014.whole(), sources::KARRAS_2012.whole()],
-    shaders: &[
-        "shaders/accel/lbvh_grid.comp",
-        "shaders/accel/lbvh_codes.comp",
-        "shaders/accel/lbvh_hierarchy.comp",
-        "shaders/accel/lbvh_climb.comp",
-        "shaders/accel/lbvh_boxes.comp",
-        "shaders/accel/lbvh_emit.comp",
-        "shaders/accel/lbvh_refit.comp",
-        "shaders/accel/lbvh_refit_triangles.comp",
-    ],
-    tests: &[
-        "engine/src/accel/lbvh/tests.rs::trees_are_valid_on_hard_boxes",
-        "engine/src/accel/lbvh/tests.rs::the_order_of_climbing_never_shows",
-        "engine/src/accel/lbvh/tests.rs::hits_are_those_of_the_binned_tree",
-        "engine/src/accel/lbvh/tests.rs::refitted_trees_have_the_hits_of_new_ones",
-        "tests/tests/lbvh.rs::device_builds_are_the_twins_on_soups",
-        "tests/tests/lbvh.rs::device_builds_are_the_twins_on_hard_cases",
-        "tests/tests/lbvh.rs::trees_that_are_too_deep_are_made_again_as_the_hosts",
-        "tests/tests/lbvh.rs::device_refits_are_the_twins",
-    ],
-    experiment: "clerestory index",
-    ..Row::of(file!())
-}];

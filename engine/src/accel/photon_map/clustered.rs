@@ -9,7 +9,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 use crate::accel::lbvh::SortedCodes;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// How much was left to sort and to pass over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -169,6 +169,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/photon_map/tests.rs::sorting_by_clusters_is_the_stable_sort",
         "engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
     ],
-    experiment: "clerestory report map-construction",
+    api: &["clerestory::accel::photon_map::clustered::clustered_hierarchy"],
     ..Row::of(file!())
 }];

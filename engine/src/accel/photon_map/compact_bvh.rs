@@ -14,7 +14,7 @@ use super::complete_bvh::{
 };
 use crate::accel::Aabb;
 use crate::accel::box_tree::TreeFault;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -272,7 +272,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes",
             "engine/src/accel/photon_map/compact_bvh/tests.rs::loose_boxes_are_refused",
         ],
-        experiment: "clerestory report compact-map",
+        api: &["clerestory::accel::photon_map::compact_bvh::CompactBvh"],
         ..Row::of(file!())
     },
     Row {
@@ -286,7 +286,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",
         ],
-        experiment: "clerestory report compact-map photon-frame",
+        api: &["clerestory::accel::photon_map::compact_bvh::CompactBvh"],
         ..Row::of(file!())
     },
     Row {
@@ -300,7 +300,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",
         ],
-        experiment: "clerestory report compact-rays",
+        api: &["clerestory::accel::photon_map::compact_bvh::CompactBvh"],
         ..Row::of(file!())
     },
 ];

@@ -8,7 +8,7 @@
 
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -315,7 +315,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
         ],
-        experiment: "clerestory report compact-map compact-rays",
+        api: &["clerestory::accel::photon_map::complete_bvh::QueryCounters"],
         ..Row::of(file!())
     },
     Row {
@@ -327,7 +327,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes",
         ],
-        experiment: "clerestory report compact-map",
+        api: &["clerestory::accel::photon_map::complete_bvh::CompleteBvh"],
         ..Row::of(file!())
     },
     Row {
@@ -340,7 +340,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",
         ],
-        experiment: "clerestory report compact-rays",
+        api: &["clerestory::accel::photon_map::complete_bvh::SlabRay"],
         ..Row::of(file!())
     },
     Row {
@@ -350,7 +350,7 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "A point on the border of a box may count as outside.",
         sources: &[sources::FABIANOWSKI_2011.at("§3.2.4.2")],
         tests: &["engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order"],
-        experiment: "clerestory report compact-map",
+        api: &["clerestory::accel::photon_map::complete_bvh::holds_inside"],
         ..Row::of(file!())
     },
 ];

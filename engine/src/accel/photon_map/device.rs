@@ -13,7 +13,7 @@
 
 use super::complete_bvh::INDEX_BITS;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::accel::{lbvh_codes, lbvh_grid, map_begin, map_blocks, map_pairs, map_split};
@@ -414,7 +414,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/photon/maps.rs::device_maps_of_scenes_are_the_twins_and_pictures_are_equal",
         "tests/tests/photon/maps.rs::devices_without_numbers_of_64_bits_leave_maps_to_the_host",
     ],
-    experiment: "clerestory report photon-frame",
+    api: &["clerestory::accel::photon_map::device::MapBuilder"],
+    settings: &["map_build"],
     ..Row::of(file!())
 }];
 

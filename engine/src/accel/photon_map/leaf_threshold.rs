@@ -4,7 +4,7 @@
 //! kernels as their areas cover the scene's; leaves of a fixed share of that number cost about the least. The constant of
 //! proportionality is printed there as 8; the leaf sizes and counts of its own table need 1/16 to 1/8.
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Share of a point's kernels that a leaf holds.
 pub const LEAF_SHARE: f64 = 0.125;
@@ -31,7 +31,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "One size for the whole map, from a mean over the scene's surfaces.",
     sources: &[sources::FABIANOWSKI_2011.at("§6.1.3")],
     tests: &["engine/src/accel/photon_map/leaf_threshold.rs::leaf_sizes_follow_the_cover_of_the_scene"],
-    experiment: "clerestory report leaf-sizes",
+    api: &["clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size"],
     ..Row::of(file!())
 }];
 

@@ -10,7 +10,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use crate::accel::lbvh::SortedCodes;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Two neighbours whose codes differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -141,6 +141,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/photon_map/tests.rs::the_worked_example_of_the_merge_comes_out_step_by_step",
         "engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
     ],
-    experiment: "clerestory report map-construction map-quality merge-example",
+    api: &["clerestory::accel::photon_map::merge::merged_hierarchy"],
     ..Row::of(file!())
 }];

@@ -9,7 +9,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE};
 use crate::accel::lbvh::SortedCodes;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// A node of one level: a range of places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,6 +144,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Makes chains of nodes with one child, which are taken out later; boxes need a pass of their own.",
     sources: &[sources::LAUTERBACH_2009.whole()],
     tests: &["engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition"],
-    experiment: "clerestory report map-construction merge-example",
+    api: &["clerestory::accel::photon_map::split_lists::split_list_hierarchy"],
     ..Row::of(file!())
 }];

@@ -11,7 +11,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child, EMPTY_NODE, PairNode};
 use crate::accel::morton::doubled_centre;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 
 /// Most inner nodes on a way from the root.
 pub const MAX_SWEEP_DEPTH: u32 = 64;
@@ -130,6 +130,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Built at leisure by full sweeps: too slow for a map that is made anew each pass.",
     sources: &[sources::FABIANOWSKI_2011.at("§6.1.1")],
     tests: &["engine/src/accel/photon_map/tests.rs::sweeps_are_valid_and_beat_the_linear_tree"],
-    experiment: "clerestory report map-quality",
+    api: &["clerestory::accel::photon_map::vvh::sweep_tree"],
     ..Row::of(file!())
 }];

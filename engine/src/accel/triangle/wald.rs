@@ -8,7 +8,7 @@
 
 use super::TriangleHit;
 use crate::accel::Ray;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::Vec3;
 
 /// A triangle made ready: nine numbers and an axis, of which the plane's four are read first.
@@ -84,7 +84,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Not watertight, and weights lose digits where a triangle is far smaller than its distance from the origin of coordinates.",
     sources: &[sources::WALD_2004.at("7.1")],
     tests: &["engine/src/accel/triangle/wald.rs::hits_differ_from_the_oracle_only_near_edges"],
-    experiment: "clerestory report triangle-tests",
+    api: &["clerestory::accel::triangle::wald::WaldTriangle"],
     ..Row::of(file!())
 }];
 

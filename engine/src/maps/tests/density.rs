@@ -1,4 +1,4 @@
-//! The tables of density of the source (visibility digest, sections 5 and 7), to the digits given.
+//! The tables of density of T. Engelhardt's thesis (2013, chapters 5 and 7), to the digits given.
 
 use super::super::statistics::anisotropy;
 use super::super::*;

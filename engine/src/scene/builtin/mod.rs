@@ -25,7 +25,7 @@ mod volumes;
 
 pub use parameters::{Parameter, ParameterKind};
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use parameters::Values;
@@ -148,6 +148,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/builtin/mod.rs::every_entry_builds_with_its_defaults_and_has_what_it_promises",
     ],
     experiment: "clerestory agreement",
+    api: &["clerestory::scene::builtin::generate"],
+    settings: &["clerestory scenes"],
     ..Row::of(file!())
 }];
 

@@ -24,7 +24,7 @@ use std::path::Path;
 use ::gltf::json::{self, Index, Root};
 
 use super::{Note, Scene};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
 /// Extensions that are carried over.
@@ -235,5 +235,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/gltf/tests/malformed.rs::every_truncation_is_an_error",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::gltf::load", "clerestory::scene::load"],
     ..Row::of(file!())
 }];

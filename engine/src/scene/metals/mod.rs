@@ -12,7 +12,7 @@ mod spectra;
 use glam::DVec3;
 
 use super::ConductorIor;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use spectra::Spectrum;
 
 impl Spectrum {
@@ -72,6 +72,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/metals/mod.rs::channels_reflect_like_other_samples_of_the_metals",
     ],
     experiment: "clerestory agreement --scene cornell-metals",
+    api: &["clerestory::scene::metals"],
     ..Row::of(file!())
 }];
 

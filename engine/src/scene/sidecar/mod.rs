@@ -39,7 +39,7 @@ use serde::Deserialize;
 use medium::MediumTable;
 
 use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, builtin, metals};
-use crate::card::{Role, Row};
+use crate::catalogue::{Role, Row};
 use crate::{Error, Result};
 
 /// Greatest number of texels of an environment map.
@@ -431,5 +431,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
     ],
     experiment: "tools/models",
+    api: &["clerestory::scene::sidecar::Sidecar"],
     ..Row::of(file!())
 }];

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::techniques::ambient::ambient as kernel;
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
 use crate::scene::{EnvironmentUse, camera_frame::CameraFrame};
@@ -22,7 +22,7 @@ const ROW: Row = Row {
     path_set: Some("bounces=0..1,lobes=diffuse+reflection+transmission"),
     bias: Some(Bias::Unbiased),
     tests: &["tests/tests/ambient.rs::pictures_are_the_path_tracers"],
-    experiment: "clerestory report ambient",
+    api: &["clerestory::techniques::ambient::Ambient"],
     ..Row::of(file!())
 };
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::Result;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
@@ -140,14 +140,7 @@ const ROWS: &[Row] = &[Row {
         sources::VEACH_1997.at("chapters 9 and 10"),
         sources::LAINE_2013.whole(),
     ],
-    shaders: &[
-        "shaders/techniques/path/path_camera.comp",
-        "shaders/walk/extend.comp",
-        "shaders/techniques/path/path_medium.comp",
-        "shaders/techniques/path/path_shade.comp",
-        "shaders/walk/shadow.comp",
-        "shaders/techniques/path/path_resolve.comp",
-    ],
+    shaders: &["shaders/techniques/path/", "shaders/walk/"],
     path_set: Some("all"),
     bias: Some(Bias::Unbiased),
     tests: &[
@@ -166,8 +159,13 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/hard_cases.rs::the_path_tracer_takes_the_cases_with_independent_samples",
         "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
     ],
-    experiment: "clerestory report error-against-time",
-    ..Row::of(file!())
+    experiment: "clerestory agreement",
+    api: &["clerestory::techniques::PathTracer"],
+    settings: &[
+        "clerestory::techniques::PathTracerSettings",
+        "clerestory render --technique path",
+    ],
+    ..Row::of("engine/src/techniques/path/mod.rs")
 }];
 
 #[cfg(test)]

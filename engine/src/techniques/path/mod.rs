@@ -27,7 +27,7 @@ use self::record::{EyeStages, record_resolve};
 pub use self::settings::PathTracerSettings;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::Result;
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
 use crate::gpu::shaders::constants::WALK_GROUP;
@@ -322,7 +322,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/path_tracer.rs::the_variance_layer_is_the_variance_of_the_means",
             "tests/tests/path_tracer.rs::sobol_draws_have_the_same_expectation_and_less_variance_between_seeds",
         ],
-        experiment: "clerestory report roulette",
+        settings: &["roulette_start", "roulette_cap"],
         ..Row::of(file!())
     },
     Row {
@@ -339,7 +339,6 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/alpha.rs::blended_surfaces_scatter_in_proportion_to_alpha",
             "tests/tests/alpha.rs::textures_and_vertex_colours_carry_alpha",
         ],
-        experiment: "clerestory report alpha",
         ..Row::of(file!())
     },
     Row {
@@ -350,7 +349,6 @@ pub(crate) const ROWS: &[Row] = &[
         sources: &[sources::KHRONOS_MATERIALS_VOLUME.at("law of Beer and Lambert")],
         shaders: &["shaders/techniques/path/path_shade.comp"],
         tests: &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
-        experiment: "clerestory report absorption",
         ..Row::of(file!())
     },
 ];

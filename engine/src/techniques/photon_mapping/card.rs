@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer};
 use crate::Result;
 use crate::accel::photon_map::device::MapBuilder;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
@@ -210,7 +210,11 @@ const ROWS: &[Row] = &[Row {
         sources::KNAUS_ZWICKER_2011.whole(),
         sources::FABIANOWSKI_2011.at("§6.3"),
     ],
-    shaders: &["shaders/techniques/photon_mapping/"],
+    shaders: &[
+        "shaders/techniques/photon_mapping/",
+        "shaders/techniques/path/",
+        "shaders/walk/",
+    ],
     path_set: Some("all"),
     bias: Some(BIAS),
     tests: &[
@@ -226,8 +230,12 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/photon/traps.rs::colours_bleed_through_the_passage_as_they_should",
         "tests/tests/hard_cases.rs::photon_mapping_takes_the_cases_as_documented",
     ],
-    experiment: "clerestory report photon-convergence photon-or-path photon-nearest photon-ring photon-frame photon-peers photon-settings",
-    ..Row::of(file!())
+    api: &["clerestory::techniques::photon_mapping::PhotonMapper"],
+    settings: &[
+        "clerestory::techniques::photon_mapping::PhotonSettings",
+        "clerestory render --technique photon",
+    ],
+    ..Row::of("engine/src/techniques/photon_mapping/mapper.rs")
 }];
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use super::map::PhotonMap;
 use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_SET_DEAD, PATH_SET_STATE_BITS,
@@ -401,7 +401,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
             "tests/tests/photon/traps.rs::thin_walls_let_no_photon_through",
         ],
-        experiment: "clerestory report photon-kernels photon-convergence",
+        settings: &["radius", "reduction", "shape"],
         ..Row::of(file!())
     },
     Row {
@@ -412,7 +412,7 @@ pub(crate) const ROWS: &[Row] = &[
         sources: &[sources::JENSEN_2001.at("§7"), sources::FABIANOWSKI_2011.at("§3.4.2.1")],
         shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
         tests: &["tests/tests/photon/settings.rs::nearest_neighbours_agree_with_the_path_tracer"],
-        experiment: "clerestory report photon-kernels photon-nearest photon-ring",
+        settings: &["neighbors", "radius"],
         ..Row::of(file!())
     },
     Row {
@@ -427,7 +427,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::even_light_is_estimated_without_bias",
             "tests/tests/photon/settings.rs::every_shape_agrees_with_the_path_tracer",
         ],
-        experiment: "clerestory report photon-statistics photon-kernels",
+        settings: &["shape", "spread"],
         ..Row::of(file!())
     },
     Row {
@@ -442,18 +442,18 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/flux.rs::the_picture_has_the_flux_of_the_map",
             "tests/tests/photon/determinism.rs::threads_never_show",
         ],
-        experiment: "clerestory report photon-frame photon-queues",
+        settings: &["query"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-ST-6",
         name: "queries of the photon map, a subgroup's together",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Needs subgroup votes; visits what any point of the subgroup asks for.",
+        limits: "Needs subgroup votes; visits what any point of the subgroup asks for, and so meets the quota sooner, which with `neighbors` is an error.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
         shaders: &["shaders/techniques/photon_mapping/photon_gather_packet.comp"],
         tests: &["tests/tests/photon/settings.rs::points_that_ask_together_see_the_same"],
-        experiment: "clerestory report photon-kernels photon-queues",
+        settings: &["query"],
         ..Row::of(file!())
     },
 ];

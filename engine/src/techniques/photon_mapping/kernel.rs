@@ -13,7 +13,7 @@ mod room_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
     PHOTON_BOUNCE_SHIFT, PHOTON_DIFFUSED_BIT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
@@ -277,7 +277,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/photons.rs::weights_agree_with_their_twins",
             "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
         ],
-        experiment: "clerestory report photon-kernels photon-settings",
+        settings: &["profile"],
         ..Row::of(file!())
     },
     Row {
@@ -296,7 +296,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/photons.rs::kernels_agree_with_their_twins",
             "tests/tests/twins/photons.rs::records_agree_with_their_twins",
         ],
-        experiment: "clerestory report photon-statistics photon-kernels photon-settings",
+        settings: &["shape", "spread"],
         ..Row::of(file!())
     },
     Row {
@@ -315,7 +315,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/kernel/room_tests.rs::stronger_dampening_means_fewer_kernels_over_a_point",
             "engine/src/techniques/photon_mapping/kernel/room_tests.rs::the_room_looks_the_same_at_every_scale_when_the_unit_goes_with_it",
         ],
-        experiment: "clerestory report photon-statistics photon-kernels",
+        settings: &["dampening", "unit_length", "flatness", "widen_flat", "radius"],
         ..Row::of(file!())
     },
 ];

@@ -4,7 +4,7 @@
 //! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
 
 use super::settings::MapQueue;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, QUEUE_BLOCKS, QUEUE_COMPACTED, QUEUE_SLOTS, WALK_GROUP};
 use crate::gpu::shaders::sets::{GatherQueue, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_queue_blocks, photon_queue_flags};
@@ -247,7 +247,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
             "tests/tests/photon/queues.rs::queues_take_places_that_all_lie_in_the_same_thousand_kernels",
         ],
-        experiment: "clerestory report photon-queues",
+        settings: &["queue"],
         ..Row::of(file!())
     },
     Row {
@@ -262,14 +262,14 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
             "tests/tests/photon/queues.rs::queues_may_stay_empty",
         ],
-        experiment: "clerestory report photon-queues",
+        settings: &["queue"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-ST-4",
         name: "queue of queries, type III: places that ask, in blocks that subgroups collect in shared memory",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Needs full subgroups with ballots; blocks may be partial and come in any order, which no picture shows.",
+        limits: "Needs full subgroups with ballots, of a size that divides 64; blocks may be partial and come in any order, which no picture shows.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
         shaders: &["shaders/techniques/photon_mapping/photon_queue_blocks.comp"],
         tests: &[
@@ -278,7 +278,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/queues.rs::queues_may_stay_empty",
             "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
         ],
-        experiment: "clerestory report photon-queues",
+        settings: &["queue"],
         ..Row::of(file!())
     },
 ];

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::kernel::KernelSettings;
 use super::settings::PhotonSettings;
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{PHOTON_QUARTERS, WALK_GROUP};
@@ -404,7 +404,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
             "tests/tests/photon/determinism.rs::runs_are_equal_and_seeds_are_not",
         ],
-        experiment: "clerestory report photon-statistics photon-frame",
+        settings: &["photons"],
         ..Row::of(file!())
     },
     Row {
@@ -418,7 +418,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/determinism.rs::runs_are_equal_and_seeds_are_not",
             "tests/tests/photon/sphere.rs::reflections_in_a_sphere_are_those_of_the_closed_form",
         ],
-        experiment: "clerestory report photon-settings",
+        settings: &["sampler"],
         ..Row::of(file!())
     },
 ];

@@ -2,7 +2,7 @@
 
 use super::drawing::LIGHTS_MAX;
 use super::{PreviewMethod, PreviewSettings, live};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::maps::{directional_border, directional_coarser, prefilter_ggx};
 use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert, surface_vert};
@@ -116,6 +116,14 @@ const ROWS: &[Row] = &[Row {
         "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
         "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",
     ],
-    experiment: "clerestory report preview-picture",
-    module: "engine/src/techniques/preview/mod.rs",
+    api: &[
+        "clerestory::techniques::preview::Preview",
+        "clerestory::techniques::preview::PreviewMethod",
+    ],
+    settings: &[
+        "clerestory::techniques::preview::PreviewSettings",
+        "clerestory::techniques::preview::PreviewDesc",
+        "clerestory render --technique preview",
+    ],
+    ..Row::of("engine/src/techniques/preview/mod.rs")
 }];

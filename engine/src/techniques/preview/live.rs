@@ -13,7 +13,7 @@ use glam::Vec3;
 use super::probe::{LightProbe, LightProbeDesc};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use super::{Preview, PreviewLights};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::{Area, Gpu, Recorder};
 use crate::maps::octahedron::OctahedronLayout;
 use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Surfaces, View};
@@ -132,7 +132,14 @@ pub(super) const ROWS: &[Row] = &[Row {
         sources::GREENE_1986.whole(),
         sources::ENGELHARDT_DACHSBACHER_2008.whole(),
     ],
-    shaders: &["shaders/techniques/preview/preview_shade.comp"],
+    shaders: &[
+        "shaders/techniques/preview/probe.glsl",
+        "shaders/techniques/preview/preview_shade.comp",
+        "shaders/raster/surface_octant.vert",
+        "shaders/maps/directional_coarser.comp",
+        "shaders/maps/directional_border.comp",
+        "shaders/maps/prefilter_ggx.comp",
+    ],
     bias: Some(Bias::Biased("radiance at texel centres; parallax beside its place")),
     tests: &[
         "tests/tests/preview/live.rs::irradiance_in_a_closed_room_is_that_of_rays",
@@ -140,6 +147,7 @@ pub(super) const ROWS: &[Row] = &[Row {
         "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
         "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
     ],
-    experiment: "clerestory report live-maps live-map-pictures",
+    api: &["clerestory::techniques::preview::LiveProbe"],
+    settings: &["clerestory::techniques::preview::LightProbeDesc"],
     ..Row::of(file!())
 }];

@@ -27,7 +27,7 @@ use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
 use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
-use crate::card::{Bias, Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants;
 
 /// The diffuse base.
@@ -283,6 +283,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
         ],
         experiment: "clerestory agreement --scene furnace-metal,furnace-glass",
+        settings: &["separable_masking"],
+        api: &["clerestory::transport::bsdf"],
         ..Row::of(file!())
     },
     Row {
@@ -300,7 +302,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::white_furnace",
             "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
         ],
-        experiment: "clerestory report coupled-reflection",
+        api: &["clerestory::transport::bsdf"],
         ..Row::of(file!())
     },
 ];

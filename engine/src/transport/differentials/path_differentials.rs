@@ -9,7 +9,7 @@
 use super::{
     Differentials, emission_differentials, reflect_differentials, refract_differentials, transfer_differentials,
 };
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -117,6 +117,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/differentials/path_differentials.rs::scattering_derivatives_agree_with_finite_differences",
     ],
     experiment: "tools/test",
+    api: &["clerestory::transport::differentials::path_differentials::PathDifferentials"],
     ..Row::of(file!())
 }];
 

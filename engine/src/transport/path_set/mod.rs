@@ -15,7 +15,7 @@ use std::hash::{Hash, Hasher};
 use self::automaton::{DEAD, Dfa, SYMBOLS, TooLarge};
 use self::expression::Node;
 use super::bsdf::{LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION};
-use crate::card::{Role, Row, sources};
+use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::{
     self, PATH_SET_DEAD, PATH_SET_MAX_SHIFT, PATH_SET_MIN_SHIFT, PATH_SET_STATE_BITS, PATH_SET_STATES,
 };
@@ -397,7 +397,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/path_tracer.rs::path_sets_are_a_partition",
         "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
     ],
-    experiment: "clerestory report path-sets",
+    api: &["clerestory::transport::PathSet"],
+    settings: &["clerestory render --path-set direct"],
     ..Row::of(file!())
 }];
 

@@ -1,6 +1,6 @@
 //! How evenly maps spread their texels: statistics beside the document's figures, ratios along great circles, pictures of densities.
 //!
-//! Oracle: exact solid angles of texels ([`clerestory::maps`]) and what the document and its digest state.
+//! Oracle: exact solid angles of texels ([`clerestory::maps`]) and what T. Engelhardt's thesis states (2013, chapters 5 and 7), with its sums worked out.
 
 use clerestory::Result;
 use clerestory::film::{atomic, png};
@@ -16,7 +16,7 @@ use crate::experiments::plot::Words;
 use crate::experiments::table::Table;
 use crate::random::Random;
 
-/// Maps with what the document and its digest state: least and greatest ratio, RMS, greatest shear.
+/// Maps with what the thesis states: least and greatest ratio, RMS, greatest shear.
 const STATED: [(Parametrization, [&str; 4]); 8] = [
     (Parametrization::LatLong, ["0", "1.571", "0.483", "∞"]),
     (Parametrization::Sphere, ["1", "1", "0", "∞"]),

@@ -37,7 +37,7 @@ sources! {
     DOTSENKO_2008 = "dotsenko-2008": "Y. Dotsenko, N. Govindaraju, P.-P. Sloan, C. Boyd, J. Manferdelli", "Fast Scan Algorithms on Graphics Processors", "ICS", 2008;
     DUPUY_BENYOUB_2023 = "dupuy-benyoub-2023": "J. Dupuy, A. Benyoub", "Sampling Visible GGX Normals with Spherical Caps", "HPG", 2023;
     ENDERTON_2010 = "enderton-2010": "E. Enderton, E. Sintorn, P. Shirley, D. Luebke", "Stochastic Transparency", "I3D", 2010;
-    ENGELHARDT_2013 = "engelhardt-2013": "T. Engelhardt", "Efficient Visibility for Realistic Rendering", "PhD thesis, KIT", 2013;
+    ENGELHARDT_2013 = "engelhardt-2013": "T. Engelhardt", "Efficient From-Point Visibility for Global Illumination in Virtual Scenes with Participating Media", "PhD thesis, KIT", 2013;
     ENGELHARDT_DACHSBACHER_2008 = "engelhardt-dachsbacher-2008": "T. Engelhardt, C. Dachsbacher", "Octahedron Environment Maps", "VMV", 2008;
     FABIANOWSKI_2011 = "fabianowski-2011": "B. Fabianowski", "Interactive Manycore Photon Mapping", "PhD thesis, Trinity College Dublin", 2011;
     FOLEY_SUGERMAN_2005 = "foley-sugerman-2005": "T. Foley, J. Sugerman", "KD-Tree Acceleration Structures for a GPU Raytracer", "Graphics Hardware", 2005;

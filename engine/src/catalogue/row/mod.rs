@@ -111,7 +111,7 @@ pub struct Cite {
 
 /// One system: a technique, a part of one, or something that stands by itself.
 ///
-/// Written as `Row { id, name, role, limits, sources, tests, experiment, ..Row::of(file!()) }`.
+/// Written as `Row { id, name, role, limits, sources, tests, api, settings, ..Row::of(file!()) }`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Row {
     /// Unique id with its prefix, such as `BG-3`.
@@ -136,8 +136,13 @@ pub struct Row {
     pub needs: &'static [&'static str],
     /// Its tests as `file::function`, the file from the repository's root.
     pub tests: &'static [&'static str],
-    /// The command that measures it, from the repository's root.
+    /// A command that measures it beside the experiments of `tools/experiments/`, whose `systems` name it; empty for none. From the repository's root.
     pub experiment: &'static str,
+    /// What a host calls: public paths of this crate, such as `clerestory::kernels::RadixSort`, or a module of functions.
+    pub api: &'static [&'static str],
+    /// What can be chosen: public paths of this crate, command lines that begin with `clerestory`, and names of settings of the technique that
+    /// it is a part of.
+    pub settings: &'static [&'static str],
 }
 
 impl Row {
@@ -156,6 +161,8 @@ impl Row {
             needs: &[],
             tests: &[],
             experiment: "",
+            api: &[],
+            settings: &[],
         }
     }
 }
@@ -184,7 +191,7 @@ mod tests {
 
     #[test]
     fn modules_are_named_from_the_root() {
-        assert_eq!(Row::of(file!()).module, "engine/src/card/mod.rs");
+        assert_eq!(Row::of(file!()).module, "engine/src/catalogue/row/mod.rs");
         assert_eq!(from_root("/home/me/engine/src/film/exr.rs"), "engine/src/film/exr.rs");
         // A host's own file stays as it is.
         assert_eq!(from_root("src/even.rs"), "src/even.rs");
