@@ -263,7 +263,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PD-2",
         name: "differentials of propagation to a surface",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Takes the surface as a plane, and |cos| of incidence as 10⁻³ at least: beyond that grazing footprints stop to grow.",
+        limits: "Takes the surface as a plane, and the cosine of incidence as 10⁻³ at least: beyond that grazing footprints stop to grow.",
         sources: &[sources::IGEHY_1999.whole(), sources::FABIANOWSKI_2011.at("§3.1.2.3")],
         shaders: &["shaders/transport/differentials.glsl"],
         tests: &[
