@@ -202,7 +202,9 @@ fn is_public(path: &str) -> bool {
     let mut folder = repository().join("engine/src");
     let mut text = read(&folder.join("lib.rs"));
     for module in modules {
-        if !text.lines().any(|line| line == format!("pub mod {module};")) {
+        // Techniques are declared by their names in `methods!`.
+        let declarations = [format!("pub mod {module};"), format!("    {module},")];
+        if !text.lines().any(|line| declarations.iter().any(|known| line == known)) {
             return false;
         }
         let file = folder.join(format!("{module}.rs"));
@@ -278,14 +280,16 @@ fn what_hosts_call_and_set_is_there() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Every kernel of a card is among its row's shaders, which name files and folders.
+/// Every kernel of a card is among the shaders, which name files and folders, of its row, of parts, or of what hosts can call alone.
 #[test]
 fn rows_of_techniques_have_the_kernels_of_their_cards() {
     for card in techniques::all() {
         let row = row_of(card).expect("row");
+        let beside = all().iter().filter(|row| !matches!(row.role, Role::Technique));
+        let shaders: Vec<&str> = beside.chain([row]).flat_map(|row| row.shaders).copied().collect();
         for kernel in card.kernels.concat() {
             let file = format!("shaders/{}", kernel.name);
-            let mut named = row.shaders.iter();
+            let mut named = shaders.iter();
             assert!(
                 named.any(|shaders| if shaders.ends_with('/') {
                     file.starts_with(shaders)

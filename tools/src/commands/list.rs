@@ -178,8 +178,9 @@ fn found(words: &[String]) -> Outcome<Vec<(usize, &'static Row)>> {
         ref ids => format!("nearest: {}; ", ids.join(", ")),
     };
     Err(
-        Failure::usage(format!("no technique or system has {:?}", words.join(" ")))
-            .hint(format!("{nearest}`clerestory list` shows all of them")),
+        Failure::usage(format!("no technique or system has {:?}", words.join(" "))).hint(format!(
+            "{nearest}`clerestory list` shows all of them; hard cases are `clerestory stability --list`, experiments `clerestory report --list`"
+        )),
     )
 }
 
@@ -207,7 +208,10 @@ fn everything() -> String {
         ]);
     }
     texts.push(table.text());
-    texts.push("`clerestory list ID` shows one of them whole, `clerestory list WORD…` finds them by words: lbvh, octahedron, photon mapping\n".into());
+    let hint = "`clerestory list ID` shows one of them whole, `clerestory list WORD…` finds them by words: lbvh, octahedron, photon mapping. Hard cases: \
+                `clerestory stability --list`. Experiments: `clerestory report --list`\n";
+    texts.insert(0, hint.into());
+    texts.push(hint.into());
     texts.join("\n")
 }
 
@@ -352,7 +356,10 @@ fn text(system: &System, whole: bool) -> String {
     let explained = card.map(|card| (card, !card.settings.infos().is_empty()));
     if let Some((card, true)) = explained {
         settings += &only(!whole, format!("; `clerestory list {}` explains them", card.id));
-    } else if let Some(card) = whole_of(row).and_then(card_of) {
+    } else if let Some(card) = whole_of(row).and_then(card_of).filter(|card| {
+        let mut own = row.settings.iter();
+        row.settings.is_empty() || own.any(|name| card.settings.has(name))
+    }) {
         settings += &format!("; `clerestory list {}` explains them", card.id);
     }
     let code = if row.module.ends_with("/mod.rs") || card.is_some() {

@@ -234,6 +234,13 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let reference = arguments.reference.as_deref().map(pictures::read).transpose()?;
     let options = options(arguments, &scene, reference.as_ref())?;
     let files = Files::choose(arguments.output.as_deref(), &scene.name)?;
+    if let Some(reference) = arguments.reference.as_deref().filter(|file| files.write_over(file)) {
+        return Err(Failure::usage(format!(
+            "{}: the picture would take the reference's place",
+            reference.display()
+        ))
+        .hint("-o NAME.exr writes it elsewhere; another --seed makes it independent of the reference"));
+    }
     files.prepare()?;
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");

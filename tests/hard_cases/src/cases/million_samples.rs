@@ -28,6 +28,8 @@ fn scene() -> Scene {
 
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut judgement = Judgement::default();
+    // Nothing is scattered: bounces beyond the first are not even recorded.
+    let easel = easel.with("path_set", "bounces=0..1");
     for (size, samples) in [([1, 1], 1_000_000), ([2, 2], 100_000)] {
         let painted = easel.paint(&scene(), size, samples)?;
         judgement.exactly(&format!("{size:?}"), &painted, [VALUE; 3]);

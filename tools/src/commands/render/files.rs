@@ -46,6 +46,15 @@ pub struct Files {
 }
 
 impl Files {
+    /// Whether one of the files is this one.
+    pub fn write_over(&self, file: &Path) -> bool {
+        let Ok(file) = file.canonicalize() else { return false };
+        let own = [self.exr.as_ref(), Some(&self.png), Some(&self.json)];
+        own.into_iter()
+            .flatten()
+            .any(|own| own.canonicalize().is_ok_and(|own| own == file))
+    }
+
     /// From the output as given: a file `.exr` or `.png`, a folder, or nothing for `out/`.
     pub fn choose(wanted: Option<&Path>, scene_name: &str) -> Outcome<Self> {
         let name: String = scene_name
