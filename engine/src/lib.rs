@@ -25,7 +25,7 @@
 //! 7. [`render`], which ties them together.
 //! 8. [`plan`], which chooses among them.
 //!
-//! [`catalogue`] has the rows that say where each published method lives; [`settings`], [`error`], [`fingerprint`] and [`srgb`] serve
+//! [`catalogue`] has the rows that say where each published method lives; [`settings`](mod@settings), [`error`], [`fingerprint`] and [`srgb`] serve
 //! all floors.
 
 pub mod accel;

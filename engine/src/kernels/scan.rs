@@ -270,6 +270,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "shaders/kernels/scan_apply_subgroup.comp",
         "shaders/kernels/reduce_words.comp",
         "shaders/kernels/reduce_box.comp",
+        "shaders/kernels/stream_prepare.comp",
     ],
     tests: &[
         "tests/tests/kernels/blocks.rs::scans_are_as_their_twin",
