@@ -283,24 +283,26 @@ fn what_hosts_call_and_set_is_there() {
 /// Every kernel of a card is among the shaders, which name files and folders, of its row, of parts, or of what hosts can call alone.
 #[test]
 fn rows_of_techniques_have_the_kernels_of_their_cards() {
+    let mut faults = Vec::new();
     for card in techniques::all() {
         let row = row_of(card).expect("row");
         let beside = all().iter().filter(|row| !matches!(row.role, Role::Technique));
         let shaders: Vec<&str> = beside.chain([row]).flat_map(|row| row.shaders).copied().collect();
         for kernel in card.kernels.concat() {
             let file = format!("shaders/{}", kernel.name);
-            let mut named = shaders.iter();
-            assert!(
-                named.any(|shaders| if shaders.ends_with('/') {
+            let named = |shaders: &&str| {
+                if shaders.ends_with('/') {
                     file.starts_with(shaders)
                 } else {
                     *shaders == file
-                }),
-                "{}: {file}",
-                row.id
-            );
+                }
+            };
+            if !shaders.iter().any(named) {
+                faults.push(format!("{}: {file}", row.id));
+            }
         }
     }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 #[test]
