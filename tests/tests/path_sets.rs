@@ -13,7 +13,7 @@ use clerestory_tests::with_gpu;
 
 const SIZE: usize = 32;
 const BLOCK: usize = 4;
-const SAMPLES: u32 = 256;
+const SAMPLES: u32 = 96;
 
 /// Means over blocks, and the variances of these.
 fn blocks(picture: &Rendered) -> Rendered {

@@ -75,6 +75,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/ggx.rs::visible_normals_follow_their_density",
         "engine/src/transport/ggx.rs::masking_limits",
         "tests/tests/samplers.rs::visible_normals_follow_their_density",
+        "tests/tests/path_tracer.rs::rough_glass_loses_what_the_f64_twin_says",
     ],
     experiment: "clerestory agreement --scene cornell-frosted,ring-rough",
     api: &["clerestory::transport::ggx"],

@@ -15,9 +15,9 @@ const VIEW: f32 = 1e-4;
 const RADIUS: f32 = 0.6;
 const POWER: f32 = 64.0;
 const PHOTONS: u32 = 1 << 13;
-const SEEDS: u32 = 32;
+const SEEDS: u32 = 16;
 /// After which the picture is read.
-const PASSES: [u32; 3] = [1, 4, 24];
+const PASSES: [u32; 3] = [1, 4, 16];
 const REDUCTION: f32 = 2.0 / 3.0;
 
 /// A kernel's expected radiance under the light, and the variance of it with [`PHOTONS`] photons.

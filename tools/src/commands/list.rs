@@ -400,6 +400,11 @@ fn text(system: &System, whole: bool) -> String {
                 },
             ),
             ("tests", tests),
+            (
+                "hard cases",
+                card.map(|card| format!("docs/stability.md, `clerestory stability --technique {}`", card.id))
+                    .unwrap_or_default(),
+            ),
             ("measured by", lines(system.measured_by.iter().cloned())),
             ("results", results_text(&system.results)),
             ("sources", only(whole, sources)),

@@ -25,6 +25,7 @@ pub(super) use self::card::CARD;
 use self::pipelines::{Pipelines, camera_pipeline};
 use self::record::{EyeStages, record_resolve};
 pub use self::settings::PathTracerSettings;
+pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::Result;
 use crate::catalogue::{Bias, Role, Row, sources};

@@ -7,9 +7,11 @@ use crate::film::GpuFilm;
 use crate::gpu::shaders::constants::WALK_GROUP;
 use crate::walk::{SLOTS_MAX, WalkKey};
 
-/// Samples of a pixel in one wave: the resolve stage loops over them, which must stay below
+/// Most samples of a pixel in one wave: the resolve stage loops over them, eight iterations each with all layers, which must stay below
 /// [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
-const SAMPLES_PER_WAVE: u32 = 1024;
+pub(crate) const SAMPLES_PER_WAVE: u32 = 4096;
+/// Slots for each pixel of a picture, of which [`SAMPLES_PER_WAVE`] fill a wave where pixels are few.
+const SLOTS_PER_PIXEL: u32 = 1024;
 /// Samples of a pixel that are best under way together, in neighbouring lanes.
 const SAMPLES_TOGETHER: u32 = 8;
 
@@ -92,6 +94,7 @@ impl Cursor {
 
 /// Slots that waves of a picture can fill, in whole workgroups.
 pub(super) fn slots_of_picture([width, height]: [u32; 2]) -> u32 {
-    let paths = u64::from(width) * u64::from(height) * u64::from(SAMPLES_PER_WAVE);
+    let paths = u64::from(width) * u64::from(height) * u64::from(SLOTS_PER_PIXEL);
+    let paths = paths.max(SAMPLES_PER_WAVE.into());
     paths.next_multiple_of(u64::from(WALK_GROUP)).min(u64::from(SLOTS_MAX)) as u32
 }

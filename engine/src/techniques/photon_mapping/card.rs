@@ -218,17 +218,12 @@ const ROWS: &[Row] = &[Row {
     path_set: Some("all"),
     bias: Some(BIAS),
     tests: &[
-        "tests/tests/photon/convergence.rs::bias_and_variance_fall_as_radii_foretell",
         "tests/tests/photon/convergence.rs::radii_fall_at_the_rate_of_the_theory",
-        "tests/tests/photon/settings.rs::every_shape_agrees_with_the_path_tracer",
         "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
         "tests/tests/photon/settings.rs::parts_of_the_light_sum_to_the_whole",
-        "tests/tests/photon/sphere.rs::furnaces_are_uniform",
         "tests/tests/photon/scale.rs::powers_of_two_never_show",
         "tests/tests/photon/traps.rs::glass_is_not_black",
         "tests/tests/photon/traps.rs::the_ring_has_its_cusp_where_geometry_puts_it",
-        "tests/tests/photon/traps.rs::colours_bleed_through_the_passage_as_they_should",
-        "tests/tests/hard_cases.rs::photon_mapping_takes_the_cases_as_documented",
     ],
     api: &["clerestory::techniques::photon_mapping::PhotonMapper"],
     settings: &[

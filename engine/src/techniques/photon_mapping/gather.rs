@@ -400,6 +400,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::equal_disks_are_the_estimator_of_fixed_bandwidth",
             "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
             "tests/tests/photon/traps.rs::thin_walls_let_no_photon_through",
+            "tests/tests/photon/traps.rs::colours_bleed_through_the_passage_as_they_should",
         ],
         settings: &["radius", "reduction", "shape"],
         ..Row::of(file!())

@@ -276,6 +276,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::profiles_integrate_to_one_with_their_variance",
             "tests/tests/twins/photons.rs::weights_agree_with_their_twins",
             "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
+            "tests/tests/photon/convergence.rs::bias_and_variance_fall_as_radii_foretell",
         ],
         settings: &["profile"],
         ..Row::of(file!())

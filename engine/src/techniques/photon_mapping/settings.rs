@@ -4,6 +4,7 @@ use super::kernel::{KernelProfile, KernelSettings, KernelShape};
 use super::tracer::Stored;
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
+use crate::techniques::path::SAMPLES_PER_WAVE;
 use crate::transport::PathSet;
 use crate::transport::differentials::global_step;
 use crate::transport::path_set::PATH_SET_LOBES;
@@ -100,7 +101,7 @@ crate::settings! {
         /// Sources: Hachisuka and Jensen 2009; Knaus and Zwicker 2011.
         pub reduction: f32 = 2.0 / 3.0, in AboveTo(0.0, 1.0);
         /// Eye paths of a pixel that ask the same map.
-        pub samples_per_pass: u32 = 1, in 1..=1024, unit "samples";
+        pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
         /// Takes direct light from the map too, not by shadow rays; not with final_gather.
         pub direct_photons: bool = false;
         /// Sees the map after one more diffuse reflection, caustics directly; not with direct_photons.

@@ -402,7 +402,6 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/lights.rs::points_spots_and_suns_shine_as_they_should",
             "tests/tests/photon/lights.rs::lamps_and_skies_shine_as_they_should",
             "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
-            "tests/tests/photon/determinism.rs::runs_are_equal_and_seeds_are_not",
         ],
         settings: &["photons"],
         ..Row::of(file!())
@@ -417,6 +416,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/photon/determinism.rs::runs_are_equal_and_seeds_are_not",
             "tests/tests/photon/sphere.rs::reflections_in_a_sphere_are_those_of_the_closed_form",
+            "tests/tests/photon/sphere.rs::furnaces_are_uniform",
         ],
         settings: &["sampler"],
         ..Row::of(file!())

@@ -106,7 +106,6 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/preview/light.rs::albedos_in_a_uniform_environment_are_the_path_tracers",
         "tests/tests/preview/light.rs::a_lambert_sphere_under_a_cosine_sky_has_the_closed_form",
         "tests/tests/preview/light.rs::a_mirror_sphere_shows_the_environment",
-        "tests/tests/preview/light.rs::rough_reflections_are_close_to_the_path_tracers",
         "tests/tests/preview/light.rs::direct_light_is_the_path_tracers",
         "tests/tests/preview/moving.rs::moved_objects_are_as_if_made_there",
         "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
