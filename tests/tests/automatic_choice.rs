@@ -37,7 +37,8 @@ fn options() -> RenderOptions {
 #[test]
 fn predictions_come_true() {
     with_gpu(|gpu| {
-        for address in ["builtin:cornell-box", "builtin:furnace-medium"] {
+        // The furnace has no bright and rare samples, and needs fewer for its reference.
+        for (address, reference_spp) in [("builtin:cornell-box", 8192), ("builtin:furnace-medium", 2048)] {
             let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
             let picture = |spp, seed| {
                 let options = RenderOptions {
@@ -56,7 +57,7 @@ fn predictions_come_true() {
                     relative_mse_of_pair(&pair[0], &pair[1], RELATIVE_MSE_OFFSET).unwrap(),
                 );
             }
-            let (predicted, reference) = (model.relative_mse(256.0).sqrt(), picture(8192, 3));
+            let (predicted, reference) = (model.relative_mse(256.0).sqrt(), picture(reference_spp, 3));
             let last = picture(256, 4);
             let error = compare(&last, &reference, &CompareOptions::default()).unwrap();
             let error = error.relative_mse.sqrt();
@@ -92,12 +93,12 @@ fn what_cannot_be_chosen_says_why() {
         // An error beyond the time: the time is kept, and the plan says what can be had.
         let demanding = Goal {
             error: Some(1e-4),
-            time: Some(Duration::from_secs(8)),
+            time: Some(Duration::from_secs(4)),
         };
         let plan_of = |options: &RenderOptions, goal| plan(&renderer, options, goal, &mut || true);
         let short = plan_of(&options(), demanding).unwrap();
         assert!(short.shortfall.contains("takes longer"), "{}", short.shortfall);
-        assert!(short.choice().seconds + short.pilot_seconds <= 8.1, "{short:?}");
+        assert!(short.choice().seconds + short.pilot_seconds <= 4.1, "{short:?}");
         // Without light nothing is known, and that is said.
         let dark = Renderer::new(gpu, &scene::load("builtin:cornell-box?light=0").unwrap()).unwrap();
         let goal = Goal {

@@ -11,7 +11,7 @@ use clerestory::transport::PathSet;
 use clerestory_tests::render::{Rendered, builtin, paths, render, tracer};
 use clerestory_tests::with_gpu;
 
-const SIZE: usize = 32;
+const SIZE: usize = 24;
 const BLOCK: usize = 4;
 const SAMPLES: u32 = 96;
 

@@ -69,7 +69,7 @@ fn queued() -> PhotonSettings {
 fn direct() -> PhotonSettings {
     PhotonSettings {
         direct_photons: true,
-        photons: 1 << 13,
+        photons: 1 << 14,
         ..fixed("all", 0.3)
     }
 }

@@ -242,7 +242,7 @@ fn what_cannot_be_is_refused_by_name() {
             (
                 "samples_per_pass",
                 PhotonSettings {
-                    samples_per_pass: 1025,
+                    samples_per_pass: 4097,
                     ..fine()
                 },
             ),

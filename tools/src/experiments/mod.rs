@@ -7,6 +7,7 @@
 
 pub mod bars;
 pub mod equal_error;
+pub mod findings;
 pub mod fingerprint;
 pub mod lines;
 pub mod measurement;

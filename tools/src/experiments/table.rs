@@ -1,5 +1,7 @@
 //! Tables of measured numbers, as text, Markdown, CSV and JSON.
 
+use super::findings::Measured;
+
 /// A cell of a [`Table`].
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[serde(untagged)]
@@ -10,6 +12,8 @@ pub enum Cell {
     Count(u64),
     /// A measured number.
     Number(f64),
+    /// A measured number with its interval.
+    Interval(Measured),
 }
 
 impl From<&str> for Cell {
@@ -36,6 +40,17 @@ impl From<f64> for Cell {
     }
 }
 
+impl From<Measured> for Cell {
+    /// An exact number is shown without an interval.
+    fn from(found: Measured) -> Self {
+        if found.is_exact() {
+            Self::Number(found.value)
+        } else {
+            Self::Interval(found)
+        }
+    }
+}
+
 impl<T: Into<Cell>> From<Option<T>> for Cell {
     /// What is not there is named so.
     fn from(value: Option<T>) -> Self {
@@ -55,6 +70,11 @@ impl std::fmt::Display for Cell {
                 write!(f, "{number:.digits$}")
             }
             Self::Number(number) => write!(f, "{number:.3e}"),
+            Self::Interval(Measured { value, low, high }) if low.is_finite() && high.is_finite() => {
+                let [value, low, high] = [value, low, high].map(|number| Self::Number(*number));
+                write!(f, "{value} ({low} … {high})")
+            }
+            Self::Interval(Measured { value, .. }) => Self::Number(*value).fmt(f),
         }
     }
 }
@@ -115,7 +135,11 @@ impl Table {
                     self.heads.len()
                 ));
             }
-            let bad = |cell: &Cell| matches!(cell, Cell::Number(number) if !number.is_finite());
+            let bad = |cell: &Cell| match cell {
+                Cell::Number(number) => !number.is_finite(),
+                Cell::Interval(found) => !found.value.is_finite(),
+                Cell::Text(_) | Cell::Count(_) => false,
+            };
             let column = row.iter().position(bad)?;
             Some(format!("row {index}, {}: {}", self.heads[column], row[column]))
         })
@@ -152,17 +176,30 @@ impl Table {
             }
         };
         let line = |cells: Vec<String>| cells.join(",") + "\n";
-        let mut text = line(self.heads.iter().map(|head| quote(head)).collect());
+        // Intervals get columns of their own.
+        let spans = |column: usize| {
+            let mut cells = self.rows.iter().filter_map(|row| row.get(column));
+            cells.any(|cell| matches!(cell, Cell::Interval(_)))
+        };
+        let spans: Vec<bool> = (0..self.heads.len()).map(spans).collect();
+        let heads = self.heads.iter().zip(&spans).flat_map(|(head, spans)| {
+            let ends: &[&str] = if *spans { &["", ", least", ", greatest"] } else { &[""] };
+            ends.iter().map(move |end| quote(&format!("{head}{end}")))
+        });
+        let mut text = line(heads.collect());
         for row in &self.rows {
-            text += &line(
-                row.iter()
-                    .map(|cell| match cell {
-                        Cell::Text(words) => quote(words),
-                        Cell::Count(count) => count.to_string(),
-                        Cell::Number(number) => format!("{number:e}"),
-                    })
-                    .collect(),
-            );
+            let cells = row.iter().zip(&spans).flat_map(|(cell, spans)| {
+                let values = match cell {
+                    Cell::Text(words) => [quote(words), quote(words), quote(words)],
+                    Cell::Count(count) => [count, count, count].map(u64::to_string),
+                    Cell::Number(number) => [number; 3].map(|number| format!("{number:e}")),
+                    Cell::Interval(Measured { value, low, high }) => {
+                        [value, low, high].map(|number| format!("{number:e}"))
+                    }
+                };
+                values.into_iter().take(if *spans { 3 } else { 1 })
+            });
+            text += &line(cells.collect());
         }
         text
     }

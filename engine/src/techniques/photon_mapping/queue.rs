@@ -273,7 +273,6 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/techniques/photon_mapping/photon_queue_blocks.comp"],
         tests: &[
             "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
-            "tests/tests/photon/queues.rs::queues_may_stay_empty",
             "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
         ],
         settings: &["queue"],

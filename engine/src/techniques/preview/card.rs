@@ -110,7 +110,6 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/preview/moving.rs::moved_objects_are_as_if_made_there",
         "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
         "tests/tests/preview/technique.rs::pictures_come_to_be_the_path_tracers",
-        "tests/tests/preview/technique.rs::the_environment_is_read_back_as_it_was",
         "engine/src/techniques/preview/probe.rs::lobes_grow_from_level_to_level",
         "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
         "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use clerestory::Error;
 use clerestory::film::{atomic, png};
+use clerestory_tools::experiments::findings::Findings;
+use clerestory_tools::experiments::measures::Run;
 use clerestory_tools::experiments::reference::slug;
 use clerestory_tools::experiments::results::Results;
 use clerestory_tools::experiments::series::{self, Work};
 use clerestory_tools::experiments::strip::{self, Strip};
-use clerestory_tools::experiments::table::Table;
 use clerestory_tools::experiments::{Experiment, summary, web_page};
 
 use crate::failure::Outcome;
@@ -22,23 +23,72 @@ fn make(folder: &Path) -> Outcome {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error).into())
 }
 
-/// Writes the tables of a measure: Markdown, JSON, and a CSV for each. Returns the Markdown.
-pub fn tables(folder: &Path, experiment: &Experiment, tables: &[Table]) -> Outcome<String> {
+/// Writes what a measure found: a page with the verdicts first, JSON, a CSV for each table, and its rows if it keeps any. Returns the page.
+pub fn measure(folder: &Path, experiment: &Experiment, run: &Run) -> Outcome<String> {
     make(folder)?;
-    let mut page = format!("# {}: {}\n\n{}\n", experiment.name, experiment.title, experiment.about);
+    let Findings {
+        verdicts,
+        tables,
+        headline,
+    } = &run.findings;
+    let mut page = format!(
+        "# {}: {}\n\n{}{}\n",
+        experiment.name,
+        experiment.title,
+        verdicts_first(&run.findings),
+        experiment.about
+    );
     for (index, table) in tables.iter().enumerate() {
         page += &format!("\n{}", table.markdown());
         write(&folder.join(format!("{}.csv", index + 1)), &table.csv())?;
     }
     write(&folder.join("report.md"), &page)?;
-    write(&folder.join("report.json"), &output::json_text("report.json", &tables)?)?;
+    let verdicts: Vec<_> = verdicts
+        .iter()
+        .map(|judged| {
+            serde_json::json!({
+                "criterion": judged.name,
+                "wanted": judged.bound.to_string(),
+                "because": judged.because,
+                "verdict": judged.verdict,
+                "found": judged.found,
+                "rows": judged.rows,
+                "failing": judged.failing,
+                "worst": judged.worst,
+            })
+        })
+        .collect();
+    let headline = headline
+        .as_ref()
+        .map(|headline| serde_json::json!({ "words": headline.words, "found": headline.found }));
+    let document = serde_json::json!({ "verdicts": verdicts, "headline": headline, "tables": tables });
+    write(
+        &folder.join("report.json"),
+        &output::json_text("report.json", &document)?,
+    )?;
+    if let Some(rows) = &run.rows {
+        write(&folder.join("rows.json"), rows)?;
+    }
     Ok(page)
 }
 
-/// What a page of results says of a measure: its tables, but of long ones the file alone.
-pub fn for_a_page(experiment: &Experiment, tables: &[Table]) -> String {
-    let mut text = format!("{}. {}\n", experiment.title, experiment.about.trim_end());
-    for (index, table) in tables.iter().enumerate() {
+/// Verdicts and the one number, with an empty line after; nothing of a measure without any.
+fn verdicts_first(findings: &Findings) -> String {
+    match findings.summary() {
+        text if text.is_empty() => text,
+        text => text + "\n",
+    }
+}
+
+/// What a page of results says of a measure: verdicts and tables, but of long ones the file alone.
+pub fn for_a_page(experiment: &Experiment, findings: &Findings) -> String {
+    let mut text = format!(
+        "{}{}. {}\n",
+        verdicts_first(findings),
+        experiment.title,
+        experiment.about.trim_end()
+    );
+    for (index, table) in findings.tables.iter().enumerate() {
         text += &if table.is_long {
             let (rows, file) = (table.rows.len(), index + 1);
             format!(

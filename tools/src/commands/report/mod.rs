@@ -203,7 +203,7 @@ fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
     arguments.folder.join(format!("{}{form}", experiment.name))
 }
 
-/// The tables go to standard output and, with all digits, into the folder. Says whether it was interrupted.
+/// Verdicts and tables go to standard output and, with all digits, into the folder. Says whether it was interrupted.
 fn measure(
     arguments: &Arguments,
     experiment: &Experiment,
@@ -226,14 +226,17 @@ fn measure(
         folder: &folder,
         watch: bar,
     };
-    let tables = (measures::find(name)?.run)(&context);
+    let run = (measures::find(name)?.run)(&context);
     bar.clear();
-    let tables = tables?;
+    let mut run = run?;
+    if arguments.smoke {
+        run.findings = run.findings.of_smoke_run();
+    }
     if bar.stopped() {
         // Whole tables of an earlier run are worth more than the part of this one.
         return Ok(true);
     }
-    let page = files::tables(&folder, experiment, &tables)?;
+    let page = files::measure(&folder, experiment, &run)?;
     output::print(&page)?;
     output::note(&format!("wrote {}", folder.display()));
     if let Some((block, path)) = part {
@@ -244,7 +247,10 @@ fn measure(
             device.borrow(),
             env!("CARGO_PKG_VERSION"),
         ));
-        block.write(&path, &format!("{facts}\n\n{}", files::for_a_page(experiment, &tables)))?;
+        block.write(
+            &path,
+            &format!("{facts}\n\n{}", files::for_a_page(experiment, &run.findings)),
+        )?;
         output::note(&format!("wrote {}", path.display()));
     }
     Ok(false)

@@ -2,6 +2,7 @@
 //! share: a clock, sizes of errors, pictures and numbers of twice the precision.
 
 mod clock;
+mod context;
 mod device;
 mod errors;
 mod kd;
@@ -16,38 +17,10 @@ mod rendering;
 mod surfaces;
 mod wide;
 
-use std::path::{Path, PathBuf};
-
-use clerestory::gpu::Gpu;
 use clerestory::{Error, Result};
 
-use super::table::Table;
-use super::watch::Watch;
-
-/// What a measure is given.
-pub struct Context<'a> {
-    /// Few inputs, for a quick look.
-    pub smoke: bool,
-    /// Addresses of scenes to measure in place of a measure's own, for those that measure scenes; none for its own.
-    pub scenes: &'a [String],
-    /// Opens the device, for measures that need one.
-    pub gpu: &'a dyn Fn() -> Result<Gpu>,
-    /// For files beside the tables ([`Context::file`]); it may not be there yet.
-    pub folder: &'a Path,
-    /// Sees the progress of measures that take long. A measure that is stopped gives the rows that it has.
-    pub watch: &'a dyn Watch,
-}
-
-impl Context<'_> {
-    /// Where a file beside the tables goes; its folder is made.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn file(&self, name: &str) -> Result<PathBuf> {
-        std::fs::create_dir_all(self.folder).map_err(|error| Error::io(self.folder, error))?;
-        Ok(self.folder.join(name))
-    }
-}
+pub use self::context::Context;
+use super::findings::{self, Findings, Study};
 
 /// A measure by name.
 pub struct Measure {
@@ -58,24 +31,34 @@ pub struct Measure {
     /// Whether it measures scenes that it is told ([`Context::scenes`]).
     pub takes_scenes: bool,
     /// Takes the measure. Errors and counts are deterministic; times are not.
-    pub run: fn(&Context<'_>) -> Result<Vec<Table>>,
+    pub run: fn(&Context<'_>) -> Result<Run>,
+    /// What it says where nothing was run: its criteria.
+    pub declared: fn() -> Findings,
 }
 
-const fn on_host(name: &'static str, run: fn(&Context<'_>) -> Result<Vec<Table>>) -> Measure {
-    Measure {
-        name,
-        needs_device: false,
-        takes_scenes: false,
-        run,
-    }
+/// What a measure has found.
+#[derive(Debug)]
+pub struct Run {
+    /// Its rows as JSON; `None` of a measure that keeps tables alone.
+    pub rows: Option<String>,
+    /// What they say, as they are read back: text may cost a number its last bit, and a verdict must not depend on when it was made.
+    pub findings: Findings,
 }
 
-const fn on_device(name: &'static str, run: fn(&Context<'_>) -> Result<Vec<Table>>) -> Measure {
+/// A measure of rows.
+const fn rows<S: Study>(name: &'static str, needs_device: bool) -> Measure {
     Measure {
         name,
-        needs_device: true,
+        needs_device,
         takes_scenes: false,
-        run,
+        run: |context| {
+            let rows = findings::run::<S>(context)?;
+            Ok(Run {
+                findings: findings::read::<S>(&rows)?,
+                rows: Some(rows),
+            })
+        },
+        declared: || S::default().findings(),
     }
 }
 
@@ -86,11 +69,40 @@ impl Measure {
     }
 }
 
-/// [`MEASURES`], and a test of each measure's quick form, from a line a measure: `where it runs "name" topic::module`.
+/// A [`Measure`] of one of the two kinds: a module has rows of its type `Found`, or a function `measure` that gives tables.
+macro_rules! measure {
+    (rows $name:literal, $needs_device:expr, $topic:ident::$module:ident) => {
+        rows::<$topic::$module::Found>($name, $needs_device)
+    };
+    (tables $name:literal, $needs_device:expr, $topic:ident::$module:ident) => {
+        Measure {
+            name: $name,
+            needs_device: $needs_device,
+            takes_scenes: false,
+            run: |context| {
+                let findings = $topic::$module::measure(context)?.into();
+                Ok(Run { rows: None, findings })
+            },
+            declared: Findings::default,
+        }
+    };
+}
+
+/// Whether a measure opens the device, by a word.
+macro_rules! needs_device {
+    (on_host) => {
+        false
+    };
+    (on_device) => {
+        true
+    };
+}
+
+/// [`MEASURES`], and a test of each measure's quick form, from a line a measure: `where it runs, what it keeps, "name" topic::module`.
 macro_rules! measures {
-    ($($place:ident $name:literal $topic:ident::$module:ident $(.$also:ident())?;)*) => {
+    ($($place:ident $kind:ident $name:literal $topic:ident::$module:ident $(.$also:ident())?;)*) => {
         /// All measures, each called as its experiment and, with underscores, its module in the folder of its topic.
-        pub const MEASURES: &[Measure] = &[$($place($name, $topic::$module::measure)$(.$also())?),*];
+        pub const MEASURES: &[Measure] = &[$(measure!($kind $name, needs_device!($place), $topic::$module)$(.$also())?),*];
 
         /// A test a measure, so that each has its own time and its own failure.
         #[cfg(test)]
@@ -106,55 +118,55 @@ macro_rules! measures {
 }
 
 measures! {
-    on_device "absorption" media::absorption;
-    on_device "alpha" surfaces::alpha;
-    on_device "automatic-choice" rendering::automatic_choice;
-    on_device "barriers" device::barriers;
-    on_device "build-stages" rays::build_stages;
-    on_host "compact-map" photon_maps::compact_map;
-    on_host "compact-rays" photon_maps::compact_rays;
-    on_host "coupled-reflection" surfaces::coupled_reflection;
-    on_device "device-model" device::device_model;
-    on_host "free-flight" media::free_flight;
-    on_device "kd-caches" kd::kd_caches.of_any_scenes();
-    on_device "kd-heuristics" kd::kd_heuristics.of_any_scenes();
-    on_device "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
-    on_host "kd-probability" kd::kd_probability;
-    on_device "kd-rays" kd::kd_rays.of_any_scenes();
-    on_device "kd-threads" kd::kd_threads.of_any_scenes();
-    on_device "kd-traversal" kd::kd_traversal.of_any_scenes();
-    on_host "leaf-sizes" photon_maps::leaf_sizes;
-    on_device "live-map-pictures" preview::live_map_pictures;
-    on_device "live-maps" preview::live_maps.of_any_scenes();
-    on_host "map-borders" maps::map_borders;
-    on_host "map-choice" maps::map_choice;
-    on_device "map-construction" photon_maps::map_construction;
-    on_host "map-density" maps::map_density;
-    on_host "map-error" maps::map_error;
-    on_device "map-glossiness" maps::map_glossiness;
-    on_host "map-levels" maps::map_levels;
-    on_host "map-quality" photon_maps::map_quality;
-    on_device "map-rendering" maps::map_rendering;
-    on_host "merge-example" photon_maps::merge_example;
-    on_device "mitsuba" rendering::mitsuba;
-    on_host "multiple-scattering" surfaces::multiple_scattering;
-    on_device "path-sets" rendering::path_sets;
-    on_device "persistent-threads" rays::persistent_threads;
-    on_host "phase-functions" media::phase_functions;
-    on_device "photon-frame" photons::photon_frame;
-    on_device "photon-peers" photons::photon_peers;
-    on_device "photon-queues" photons::photon_queues;
-    on_device "photon-statistics" photons::photon_statistics;
-    on_host "picture-formats" rendering::picture_formats;
-    on_host "ray-offsets" rays::ray_offsets;
-    on_host "sample-sums" rendering::sample_sums;
-    on_device "scene-profile" rendering::scene_profile;
-    on_device "shadow-maps" preview::shadow_maps.of_any_scenes();
-    on_host "shading-normals" surfaces::shading_normals;
-    on_host "sphere-tests" rays::sphere_tests;
-    on_host "tangents" surfaces::tangents;
-    on_host "tree-quality" rays::tree_quality;
-    on_host "triangle-tests" rays::triangle_tests;
+    on_device rows "absorption" media::absorption;
+    on_device rows "alpha" surfaces::alpha;
+    on_device tables "automatic-choice" rendering::automatic_choice;
+    on_device tables "barriers" device::barriers;
+    on_device tables "build-stages" rays::build_stages;
+    on_host tables "compact-map" photon_maps::compact_map;
+    on_host tables "compact-rays" photon_maps::compact_rays;
+    on_host rows "coupled-reflection" surfaces::coupled_reflection;
+    on_device tables "device-model" device::device_model;
+    on_host tables "free-flight" media::free_flight;
+    on_device tables "kd-caches" kd::kd_caches.of_any_scenes();
+    on_device tables "kd-heuristics" kd::kd_heuristics.of_any_scenes();
+    on_device tables "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
+    on_host tables "kd-probability" kd::kd_probability;
+    on_device tables "kd-rays" kd::kd_rays.of_any_scenes();
+    on_device tables "kd-threads" kd::kd_threads.of_any_scenes();
+    on_device tables "kd-traversal" kd::kd_traversal.of_any_scenes();
+    on_host tables "leaf-sizes" photon_maps::leaf_sizes;
+    on_device tables "live-map-pictures" preview::live_map_pictures;
+    on_device tables "live-maps" preview::live_maps.of_any_scenes();
+    on_host tables "map-borders" maps::map_borders;
+    on_host tables "map-choice" maps::map_choice;
+    on_device tables "map-construction" photon_maps::map_construction;
+    on_host tables "map-density" maps::map_density;
+    on_host tables "map-error" maps::map_error;
+    on_device tables "map-glossiness" maps::map_glossiness;
+    on_host tables "map-levels" maps::map_levels;
+    on_host tables "map-quality" photon_maps::map_quality;
+    on_device tables "map-rendering" maps::map_rendering;
+    on_host rows "merge-example" photon_maps::merge_example;
+    on_device tables "mitsuba" rendering::mitsuba;
+    on_host rows "multiple-scattering" surfaces::multiple_scattering;
+    on_device tables "path-sets" rendering::path_sets;
+    on_device tables "persistent-threads" rays::persistent_threads;
+    on_host rows "phase-functions" media::phase_functions;
+    on_device tables "photon-frame" photons::photon_frame;
+    on_device tables "photon-peers" photons::photon_peers;
+    on_device tables "photon-queues" photons::photon_queues;
+    on_device tables "photon-statistics" photons::photon_statistics;
+    on_host tables "picture-formats" rendering::picture_formats;
+    on_host rows "ray-offsets" rays::ray_offsets;
+    on_host tables "sample-sums" rendering::sample_sums;
+    on_device tables "scene-profile" rendering::scene_profile;
+    on_device tables "shadow-maps" preview::shadow_maps.of_any_scenes();
+    on_host rows "shading-normals" surfaces::shading_normals;
+    on_host tables "sphere-tests" rays::sphere_tests;
+    on_host rows "tangents" surfaces::tangents;
+    on_host tables "tree-quality" rays::tree_quality;
+    on_host rows "triangle-tests" rays::triangle_tests;
 }
 
 /// The measure of that name.
@@ -170,6 +182,11 @@ pub fn find(name: &str) -> Result<&'static Measure> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use clerestory::gpu::Gpu;
+
+    use super::super::findings::Verdict;
     use super::super::watch::Unwatched;
     use super::*;
 
@@ -187,10 +204,40 @@ mod tests {
             folder: folder.path(),
             watch: &Unwatched,
         };
-        let tables = (measure.run)(&context).unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert!(!tables.is_empty(), "{name}");
-        for table in tables {
+        let run = (measure.run)(&context).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let findings = run.findings.of_smoke_run();
+        assert!(!findings.tables.is_empty(), "{name}");
+        for table in findings.tables {
             assert_eq!(table.fault(), None, "{name}: {}", table.title);
+        }
+        for judged in findings.verdicts {
+            let expected = if judged.in_every_form {
+                Verdict::Holds
+            } else {
+                Verdict::SmokeForm
+            };
+            assert_eq!(judged.verdict, expected, "{name}: {judged}");
+        }
+    }
+
+    #[test]
+    fn criteria_are_there_before_a_run() {
+        for measure in MEASURES {
+            let declared = (measure.declared)();
+            let mut names: Vec<&str> = declared.verdicts.iter().map(|judged| judged.name).collect();
+            assert!(
+                declared.verdicts.iter().all(|judged| judged.verdict == Verdict::NotRun),
+                "{}",
+                measure.name
+            );
+            assert!(
+                declared.tables.is_empty() && declared.headline.is_none(),
+                "{}",
+                measure.name
+            );
+            names.sort_unstable();
+            names.dedup();
+            assert_eq!(names.len(), declared.verdicts.len(), "{}", measure.name);
         }
     }
 

@@ -8,62 +8,94 @@ use clerestory::scene::Material;
 use clerestory_hard_cases::scenes::{cuboid, floor_from_above, lamp};
 use glam::Vec3;
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Study, largest, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::pictures::{Image, z_score};
-use crate::experiments::table::Table;
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (size, spp) = if context.smoke { (4, 16) } else { (32, 1024) };
-    let gpu = (context.gpu)()?;
-    let mut table = Table::new(
-        "Light straight through an absorbing slab",
-        &[
-            "index",
-            "thickness (m)",
-            "absorption (1/m)",
-            "expected",
-            "rendered",
-            "relative error",
-            "standard deviation",
-            "z",
-            "GPU ns a sample",
-        ],
-    );
-    for ior in [1.0_f32, 1.5] {
-        for (thickness, sigma) in [(0.5_f32, 0.0_f64), (0.5, 1.0), (2.0, 1.0), (2.0, 4.0), (5.0, 0.1)] {
+/// Thickness, m, and absorption, 1/m.
+const SLABS: [(f32, f64); 5] = [(0.5, 0.0), (0.5, 1.0), (2.0, 1.0), (2.0, 4.0), (5.0, 0.1)];
+const INDICES: [f32; 2] = [1.0, 1.5];
+
+rows! {
+    /// A slab.
+    struct Row = "Light straight through an absorbing slab" by [index, thickness, absorption] {
+        index: f64 = "index",
+        thickness: f64 = "thickness (m)",
+        absorption: f64 = "absorption (1/m)",
+        expected: f64 = "expected",
+        rendered: f64 = "rendered",
+        error: f64 = "relative error",
+        deviation: f64 = "standard deviation",
+        z: f64 = "z",
+        samples: u64 = "samples",
+        time: f64 = "GPU time of a sample (ns)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each("z of the mean is standard normal", Bound::AtMost(3.29), |row: &Row| {
+        row.z.abs().into()
+    })
+    .because("the largest of ten is beyond that once in a hundred runs, by Šidák")
+    .in_every_form(),
+    Criterion::each(
+        "the test can tell an error of one per cent",
+        Bound::AtMost(0.01),
+        |row: &Row| (row.deviation / row.expected).into(),
+    )
+    .because("half of what an eye sees"),
+];
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let (size, spp) = context.pick((32, 1024), (4, 16));
+        let gpu = (context.gpu)()?;
+        let slabs = INDICES
+            .iter()
+            .flat_map(|ior| SLABS.iter().map(move |slab| (*ior, *slab)));
+        let slabs: Vec<(f32, (f32, f64))> = slabs.collect();
+        let name = |(ior, (thickness, sigma)): &(f32, (f32, f64))| format!("index {ior}, {thickness} m, {sigma}/m");
+        context.each(&slabs, name, |(ior, (thickness, sigma))| {
             let mut scene = floor_from_above(lamp(Vec3::ONE));
             let material = Material {
                 attenuation_color: Vec3::splat((-sigma).exp() as f32),
                 attenuation_distance: 1.0,
-                ..Material::glass("slab", ior)
+                ..Material::glass("slab", *ior)
             };
             let (lower, upper) = (Vec3::new(-3.0, 0.5, -3.0), Vec3::new(3.0, 0.5 + thickness, 3.0));
             let material = scene.add_material(material);
             scene.place(cuboid("slab", material, lower, upper));
-            let index = f64::from(ior);
+            let index = f64::from(*ior);
             let reflected = ((index - 1.0) / (index + 1.0)).powi(2);
             // The colour is what the material holds, rounded.
-            let through = f64::from((-sigma).exp() as f32).powf(thickness.into());
+            let through = f64::from((-sigma).exp() as f32).powf((*thickness).into());
             let expected = (1.0 - reflected).powi(2) * through / (1.0 - (reflected * through).powi(2));
             let image = Image::render(&Renderer::new(&gpu, &scene)?, size, spp, 4, "all")?;
             let (mean, deviation) = image.mean(0);
-            let samples = f64::from(size * size) * f64::from(spp);
-            table.row([
-                index.into(),
-                f64::from(thickness).into(),
-                sigma.into(),
-                expected.into(),
-                mean.into(),
-                (mean / expected - 1.0).into(),
-                deviation.into(),
-                z_score(mean - expected, deviation, expected).into(),
-                (image.report.gpu_seconds * 1e9 / samples).into(),
-            ]);
-        }
+            let samples = u64::from(size * size) * u64::from(spp);
+            Ok(vec![Row {
+                index,
+                thickness: (*thickness).into(),
+                absorption: *sigma,
+                expected,
+                rendered: mean,
+                error: mean / expected - 1.0,
+                deviation,
+                z: z_score(mean - expected, deviation, expected),
+                samples,
+                time: image.report.gpu_seconds * 1e9 / samples as f64,
+            }])
+        })
     }
-    table.note(format!(
-        "{size} × {size} pixels, {spp} independent samples each. Deviations below 2⁻¹⁷ of the value count as that much in z: they are rounding."
-    ));
-    Ok(vec![table])
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "the largest relative error",
+                largest(self, |_| true, |row| row.error.abs()),
+            )
+            .note("Independent samples. Deviations below 2⁻¹⁷ of the value count as that much in z: they are rounding.")
+    }
 }

@@ -11,9 +11,9 @@ use clerestory::transport::phase::{
 };
 use clerestory_hard_cases::chi_square::{chi_square, chi_square_z};
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
-use crate::experiments::table::Table;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::random::Random;
 
 /// Nodes and weights of the five-point rule on [-1, 1].
@@ -27,6 +27,8 @@ const GAUSS: [(f64, f64); 5] = [
 const PANELS: u32 = 512;
 /// e^−36 is below what f64 holds beside one.
 const DEPTH: f64 = 36.0;
+/// What the function is evaluated at in an integral.
+const VALUES: f64 = 2.0 * PANELS as f64 * GAUSS.len() as f64;
 const CELLS: usize = 64;
 /// What functions with a parameter are measured at.
 const PARAMETERS: &[f64] = &[-0.99, -0.5, 0.0, 0.01, 0.5, 0.9, 0.99, 0.999];
@@ -42,19 +44,19 @@ struct Phase {
     cumulative: fn(f64, f64) -> f64,
 }
 
+const HENYEY_GREENSTEIN: &str = "Henyey–Greenstein";
+
 const PHASES: [Phase; 3] = [
     Phase {
-        name: "Henyey–Greenstein",
+        name: HENYEY_GREENSTEIN,
         parameters: PARAMETERS,
         density: henyey_greenstein,
         sample: henyey_greenstein_sample,
         mean_cosine: |g| g,
         cumulative: |c, g| {
-            if g == 0.0 {
-                return 0.5 * (1.0 + c);
-            }
+            // The closed form without its difference of two numbers that are alike for small g.
             let root = ((1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - c)).sqrt();
-            (1.0 - g * g) / (2.0 * g) * (1.0 / root - 1.0 / (1.0 + g))
+            (1.0 - g) * (1.0 + c) / (root * (1.0 + g + root))
         },
     },
     Phase {
@@ -88,64 +90,141 @@ fn over_sphere(f: impl Fn(f64) -> f64) -> f64 {
     TAU * sum
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let samples: u64 = if context.smoke { 4096 } else { 1 << 20 };
-    let mut table = Table::new(
-        "Phase functions",
-        &[
-            "function",
-            "parameter",
-            "integral − 1",
-            "mean cosine: error of the closed form",
-            "cosine of samples: error of the mean",
-            "inversion: worst error of the probability",
-            "χ² of samples, 64 cells (σ)",
-            "ns an evaluation",
-            "ns a sample",
-        ],
-    );
-    for phase in &PHASES {
-        for &parameter in phase.parameters {
-            let density = |c| (phase.density)(c, parameter);
-            let mean = over_sphere(|c| c * density(c));
-            let sample = |u| (phase.sample)(parameter, u);
-            let (mut cosines, mut worst) = (0.0, 0.0_f64);
-            for i in 0..samples {
-                let u = (i as f64 + 0.5) / samples as f64;
-                let c = sample(u);
-                cosines += c;
-                let p = (phase.cumulative)(c, parameter);
-                worst = worst.max((p - u).abs().min((1.0 - p - u).abs()));
-            }
-            let mut random = Random::new(table.rows.len() as u32);
-            let mut counts = [0.0; CELLS];
-            let inputs: Vec<f64> = (0..samples).map(|_| random.unit()).collect();
-            for u in &inputs {
-                let cell = ((phase.cumulative)(sample(*u), parameter) * CELLS as f64) as usize;
-                counts[cell.min(CELLS - 1)] += 1.0;
-            }
-            let chi_square = chi_square(&counts, &[samples as f64 / CELLS as f64; CELLS]);
-            let timed = &inputs[..inputs.len().min(1 << 16)];
-            table.row([
-                phase.name.into(),
-                parameter.into(),
-                (over_sphere(density) - 1.0).into(),
-                ((phase.mean_cosine)(parameter) - mean).into(),
-                (cosines / samples as f64 - mean).into(),
-                worst.into(),
-                chi_square
-                    .map_or(f64::NAN, |(statistic, degrees)| chi_square_z(statistic, degrees))
-                    .into(),
-                nanoseconds(context.smoke, timed, |u| density(2.0 * u - 1.0)).into(),
-                nanoseconds(context.smoke, timed, |u| sample(*u)).into(),
-            ]);
+/// A function, its parameter, and the seed of its samples.
+type Case = (&'static Phase, f64, u32);
+
+fn cases() -> Vec<Case> {
+    let of = |phase: &'static Phase| phase.parameters.iter().map(move |parameter| (phase, *parameter));
+    let all = PHASES.iter().flat_map(of).zip(0..);
+    all.map(|((phase, parameter), seed)| (phase, parameter, seed)).collect()
+}
+
+rows! {
+    /// A phase function with its parameter.
+    struct Row = "Phase functions" by [function, parameter] {
+        function: String = "function",
+        parameter: f64 = "parameter",
+        integral: f64 = "integral − 1",
+        mean_cosine: f64 = "mean cosine: error of the closed form",
+        mean_of_samples: f64 = "cosine of samples: error of the mean",
+        inversion: f64 = "inversion: worst error of the probability",
+        chi_square: Option<f64> = "χ² of samples, 64 cells (σ)",
+        samples: u64 = "samples",
+        peak: f64 = "greatest density of the cosine",
+        evaluation: Repeats = "an evaluation (ns)",
+        sample: Repeats = "a sample (ns)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "the integral is 1: its error in roundings",
+        Bound::AtMost(2.0),
+        |row: &Row| row.integral_in_roundings().into(),
+    )
+    .because("one for each value of the quadrature, which ends a step of f64 before the poles")
+    .in_every_form(),
+    Criterion::each(
+        "samples invert the distribution: the worst error in roundings",
+        Bound::AtMost(8.0),
+        |row: &Row| row.inversion_in_roundings().into(),
+    )
+    .because("a few of the probability, and of the cosine where its density is greatest")
+    .in_every_form(),
+    Criterion::each(
+        "χ² of the samples is within a few standard deviations",
+        Bound::AtMost(3.44),
+        |row: &Row| row.chi_square.map_or(f64::INFINITY, f64::abs).into(),
+    )
+    .because("the largest of 17 is beyond that once in a hundred runs, by Šidák"),
+];
+
+impl Row {
+    /// The error of the integral over what f64 can tell: a step in a cosine changes a probability by up to the greatest density times as much.
+    fn integral_in_roundings(&self) -> f64 {
+        self.integral.abs() / (f64::EPSILON * (VALUES + self.peak))
+    }
+
+    /// The inversion's worst error over what f64 can tell.
+    fn inversion_in_roundings(&self) -> f64 {
+        self.inversion / (f64::EPSILON * (1.0 + self.peak))
+    }
+
+    /// All but times.
+    fn of((phase, parameter, seed): Case, samples: u64) -> Self {
+        let density = |c| (phase.density)(c, parameter);
+        let sample = |u| (phase.sample)(parameter, u);
+        let cumulative = |c| (phase.cumulative)(c, parameter);
+        let mean = over_sphere(|c| c * density(c));
+        let (mut cosines, mut worst) = (0.0, 0.0_f64);
+        for i in 0..samples {
+            let u = (i as f64 + 0.5) / samples as f64;
+            let c = sample(u);
+            cosines += c;
+            let p = cumulative(c);
+            worst = worst.max((p - u).abs().min((1.0 - p - u).abs()));
+        }
+        let mut random = Random::new(seed);
+        let mut counts = [0.0; CELLS];
+        for _ in 0..samples {
+            let cell = (cumulative(sample(random.unit())) * CELLS as f64) as usize;
+            counts[cell.min(CELLS - 1)] += 1.0;
+        }
+        let chi_square = chi_square(&counts, &[samples as f64 / CELLS as f64; CELLS]);
+        Self {
+            function: phase.name.into(),
+            parameter,
+            integral: over_sphere(density) - 1.0,
+            mean_cosine: (phase.mean_cosine)(parameter) - mean,
+            mean_of_samples: cosines / samples as f64 - mean,
+            inversion: worst,
+            chi_square: chi_square.map(|(statistic, degrees)| chi_square_z(statistic, degrees)),
+            samples,
+            // All are greatest at a pole.
+            peak: TAU * density(1.0).max(density(-1.0)),
+            ..Self::default()
         }
     }
-    table.note(format!(
-        "Integrals and means by graded quadrature ({PANELS} panels of five points towards each pole). Samples: {samples} stratified ones for the \
-         mean and the inversion, as many independent ones for χ², whose deviation is standard normal when they follow their density. Rayleigh's \
-         function has no parameter."
-    ));
-    Ok(vec![table])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let samples: u64 = context.pick(1 << 20, 4096);
+        let cases = cases();
+        let name = |(phase, parameter, _): &Case| format!("{} of {parameter}", phase.name);
+        let mut rows = context.each(&cases, name, |case| Ok(vec![Row::of(*case, samples)]))?;
+        let mut random = Random::new(0);
+        let inputs: Vec<f64> = (0..samples.min(1 << 16)).map(|_| random.unit()).collect();
+        let evaluations = context.in_turns(9, rows.len(), |i| {
+            let (phase, parameter, _) = cases[i];
+            Ok(nanoseconds_once(&inputs, |u| (phase.density)(2.0 * u - 1.0, parameter)))
+        })?;
+        let draws = context.in_turns(9, rows.len(), |i| {
+            let (phase, parameter, _) = cases[i];
+            Ok(nanoseconds_once(&inputs, |u| (phase.sample)(parameter, *u)))
+        })?;
+        for (row, (evaluation, draw)) in rows.iter_mut().zip(evaluations.into_iter().zip(draws)) {
+            row.evaluation = Repeats(evaluation);
+            row.sample = Repeats(draw);
+        }
+        Ok(rows)
+    }
+
+    fn findings(&self) -> Findings {
+        let usual = self
+            .iter()
+            .find(|row| row.function == HENYEY_GREENSTEIN && row.parameter == 0.9);
+        Findings::of(self, CRITERIA)
+            .headline(
+                "a sample of Henyey and Greenstein's function of 0.9 (ns)",
+                usual.map(|row| (&row.sample).into()),
+            )
+            .note(format!(
+                "Integrals and means by graded quadrature ({PANELS} panels of five points towards each pole). Samples: stratified ones for the \
+                 mean and the inversion, as many independent ones for χ², whose deviation is standard normal when they follow their density. \
+                 Rayleigh's function has no parameter."
+            ))
+    }
 }

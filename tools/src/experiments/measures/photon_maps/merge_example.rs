@@ -11,8 +11,8 @@ use clerestory::accel::photon_map::split_lists::split_list_hierarchy;
 use clerestory::{Error, Result};
 use glam::Vec3;
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Study, rows, total};
 use crate::experiments::measures::Context;
-use crate::experiments::table::Table;
 use crate::random::Random;
 
 const CODES: [u64; 7] = [0b0010, 0b0011, 0b0101, 0b0101, 0b0110, 0b1001, 0b1101];
@@ -46,29 +46,87 @@ fn points_along_a_line(count: usize) -> Vec<Aabb> {
         .collect()
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
+rows! {
+    /// An array of the worked example.
+    struct Array = "The worked example: seven codes of four bits, leaf size 1" by [array] {
+        array: String = "array",
+        found: String = "found",
+        by_hand: String = "by hand",
+        different: u64 = "differs (1) or not (0)",
+    }
+}
+
+rows! {
+    /// Trees over random codes.
+    struct Trees = "Random codes: merging beside lists of splits" by [codes, bits] {
+        codes: u64 = "codes",
+        bits: u64 = "bits",
+        leaf_size: u64 = "leaf size",
+        sets: u64 = "sets",
+        different: u64 = "sets with another tree",
+    }
+}
+
+const OF_ARRAYS: &[Criterion<Array>] =
+    &[
+        Criterion::each("every array is as by hand", Bound::AtMost(0.0), |row: &Array| {
+            row.different.into()
+        })
+        .in_every_form(),
+    ];
+const OF_TREES: &[Criterion<Trees>] = &[Criterion::each(
+    "trees are those by lists of splits",
+    Bound::AtMost(0.0),
+    |row: &Trees| row.different.into(),
+)
+.in_every_form()];
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    arrays: Vec<Array>,
+    trees: Vec<Trees>,
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        Ok(Self {
+            arrays: arrays()?,
+            trees: trees(context.pick(1000, 10)),
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(&self.arrays, OF_ARRAYS)
+            .note(
+                "The hand-made example merges the two points of level 1 one after the other; here a level is one step, and its sizes are those after both.",
+            )
+            .and(Findings::of(&self.trees, OF_TREES))
+            .headline("trees over random codes that differ from those by lists of splits", total(&self.trees, |_| true, |row| row.different))
+    }
+}
+
+/// The arrays of the worked example.
+fn arrays() -> Result<Vec<Array>> {
     let sorted = SortedCodes {
         codes: CODES.to_vec(),
         order: (0..CODES.len() as u32).collect(),
         bits: BITS,
     };
-    let mut example = Table::new(
-        "The worked example: seven codes of four bits, leaf size 1",
-        &["array", "found", "by hand", "equal"],
-    );
-    let mut row = |array: String, found: String, by_hand: String| {
-        let equal = if found == by_hand { "yes" } else { "no" };
-        example.row([array.into(), found.into(), by_hand.into(), equal.into()]);
+    let row = |array: String, found: String, by_hand: String| Array {
+        different: u64::from(found != by_hand),
+        array,
+        found,
+        by_hand,
     };
     let mut points: Vec<(u32, u32)> = merge_points(&sorted).iter().map(|p| (p.level, p.place)).collect();
     // Levels are merged from the last to the first, the points of each by place.
     points.sort_by_key(|(level, place)| (std::cmp::Reverse(*level), *place));
-    row(
+    let mut rows = vec![row(
         "merge points (level, place)".into(),
         format!("{points:?}"),
         format!("{POINTS:?}"),
-    );
+    )];
     let boxes = points_along_a_line(CODES.len());
     let mut steps = Vec::new();
     let tree = merged_hierarchy(&boxes, &sorted, 1, |sizes| steps.push(sizes.to_vec()));
@@ -78,29 +136,26 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             i => format!("sizes after {i} of 4 levels"),
         };
         let by_hand = SIZES.get(i).map_or_else(String::new, |sizes| format!("{sizes:?}"));
-        row(name, format!("{sizes:?}"), by_hand);
+        rows.push(row(name, format!("{sizes:?}"), by_hand));
     }
-    row("tree".into(), words(&tree, tree.root), TREE.into());
+    rows.push(row("tree".into(), words(&tree, tree.root), TREE.into()));
     let shape = tree
         .shape(&boxes)
         .map_err(|fault| Error::setting("tree", "worked example", format!("is not valid: {fault:?}")))?;
-    row(
+    rows.push(row(
         "leaves, inner nodes".into(),
         format!("{}, {}", shape.leaves, shape.nodes),
         "6, 5".into(),
-    );
-    example.note(
-        "The hand-made example merges the two points of level 1 one after the other; here a level is one step, and its sizes are those after both.",
-    );
-    let mut random_codes = Table::new(
-        "Random codes: merging beside lists of splits",
-        &["codes", "bits", "leaf size", "sets", "sets with another tree"],
-    );
-    let sets = if context.smoke { 10 } else { 1000 };
+    ));
+    Ok(rows)
+}
+
+/// Trees over so many sets of random codes.
+fn trees(sets: u64) -> Vec<Trees> {
     let mut random = Random::new(25);
-    for (count, bits, leaf_size) in [(7, 4, 1), (100, 6, 1), (100, 30, 5), (1000, 12, 8)] {
+    let mut of = |(count, bits, leaf_size): (usize, u32, u32)| {
         let boxes = points_along_a_line(count);
-        let mut different = 0_u64;
+        let mut different = 0;
         for _ in 0..sets {
             let mut codes: Vec<u64> = (0..count)
                 .map(|_| (random.unit() * f64::from(1_u32 << bits)) as u64)
@@ -115,39 +170,15 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             let (lists, _) = split_list_hierarchy(&boxes, &sorted, leaf_size);
             different += u64::from(words(&merged, merged.root) != words(&lists, lists.root));
         }
-        random_codes.row([
-            (count as u64).into(),
-            u64::from(bits).into(),
-            u64::from(leaf_size).into(),
-            (sets as u64).into(),
-            different.into(),
-        ]);
-    }
-    Ok(vec![example, random_codes])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::experiments::table::Cell;
-    use crate::experiments::watch::Unwatched;
-
-    #[test]
-    fn every_array_of_the_worked_example_is_as_by_hand() {
-        let context = Context {
-            smoke: true,
-            scenes: &[],
-            gpu: &|| Err(Error::setting("device", "none", "is not to be opened")),
-            folder: std::path::Path::new(""),
-            watch: &Unwatched,
-        };
-        let tables = measure(&context).unwrap();
-        assert_eq!(tables[0].rows.len(), 8);
-        for row in &tables[0].rows {
-            assert_eq!(row[3], Cell::from("yes"), "{row:?}");
+        Trees {
+            codes: count as u64,
+            bits: bits.into(),
+            leaf_size: leaf_size.into(),
+            sets,
+            different,
         }
-        for row in &tables[1].rows {
-            assert_eq!(row[4], Cell::from(0_u64), "{row:?}");
-        }
-    }
+    };
+    [(7, 4, 1), (100, 6, 1), (100, 30, 5), (1000, 12, 8)]
+        .map(&mut of)
+        .to_vec()
 }

@@ -8,10 +8,10 @@ use clerestory::accel::offset::{offset_ray_origin, scene_reach, surface_point};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
 use glam::Vec3;
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows, total};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::experiments::measures::errors::Errors;
-use crate::experiments::table::Table;
 use crate::random::Random;
 
 /// Distance of the wall over the size of the triangle.
@@ -87,65 +87,109 @@ fn input(random: &mut Random, size: f64, away: f64) -> Input {
     }
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let count = if context.smoke { 500 } else { 100_000 };
-    let mut table = Table::new(
-        "Rays that leave a triangle",
-        &[
-            "size (m)",
-            "from the origin of coordinates (m)",
-            "offset",
-            "met their own surface",
-            "began behind the wall",
-            "rays",
-            "median distance from the plane (m)",
-            "ns an origin",
-        ],
-    );
-    let forms = [
-        ("by error bounds (engine)", Form::Engine),
-        ("1e-3 m", Form::Fixed(1e-3)),
-        ("1e-4 m", Form::Fixed(1e-4)),
-        ("1e-6 m", Form::Fixed(1e-6)),
-    ];
-    for (size, away) in [
-        (1e-4, 0.0),
-        (1e-2, 0.0),
-        (1.0, 0.0),
-        (1.0, 1e3),
-        (1e2, 0.0),
-        (1e5, 0.0),
-        (1e3, 1e6),
-    ] {
-        let mut random = Random::new(7);
-        let inputs: Vec<Input> = (0..count).map(|_| input(&mut random, size, away)).collect();
-        for (name, form) in forms {
-            let (mut met, mut behind, mut distances) = (0_u64, 0_u64, Errors::default());
-            for input in &inputs {
-                let origin = start(form, input);
-                let shear = ray_shear(origin, input.direction);
-                let meets = |triangle| intersect_triangle(&shear, triangle, 0.0, f32::INFINITY).is_some();
-                met += u64::from(meets(&input.triangle) || meets(&input.neighbour));
-                let height = (origin.as_dvec3() - input.triangle[0].as_dvec3()).dot(input.normal.as_dvec3());
-                behind += u64::from(height > GAP * size);
-                distances.add(height);
-            }
-            table.row([
-                size.into(),
-                away.into(),
-                name.into(),
-                met.into(),
-                behind.into(),
-                (inputs.len() as u64).into(),
-                distances.quantile(0.5).into(),
-                nanoseconds(context.smoke, &inputs, |input| start(form, input)).into(),
-            ]);
+const ENGINES: &str = "by error bounds (engine)";
+
+const FORMS: [(&str, Form); 4] = [
+    (ENGINES, Form::Engine),
+    ("1e-3 m", Form::Fixed(1e-3)),
+    ("1e-4 m", Form::Fixed(1e-4)),
+    ("1e-6 m", Form::Fixed(1e-6)),
+];
+
+/// Sizes of triangles, and how far they lie from the origin of coordinates, m.
+const CASES: [(f64, f64); 7] = [
+    (1e-4, 0.0),
+    (1e-2, 0.0),
+    (1.0, 0.0),
+    (1.0, 1e3),
+    (1e2, 0.0),
+    (1e5, 0.0),
+    (1e3, 1e6),
+];
+
+rows! {
+    /// A way to begin rays, on triangles of a size in a place.
+    struct Row = "Rays that leave a triangle" by [offset, size, away] {
+        offset: String = "offset",
+        size: f64 = "size (m)",
+        away: f64 = "from the origin of coordinates (m)",
+        met: u64 = "met their own surface",
+        behind: u64 = "began behind the wall",
+        rays: u64 = "rays",
+        distance: f64 = "median distance from the plane (m)",
+        time: Repeats = "an origin (ns)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each("no ray meets its own surface", Bound::AtMost(0.0), |row: &Row| {
+        row.met.into()
+    })
+    .among(Row::is_the_engines)
+    .in_every_form(),
+    Criterion::each("no ray begins behind the wall", Bound::AtMost(0.0), |row: &Row| {
+        row.behind.into()
+    })
+    .among(Row::is_the_engines)
+    .in_every_form(),
+];
+
+impl Row {
+    fn is_the_engines(&self) -> bool {
+        self.offset == ENGINES
+    }
+
+    fn of((name, form): (&str, Form), (size, away): (f64, f64), inputs: &[Input], time: Vec<f64>) -> Self {
+        let (mut met, mut behind, mut distances) = (0, 0, Errors::default());
+        for input in inputs {
+            let origin = start(form, input);
+            let shear = ray_shear(origin, input.direction);
+            let meets = |triangle| intersect_triangle(&shear, triangle, 0.0, f32::INFINITY).is_some();
+            met += u64::from(meets(&input.triangle) || meets(&input.neighbour));
+            let height = (origin.as_dvec3() - input.triangle[0].as_dvec3()).dot(input.normal.as_dvec3());
+            behind += u64::from(height > GAP * size);
+            distances.add(height);
+        }
+        Self {
+            offset: name.into(),
+            size,
+            away,
+            met,
+            behind,
+            rays: inputs.len() as u64,
+            distance: distances.quantile(0.5),
+            time: Repeats(time),
         }
     }
-    table.note(format!(
-        "Exact: none and none. The surface is the triangle and a coplanar one {NEIGHBOUR} times as long; half of the rays graze it. The wall is \
-         parallel to it at {GAP} of the triangle's size. The point comes from weights, not from the ray, for all forms; the speed includes it."
-    ));
-    Ok(vec![table])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let count = context.pick(100_000, 500);
+        let name = |(size, away): &(f64, f64)| format!("{size} m, {away} m away");
+        context.each(&CASES, name, |case| {
+            let mut random = Random::new(7);
+            let inputs: Vec<Input> = (0..count).map(|_| input(&mut random, case.0, case.1)).collect();
+            let times = context.in_turns(9, FORMS.len(), |i| {
+                Ok(nanoseconds_once(&inputs, |input| start(FORMS[i].1, input)))
+            })?;
+            let forms = FORMS.into_iter().zip(times);
+            Ok(forms.map(|(form, time)| Row::of(form, *case, &inputs, time)).collect())
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "rays by the engine's bounds that meet their own surface",
+                total(self, Row::is_the_engines, |row| row.met),
+            )
+            .note(format!(
+                "Exact: none and none. The surface is the triangle and a coplanar one {NEIGHBOUR} times as long; half of the rays graze it. The \
+                 wall is parallel to it at {GAP} of the triangle's size. The point comes from weights, not from the ray, for all forms; the \
+                 speed includes it."
+            ))
+    }
 }

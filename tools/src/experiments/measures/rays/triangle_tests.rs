@@ -10,11 +10,11 @@ use clerestory::accel::triangle::{
 };
 use glam::{DVec3, Vec3};
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows, total};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::experiments::measures::errors::Errors;
 use crate::experiments::measures::wide::{Wide, WideVec};
-use crate::experiments::table::Table;
 use crate::random::Random;
 
 /// The unit of relative errors, half a step of f32.
@@ -22,6 +22,8 @@ const UNIT: f64 = 1.0 / 16_777_216.0;
 
 type Input = (Ray, [Vec3; 3]);
 type Answer = Option<TriangleHit<f64>>;
+/// A ray, and two triangles on both sides of an edge.
+type Seam = (Ray, [[Vec3; 3]; 2]);
 
 fn exact((ray, vertices): &Input) -> Answer {
     let [v0, v1, v2] = vertices.map(|v| v.as_dvec3());
@@ -87,10 +89,11 @@ fn moller_trumbore_f64((ray, vertices): &Input) -> Answer {
 /// One way to test.
 type Form = fn(&Input) -> Answer;
 
+const KERNELS: &str = "watertight, f32 (kernels)";
 const WALD: &str = "Wald, f32, made ready";
 
 const FORMS: [(&str, Form); 5] = [
-    ("watertight, f32 (kernels)", watertight),
+    (KERNELS, watertight),
     ("Möller–Trumbore, f32", moller_trumbore_f32),
     (WALD, wald),
     ("watertight, f64 (oracle)", watertight_f64),
@@ -190,104 +193,138 @@ fn is_between(ray: &Ray, [[a, b, c], [_, _, d]]: &[[Vec3; 3]; 2]) -> bool {
     plane.dot(from(c)) * plane.dot(from(d)) < 0.0
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let count = if context.smoke { 500 } else { 100_000 };
-    let mut errors = Table::new(
-        "Ray against triangle",
-        &[
-            "case",
-            "form",
-            "t: median relative error (2⁻²⁴)",
-            "t: 99.9 % (2⁻²⁴)",
-            "t: worst (2⁻²⁴)",
-            "weights: 99.9 % error",
-            "weights: worst error",
-            "missed hits",
-            "false hits",
-            "rays",
-            "ns a test",
-        ],
-    );
-    let mut edges = Table::new(
-        "Rays at the common edge of two triangles",
-        &["case", "form", "lost between both", "rays"],
-    );
-    for case in &CASES {
-        let mut random = Random::new(2);
-        let inputs: Vec<Input> = (0..count)
-            .map(|_| {
-                let [vertices, _] = case.pair(&mut random);
-                let target = point(&vertices, random.range(-0.2, 0.8), random.range(-0.2, 0.8));
-                (case.towards(&mut random, target), vertices)
-            })
-            .collect();
-        let seams: Vec<(Ray, [[Vec3; 3]; 2])> = (0..count)
-            .map(|_| {
-                let pair = case.pair(&mut random);
-                let target = point(&pair[0], random.range(0.05, 0.95), 0.0);
-                (case.towards(&mut random, target), pair)
-            })
-            .filter(|(ray, pair)| {
-                is_between(ray, pair) && pair.iter().any(|vertices| exact(&(*ray, *vertices)).is_some())
-            })
-            .collect();
-        let ready: Vec<(Ray, WaldTriangle)> = inputs
-            .iter()
-            .filter_map(|(ray, vertices)| Some((*ray, WaldTriangle::new(vertices)?)))
-            .collect();
-        for (form, function) in FORMS {
-            let (mut parameters, mut weights) = (Errors::default(), Errors::default());
-            let (mut missed, mut false_hits) = (0_u64, 0_u64);
-            for input in &inputs {
-                match (exact(input), function(input)) {
-                    (Some(expected), Some(found)) => {
-                        parameters.add((found.t / expected.t - 1.0) / UNIT);
-                        weights.add((found.u - expected.u).abs().max((found.v - expected.v).abs()));
-                    }
-                    (Some(_), None) => missed += 1,
-                    (None, Some(_)) => false_hits += 1,
-                    (None, None) => {}
+/// Rays at and around single triangles, and rays at the common edges of pairs, of which the exact test meets one or both.
+fn rays(case: &Case, count: u32) -> (Vec<Input>, Vec<Seam>) {
+    let mut random = Random::new(2);
+    let inputs = (0..count)
+        .map(|_| {
+            let [vertices, _] = case.pair(&mut random);
+            let target = point(&vertices, random.range(-0.2, 0.8), random.range(-0.2, 0.8));
+            (case.towards(&mut random, target), vertices)
+        })
+        .collect();
+    let seams = (0..count)
+        .map(|_| {
+            let pair = case.pair(&mut random);
+            let target = point(&pair[0], random.range(0.05, 0.95), 0.0);
+            (case.towards(&mut random, target), pair)
+        })
+        .filter(|(ray, pair)| is_between(ray, pair) && pair.iter().any(|vertices| exact(&(*ray, *vertices)).is_some()))
+        .collect();
+    (inputs, seams)
+}
+
+rows! {
+    /// A form of the test on a case.
+    struct Row = "Ray against triangle" by [case, form] {
+        case: String = "case",
+        form: String = "form",
+        t_median: f64 = "t: median relative error (2⁻²⁴)",
+        t_most: f64 = "t: 99.9 % (2⁻²⁴)",
+        t_worst: f64 = "t: worst (2⁻²⁴)",
+        weights_most: f64 = "weights: 99.9 % error",
+        weights_worst: f64 = "weights: worst error",
+        missed: u64 = "missed hits",
+        false_hits: u64 = "false hits",
+        rays: u64 = "rays",
+        lost: u64 = "lost between two triangles",
+        seams: u64 = "rays at common edges",
+        time: Repeats = "a test (ns)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each("no ray is lost between neighbours", Bound::AtMost(0.0), |row: &Row| {
+        row.lost.into()
+    })
+    .among(Row::is_the_kernels),
+    Criterion::each(
+        "the ray's parameter errs by a few units of rounding, 99.9 % of the rays",
+        Bound::AtMost(18.0),
+        |row: &Row| row.t_most.into(),
+    )
+    .among(Row::is_the_kernels)
+    .because("eighteen roundings are what the engine's bound of the parameter counts"),
+];
+
+impl Row {
+    fn is_the_kernels(&self) -> bool {
+        self.form == KERNELS
+    }
+
+    fn of(case: &Case, (form, test): (&str, Form), inputs: &[Input], seams: &[Seam], time: Vec<f64>) -> Self {
+        let (mut parameters, mut weights) = (Errors::default(), Errors::default());
+        let (mut missed, mut false_hits) = (0, 0);
+        for input in inputs {
+            match (exact(input), test(input)) {
+                (Some(expected), Some(found)) => {
+                    parameters.add((found.t / expected.t - 1.0) / UNIT);
+                    weights.add((found.u - expected.u).abs().max((found.v - expected.v).abs()));
                 }
+                (Some(_), None) => missed += 1,
+                (None, Some(_)) => false_hits += 1,
+                (None, None) => {}
             }
-            let time = if form == WALD {
-                nanoseconds(context.smoke, &ready, |(ray, triangle)| triangle.intersect(ray))
-            } else {
-                nanoseconds(context.smoke, &inputs, function)
-            };
-            errors.row([
-                case.name.into(),
-                form.into(),
-                parameters.quantile(0.5).into(),
-                parameters.quantile(0.999).into(),
-                parameters.worst().into(),
-                weights.quantile(0.999).into(),
-                weights.worst().into(),
-                missed.into(),
-                false_hits.into(),
-                (inputs.len() as u64).into(),
-                time.into(),
-            ]);
-            let lost = |(ray, pair): &&(Ray, [[Vec3; 3]; 2])| {
-                pair.iter().all(|vertices| function(&(*ray, *vertices)).is_none())
-            };
-            edges.row([
-                case.name.into(),
-                form.into(),
-                (seams.iter().filter(lost).count() as u64).into(),
-                (seams.len() as u64).into(),
-            ]);
+        }
+        let lost = |(ray, pair): &&Seam| pair.iter().all(|vertices| test(&(*ray, *vertices)).is_none());
+        Self {
+            case: case.name.into(),
+            form: form.into(),
+            t_median: parameters.quantile(0.5),
+            t_most: parameters.quantile(0.999),
+            t_worst: parameters.worst(),
+            weights_most: weights.quantile(0.999),
+            weights_worst: weights.worst(),
+            missed,
+            false_hits,
+            rays: inputs.len() as u64,
+            lost: seams.iter().filter(lost).count() as u64,
+            seams: seams.len() as u64,
+            time: Repeats(time),
         }
     }
-    errors.note(
-        "Errors against Möller–Trumbore's test in numbers of 106 bits, on the same f32 input. Rays are aimed at and around each triangle. \
-         The watertight test counts a zero as inside for both triangles of an edge: what it adds by that shows as false hits. Tests on one \
-         thread, the ray's shear computed anew for each, which kernels compute once a ray; Wald's test is timed on triangles that were \
-         made ready, of which it reads 36 bytes and an axis, and it ends at the plane unless that lies in the ray's range.",
-    );
-    edges.note(
-        "Pairs with one triangle on each side of their edge, as the ray sees it, of which the exact test meets one or both; lost are rays \
-         that meet neither. Pairs that look narrower than the ray's rounding also lose rays past their outer edges.",
-    );
-    Ok(vec![errors, edges])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let count = context.pick(100_000, 500);
+        context.each(
+            &CASES,
+            |case| case.name.to_owned(),
+            |case| {
+                let (inputs, seams) = rays(case, count);
+                let ready = |(ray, vertices): &Input| Some((*ray, WaldTriangle::new(vertices)?));
+                let ready: Vec<(Ray, WaldTriangle)> = inputs.iter().filter_map(ready).collect();
+                let times = context.in_turns(9, FORMS.len(), |i| {
+                    Ok(match FORMS[i] {
+                        (WALD, _) => nanoseconds_once(&ready, |(ray, triangle)| triangle.intersect(ray)),
+                        (_, test) => nanoseconds_once(&inputs, test),
+                    })
+                })?;
+                let forms = FORMS.into_iter().zip(times);
+                Ok(forms
+                    .map(|(form, time)| Row::of(case, form, &inputs, &seams, time))
+                    .collect())
+            },
+        )
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "rays that the kernels' test loses between neighbours",
+                total(self, Row::is_the_kernels, |row| row.lost),
+            )
+            .note(
+                "Errors against Möller–Trumbore's test in numbers of 106 bits, on the same f32 input. Rays are aimed at and around each \
+                 triangle; rays at common edges at pairs with one triangle on each side, as the ray sees them, of which the exact test meets \
+                 one or both: lost are those that meet neither. Pairs that look narrower than the ray's rounding also lose rays past their \
+                 outer edges. The watertight test counts a zero as inside for both triangles of an edge: what it adds by that shows as false \
+                 hits. Tests on one thread, the ray's shear computed anew for each, which kernels compute once a ray; Wald's test is timed on \
+                 triangles that were made ready, of which it reads 36 bytes and an axis, and it ends at the plane unless that lies in the \
+                 ray's range.",
+            )
+    }
 }

@@ -8,86 +8,109 @@ use clerestory::scene::{AlphaMode, Material};
 use clerestory_hard_cases::scenes::{floor, floor_from_above, lamp};
 use glam::{Vec3, Vec4};
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Study, largest, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::pictures::{Image, z_score};
-use crate::experiments::table::Table;
 
 /// What the emitter behind shines with.
 const EMISSION: f32 = 2.0;
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (size, spp) = if context.smoke { (4, 16) } else { (32, 1024) };
-    let gpu = (context.gpu)()?;
-    let mut table = Table::new(
-        "Light through black surfaces with alpha",
-        &[
-            "alpha",
-            "mode",
-            "surfaces",
-            "expected",
-            "rendered",
-            "error over what is behind",
-            "z",
-            "variance over the binomial one",
-            "rays a sample",
-            "GPU ns a sample",
-        ],
-    );
-    let blend = ("blend", AlphaMode::Blend);
-    let mask = ("mask, cutoff 0.5", AlphaMode::Mask { cutoff: 0.5 });
-    for (alpha, (name, alpha_mode), layers) in [
-        (0.0, blend, 1),
-        (0.25, blend, 1),
-        (0.25, blend, 4),
-        (0.25, blend, 16),
-        (0.75, blend, 1),
-        (0.75, blend, 4),
-        (1.0, blend, 1),
-        (0.25, mask, 4),
-        (0.75, mask, 4),
-    ] {
-        let mut scene = floor_from_above(lamp(Vec3::splat(EMISSION)));
-        for layer in 0..layers {
-            let material = Material {
-                base_color: Vec4::new(0.0, 0.0, 0.0, alpha),
-                alpha_mode,
-                ..Material::lambert("black", Vec3::ZERO)
-            };
-            let material = scene.add_material(material);
-            scene.place(floor("black", material, 4.0, 0.25 * (layer + 1) as f32));
-        }
-        let through = match alpha_mode {
-            AlphaMode::Mask { cutoff } => f64::from(u8::from(alpha < cutoff)),
-            _ => (1.0 - f64::from(alpha)).powi(layers),
-        };
-        let expected = f64::from(EMISSION) * through;
-        let image = Image::render(&Renderer::new(&gpu, &scene)?, size, spp, 3, "all")?;
-        let (mean, deviation) = image.mean(0);
-        let samples = f64::from(size * size) * f64::from(spp);
-        // Each sample is all or nothing: the variance of the mean is known as well.
-        let binomial = f64::from(EMISSION).powi(2) * through * (1.0 - through) / samples;
-        let ratio = if binomial > 0.0 {
-            deviation * deviation / binomial
-        } else {
-            1.0 + deviation
-        };
-        table.row([
-            f64::from(alpha).into(),
-            name.into(),
-            (layers as u64).into(),
-            expected.into(),
-            mean.into(),
-            ((mean - expected) / f64::from(EMISSION)).into(),
-            z_score(mean - expected, binomial.sqrt(), expected).into(),
-            ratio.into(),
-            (image.count("rays") as f64 / samples).into(),
-            (image.report.gpu_seconds * 1e9 / samples).into(),
-        ]);
+const BLEND: (&str, AlphaMode) = ("blend", AlphaMode::Blend);
+const MASK: (&str, AlphaMode) = ("mask, cutoff 0.5", AlphaMode::Mask { cutoff: 0.5 });
+/// Alpha, what it does, and surfaces one behind the other.
+type Case = (f32, (&'static str, AlphaMode), i32);
+const CASES: [Case; 9] = [
+    (0.0, BLEND, 1),
+    (0.25, BLEND, 1),
+    (0.25, BLEND, 4),
+    (0.25, BLEND, 16),
+    (0.75, BLEND, 1),
+    (0.75, BLEND, 4),
+    (1.0, BLEND, 1),
+    (0.25, MASK, 4),
+    (0.75, MASK, 4),
+];
+
+rows! {
+    /// Surfaces of an alpha.
+    struct Row = "Light through black surfaces with alpha" by [mode, alpha, surfaces] {
+        mode: String = "mode",
+        alpha: f64 = "alpha",
+        surfaces: u64 = "surfaces",
+        expected: f64 = "expected",
+        rendered: f64 = "rendered",
+        error: f64 = "error over what is behind",
+        z: f64 = "z",
+        variance: f64 = "variance over the binomial one",
+        rays: f64 = "rays a sample",
+        samples: u64 = "samples",
+        time: f64 = "GPU time of a sample (ns)",
     }
-    table.note(format!(
-        "{size} × {size} pixels, {spp} independent samples each; z with the binomial variance, standard normal when the probability is right. \
-         Where the expectation is 0 or certain, any difference shows as a large z."
-    ));
-    Ok(vec![table])
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each("z of the mean is standard normal", Bound::AtMost(3.26), |row: &Row| row.z.abs().into())
+        .because("the largest of nine is beyond that once in a hundred runs, by Šidák")
+        .in_every_form(),
+    Criterion::each("the variance is the binomial one", Bound::Between(0.95, 1.05), |row: &Row| row.variance.into())
+        .because("sixteen surfaces of a quarter let a hundredth through: its standard error is 1 % in 2²⁰ samples, and five of them are allowed"),
+];
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let (size, spp) = context.pick((32, 1024), (4, 16));
+        let gpu = (context.gpu)()?;
+        let name = |(alpha, (mode, _), layers): &Case| format!("{mode}, {layers} of {alpha}");
+        context.each(&CASES, name, |(alpha, (mode, alpha_mode), layers)| {
+            let mut scene = floor_from_above(lamp(Vec3::splat(EMISSION)));
+            for layer in 0..*layers {
+                let material = Material {
+                    base_color: Vec4::new(0.0, 0.0, 0.0, *alpha),
+                    alpha_mode: *alpha_mode,
+                    ..Material::lambert("black", Vec3::ZERO)
+                };
+                let material = scene.add_material(material);
+                scene.place(floor("black", material, 4.0, 0.25 * (layer + 1) as f32));
+            }
+            let through = match alpha_mode {
+                AlphaMode::Mask { cutoff } => f64::from(u8::from(alpha < cutoff)),
+                _ => (1.0 - f64::from(*alpha)).powi(*layers),
+            };
+            let expected = f64::from(EMISSION) * through;
+            let image = Image::render(&Renderer::new(&gpu, &scene)?, size, spp, 3, "all")?;
+            let (mean, deviation) = image.mean(0);
+            let samples = u64::from(size * size) * u64::from(spp);
+            // Each sample is all or nothing: the variance of the mean is known as well.
+            let binomial = f64::from(EMISSION).powi(2) * through * (1.0 - through) / samples as f64;
+            let variance = if binomial > 0.0 {
+                deviation * deviation / binomial
+            } else {
+                1.0 + deviation
+            };
+            Ok(vec![Row {
+                mode: (*mode).into(),
+                alpha: (*alpha).into(),
+                surfaces: *layers as u64,
+                expected,
+                rendered: mean,
+                error: (mean - expected) / f64::from(EMISSION),
+                z: z_score(mean - expected, binomial.sqrt(), expected),
+                variance,
+                rays: image.count("rays") as f64 / samples as f64,
+                samples,
+                time: image.report.gpu_seconds * 1e9 / samples as f64,
+            }])
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline("the largest error over what is behind", largest(self, |_| true, |row| row.error.abs()))
+            .note(
+                "Independent samples; z with the binomial variance, standard normal when the probability is right. Where the expectation is 0 or \
+                 certain, any difference shows as a large z.",
+            )
+    }
 }

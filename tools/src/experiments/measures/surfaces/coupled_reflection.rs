@@ -6,16 +6,16 @@ use std::f64::consts::FRAC_1_PI;
 
 use clerestory::Result;
 use clerestory::transport::bsdf::{
-    Bsdf, BsdfFeatures, LOBE_ALL, LOBE_GLOSSY, LOBE_REFLECTION, bsdf_eval, bsdf_gltf, bsdf_sample,
+    Bsdf, BsdfFeatures, GltfFactors, LOBE_ALL, LOBE_GLOSSY, LOBE_REFLECTION, bsdf_eval, bsdf_gltf, bsdf_sample,
 };
 use clerestory::transport::fresnel::fresnel_dielectric;
 use clerestory::transport::warp::square_to_cosine_hemisphere;
 use glam::DVec3;
 
 use super::energy::{COSINES, Mean, ROUGHNESSES, WHITE, albedo, context as bsdf, direction, mean, numbers};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
-use crate::experiments::table::Table;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::random::Random;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -27,8 +27,10 @@ enum Form {
     FresnelMix,
 }
 
+const ENGINES: &str = "coupled (engine)";
+
 const FORMS: [(&str, Form); 3] = [
-    ("coupled (engine)", Form::Coupled),
+    (ENGINES, Form::Coupled),
     ("Fresnel mix", Form::FresnelMix),
     ("plain sum", Form::Sum),
 ];
@@ -67,71 +69,138 @@ fn white_albedo(form: Form, surface: &Bsdf, cos_theta: f64, samples: u32) -> Mea
     }
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let samples = if context.smoke { 256 } else { 1 << 15 };
-    let pairs = if context.smoke { 200 } else { 50_000 };
-    let mut table = Table::new(
-        "White base under a clear layer of index 1.5, in a white furnace",
-        &[
-            "roughness",
-            "form",
-            "least albedo",
-            "at cosine",
-            "greatest albedo",
-            "its standard error",
-            "at cosine",
-            "reciprocity: worst relative difference",
-            "ns an evaluation",
-            "ns a sample",
-        ],
-    );
-    for roughness in ROUGHNESSES {
-        let surface = bsdf_gltf(&clerestory::transport::bsdf::GltfFactors { roughness, ..WHITE });
-        let mut random = Random::new(4);
-        let directions: Vec<[DVec3; 2]> = (0..pairs)
-            .map(|_| {
-                let mut up = || direction(1.0 - random.unit(), 7.0 * random.unit());
-                [up(), up()]
-            })
-            .collect();
-        for (name, form) in FORMS {
-            let albedos = COSINES.map(|cosine| (white_albedo(form, &surface, cosine, samples), cosine));
-            let extreme = |better: fn(f64, f64) -> bool| {
-                albedos[1..]
-                    .iter()
-                    .fold(albedos[0], |a, b| if better(b.0.value, a.0.value) { *b } else { a })
-            };
-            let (least, greatest) = (extreme(|a, b| a < b), extreme(|a, b| a > b));
-            let reciprocity = directions.iter().fold(0.0_f64, |worst, [a, b]| {
-                let (there, back) = (value(form, &surface, *a, *b), value(form, &surface, *b, *a));
-                worst.max((there - back).abs() / there.abs().max(back.abs()).max(f64::MIN_POSITIVE))
-            });
-            let evaluation = nanoseconds(context.smoke, &directions, |[a, b]| value(form, &surface, *a, *b));
-            let scattering = bsdf(BsdfFeatures::ALL);
-            let uniforms: Vec<DVec3> = (0..1024).map(numbers).collect();
-            // All forms would be sampled by the engine's strategy.
-            let sample = nanoseconds(context.smoke, &uniforms, |u| {
-                bsdf_sample(&scattering, &surface, direction(0.6, 0.0), *u, LOBE_ALL).weight
-            });
-            table.row([
-                roughness.into(),
-                name.into(),
-                least.0.value.into(),
-                least.1.into(),
-                greatest.0.value.into(),
-                greatest.0.error.into(),
-                greatest.1.into(),
-                reciprocity.into(),
-                evaluation.into(),
-                sample.into(),
-            ]);
+rows! {
+    /// A form on a surface of a roughness.
+    struct Row = "White base under a clear layer of index 1.5, in a white furnace" by [form, roughness] {
+        form: String = "form",
+        roughness: f64 = "roughness",
+        least: f64 = "least albedo",
+        least_at: f64 = "cosine of the least albedo",
+        greatest: f64 = "greatest albedo",
+        error: f64 = "standard error of the greatest albedo",
+        greatest_at: f64 = "cosine of the greatest albedo",
+        samples: u64 = "samples of an albedo",
+        reciprocity: f64 = "reciprocity: worst relative difference",
+        pairs: u64 = "pairs of directions",
+        evaluation: Repeats = "an evaluation (ns)",
+        sample: Repeats = "a sample (ns)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+/// Standard errors of sixteen sequences that the greatest of 42 albedos exceeds once in a hundred runs, by Student's t and Šidák.
+const ERRORS: f64 = 4.44;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "the albedo is 1 at every angle: the greatest difference",
+        Bound::AtMost(0.01),
+        |row: &Row| row.difference().into(),
+    )
+    .among(Row::is_the_engines)
+    .because("half of what an eye sees"),
+    Criterion::each(
+        "no light comes out of nothing: the greatest albedo less 4.44 standard errors",
+        Bound::AtMost(1.0),
+        |row: &Row| (row.greatest - ERRORS * row.error).into(),
+    )
+    .among(Row::is_the_engines)
+    .because("chance exceeds it once in a hundred runs of 42 albedos, by Student's t and Šidák"),
+    Criterion::each(
+        "no difference when the directions change places",
+        Bound::AtMost(1e-9),
+        |row: &Row| row.reciprocity.into(),
+    )
+    .among(Row::is_the_engines)
+    .because("roundings of f64, of 10⁻¹⁶, over the least cosines, of 10⁻⁷")
+    .in_every_form(),
+];
+
+impl Row {
+    fn is_the_engines(&self) -> bool {
+        self.form == ENGINES
+    }
+
+    /// Of the albedo from 1, at the cosine where it is greatest.
+    fn difference(&self) -> f64 {
+        (1.0 - self.least).max(self.greatest - 1.0)
+    }
+
+    /// All but times.
+    fn of((name, form): (&str, Form), roughness: f64, surface: &Bsdf, directions: &[[DVec3; 2]], samples: u32) -> Self {
+        let mut albedos = COSINES.map(|cosine| (white_albedo(form, surface, cosine, samples), cosine));
+        albedos.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
+        let [least, .., greatest] = albedos;
+        let reciprocity = directions.iter().fold(0.0_f64, |worst, [a, b]| {
+            let (there, back) = (value(form, surface, *a, *b), value(form, surface, *b, *a));
+            worst.max((there - back).abs() / there.abs().max(back.abs()).max(f64::MIN_POSITIVE))
+        });
+        Self {
+            form: name.into(),
+            roughness,
+            least: least.0.value,
+            least_at: least.1,
+            greatest: greatest.0.value,
+            error: greatest.0.error,
+            greatest_at: greatest.1,
+            samples: samples.into(),
+            reciprocity,
+            pairs: directions.len() as u64,
+            ..Self::default()
         }
     }
-    table.note(format!(
-        "Exact: albedo 1 at every angle, no difference when the directions change places. Albedos over cosines {COSINES:?} by {samples} Sobol' \
-         samples each. More than 1 beyond its standard error is light out of nothing. Evaluations in f64 on one thread; the forms that are no part of the engine \
-         evaluate its layer and add their base."
-    ));
-    Ok(vec![table])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let (samples, pairs): (u32, u32) = context.pick((1 << 15, 50_000), (256, 200));
+        let scattering = bsdf(BsdfFeatures::ALL);
+        let uniforms: Vec<DVec3> = (0..1024).map(numbers).collect();
+        let name = |roughness: &f64| format!("roughness {roughness}");
+        context.each(&ROUGHNESSES, name, |roughness| {
+            let surface = bsdf_gltf(&GltfFactors {
+                roughness: *roughness,
+                ..WHITE
+            });
+            let mut random = Random::new(4);
+            let directions: Vec<[DVec3; 2]> = (0..pairs)
+                .map(|_| {
+                    let mut up = || direction(1.0 - random.unit(), 7.0 * random.unit());
+                    [up(), up()]
+                })
+                .collect();
+            // All forms would be sampled by the engine's strategy, which is the last to take its turn.
+            let mut times = context.in_turns(9, FORMS.len() + 1, |i| {
+                Ok(match FORMS.get(i) {
+                    Some((_, form)) => nanoseconds_once(&directions, |[a, b]| value(*form, &surface, *a, *b)),
+                    None => nanoseconds_once(&uniforms, |u| {
+                        bsdf_sample(&scattering, &surface, direction(0.6, 0.0), *u, LOBE_ALL).weight
+                    }),
+                })
+            })?;
+            let sample = Repeats(times.pop().unwrap_or_default());
+            let forms = FORMS.into_iter().zip(times);
+            Ok(forms
+                .map(|(form, time)| Row {
+                    evaluation: Repeats(time),
+                    sample: sample.clone(),
+                    ..Row::of(form, *roughness, &surface, &directions, samples)
+                })
+                .collect())
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "the coupled albedo's greatest difference from 1",
+                largest(self, Row::is_the_engines, Row::difference),
+            )
+            .note(format!(
+                "Exact: albedo 1 at every angle, no difference when the directions change places. Albedos over cosines {COSINES:?} by Sobol' \
+                 samples. More than 1 beyond its standard error is light out of nothing. Evaluations in f64 on one thread; the forms that are \
+                 no part of the engine evaluate its layer and add their base, and all are sampled by its strategy."
+            ))
+    }
 }

@@ -12,9 +12,9 @@ use clerestory::transport::warp::orthonormal_basis;
 use glam::DVec3;
 
 use super::energy::{WHITE, context as bsdf, direction, numbers};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
-use crate::experiments::table::Table;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::random::Random;
 
 /// A frame about a normal.
@@ -109,59 +109,125 @@ fn beam(ns: DVec3, wi: DVec3, adapted: bool, samples: u32) -> f64 {
     TAU * sum / f64::from(samples)
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (views, samples) = if context.smoke { (8, 64) } else { (256, 2048) };
-    let mut table = Table::new(
-        "A white surface under a shading normal that is tilted",
-        &[
-            "tilt (degrees)",
-            "normal",
-            "greatest reflectance seen",
-            "mean reflectance seen",
-            "views that see black",
-            "greatest share of light through the surface",
-            "greatest share of a beam that is scattered up",
-            "ns a normal",
-        ],
-    );
-    for tilt in [5.0_f64, 20.0, 45.0, 75.0] {
-        let ns = direction(tilt.to_radians().cos(), 0.0);
-        for (name, adapted) in [("adapted (engine)", true), ("as it is", false)] {
+const ADAPTED: &str = "adapted (engine)";
+
+/// Ways to take normals, and whether they are adapted.
+const FORMS: [(&str, bool); 2] = [(ADAPTED, true), ("as it is", false)];
+
+/// Degrees.
+const TILTS: [f64; 4] = [5.0, 20.0, 45.0, 75.0];
+
+rows! {
+    /// A way to take normals, at a tilt.
+    struct Row = "A white surface under a shading normal that is tilted" by [normal, tilt] {
+        normal: String = "normal",
+        tilt: f64 = "tilt (degrees)",
+        greatest: f64 = "greatest reflectance seen",
+        mean: f64 = "mean reflectance seen",
+        black: f64 = "views that see black",
+        through: f64 = "greatest share of light through the surface",
+        scattered_up: f64 = "greatest share of a beam that is scattered up",
+        views: u64 = "views",
+        samples: u64 = "samples a view",
+        time: Repeats = "a normal (ns)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "the greatest reflectance seen is 1",
+        Bound::Between(0.99, 1.01),
+        |row: &Row| row.greatest.into(),
+    )
+    .among(Row::is_adapted)
+    .because("half of what an eye sees"),
+    Criterion::each(
+        "the mean reflectance seen is 1",
+        Bound::Between(0.99, 1.01),
+        |row: &Row| row.mean.into(),
+    )
+    .among(Row::is_adapted)
+    .because("half of what an eye sees"),
+    Criterion::each("no view sees black", Bound::AtMost(0.0), |row: &Row| row.black.into())
+        .among(Row::is_adapted)
+        .in_every_form(),
+    Criterion::each("no light passes through", Bound::AtMost(0.0), |row: &Row| {
+        row.through.into()
+    })
+    .among(Row::is_adapted)
+    .in_every_form(),
+];
+
+impl Row {
+    fn is_adapted(&self) -> bool {
+        self.normal == ADAPTED
+    }
+
+    fn of((name, adapted): (&str, bool), tilt: f64, directions: &[DVec3], samples: u32, time: Vec<f64>) -> Self {
+        let ns = tilted(tilt);
+        let all: Vec<Seen> = directions.iter().map(|wo| seen(ns, *wo, adapted, samples)).collect();
+        let greatest = |value: fn(&Seen) -> f64| all.iter().map(value).fold(0.0, f64::max);
+        let black = all.iter().filter(|seen| seen.reflected + seen.through == 0.0).count();
+        let beams = directions.iter().map(|wi| beam(ns, *wi, adapted, samples));
+        Self {
+            normal: name.into(),
+            tilt,
+            greatest: greatest(|seen| seen.reflected),
+            mean: all.iter().map(|seen| seen.reflected).sum::<f64>() / all.len() as f64,
+            black: black as f64 / all.len() as f64,
+            through: greatest(|seen| seen.through),
+            scattered_up: beams.fold(0.0, f64::max),
+            views: all.len() as u64,
+            samples: samples.into(),
+            time: Repeats(time),
+        }
+    }
+}
+
+/// The shading normal at so many degrees from the surface's own.
+fn tilted(tilt: f64) -> DVec3 {
+    direction(tilt.to_radians().cos(), 0.0)
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let (views, samples): (u32, u32) = context.pick((256, 2048), (8, 64));
+        let name = |tilt: &f64| format!("{tilt} degrees");
+        context.each(&TILTS, name, |tilt| {
             let mut random = Random::new(6);
             let directions: Vec<DVec3> = (0..views)
                 .map(|_| direction(1.0 - 0.99 * random.unit(), TAU * random.unit()))
                 .collect();
-            let all: Vec<Seen> = directions.iter().map(|wo| seen(ns, *wo, adapted, samples)).collect();
-            let greatest = |value: fn(&Seen) -> f64| all.iter().map(value).fold(0.0, f64::max);
-            let black = all.iter().filter(|seen| seen.reflected + seen.through == 0.0).count();
-            let beams = directions
-                .iter()
-                .map(|wi| beam(ns, *wi, adapted, samples))
-                .fold(0.0, f64::max);
-            let time = nanoseconds(context.smoke, &directions, |wo| {
-                if adapted {
-                    adapt_shading_normal(ns, SURFACE, *wo)
-                } else {
-                    ns
-                }
-            });
-            table.row([
-                tilt.into(),
-                name.into(),
-                greatest(|seen| seen.reflected).into(),
-                (all.iter().map(|seen| seen.reflected).sum::<f64>() / all.len() as f64).into(),
-                (black as f64 / all.len() as f64).into(),
-                greatest(|seen| seen.through).into(),
-                beams.into(),
-                time.into(),
-            ]);
-        }
+            let ns = tilted(*tilt);
+            let times = context.in_turns(9, FORMS.len(), |i| {
+                let (_, adapted) = FORMS[i];
+                Ok(nanoseconds_once(&directions, |wo| {
+                    if adapted {
+                        adapt_shading_normal(ns, SURFACE, *wo)
+                    } else {
+                        ns
+                    }
+                }))
+            })?;
+            let forms = FORMS.into_iter().zip(times);
+            Ok(forms
+                .map(|(form, time)| Row::of(form, *tilt, &directions, samples, time))
+                .collect())
+        })
     }
-    table.note(format!(
-        "Exact: reflectance 1, nothing black, nothing through. {views} directions over the upper half, {samples} Sobol' samples each. A path \
-         tracer gathers what is seen; a beam's share above 1 concerns paths from lights (Veach 1997, 5.3), which shading normals of either \
-         kind give energy to."
-    ));
-    Ok(vec![table])
+
+    fn findings(&self) -> Findings {
+        let half_way = self.iter().find(|row| row.is_adapted() && row.tilt == 45.0);
+        Findings::of(self, CRITERIA)
+            .headline(
+                "mean reflectance by adapted normals at a tilt of 45 degrees",
+                half_way.map(|row| row.mean.into()),
+            )
+            .note(
+                "Exact: reflectance 1, nothing black, nothing through. Directions over the upper half, Sobol' samples. A path tracer gathers what \
+                 is seen; a beam's share above 1 concerns paths from lights (Veach 1997, 5.3), which shading normals of either kind give energy to.",
+            )
+    }
 }

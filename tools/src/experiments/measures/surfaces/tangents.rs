@@ -9,10 +9,10 @@ use clerestory::scene::Mesh;
 use clerestory::scene::tangents::generate;
 use glam::{Vec2, Vec3};
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::experiments::measures::errors::Errors;
-use crate::experiments::table::Table;
 
 /// A closed surface over [0, 1]²: position, normal and direction of growing u.
 struct Surface {
@@ -85,63 +85,103 @@ fn mesh(surface: &Surface, steps: u32) -> Mesh {
     mesh
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let steps: &[u32] = if context.smoke { &[8] } else { &[16, 64, 256] };
-    let mut table = Table::new(
-        "Tangents",
-        &[
-            "surface",
-            "triangles",
-            "mean error (degrees)",
-            "worst error (degrees)",
-            "wrong signs",
-            "vertices",
-            "vertices after",
-            "ns a triangle",
-        ],
-    );
-    for surface in &SURFACES {
-        for &steps in steps {
-            let source = mesh(surface, steps);
-            let mut made = source.clone();
-            generate(&mut made);
-            let (mut errors, mut wrong) = (Errors::default(), 0_u64);
-            for ((tangent, uv), normal) in made.tangents.iter().zip(&made.uv0).zip(&made.normals) {
-                // Texture coordinates are the parameters up to a mirror.
-                let [_, _, along] = (surface.at)(uv.x.abs(), uv.y);
-                let along = if uv.x < 0.0 || (surface.uv)(1.0, 0.0).x < 0.0 {
-                    -along
-                } else {
-                    along
-                };
-                let found = tangent.truncate().as_dvec3();
-                let along = along.as_dvec3();
-                errors.add(found.cross(along).length().atan2(found.dot(along)).to_degrees());
-                wrong += u64::from(tangent.w != surface.sign);
-                debug_assert!(normal.is_normalized());
-            }
-            let triangles = source.triangles.len();
-            let time = nanoseconds(context.smoke, std::slice::from_ref(&source), |source| {
+/// Steps around the finest meshes.
+const FINEST: u32 = 256;
+
+rows! {
+    /// A mesh of a surface.
+    struct Row = "Tangents" by [surface, steps] {
+        surface: String = "surface",
+        steps: u64 = "steps around",
+        triangles: u64 = "triangles",
+        mean: f64 = "mean error (degrees)",
+        worst: f64 = "worst error (degrees)",
+        wrong: u64 = "wrong signs",
+        vertices: u64 = "vertices",
+        vertices_after: u64 = "vertices after",
+        time: Repeats = "a triangle (ns)",
+    }
+    beside "angle that a triangle spans (degrees)" = |row| row.angle().into();
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "the worst error is no larger than the angle that a triangle spans: its share",
+        Bound::AtMost(1.0),
+        |row: &Row| (row.worst / row.angle()).into(),
+    )
+    .in_every_form(),
+    Criterion::each("no sign is wrong", Bound::AtMost(0.0), |row: &Row| row.wrong.into()).in_every_form(),
+];
+
+impl Row {
+    /// The angle that a triangle spans around the surface, degrees.
+    fn angle(&self) -> f64 {
+        360.0 / self.steps as f64
+    }
+
+    fn of(context: &Context<'_>, surface: &Surface, steps: u32) -> Result<Self> {
+        let source = mesh(surface, steps);
+        let mut made = source.clone();
+        generate(&mut made);
+        let (mut errors, mut wrong) = (Errors::default(), 0_u64);
+        for ((tangent, uv), normal) in made.tangents.iter().zip(&made.uv0).zip(&made.normals) {
+            // Texture coordinates are the parameters up to a mirror.
+            let [_, _, along] = (surface.at)(uv.x.abs(), uv.y);
+            let along = if uv.x < 0.0 || (surface.uv)(1.0, 0.0).x < 0.0 {
+                -along
+            } else {
+                along
+            };
+            let found = tangent.truncate().as_dvec3();
+            let along = along.as_dvec3();
+            errors.add(found.cross(along).length().atan2(found.dot(along)).to_degrees());
+            wrong += u64::from(tangent.w != surface.sign);
+            debug_assert!(normal.is_normalized());
+        }
+        let times = context.in_turns(9, 1, |_| {
+            Ok(nanoseconds_once(std::slice::from_ref(&source), |source| {
                 let mut copy = source.clone();
                 generate(&mut copy);
                 copy
-            });
-            table.row([
-                surface.name.into(),
-                (triangles as u64).into(),
-                errors.mean().into(),
-                errors.worst().into(),
-                wrong.into(),
-                (source.positions.len() as u64).into(),
-                (made.positions.len() as u64).into(),
-                (time / triangles as f64).into(),
-            ]);
-        }
+            }))
+        })?;
+        let time: Repeats = times.into_iter().flatten().collect();
+        let triangles = source.triangles.len();
+        Ok(Self {
+            surface: surface.name.into(),
+            steps: steps.into(),
+            triangles: triangles as u64,
+            mean: errors.mean(),
+            worst: errors.worst(),
+            wrong,
+            vertices: source.positions.len() as u64,
+            vertices_after: made.positions.len() as u64,
+            time: time.scaled(1.0 / triangles as f64),
+        })
     }
-    table.note(
-        "Exact: ∂P/∂u of the surface. Triangles are flat, so their tangents differ from it by about the angle that one of them spans; vertices \
-         take the mean of theirs, one-sided along the seam of the coordinates. The speed includes the copy of the mesh.",
-    );
-    Ok(vec![table])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let steps = context.pick::<&[u32]>(&[16, 64, FINEST], &[8]);
+        let name = |surface: &Surface| surface.name.to_owned();
+        context.each(&SURFACES, name, |surface| {
+            steps.iter().map(|steps| Row::of(context, surface, *steps)).collect()
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "mean error with 256 steps around, on the worst surface (degrees)",
+                largest(self, |row| row.steps == u64::from(FINEST), |row| row.mean),
+            )
+            .note(
+                "Exact: ∂P/∂u of the surface. Triangles are flat, so their tangents differ from it by about the angle that one of them spans; \
+                 vertices take the mean of theirs, one-sided along the seam of the coordinates. The speed includes the copy of the mesh.",
+            )
+    }
 }

@@ -1,0 +1,124 @@
+//! What a measure is given.
+
+use std::path::{Path, PathBuf};
+
+use clerestory::gpu::Gpu;
+use clerestory::{Error, Result};
+
+use crate::experiments::watch::Watch;
+
+/// Turns of a smoke run.
+const SMOKE_TURNS: usize = 2;
+
+/// What a measure is given.
+pub struct Context<'a> {
+    /// Few inputs, for a quick look.
+    pub smoke: bool,
+    /// Addresses of scenes to measure in place of a measure's own, for those that measure scenes; none for its own.
+    pub scenes: &'a [String],
+    /// Opens the device, for measures that need one.
+    pub gpu: &'a dyn Fn() -> Result<Gpu>,
+    /// For files beside the tables ([`Context::file`]); it may not be there yet.
+    pub folder: &'a Path,
+    /// Sees the progress of measures that take long. A measure that is stopped gives the rows that it has.
+    pub watch: &'a dyn Watch,
+}
+
+impl Context<'_> {
+    /// Where a file beside the tables goes; its folder is made.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn file(&self, name: &str) -> Result<PathBuf> {
+        std::fs::create_dir_all(self.folder).map_err(|error| Error::io(self.folder, error))?;
+        Ok(self.folder.join(name))
+    }
+
+    /// One of two: in full, or of a smoke run.
+    pub fn pick<T>(&self, full: T, smoke: T) -> T {
+        if self.smoke { smoke } else { full }
+    }
+
+    /// Rows of each case, until it is stopped; the watch is told of each by its name.
+    ///
+    /// # Errors
+    /// The first of a case.
+    pub fn each<C, R>(
+        &self,
+        cases: &[C],
+        name: impl Fn(&C) -> String,
+        mut rows: impl FnMut(&C) -> Result<Vec<R>>,
+    ) -> Result<Vec<R>> {
+        let mut all = Vec::new();
+        for (done, case) in cases.iter().enumerate() {
+            if self.watch.stopped() {
+                break;
+            }
+            self.watch.begin(&name(case), done, cases.len());
+            all.extend(rows(case)?);
+        }
+        Ok(all)
+    }
+
+    /// Values of so many contenders that take turns: after a turn that warms up, `turns` turns (two in a smoke run), each begun by the next
+    /// contender, so that no place in the turn is anybody's. By contender, in the order of turns.
+    ///
+    /// # Errors
+    /// The first of `once`.
+    pub fn in_turns<M>(
+        &self,
+        turns: usize,
+        contenders: usize,
+        mut once: impl FnMut(usize) -> Result<M>,
+    ) -> Result<Vec<Vec<M>>> {
+        let turns = self.pick(turns, SMOKE_TURNS);
+        let mut all: Vec<Vec<M>> = (0..contenders).map(|_| Vec::with_capacity(turns)).collect();
+        for turn in 0..=turns {
+            for place in 0..contenders {
+                let contender = (turn + place) % contenders;
+                let value = once(contender)?;
+                if turn > 0 {
+                    all[contender].push(value);
+                }
+            }
+        }
+        Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::watch::Unwatched;
+
+    fn context<'a>(smoke: bool) -> Context<'a> {
+        Context {
+            smoke,
+            scenes: &[],
+            gpu: &|| Err(Error::setting("device", "none", "is not to be opened")),
+            folder: Path::new(""),
+            watch: &Unwatched,
+        }
+    }
+
+    #[test]
+    fn contenders_take_turns_and_each_begins_one() {
+        let mut order = Vec::new();
+        let mut clock = 0;
+        let all = context(false).in_turns(3, 3, |contender| {
+            order.push(contender);
+            clock += 1;
+            Ok(clock)
+        });
+        assert_eq!(order, [0, 1, 2, 1, 2, 0, 2, 0, 1, 0, 1, 2]);
+        // The first turn warms up.
+        assert_eq!(all.unwrap(), [vec![6, 8, 10], vec![4, 9, 11], vec![5, 7, 12]]);
+        assert_eq!(context(true).in_turns(9, 1, Ok).unwrap(), [vec![0, 0]]);
+    }
+
+    #[test]
+    fn cases_have_their_rows_in_order() {
+        let rows = context(false).each(&[1, 2], i32::to_string, |case| Ok(vec![*case; 2]));
+        assert_eq!(rows.unwrap(), [1, 1, 2, 2]);
+    }
+}
