@@ -109,16 +109,23 @@ impl<R: Sheet> Criterion<R> {
             noisy: 0,
             worst: String::new(),
         };
-        let mut most = f64::NEG_INFINITY;
+        // Rows that fail come before those that noise decides, and these before those that hold.
+        let mut most = (0, f64::NEG_INFINITY);
         for row in rows.iter().filter(|row| (self.among)(row)) {
             let found = (self.of)(row);
             judged.rows += 1;
-            match self.bound.holds(&found) {
-                Some(true) => {}
-                Some(false) => judged.failing += 1,
-                None => judged.noisy += 1,
-            }
-            let missed = self.bound.missed_by(found.value);
+            let rank = match self.bound.holds(&found) {
+                Some(true) => 0,
+                Some(false) => {
+                    judged.failing += 1;
+                    2
+                }
+                None => {
+                    judged.noisy += 1;
+                    1
+                }
+            };
+            let missed = (rank, self.bound.missed_by(found.value));
             if missed > most || judged.found.is_none() {
                 most = missed;
                 judged.found = Some(found);
@@ -129,7 +136,7 @@ impl<R: Sheet> Criterion<R> {
             (0, ..) => Verdict::NotRun,
             (_, 0, 0) => Verdict::Holds,
             (_, 0, _) => Verdict::Noise,
-            _ => Verdict::Fails { by: most.max(0.0) },
+            _ => Verdict::Fails { by: most.1.max(0.0) },
         };
         judged
     }
@@ -258,6 +265,8 @@ mod tests {
         let judged = FAST.judge(&[fast, slow, noisy]);
         assert_eq!(judged.verdict, Verdict::Fails { by: 1.0 });
         assert_eq!((judged.rows, judged.failing, judged.noisy), (3, 1, 1));
+        let wide = row("wide", &[1.0, 2.0, 5.0, 9.0, 9.0]);
+        assert_eq!(FAST.judge(&[wide, row("slow", &[2.5; 5])]).worst, "slow");
         let text = judged.to_string();
         assert!(
             text.starts_with("**fails** by 1") && text.ends_with("in 1 of 3 rows; worst: slow"),

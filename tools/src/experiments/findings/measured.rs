@@ -71,7 +71,7 @@ pub struct Repeats(pub Vec<f64>);
 
 impl Repeats {
     /// The median, with the narrowest interval of order statistics that holds the quantity's median with a probability of 93 % at least, whatever
-    /// its distribution: the least and the greatest of 5 to 8 values, the second and the last but one of 9 or 10, and so on. Fewer than 5 values
+    /// the distribution of independent turns: the least and the greatest of 5 to 8 values, the second and the last but one of 9 or 10, and so on. Fewer than 5 values
     /// bound nothing. Source: H. A. David and H. N. Nagaraja, *Order Statistics*, 3rd ed., 2003, §7.1.
     pub fn measured(&self) -> Measured {
         let mut sorted = self.0.clone();

@@ -4,6 +4,7 @@
 //! (judged over no rows, they are "not run").
 
 mod criterion;
+pub(crate) mod json;
 mod measured;
 mod sheet;
 
@@ -158,5 +159,6 @@ pub fn total<R>(rows: &[R], among: fn(&R) -> bool, of: fn(&R) -> u64) -> Option<
 /// The worst of some rows' numbers; `None` of no rows.
 pub fn largest<R>(rows: &[R], among: fn(&R) -> bool, of: fn(&R) -> f64) -> Option<Measured> {
     let values = rows.iter().filter(|row| among(row)).map(of);
-    values.reduce(f64::max).map(Measured::exact)
+    let worse = |a: f64, b: f64| if a.is_nan() || a > b { a } else { b };
+    values.reduce(worse).map(Measured::exact)
 }

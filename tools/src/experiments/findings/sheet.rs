@@ -103,7 +103,7 @@ macro_rules! rows {
         #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct $name {
-            $(#[doc = $head] pub $field: $type,)*
+            $(#[doc = $head] #[serde(serialize_with = "crate::experiments::findings::json::Field::write", deserialize_with = "crate::experiments::findings::json::Field::read")] pub $field: $type,)*
         }
 
         impl $crate::experiments::findings::Sheet for $name {
@@ -158,5 +158,12 @@ mod tests {
         let text = serde_json::to_string(&rows).unwrap();
         assert_eq!(serde_json::from_str::<Vec<Row>>(&text).unwrap(), rows);
         assert!(serde_json::from_str::<Vec<Row>>(&text.replace("rays", "beams")).is_err());
+        let broken = Row {
+            time: Repeats(vec![f64::NAN, f64::INFINITY]),
+            ..rows[0].clone()
+        };
+        let text = serde_json::to_string(&broken).unwrap();
+        let back: Row = serde_json::from_str(&text).unwrap();
+        assert!(back.time.0[0].is_nan() && back.time.0[1] == f64::INFINITY, "{text}");
     }
 }

@@ -78,6 +78,7 @@ rows! {
         least_at: f64 = "cosine of the least albedo",
         greatest: f64 = "greatest albedo",
         error: f64 = "standard error of the greatest albedo",
+        surely: f64 = "greatest albedo less 4.44 standard errors of it",
         greatest_at: f64 = "cosine of the greatest albedo",
         samples: u64 = "samples of an albedo",
         reciprocity: f64 = "reciprocity: worst relative difference",
@@ -103,7 +104,7 @@ const CRITERIA: &[Criterion<Row>] = &[
     Criterion::each(
         "no light comes out of nothing: the greatest albedo less 4.44 standard errors",
         Bound::AtMost(1.0),
-        |row: &Row| (row.greatest - ERRORS * row.error).into(),
+        |row: &Row| row.surely.into(),
     )
     .among(Row::is_the_engines)
     .because("chance exceeds it once in a hundred runs of 42 albedos, by Student's t and Šidák"),
@@ -130,6 +131,8 @@ impl Row {
     /// All but times.
     fn of((name, form): (&str, Form), roughness: f64, surface: &Bsdf, directions: &[[DVec3; 2]], samples: u32) -> Self {
         let mut albedos = COSINES.map(|cosine| (white_albedo(form, surface, cosine, samples), cosine));
+        let surely = albedos.iter().map(|(albedo, _)| albedo.value - ERRORS * albedo.error);
+        let surely = surely.fold(f64::NEG_INFINITY, f64::max);
         albedos.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         let [least, .., greatest] = albedos;
         let reciprocity = directions.iter().fold(0.0_f64, |worst, [a, b]| {
@@ -143,6 +146,7 @@ impl Row {
             least_at: least.1,
             greatest: greatest.0.value,
             error: greatest.0.error,
+            surely,
             greatest_at: greatest.1,
             samples: samples.into(),
             reciprocity,
