@@ -111,6 +111,7 @@ fn every_queue_gives_the_same_picture() {
             ..direct()
         };
         expect_alike(gpu, &seen_little(), &settings);
+        expect_alike(gpu, &builtin("builtin:ring"), &queued());
     });
 }
 

@@ -60,6 +60,7 @@ fn white_surfaces_vanish_in_a_white_furnace() {
         for (settings, allowed) in [
             ("metallic=0&specular=0", 2e-6),
             ("metallic=0&roughness=0.5", 2e-3),
+            ("metallic=0&roughness=0.1", 2e-3),
             ("metallic=1&roughness=0", 1e-4),
             ("metallic=1&roughness=0.3", 2e-3),
             ("metallic=1&roughness=1", 2e-3),

@@ -15,13 +15,10 @@ fn repeats(smoke: bool) -> usize {
 
 /// Nanoseconds of one call: the median over repeats of a run over all `inputs`, one thread, after a run that warms up.
 pub fn nanoseconds<I, O>(smoke: bool, inputs: &[I], mut function: impl FnMut(&I) -> O) -> f64 {
-    let mut run = || {
-        for input in inputs {
-            black_box(function(black_box(input)));
-        }
-    };
-    let Ok(((), seconds)) = repeated(repeats(smoke), || Ok::<_, Infallible>(timed(&mut run)));
-    1e9 * median(seconds) / inputs.len().max(1) as f64
+    let Ok(((), times)) = repeated(repeats(smoke), || {
+        Ok::<_, Infallible>(((), nanoseconds_once(inputs, &mut function)))
+    });
+    median(times)
 }
 
 /// Nanoseconds of one call, by one run over all `inputs` on one thread: for contenders that take turns ([`Context::in_turns`]).

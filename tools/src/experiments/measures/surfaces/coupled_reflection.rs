@@ -12,7 +12,9 @@ use clerestory::transport::fresnel::fresnel_dielectric;
 use clerestory::transport::warp::square_to_cosine_hemisphere;
 use glam::DVec3;
 
-use super::energy::{COSINES, Mean, ROUGHNESSES, WHITE, albedo, context as bsdf, direction, mean, numbers};
+use super::energy::{
+    BY_CHANCE, COSINES, ERRORS_OF_42, Mean, ROUGHNESSES, WHITE, albedo, context as bsdf, direction, mean, numbers,
+};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::nanoseconds_once;
@@ -90,9 +92,6 @@ rows! {
 /// What was found.
 pub type Found = Vec<Row>;
 
-/// Standard errors of sixteen sequences that the greatest of 42 albedos exceeds once in a hundred runs, by Student's t and Šidák.
-const ERRORS: f64 = 4.44;
-
 const CRITERIA: &[Criterion<Row>] = &[
     Criterion::each(
         "the albedo is 1 at every angle: the greatest difference",
@@ -107,7 +106,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.surely.into(),
     )
     .among(Row::is_the_engines)
-    .because("chance exceeds it once in a hundred runs of 42 albedos, by Student's t and Šidák"),
+    .because(BY_CHANCE),
     Criterion::each(
         "no difference when the directions change places",
         Bound::AtMost(1e-9),
@@ -131,7 +130,9 @@ impl Row {
     /// All but times.
     fn of((name, form): (&str, Form), roughness: f64, surface: &Bsdf, directions: &[[DVec3; 2]], samples: u32) -> Self {
         let mut albedos = COSINES.map(|cosine| (white_albedo(form, surface, cosine, samples), cosine));
-        let surely = albedos.iter().map(|(albedo, _)| albedo.value - ERRORS * albedo.error);
+        let surely = albedos
+            .iter()
+            .map(|(albedo, _)| albedo.value - ERRORS_OF_42 * albedo.error);
         let surely = surely.fold(f64::NEG_INFINITY, f64::max);
         albedos.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
         let [least, .., greatest] = albedos;

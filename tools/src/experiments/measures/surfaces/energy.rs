@@ -56,6 +56,11 @@ pub fn numbers(sample_index: u32) -> DVec3 {
 /// Independent sequences of a mean; their spread gives its error.
 const SEQUENCES: u32 = 16;
 
+/// Standard errors of [`mean`]s that the greatest of 42 exceeds once in a hundred runs, by Student's t and Šidák.
+pub const ERRORS_OF_42: f64 = 4.44;
+/// Where a bound by them is from.
+pub const BY_CHANCE: &str = "chance exceeds it once in a hundred runs of 42 albedos, by Student's t and Šidák";
+
 /// A mean of samples and its standard error.
 #[derive(Debug, Clone, Copy)]
 pub struct Mean {

@@ -6,7 +6,7 @@ use clerestory::Result;
 use clerestory::transport::bsdf::{BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval, bsdf_gltf};
 use glam::DVec3;
 
-use super::energy::{COSINES, ROUGHNESSES, WHITE, albedo, context as bsdf, direction};
+use super::energy::{BY_CHANCE, COSINES, ERRORS_OF_42, ROUGHNESSES, WHITE, albedo, context as bsdf, direction};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::nanoseconds_once;
@@ -47,22 +47,19 @@ pub struct Found {
     costs: Vec<Cost>,
 }
 
-/// Standard errors of sixteen sequences that the greatest of 42 albedos exceeds once in a hundred runs, by Student's t and Šidák.
-const ERRORS: f64 = 4.44;
-
 const CRITERIA: &[Criterion<Row>] = &[
     Criterion::each(
         "the albedo is 1 with the compensation: albedo − 1",
         Bound::Between(-0.01, 0.01),
-        |row: &Row| Measured::within(row.compensated, ERRORS * row.error),
+        |row: &Row| Measured::within(row.compensated, ERRORS_OF_42 * row.error),
     )
     .because("half of what an eye sees, within 4.44 standard errors"),
     Criterion::each(
         "it is never above 1: albedo − 1 less 4.44 standard errors",
         Bound::AtMost(0.0),
-        |row: &Row| (row.compensated - ERRORS * row.error).into(),
+        |row: &Row| (row.compensated - ERRORS_OF_42 * row.error).into(),
     )
-    .because("chance exceeds it once in a hundred runs of 42 albedos, by Student's t and Šidák"),
+    .because(BY_CHANCE),
 ];
 
 impl Study for Found {
