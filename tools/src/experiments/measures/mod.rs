@@ -122,7 +122,7 @@ measures! {
     on_device rows "alpha" surfaces::alpha;
     on_device tables "automatic-choice" rendering::automatic_choice;
     on_device tables "barriers" device::barriers;
-    on_device tables "build-stages" rays::build_stages;
+    on_device rows "build-stages" rays::build_stages;
     on_host tables "compact-map" photon_maps::compact_map;
     on_host tables "compact-rays" photon_maps::compact_rays;
     on_host rows "coupled-reflection" surfaces::coupled_reflection;
@@ -151,7 +151,7 @@ measures! {
     on_device tables "mitsuba" rendering::mitsuba;
     on_host rows "multiple-scattering" surfaces::multiple_scattering;
     on_device tables "path-sets" rendering::path_sets;
-    on_device tables "persistent-threads" rays::persistent_threads;
+    on_device rows "persistent-threads" rays::persistent_threads;
     on_host rows "phase-functions" media::phase_functions;
     on_device tables "photon-frame" photons::photon_frame;
     on_device tables "photon-peers" photons::photon_peers;
