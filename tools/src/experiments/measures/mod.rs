@@ -163,7 +163,7 @@ measures! {
     on_device tables "scene-profile" rendering::scene_profile;
     on_device tables "shadow-maps" preview::shadow_maps.of_any_scenes();
     on_host rows "shading-normals" surfaces::shading_normals;
-    on_host tables "sphere-tests" rays::sphere_tests;
+    on_host rows "sphere-tests" rays::sphere_tests;
     on_host rows "tangents" surfaces::tangents;
     on_host tables "tree-quality" rays::tree_quality;
     on_host rows "triangle-tests" rays::triangle_tests;
