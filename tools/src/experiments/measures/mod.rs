@@ -121,7 +121,7 @@ measures! {
     on_device rows "absorption" media::absorption;
     on_device rows "alpha" surfaces::alpha;
     on_device tables "automatic-choice" rendering::automatic_choice;
-    on_device tables "barriers" device::barriers;
+    on_device rows "barriers" device::barriers;
     on_device rows "build-stages" rays::build_stages;
     on_host tables "compact-map" photon_maps::compact_map;
     on_host tables "compact-rays" photon_maps::compact_rays;
@@ -165,7 +165,7 @@ measures! {
     on_host rows "shading-normals" surfaces::shading_normals;
     on_host rows "sphere-tests" rays::sphere_tests;
     on_host rows "tangents" surfaces::tangents;
-    on_host tables "tree-quality" rays::tree_quality;
+    on_host rows "tree-quality" rays::tree_quality;
     on_host rows "triangle-tests" rays::triangle_tests;
 }
 
