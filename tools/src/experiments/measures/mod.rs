@@ -126,7 +126,7 @@ measures! {
     on_host tables "compact-map" photon_maps::compact_map;
     on_host tables "compact-rays" photon_maps::compact_rays;
     on_host rows "coupled-reflection" surfaces::coupled_reflection;
-    on_device tables "device-model" device::device_model;
+    on_device rows "device-model" device::device_model;
     on_host tables "free-flight" media::free_flight;
     on_device tables "kd-caches" kd::kd_caches.of_any_scenes();
     on_device tables "kd-heuristics" kd::kd_heuristics.of_any_scenes();
