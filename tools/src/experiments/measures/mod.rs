@@ -127,7 +127,7 @@ measures! {
     on_host tables "compact-rays" photon_maps::compact_rays;
     on_host rows "coupled-reflection" surfaces::coupled_reflection;
     on_device rows "device-model" device::device_model;
-    on_host tables "free-flight" media::free_flight;
+    on_host rows "free-flight" media::free_flight;
     on_device tables "kd-caches" kd::kd_caches.of_any_scenes();
     on_device tables "kd-heuristics" kd::kd_heuristics.of_any_scenes();
     on_device tables "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();

@@ -3,3 +3,4 @@
 pub mod absorption;
 pub mod free_flight;
 pub mod phase_functions;
+mod profiles;
