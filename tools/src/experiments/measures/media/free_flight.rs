@@ -5,32 +5,14 @@
 use std::cell::Cell;
 
 use clerestory::Result;
-use clerestory::transport::free_flight::{
-    adaptively_marched_free_flight, marched_free_flight, marched_transmittance, ratio_tracked_transmittance,
-    tracked_free_flight,
-};
-use clerestory::transport::medium::{sample_free_flight, transmittance};
-use glam::DVec3;
 
-use super::profiles::{EVEN, PROFILES, Profile};
+use super::methods::{DELTA, Method, PLACES, RATIO, STEPS, T_MAX, estimates, flights, marched};
+use super::profiles::{PROFILES, Profile};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, curves, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::nanoseconds_once;
 use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
-
-/// Flights and estimates end here, m.
-const T_MAX: f64 = 1.0;
-/// Look-ups that a marched ray makes.
-const STEPS: [u32; 3] = [8, 64, 512];
-/// Where in a step it looks, and how that is called.
-const PLACES: [(f64, &str); 2] = [(1.0, "ends"), (0.5, "middles")];
-/// Steps of adaptive marching in local mean free paths.
-const SHARES: [f64; 2] = [0.5, 0.05];
-/// The longest of them, m.
-const LONGEST: f64 = 0.125;
-/// Majorants as multiples of the greatest extinction.
-const LOOSENESS: [f64; 2] = [1.0, 8.0];
 
 const TURNS: usize = 9;
 /// Runs of a turn.
@@ -42,85 +24,6 @@ const ROUNDING: f64 = 1e-12;
 
 const THIN: &str = "thin layers";
 const WAVES: &str = "waves";
-const RATIO: &str = "ratio tracking";
-const DELTA: &str = "delta tracking";
-
-/// The extinction along a ray.
-type Extinction<'a> = dyn Fn(f64) -> f64 + 'a;
-/// Draws from [0, 1).
-type Draw<'a> = dyn FnMut() -> f64 + 'a;
-
-/// A way to estimate the transmittance, or to fly.
-struct Method<R> {
-    name: String,
-    run: Box<dyn Fn(&Extinction<'_>, &mut Draw<'_>) -> R>,
-}
-
-fn method<R>(name: impl Into<String>, run: impl Fn(&Extinction<'_>, &mut Draw<'_>) -> R + 'static) -> Method<R> {
-    Method {
-        name: name.into(),
-        run: Box::new(run),
-    }
-}
-
-/// How a marched estimate is called.
-fn marched(steps: u32, place: &str) -> String {
-    format!("marched, {steps} steps, {place}")
-}
-
-fn estimates(profile: &Profile) -> Vec<Method<f64>> {
-    let mut all = Vec::new();
-    if profile.name == PROFILES[0].name {
-        all.push(method("analytic", |_, _| transmittance(DVec3::splat(EVEN), T_MAX).x));
-    }
-    for steps in STEPS {
-        for (place, word) in PLACES {
-            let name = marched(steps, word);
-            all.push(method(name, move |extinction, _| {
-                marched_transmittance(extinction, T_MAX, steps, place)
-            }));
-        }
-    }
-    for looseness in LOOSENESS {
-        let majorant = looseness * profile.greatest;
-        let name = format!("{RATIO}, majorant × {looseness}");
-        all.push(method(name, move |extinction, draw| {
-            ratio_tracked_transmittance(extinction, majorant, T_MAX, draw)
-        }));
-    }
-    all
-}
-
-fn flights(profile: &Profile) -> Vec<Method<Option<f64>>> {
-    let mut all = Vec::new();
-    if profile.name == PROFILES[0].name {
-        all.push(method("analytic", |_, draw| {
-            let sigma = DVec3::splat(EVEN);
-            let flight = sample_free_flight(sigma, sigma, DVec3::splat(1.0 / 3.0), T_MAX, [draw(), draw()]);
-            flight.collides.then_some(flight.t)
-        }));
-    }
-    for steps in STEPS {
-        let name = format!("marched, steps of 1/{steps} m");
-        all.push(method(name, move |extinction, draw| {
-            marched_free_flight(extinction, T_MAX, T_MAX / f64::from(steps), draw)
-        }));
-    }
-    for share in SHARES {
-        let name = format!("marched, steps of {share} mean free paths");
-        all.push(method(name, move |extinction, draw| {
-            adaptively_marched_free_flight(extinction, T_MAX, share, LONGEST, draw)
-        }));
-    }
-    for looseness in LOOSENESS {
-        let majorant = looseness * profile.greatest;
-        let name = format!("{DELTA}, majorant × {looseness}");
-        all.push(method(name, move |extinction, draw| {
-            tracked_free_flight(extinction, majorant, T_MAX, draw)
-        }));
-    }
-    all
-}
 
 rows! {
     /// A method on a profile.
@@ -181,7 +84,7 @@ const OF_FALLS: &[Criterion<Fall>] = &[
         |row: &Fall| row.exponent.unwrap_or(f64::NAN).into(),
     )
     .among(|row| row.exponent.is_some() && row.profile != THIN)
-    .because("the first order or a higher one; a tenth is for steps that are not small yet")
+    .because("the first order or a higher one; a tenth is for what higher orders change")
     .in_every_form(),
     Criterion::each(
         "the error of marching falls with the step in thin layers: exponent",
@@ -252,8 +155,8 @@ impl Study for Found {
             )
             .and(Findings::of(&self.falls, OF_FALLS))
             .note(format!(
-                "By {} and {} steps. There is no exponent where the fewest are exact up to the rounding of f64.",
-                STEPS[0],
+                "By {} and {} steps. There is no exponent where the fewer are exact up to the rounding of f64.",
+                STEPS[STEPS.len() - 2],
                 STEPS[STEPS.len() - 1]
             ))
             .and(Findings::of(&self.flights, OF_FLIGHTS))
@@ -315,7 +218,7 @@ fn transmittance_of(context: &Context<'_>, profile: &Profile, method: &Method<f6
     }
 }
 
-/// Exponents of marched errors by the fewest and the most steps.
+/// Exponents of marched errors by the finest steps.
 fn falls(all: &[Transmittance]) -> Vec<Fall> {
     let profiles = PROFILES.iter().filter(|profile| profile.name != PROFILES[0].name);
     let of = |profile: &Profile, place: &str| {
@@ -326,7 +229,7 @@ fn falls(all: &[Transmittance]) -> Vec<Fall> {
                 .find(|row| row.profile == profile.name && row.method == method);
             row.map_or(f64::NAN, |row| row.error.abs())
         };
-        let [few, .., many] = STEPS;
+        let [.., few, many] = STEPS;
         let fall = (error(many) / error(few)).ln() / f64::from(many / few).ln();
         Fall {
             profile: profile.name.into(),
