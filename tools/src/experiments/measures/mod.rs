@@ -150,14 +150,14 @@ measures! {
     on_host rows "merge-example" photon_maps::merge_example;
     on_device tables "mitsuba" rendering::mitsuba;
     on_host rows "multiple-scattering" surfaces::multiple_scattering;
-    on_device tables "path-sets" rendering::path_sets;
+    on_device rows "path-sets" rendering::path_sets;
     on_device rows "persistent-threads" rays::persistent_threads;
     on_host rows "phase-functions" media::phase_functions;
     on_device tables "photon-frame" photons::photon_frame;
     on_device tables "photon-peers" photons::photon_peers;
     on_device tables "photon-queues" photons::photon_queues;
     on_device tables "photon-statistics" photons::photon_statistics;
-    on_host tables "picture-formats" rendering::picture_formats;
+    on_host rows "picture-formats" rendering::picture_formats;
     on_host rows "ray-offsets" rays::ray_offsets;
     on_host tables "sample-sums" rendering::sample_sums;
     on_device tables "scene-profile" rendering::scene_profile;
