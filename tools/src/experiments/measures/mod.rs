@@ -159,7 +159,7 @@ measures! {
     on_device tables "photon-statistics" photons::photon_statistics;
     on_host rows "picture-formats" rendering::picture_formats;
     on_host rows "ray-offsets" rays::ray_offsets;
-    on_host tables "sample-sums" rendering::sample_sums;
+    on_host rows "sample-sums" rendering::sample_sums;
     on_device tables "scene-profile" rendering::scene_profile;
     on_device tables "shadow-maps" preview::shadow_maps.of_any_scenes();
     on_host rows "shading-normals" surfaces::shading_normals;
