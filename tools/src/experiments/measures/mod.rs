@@ -160,7 +160,7 @@ measures! {
     on_host rows "picture-formats" rendering::picture_formats;
     on_host rows "ray-offsets" rays::ray_offsets;
     on_host rows "sample-sums" rendering::sample_sums;
-    on_device tables "scene-profile" rendering::scene_profile;
+    on_device rows "scene-profile" rendering::scene_profile;
     on_device tables "shadow-maps" preview::shadow_maps.of_any_scenes();
     on_host rows "shading-normals" surfaces::shading_normals;
     on_host rows "sphere-tests" rays::sphere_tests;

@@ -233,7 +233,7 @@ fn sums_of(context: &Context<'_>, case: &str, samples: &[f32], variance: f64) ->
             count: samples.len() as u64,
             form: form.into(),
             error: (error / exact).round(),
-            of_noise: (noise > 0.0).then(|| error.round().abs() / noise),
+            of_noise: (case != EQUAL).then(|| error.round().abs() / noise),
             bytes,
             time,
         }
