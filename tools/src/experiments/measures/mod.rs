@@ -148,7 +148,7 @@ measures! {
     on_host tables "map-quality" photon_maps::map_quality;
     on_device tables "map-rendering" maps::map_rendering;
     on_host rows "merge-example" photon_maps::merge_example;
-    on_device tables "mitsuba" rendering::mitsuba;
+    on_device rows "mitsuba" rendering::mitsuba;
     on_host rows "multiple-scattering" surfaces::multiple_scattering;
     on_device rows "path-sets" rendering::path_sets;
     on_device rows "persistent-threads" rays::persistent_threads;
