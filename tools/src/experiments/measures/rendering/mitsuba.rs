@@ -84,7 +84,7 @@ const OF_AGREEMENT: &[Criterion<Agreement>] = &[
     Criterion::all(
         "scenes do not call for another look: the share of those that do",
         Bound::AtMost(0.02),
-        |rows| {
+        |rows: &[&Agreement]| {
             let calls: u64 = rows.iter().map(|row| row.second_looks).sum();
             (!rows.is_empty()).then(|| (calls as f64 / rows.len() as f64).into())
         },

@@ -241,13 +241,18 @@ fn bits(image: &Image) -> Vec<u32> {
 fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str, changes: &[Change]) -> Result<Vec<Row>> {
     let (size, spp) = context.pick((64, 64), (8, 4));
     let lean = scene::load(address)?;
+    let scenes: Vec<Scene> = changes
+        .iter()
+        .map(|(_, change)| {
+            let mut scene = lean.clone();
+            change(&mut scene);
+            scene
+        })
+        .collect();
     let mut rows = Vec::new();
-    let mut renderers = Vec::new();
-    for (what, change) in changes {
-        let mut scene = lean.clone();
-        change(&mut scene);
-        let [geometry, material, light] = bytes(gpu, &scene)?;
-        renderers.push(Renderer::new(gpu, &scene)?);
+    // Before there is any other on the device, which might share some.
+    for ((what, _), scene) in changes.iter().zip(&scenes) {
+        let [geometry, material, light] = bytes(gpu, scene)?;
         rows.push(Row {
             scene: short_name(address).into(),
             change: (*what).into(),
@@ -257,6 +262,8 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str, changes: &[Change])
             ..Row::default()
         });
     }
+    let renderers: Result<Vec<Renderer>> = scenes.iter().map(|scene| Renderer::new(gpu, scene)).collect();
+    let renderers = renderers?;
     let mut images: Vec<Option<Image>> = changes.iter().map(|_| None).collect();
     let seconds = context.in_turns(5, changes.len(), |i| {
         let image = Image::render(&renderers[i], size, spp, 5, "all")?;
