@@ -58,7 +58,12 @@ mod tests {
     #[test]
     fn what_is_no_number_is_the_greatest() {
         assert_eq!(greatest([-2.0, -1.0, -3.0]), -1.0);
-        for values in [&[][..], &[f64::NAN, 1.0], &[1.0, f64::NAN], &[1.0, f64::NAN, f64::INFINITY]] {
+        for values in [
+            &[][..],
+            &[f64::NAN, 1.0],
+            &[1.0, f64::NAN],
+            &[1.0, f64::NAN, f64::INFINITY],
+        ] {
             assert!(greatest(values.iter().copied()).is_nan(), "{values:?}");
         }
     }

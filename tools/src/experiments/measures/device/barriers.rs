@@ -8,86 +8,14 @@ use std::sync::Arc;
 use clerestory::gpu::{Access, Buffer, BufferDesc, Category, Gpu, Pass};
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::GpuScene;
-use clerestory::{Error, Result, scene};
+use clerestory::{Result, scene};
 
+use super::hazards::{BUFFERS, COMMANDS, Command, accepted, needed};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::context::short_name;
 use crate::random::Random;
 use crate::timing::timed;
-
-/// Buffers of a sequence and its commands.
-const BUFFERS: usize = 4;
-const COMMANDS: usize = 24;
-
-/// A command: fills a buffer, or copies one to another.
-#[derive(Clone, Copy)]
-enum Command {
-    Fill(usize),
-    Copy(usize, usize),
-}
-
-impl Command {
-    fn random(random: &mut Random) -> Self {
-        let mut index = |n: usize| (random.unit() * n as f64) as usize;
-        let to = index(BUFFERS);
-        match index(2) {
-            0 => Self::Fill(to),
-            // Another buffer than the target.
-            _ => Self::Copy((to + 1 + index(BUFFERS - 1)) % BUFFERS, to),
-        }
-    }
-
-    fn written(self) -> usize {
-        match self {
-            Self::Fill(to) | Self::Copy(_, to) => to,
-        }
-    }
-
-    fn touches(self, buffer: usize) -> bool {
-        self.written() == buffer || matches!(self, Self::Copy(from, _) if from == buffer)
-    }
-
-    /// Whether the order of the two matters.
-    fn conflicts(self, other: Self) -> bool {
-        other.touches(self.written()) || self.touches(other.written())
-    }
-}
-
-/// The commands before which a barrier is needed, when each is put as late as possible.
-fn needed(commands: &[Command]) -> Vec<usize> {
-    let mut barriers = Vec::new();
-    let mut since = 0;
-    for (i, command) in commands.iter().enumerate() {
-        if commands[since..i].iter().any(|earlier| earlier.conflicts(*command)) {
-            barriers.push(i);
-            since = i;
-        }
-    }
-    barriers
-}
-
-/// Records the commands with barriers before some of them; `false` when the recorder misses one.
-fn accepted(gpu: &Gpu, buffers: &[Buffer], commands: &[Command], barriers: &[usize]) -> Result<bool> {
-    let mut recorder = gpu.recorder("hazards")?;
-    let recorded = recorder.pass("hazards", |pass| {
-        for (i, command) in commands.iter().enumerate() {
-            if barriers.contains(&i) {
-                pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
-            }
-            match *command {
-                Command::Fill(to) => pass.fill(buffers[to].view(), 0)?,
-                Command::Copy(from, to) => pass.copy(buffers[from].view(), buffers[to].view())?,
-            }
-        }
-        Ok(())
-    });
-    match recorded {
-        Ok(()) => Ok(true),
-        Err(Error::MissingBarrier { .. }) => Ok(false),
-        Err(other) => Err(other),
-    }
-}
 
 rows! {
     /// Random sequences.
