@@ -3,19 +3,18 @@
 //!
 //! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §2.2.2 to §2.2.4.
 
+use clerestory::Result;
+use clerestory::gpu::Caps;
 use clerestory::kernels::device_model::{DeviceModel, MAX_ITERATIONS};
-use clerestory::{Error, Result};
 
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, curves, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::Table;
-use crate::timing::{median, repeated};
 
-/// Working sets as powers of two, bytes; copies likewise; steps of a walk, repeats, workgroups and tickets of an invocation, dispatches.
+/// Working sets as powers of two, bytes; copies likewise; steps of a walk, workgroups and tickets of an invocation, dispatches.
 struct Plan {
     sets: std::ops::RangeInclusive<u32>,
     copies: &'static [u32],
     steps: u32,
-    repeats: usize,
     groups: u32,
     fetches: u32,
     dispatches: u32,
@@ -25,7 +24,6 @@ const FULL: Plan = Plan {
     sets: 12..=26,
     copies: &[16, 20, 24, 26],
     steps: MAX_ITERATIONS,
-    repeats: 9,
     groups: 64,
     fetches: 512,
     dispatches: 256,
@@ -34,7 +32,6 @@ const SMOKE: Plan = Plan {
     sets: 12..=13,
     copies: &[16],
     steps: 256,
-    repeats: 1,
     groups: 2,
     fetches: 8,
     dispatches: 4,
@@ -42,122 +39,234 @@ const SMOKE: Plan = Plan {
 
 /// Clock of the source's GPU, cycles a nanosecond: 1.296 GHz of its processors.
 const SOURCE_CLOCK: f64 = 1.296;
-/// Largest working set as a power of two, and the cycles that the source gives for loads from it.
-const SOURCE_CYCLES: [(u32, f64); 3] = [(23, 440.0), (25, 487.0), (u32::MAX, 698.0)];
+/// Largest working set, KiB, and the cycles that the source gives for loads from it.
+const SOURCE_CYCLES: [(u64, f64); 3] = [(8 << 10, 440.0), (32 << 10, 487.0), (u64::MAX, 698.0)];
 
 /// What timestamps can tell apart at best.
 const LEAST_SECONDS: f64 = 1e-9;
+const TURNS: usize = 9;
+/// Invocations of a workgroup that takes tickets.
+const GROUP_SIZE: u32 = 64;
 
-/// Median of some runs after one that warms up, above zero.
-fn typical(repeats: usize, mut run: impl FnMut() -> Result<f64>) -> Result<f64> {
-    let ((), seconds) = repeated(repeats, || Ok(((), run()?)))?;
-    Ok(median(seconds).max(LEAST_SECONDS))
+rows! {
+    /// A fact of the device.
+    struct Fact = "The device" by [what] {
+        what: String = "what",
+        value: u64 = "value",
+    }
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let plan = if context.smoke { &SMOKE } else { &FULL };
-    let gpu = (context.gpu)()?;
-    let model = DeviceModel::new(&gpu)?;
-    let caps = gpu.caps();
-    let mut facts = Table::new("The device", &["what", "value"]);
-    for (what, value) in [
-        ("lanes of a subgroup", u64::from(caps.subgroup_size)),
-        (
-            "shared memory of a workgroup (bytes)",
-            u64::from(caps.max_shared_memory),
-        ),
-        ("invocations of a workgroup", u64::from(caps.max_workgroup_invocations)),
-        ("push constants (bytes)", u64::from(caps.max_push_constants)),
+rows! {
+    /// A walk through a working set.
+    struct Load = "Loads that wait for each other" by [set] {
+        set: u64 = "working set (KiB)",
+        steps: u64 = "steps",
+        time: Repeats = "a load (ns)",
+    }
+    beside "GTX 280, 1.296 GHz (source): a load (ns)" = |row| of_source(row.set).into();
+}
+
+rows! {
+    /// Copies of a size.
+    struct Copied = "Copies" by [size] {
+        size: u64 = "size (KiB)",
+        by_kernel: Repeats = "by a kernel (GB/s)",
+        by_command: Repeats = "by the copy command (GB/s)",
+        differ: u64 = "copies that differ",
+    }
+}
+
+rows! {
+    /// A way to draw tickets.
+    struct Ticket = "Tickets of one counter" by [way] {
+        way: String = "way",
+        tickets: u64 = "tickets",
+        wrong: u64 = "runs that do not give each once",
+        time: Repeats = "a ticket (ns)",
+    }
+}
+
+rows! {
+    /// A boundary.
+    struct Boundary = "Boundaries" by [what] {
+        what: String = "what",
+        time: Repeats = "time (ns)",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    facts: Vec<Fact>,
+    loads: Vec<Load>,
+    copies: Vec<Copied>,
+    tickets: Vec<Ticket>,
+    boundaries: Vec<Boundary>,
+}
+
+const BY_SUBGROUPS: &str = "a subgroup at once";
+
+const OF_COPIES: &[Criterion<Copied>] =
+    &[Criterion::each("copies are exact", Bound::AtMost(0.0), |row: &Copied| row.differ.into()).in_every_form()];
+
+const OF_TICKETS: &[Criterion<Ticket>] = &[
+    Criterion::each("tickets are exact", Bound::AtMost(0.0), |row: &Ticket| row.wrong.into()).in_every_form(),
+    Criterion::each(
+        "one counter is no bottleneck of persistent threads: ns per ticket",
+        Bound::AtMost(10.0),
+        |row: &Ticket| (&row.time).into(),
+    )
+    .among(|row| row.way == BY_SUBGROUPS)
+    .because("a hundredth of the microsecond that a ray costs at least"),
+];
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let plan = context.pick(&FULL, &SMOKE);
+        let gpu = (context.gpu)()?;
+        let model = DeviceModel::new(&gpu)?;
+        let kib = |power: &u32| format!("{} KiB", kib(*power));
+        let sets: Vec<u32> = plan.sets.clone().collect();
+        Ok(Self {
+            facts: facts(gpu.caps()),
+            loads: context.each(&sets, kib, |set| Ok(vec![load(context, plan, &model, *set)?]))?,
+            copies: context.each(plan.copies, kib, |size| Ok(vec![copied(context, &model, *size)?]))?,
+            tickets: tickets(context, plan, &model)?,
+            boundaries: boundaries(context, plan, &model)?,
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let last = self.loads.last();
+        let (ours, theirs) = ("this device".to_owned(), "the source's GPU".to_owned());
+        let mut loads = curves(
+            &self.loads,
+            |_| ours.clone(),
+            |row| (row.set as f64, row.time.measured()),
+        );
+        loads.extend(curves(
+            &self.loads,
+            |_| theirs.clone(),
+            |row| (row.set as f64, of_source(row.set).unwrap_or(f64::NAN).into()),
+        ));
+        Findings::of(&self.facts, &[])
+            .headline(
+                "a load from the largest working set (ns)",
+                last.map(|row| (&row.time).into()),
+            )
+            .and(Findings::of(&self.loads, &[]))
+            .note(
+                "One invocation follows a random cycle of indices 64 bytes apart; an empty dispatch is taken off turn by turn. A step is a load, a \
+                 test and a jump. The source's GPU has no cache before its memory: its steps are by the reach of its address translation, here \
+                 they are those of the caches.",
+            )
+            .curves(
+                "loads",
+                "Loads that wait for each other",
+                Axes::rates("working set (KiB)", "a load (ns)"),
+                loads,
+            )
+            .and(Findings::of(&self.copies, OF_COPIES))
+            .note("Bytes copied a second; each is read once and written once.")
+            .and(Findings::of(&self.tickets, OF_TICKETS))
+            .note("Persistent threads fetch rays as tickets, a subgroup at once.")
+            .and(Findings::of(&self.boundaries, &[]))
+            .note("Kernels that go through levels pay a dispatch for each.")
+    }
+}
+
+/// KiB of a power of two of bytes.
+const fn kib(power: u32) -> u64 {
+    1 << (power - 10)
+}
+
+/// What the source gives for a load from a working set of so many KiB, ns.
+fn of_source(set: u64) -> Option<f64> {
+    let within = SOURCE_CYCLES.iter().find(|(largest, _)| set <= *largest);
+    within.map(|(_, cycles)| cycles / SOURCE_CLOCK)
+}
+
+fn facts(caps: &Caps) -> Vec<Fact> {
+    let all = [
+        ("lanes of a subgroup", caps.subgroup_size.into()),
+        ("shared memory of a workgroup (bytes)", caps.max_shared_memory.into()),
+        ("invocations of a workgroup", caps.max_workgroup_invocations.into()),
+        ("push constants (bytes)", caps.max_push_constants.into()),
         ("storage buffer (bytes)", caps.max_storage_buffer_range),
         ("heap (bytes)", caps.device_heap),
-    ] {
-        facts.row([what.into(), value.into()]);
-    }
-    facts.note(format!("{}, driver {}.", caps.device, caps.driver));
+    ];
+    let of = |(what, value): (&str, u64)| Fact {
+        what: what.into(),
+        value,
+    };
+    all.into_iter().map(of).collect()
+}
 
-    let mut loads = Table::new(
-        "Loads that wait for each other",
-        &["working set (KiB)", "ns a load", "source's GPU (ns)"],
-    );
-    let sets = plan.sets.clone();
-    for (done, set) in sets.clone().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin("loads", done, sets.clone().count());
-        let chain = model.chain(1 << set)?;
-        let seconds = typical(plan.repeats, || chain.walk(plan.steps))?;
-        // What an empty dispatch takes is no part of the walk.
-        let idle = typical(plan.repeats, || chain.walk(0))?;
-        let source = SOURCE_CYCLES.iter().find(|(largest, _)| set <= *largest);
-        loads.row([
-            (1_u64 << (set - 10)).into(),
-            (1e9 * (seconds - idle).max(0.0) / f64::from(plan.steps)).into(),
-            source.map_or("none".into(), |(_, cycles)| (cycles / SOURCE_CLOCK).into()),
-        ]);
-    }
-    loads.note(format!(
-        "One invocation follows a random cycle of indices 64 bytes apart for {} steps, medians of {}, less an empty dispatch. A step is a \
-         load, a test and a jump. The source's GPU (GTX 280, 1.296 GHz) has no cache before its memory: 436 to 443 cycles up to 8 MiB, \
-         487 up to 32 MiB, 698 beyond, by the reach of its address translation; here the steps are those of the caches.",
-        plan.steps, plan.repeats
-    ));
+fn load(context: &Context<'_>, plan: &Plan, model: &DeviceModel, set: u32) -> Result<Load> {
+    let chain = model.chain(1 << set)?;
+    let walks = [plan.steps, 0];
+    let seconds = context.in_turns(TURNS, walks.len(), |i| chain.walk(walks[i]))?;
+    // What an empty dispatch takes is no part of the walk.
+    let a_load = |(walk, idle): (&f64, &f64)| 1e9 * (walk - idle).max(0.0) / f64::from(plan.steps);
+    Ok(Load {
+        set: kib(set),
+        steps: plan.steps.into(),
+        time: seconds[0].iter().zip(&seconds[1]).map(a_load).collect(),
+    })
+}
 
-    let mut copies = Table::new("Copies", &["KiB", "by a kernel (GB/s)", "by the copy command (GB/s)"]);
-    for size in plan.copies {
-        let copy = model.copies(1 << size)?;
-        let rate = |seconds: f64| 1e-9 * copy.bytes() as f64 / seconds;
-        let (by_kernel, by_command) = (
-            typical(plan.repeats, || copy.by_kernel())?,
-            typical(plan.repeats, || copy.by_command())?,
-        );
-        if !copy.are_equal()? {
-            return Err(Error::setting("copy", *size, "is not what was copied"));
-        }
-        copies.row([
-            (1_u64 << (size - 10)).into(),
-            rate(by_kernel).into(),
-            rate(by_command).into(),
-        ]);
+fn copied(context: &Context<'_>, model: &DeviceModel, size: u32) -> Result<Copied> {
+    let mut differ = 0;
+    // Of each a new pair, so that neither finds what the other has copied.
+    let ways = [model.copies(1 << size)?, model.copies(1 << size)?];
+    let rates = context.in_turns(TURNS, ways.len(), |i| {
+        let copy = &ways[i];
+        let seconds = if i == 0 { copy.by_kernel() } else { copy.by_command() }?;
+        Ok(1e-9 * copy.bytes() as f64 / seconds.max(LEAST_SECONDS))
+    })?;
+    for copy in &ways {
+        differ += u64::from(!copy.are_equal()?);
     }
-    copies.note("Bytes copied a second; each is read once and written once.");
+    let [by_kernel, by_command] = [0, 1].map(|way| Repeats(rates[way].clone()));
+    Ok(Copied {
+        size: kib(size),
+        by_kernel,
+        by_command,
+        differ,
+    })
+}
 
-    let mut queue = Table::new(
-        "Tickets of one counter and boundaries",
-        &["what", "tickets", "M/s", "ns"],
-    );
-    for by_subgroup in [false, true] {
-        let mut given = 0;
-        let seconds = typical(plan.repeats, || {
-            let tickets = model.tickets(plan.groups, plan.fetches, by_subgroup)?;
-            given = u64::from(tickets.given);
-            Ok(tickets.seconds)
-        })?;
-        let what = if by_subgroup {
-            "tickets, a subgroup at once"
-        } else {
-            "tickets, each invocation by itself"
-        };
-        let each = seconds / given.max(1) as f64;
-        queue.row([what.into(), given.into(), (1e-6 / each).into(), (1e9 * each).into()]);
-    }
-    let boundary = typical(plan.repeats, || model.boundaries(plan.dispatches))? / f64::from(plan.dispatches);
-    let submission = typical(plan.repeats, || model.submission())?;
-    for (what, seconds) in [
-        ("dispatch of one idle invocation with a barrier", boundary),
-        ("submission of one, to the end of waiting", submission),
-    ] {
-        queue.row([
-            what.into(),
-            "none".into(),
-            (1e-6 / seconds).into(),
-            (1e9 * seconds).into(),
-        ]);
-    }
-    queue.note(
-        "Persistent threads fetch rays as tickets, a subgroup at once; a ray costs microseconds, so that the counter is no bottleneck where a \
-         ticket costs nanoseconds. Kernels that go through levels pay a boundary for each.",
-    );
-    Ok(vec![facts, loads, copies, queue])
+fn tickets(context: &Context<'_>, plan: &Plan, model: &DeviceModel) -> Result<Vec<Ticket>> {
+    let asked = plan.groups * GROUP_SIZE * plan.fetches;
+    let joined = (0..asked).fold(0, |joined, ticket| joined ^ ticket);
+    let mut wrong = [0; 2];
+    let times = context.in_turns(TURNS, wrong.len(), |i| {
+        let tickets = model.tickets(plan.groups, plan.fetches, i == 1)?;
+        wrong[i] += u64::from((tickets.given, tickets.joined) != (asked, joined));
+        Ok(1e9 * tickets.seconds.max(LEAST_SECONDS) / f64::from(asked))
+    })?;
+    let of = |((way, wrong), time): ((&str, u64), Vec<f64>)| Ticket {
+        way: way.into(),
+        tickets: asked.into(),
+        wrong,
+        time: Repeats(time),
+    };
+    let ways = ["each invocation by itself", BY_SUBGROUPS].into_iter().zip(wrong);
+    Ok(ways.zip(times).map(of).collect())
+}
+
+fn boundaries(context: &Context<'_>, plan: &Plan, model: &DeviceModel) -> Result<Vec<Boundary>> {
+    let whats = [
+        "dispatch of one idle invocation with a barrier",
+        "submission of one, to the end of waiting",
+    ];
+    let seconds = context.in_turns(TURNS, whats.len(), |i| match i {
+        0 => Ok(model.boundaries(plan.dispatches)? / f64::from(plan.dispatches)),
+        _ => model.submission(),
+    })?;
+    let of = |(what, seconds): (&str, Vec<f64>)| Boundary {
+        what: what.into(),
+        time: Repeats(seconds).scaled(1e9),
+    };
+    Ok(whats.into_iter().zip(seconds).map(of).collect())
 }

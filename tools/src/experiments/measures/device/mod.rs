@@ -2,3 +2,4 @@
 
 pub mod barriers;
 pub mod device_model;
+mod hazards;

@@ -21,8 +21,9 @@ const POINT: f64 = 16.0;
 const REPORTED_POINT: f64 = 32.0;
 
 /// A ray and a triangle in f64, seen along the ray: z is the ray's parameter.
-struct Sheared {
-    corners: [DVec3; 3],
+pub struct Sheared {
+    /// With the ray in the origin of x and y.
+    pub corners: [DVec3; 3],
     /// u times the largest distance of a corner.
     unit: f64,
     /// Largest component of the direction.
@@ -30,7 +31,8 @@ struct Sheared {
 }
 
 impl Sheared {
-    fn new(ray: &Ray, triangle: &[Vec3; 3]) -> Self {
+    /// What a ray sees of a triangle.
+    pub fn new(ray: &Ray, triangle: &[Vec3; 3]) -> Self {
         let origin = Vec3::from(ray.origin).as_dvec3();
         let axis = ray_shear(Vec3::ZERO, ray.direction.into()).axis;
         let last = |v: DVec3| match axis {
@@ -55,7 +57,7 @@ impl Sheared {
     }
 
     /// The parameter where the ray meets the triangle's plane, and the bound of what a hit reports of it; infinite when seen edge-on.
-    fn plane(&self) -> (f64, f64) {
+    pub fn plane(&self) -> (f64, f64) {
         let [a, b, c] = self.corners;
         let normal = (b - a).cross(c - a);
         let slopes = (normal.x.abs() + normal.y.abs()) / normal.z.abs();
@@ -64,6 +66,11 @@ impl Sheared {
             normal.dot(a) / normal.z,
             if bound.is_nan() { f64::INFINITY } else { bound },
         )
+    }
+
+    /// What no rounding of sheared corners exceeds, a length along a diagonal: the ray's distance from edges to be clear of them.
+    pub fn rounding(&self) -> f64 {
+        POINT * std::f64::consts::SQRT_2 * self.unit
     }
 
     /// Distance of the ray from the nearest edge, positive inside.
@@ -168,8 +175,8 @@ pub fn judge(reachable: &Reachable, ray: &Ray, hit: &Hit) -> Verdict {
     }
     for triangle in nearer {
         let (t, bound) = triangle.plane();
-        // So far inside that no rounding of sheared corners loses it, which is a length along a diagonal, and clear of the ray's ends.
-        let is_clear = triangle.depth_inside() > POINT * std::f64::consts::SQRT_2 * triangle.unit
+        // So far inside that no rounding loses it, and clear of the ray's ends.
+        let is_clear = triangle.depth_inside() > triangle.rounding()
             && t - bound > f64::from(ray.t_min)
             && t + bound < f64::from(ray.t_max);
         if is_clear {

@@ -2,7 +2,7 @@
 //! beat bounding volumes.
 
 pub mod flights;
-mod hit_errors;
+pub mod hit_errors;
 pub mod kd_caches;
 pub mod kd_heuristics;
 pub mod kd_or_bvh;

@@ -3,302 +3,268 @@
 //! Oracle: the closed form of each profile's optical depth.
 
 use std::cell::Cell;
-use std::f64::consts::TAU;
 
 use clerestory::Result;
-use clerestory::transport::free_flight::{
-    adaptively_marched_free_flight, marched_free_flight, marched_transmittance, ratio_tracked_transmittance,
-    tracked_free_flight,
-};
-use clerestory::transport::medium::{sample_free_flight, transmittance};
-use glam::DVec3;
 
+use super::methods::{DELTA, Method, PLACES, RATIO, STEPS, T_MAX, estimates, flights, marched};
+use super::profiles::{PROFILES, Profile};
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, curves, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
-use crate::experiments::table::Table;
+use crate::experiments::measures::clock::nanoseconds_once;
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 
-/// Flights and estimates end here, m.
-const T_MAX: f64 = 1.0;
-/// Look-ups that a marched ray makes.
-const STEPS: [u32; 3] = [8, 64, 512];
-/// Steps of adaptive marching in local mean free paths.
-const SHARES: [f64; 2] = [0.5, 0.05];
-/// The longest of them, m.
-const LONGEST: f64 = 0.125;
-/// Majorants as multiples of the greatest extinction.
-const LOOSENESS: [f64; 2] = [1.0, 8.0];
+const TURNS: usize = 9;
+/// Runs of a turn.
+const RUNS: usize = 256;
+/// Kolmogorov's limit: √n times the distance exceeds this once in a hundred.
+const BY_CHANCE: f64 = 1.628;
+/// Errors of sums in f64.
+const ROUNDING: f64 = 1e-12;
 
-/// Extinction along a ray.
-struct Profile {
-    name: &'static str,
-    /// m⁻¹.
-    extinction: fn(f64) -> f64,
-    /// Its integral from 0.
-    depth: fn(f64) -> f64,
-    /// Its greatest value.
-    greatest: f64,
+const THIN: &str = "thin layers";
+const WAVES: &str = "waves";
+
+rows! {
+    /// A method on a profile.
+    struct Transmittance = "Transmittance over a metre" by [profile, method] {
+        profile: String = "profile",
+        method: String = "method",
+        error: f64 = "mean / exact − 1",
+        standard_error: f64 = "its standard error",
+        deviation: f64 = "relative deviation of one",
+        estimates: u64 = "estimates",
+        look_ups: f64 = "look-ups",
+        time: Repeats = "an estimate (ns)",
+    }
 }
 
-const EVEN: f64 = 4.0;
-const RISING: f64 = 8.0;
-const WAVES: f64 = 4.0;
-/// Waves in a metre.
-const FREQUENCY: f64 = 5.3;
-/// A layer begins each time after this way, m; the first one after half of it.
-const LAYER_EVERY: f64 = 0.23;
-const LAYER_WIDTH: f64 = 0.005;
-const LAYER: f64 = 200.0;
+rows! {
+    /// Marching through a profile.
+    struct Fall = "Fall of the error of marched transmittances" by [profile, place] {
+        profile: String = "profile",
+        place: String = "looks at",
+        exponent: Option<f64> = "exponent of the steps",
+    }
+}
 
-const PROFILES: [Profile; 4] = [
-    Profile {
-        name: "even",
-        extinction: |_| EVEN,
-        depth: |t| EVEN * t,
-        greatest: EVEN,
-    },
-    Profile {
-        name: "rising",
-        extinction: |t| RISING * t,
-        depth: |t| 0.5 * RISING * t * t,
-        greatest: RISING,
-    },
-    Profile {
-        name: "waves",
-        extinction: |t| WAVES * (1.0 + (TAU * FREQUENCY * t).sin()),
-        depth: |t| WAVES * (t + (1.0 - (TAU * FREQUENCY * t).cos()) / (TAU * FREQUENCY)),
-        greatest: 2.0 * WAVES,
-    },
-    Profile {
-        name: "thin layers",
-        extinction: |t| if within_layer(t) < LAYER_WIDTH { LAYER } else { 0.0 },
-        depth: |t| {
-            let begun = from_first_layer(t).max(-1.0).floor() + 1.0;
-            LAYER * (begun * LAYER_WIDTH - (LAYER_WIDTH - within_layer(t)).max(0.0))
-        },
-        greatest: LAYER,
-    },
+rows! {
+    /// A method on a profile.
+    struct Flight = "Free flight" by [profile, method] {
+        profile: String = "profile",
+        method: String = "method",
+        distance: f64 = "greatest error of the probability",
+        flights: u64 = "flights",
+        look_ups: f64 = "look-ups",
+        time: Repeats = "a flight (ns)",
+    }
+    beside "chance exceeds it once in a hundred" = |row| (BY_CHANCE / (row.flights as f64).sqrt()).into();
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    transmittances: Vec<Transmittance>,
+    falls: Vec<Fall>,
+    flights: Vec<Flight>,
+}
+
+const OF_TRANSMITTANCES: &[Criterion<Transmittance>] = &[Criterion::each(
+    "tracked transmittances have no bias: |z|",
+    Bound::AtMost(3.23),
+    |row: &Transmittance| (row.error / row.standard_error).abs().into(),
+)
+.among(|row| row.method.starts_with(RATIO))
+.because("the largest of eight is beyond that once in a hundred runs, by Šidák")];
+
+const OF_FALLS: &[Criterion<Fall>] = &[
+    Criterion::each(
+        "the error of marching falls with the step in smooth profiles: exponent",
+        Bound::AtMost(-0.9),
+        |row: &Fall| row.exponent.unwrap_or(f64::NAN).into(),
+    )
+    .among(|row| row.exponent.is_some() && row.profile != THIN)
+    .because("the first order or a higher one; a tenth is for what higher orders change")
+    .in_every_form(),
+    Criterion::each(
+        "the error of marching falls with the step in thin layers: exponent",
+        Bound::AtMost(0.0),
+        |row: &Fall| row.exponent.unwrap_or(f64::NAN).into(),
+    )
+    .among(|row| row.exponent.is_some() && row.profile == THIN)
+    .in_every_form(),
 ];
 
-/// Ways of [`LAYER_EVERY`] since the first layer began.
-fn from_first_layer(t: f64) -> f64 {
-    (t - 0.5 * LAYER_EVERY) / LAYER_EVERY
-}
+const OF_FLIGHTS: &[Criterion<Flight>] = &[Criterion::each(
+    "tracked flights are distributed as they must be: √n times the greatest error",
+    Bound::AtMost(1.92),
+    |row: &Flight| (row.distance * (row.flights as f64).sqrt()).into(),
+)
+.among(|row| row.method.starts_with(DELTA))
+.because("the largest of eight is beyond that once in a hundred runs, by Kolmogorov's distribution")];
 
-/// Distance from the begin of the last layer begun; without end before the first one.
-fn within_layer(t: f64) -> f64 {
-    let from = from_first_layer(t);
-    if from < 0.0 {
-        return f64::INFINITY;
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        // A seed for each, or their noise would be one and the same.
+        let mut seeds = 1..;
+        let mut seed = || seeds.next().unwrap_or_default();
+        let name = |profile: &Profile| profile.name.to_owned();
+        let transmittances = context.each(&PROFILES, name, |profile| {
+            let methods = estimates(profile);
+            let times = times(context, profile, &methods)?;
+            let rows = methods.iter().zip(times).map(|(method, time)| Transmittance {
+                time,
+                ..transmittance_of(context, profile, method, seed())
+            });
+            Ok(rows.collect())
+        })?;
+        let flights = context.each(&PROFILES, name, |profile| {
+            let methods = flights(profile);
+            let times = times(context, profile, &methods)?;
+            let rows = methods.iter().zip(times).map(|(method, time)| Flight {
+                time,
+                ..flight_of(context, profile, method, seed())
+            });
+            Ok(rows.collect())
+        })?;
+        Ok(Self {
+            falls: falls(&transmittances),
+            transmittances,
+            flights,
+        })
     }
-    from.fract() * LAYER_EVERY
-}
 
-/// The extinction along a ray.
-type Extinction<'a> = dyn Fn(f64) -> f64 + 'a;
-/// Draws from [0, 1).
-type Draw<'a> = dyn FnMut() -> f64 + 'a;
-
-/// A way to estimate the transmittance.
-struct Estimate<'a> {
-    name: String,
-    majorant: Option<f64>,
-    run: &'a dyn Fn(&Extinction<'_>, &mut Draw<'_>) -> f64,
-}
-
-fn transmittances(context: &Context<'_>, samples: u32) -> Table {
-    let mut table = Table::new(
-        "Transmittance over a metre",
-        &[
-            "profile",
-            "method",
-            "mean / exact − 1",
-            "its standard error",
-            "relative deviation of one",
-            "look-ups",
-            "ns",
-        ],
-    );
-    for profile in &PROFILES {
-        let exact = (-(profile.depth)(T_MAX)).exp();
-        let mut row = |estimate: &Estimate<'_>| {
-            let looked_up = Cell::new(0_u64);
-            let extinction = |t: f64| {
-                looked_up.set(looked_up.get() + 1);
-                (profile.extinction)(t)
-            };
-            let mut random = Random::new(1);
-            let mut draw = || random.unit();
-            // What draws nothing is the same each time.
-            let count = if estimate.majorant.is_some() { samples } else { 1 };
-            let (mut mean, mut squares) = (0.0, 0.0);
-            for i in 1..=count {
-                let value = (estimate.run)(&extinction, &mut draw) / exact - 1.0;
-                let difference = value - mean;
-                mean += difference / f64::from(i);
-                squares += difference * (value - mean);
-            }
-            let deviation = (squares / f64::from(count.max(2) - 1)).sqrt();
-            let look_ups = looked_up.get() as f64 / f64::from(count);
-            let plain = |t: f64| (profile.extinction)(t);
-            let time = nanoseconds(context.smoke, &[(); 256], |()| (estimate.run)(&plain, &mut draw));
-            table.row([
-                profile.name.into(),
-                estimate.name.as_str().into(),
-                mean.into(),
-                (deviation / f64::from(count).sqrt()).into(),
-                deviation.into(),
-                look_ups.into(),
-                time.into(),
-            ]);
+    fn findings(&self) -> Findings {
+        let tracked = |row: &&Flight| row.profile == WAVES && row.method.starts_with(DELTA);
+        let marched = |row: &&Transmittance| row.method.starts_with("marched") && row.error.abs() > ROUNDING;
+        let marched: Vec<Transmittance> = self.transmittances.iter().filter(marched).cloned().collect();
+        let name = |row: &Transmittance| {
+            let place = row.method.rsplit(", ").next().unwrap_or_default();
+            format!("{}, {place}", row.profile)
         };
-        if profile.name == PROFILES[0].name {
-            row(&Estimate {
-                name: "analytic".into(),
-                majorant: None,
-                run: &|_, _| transmittance(DVec3::splat(EVEN), T_MAX).x,
-            });
-        }
-        for steps in STEPS {
-            for (place, word) in [(1.0, "ends"), (0.5, "middles")] {
-                row(&Estimate {
-                    name: format!("marched, {steps} steps, {word}"),
-                    majorant: None,
-                    run: &|extinction, _| marched_transmittance(extinction, T_MAX, steps, place),
-                });
-            }
-        }
-        for looseness in LOOSENESS {
-            let majorant = looseness * profile.greatest;
-            row(&Estimate {
-                name: format!("ratio tracking, majorant × {looseness}"),
-                majorant: Some(majorant),
-                run: &|extinction, draw| ratio_tracked_transmittance(extinction, majorant, T_MAX, draw),
-            });
-        }
+        Findings::of(&self.transmittances, OF_TRANSMITTANCES)
+            .note(
+                "A marched estimate draws nothing and is made once: its error is all bias. That of tracking is noise, which falls with the root of \
+                 the number of estimates.",
+            )
+            .curves(
+                "marching",
+                "Transmittance by ray marching",
+                Axes::rates("steps", "relative error"),
+                curves(&marched, name, |row| (row.look_ups, row.error.abs().into())),
+            )
+            .and(Findings::of(&self.falls, OF_FALLS))
+            .note(format!(
+                "By {} and {} steps. There is no exponent where the fewer are exact up to the rounding of f64.",
+                STEPS[STEPS.len() - 2],
+                STEPS[STEPS.len() - 1]
+            ))
+            .and(Findings::of(&self.flights, OF_FLIGHTS))
+            .headline(
+                "look-ups of a tracked flight through waves",
+                self.flights.iter().find(tracked).map(|row| row.look_ups.into()),
+            )
+            .note(
+                "The greatest distance between the distribution of flights and the exact one (Kolmogorov and Smirnov), flights without a collision \
+                 included.",
+            )
     }
-    table.note(format!(
-        "Means of {samples} estimates; a marched one draws nothing and is made once. Its error is all bias; that of tracking is noise, \
-         which falls with the root of the number of estimates."
-    ));
-    table
 }
 
-/// Greatest distance between the distribution of what `flight` gives and the profile's; a flight without collision ends at [`T_MAX`].
-fn distance_of_distributions(profile: &Profile, samples: u32, mut flight: impl FnMut() -> Option<f64>) -> f64 {
-    let mut ends: Vec<f64> = (0..samples).filter_map(|_| flight()).collect();
-    ends.sort_by(f64::total_cmp);
-    let n = f64::from(samples);
-    let cumulative = |t: f64| 1.0 - (-(profile.depth)(t)).exp();
-    let at = |(i, t): (usize, &f64)| {
-        let f = cumulative(*t);
-        ((i + 1) as f64 / n - f).abs().max((f - i as f64 / n).abs())
+/// Times of all methods.
+fn times<R>(context: &Context<'_>, profile: &Profile, methods: &[Method<R>]) -> Result<Vec<Repeats>> {
+    let mut random = Random::new(0);
+    let mut draw = || random.unit();
+    let times = context.in_turns(TURNS, methods.len(), |i| {
+        Ok(nanoseconds_once(&[(); RUNS], |()| {
+            (methods[i].run)(&profile.extinction, &mut draw)
+        }))
+    })?;
+    Ok(times.into_iter().map(Repeats).collect())
+}
+
+/// So many values of a method, and how often one looks up the extinction.
+fn values<R>(profile: &Profile, method: &Method<R>, count: u32, seed: u32) -> (Vec<R>, f64) {
+    let looked_up = Cell::new(0_u64);
+    let extinction = |t: f64| {
+        looked_up.set(looked_up.get() + 1);
+        (profile.extinction)(t)
     };
-    let inside = ends.iter().enumerate().map(at).fold(0.0, f64::max);
-    inside.max((ends.len() as f64 / n - cumulative(T_MAX)).abs())
+    let mut random = Random::new(seed);
+    let mut draw = || random.unit();
+    let values = (0..count).map(|_| (method.run)(&extinction, &mut draw)).collect();
+    (values, looked_up.get() as f64 / f64::from(count))
 }
 
-type Flight<'a> = (
-    String,
-    &'a dyn Fn(&dyn Fn(f64) -> f64, &mut dyn FnMut() -> f64) -> Option<f64>,
-);
+fn transmittance_of(context: &Context<'_>, profile: &Profile, method: &Method<f64>, seed: u32) -> Transmittance {
+    // What draws nothing is the same each time.
+    let draws = method.name.starts_with(RATIO);
+    let count = if draws { samples(context) } else { 1 };
+    let exact = (-(profile.depth)(T_MAX)).exp();
+    let (values, look_ups) = values(profile, method, count, seed);
+    let n = f64::from(count);
+    let mean = values.iter().map(|value| value / exact - 1.0).sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value / exact - 1.0 - mean).powi(2)).sum();
+    let deviation = (squares / (n - 1.0).max(1.0)).sqrt();
+    Transmittance {
+        profile: profile.name.into(),
+        method: method.name.clone(),
+        error: mean,
+        standard_error: deviation / n.sqrt(),
+        deviation,
+        estimates: count.into(),
+        look_ups,
+        time: Repeats::default(),
+    }
+}
 
-fn flights(context: &Context<'_>, samples: u32) -> Table {
-    let mut table = Table::new(
-        "Free flight",
-        &[
-            "profile",
-            "method",
-            "greatest error of the probability",
-            "of chance, 1 in 100",
-            "look-ups",
-            "ns",
-        ],
-    );
-    // Kolmogorov's limit: √n times the distance exceeds this once in a hundred.
-    let by_chance = 1.628 / f64::from(samples).sqrt();
-    for profile in &PROFILES {
-        let mut row = |(name, fly): Flight<'_>| {
-            let looked_up = Cell::new(0_u64);
-            let extinction = |t: f64| {
-                looked_up.set(looked_up.get() + 1);
-                (profile.extinction)(t)
-            };
-            let mut random = Random::new(2);
-            let mut draw = || random.unit();
-            let distance = distance_of_distributions(profile, samples, || fly(&extinction, &mut draw));
-            let look_ups = looked_up.get() as f64 / f64::from(samples);
-            let plain = |t: f64| (profile.extinction)(t);
-            let time = nanoseconds(context.smoke, &[(); 256], |()| fly(&plain, &mut draw));
-            table.row([
-                profile.name.into(),
-                name.into(),
-                distance.into(),
-                by_chance.into(),
-                look_ups.into(),
-                time.into(),
-            ]);
+/// Exponents of marched errors by the finest steps.
+fn falls(all: &[Transmittance]) -> Vec<Fall> {
+    let profiles = PROFILES.iter().filter(|profile| profile.name != PROFILES[0].name);
+    let of = |profile: &Profile, place: &str| {
+        let error = |steps: u32| {
+            let method = marched(steps, place);
+            let row = all
+                .iter()
+                .find(|row| row.profile == profile.name && row.method == method);
+            row.map_or(f64::NAN, |row| row.error.abs())
         };
-        if profile.name == PROFILES[0].name {
-            row(("analytic".into(), &|_, draw| {
-                let sigma = DVec3::splat(EVEN);
-                let flight = sample_free_flight(sigma, sigma, DVec3::splat(1.0 / 3.0), T_MAX, [draw(), draw()]);
-                flight.collides.then_some(flight.t)
-            }));
+        let [.., few, many] = STEPS;
+        let fall = (error(many) / error(few)).ln() / f64::from(many / few).ln();
+        Fall {
+            profile: profile.name.into(),
+            place: place.into(),
+            exponent: (error(few) > ROUNDING).then_some(fall),
         }
-        for steps in STEPS {
-            row((format!("marched, steps of 1/{steps} m"), &|extinction, draw| {
-                marched_free_flight(extinction, T_MAX, T_MAX / f64::from(steps), draw)
-            }));
-        }
-        for share in SHARES {
-            row((
-                format!("marched, steps of {share} mean free paths"),
-                &|extinction, draw| adaptively_marched_free_flight(extinction, T_MAX, share, LONGEST, draw),
-            ));
-        }
-        for looseness in LOOSENESS {
-            let majorant = looseness * profile.greatest;
-            row((
-                format!("delta tracking, majorant × {looseness}"),
-                &|extinction, draw| tracked_free_flight(extinction, majorant, T_MAX, draw),
-            ));
-        }
-    }
-    table.note(format!(
-        "The greatest distance between the distribution of {samples} flights and the exact one (Kolmogorov and Smirnov), flights without a \
-         collision included. Without bias one in a hundred exceeds the column beside it."
-    ));
-    table
+    };
+    profiles
+        .flat_map(|profile| PLACES.map(|(_, place)| of(profile, place)))
+        .collect()
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let samples = if context.smoke { 2000 } else { 1_000_000 };
-    Ok(vec![transmittances(context, samples), flights(context, samples)])
+/// How the greatest distance between the distribution of flights and the profile's comes out; a flight without collision ends at [`T_MAX`].
+fn flight_of(context: &Context<'_>, profile: &Profile, method: &Method<Option<f64>>, seed: u32) -> Flight {
+    let (values, look_ups) = values(profile, method, samples(context), seed);
+    let n = values.len() as f64;
+    let mut ends: Vec<f64> = values.iter().copied().flatten().collect();
+    ends.sort_by(f64::total_cmp);
+    let cumulative = |t: f64| 1.0 - (-(profile.depth)(t)).exp();
+    let inside = ends.iter().enumerate().flat_map(|(i, t)| {
+        let f = cumulative(*t);
+        [(i + 1) as f64 / n - f, f - i as f64 / n]
+    });
+    let past = (ends.len() as f64 / n - cumulative(T_MAX)).abs();
+    Flight {
+        profile: profile.name.into(),
+        method: method.name.clone(),
+        distance: greatest(inside.chain([past])),
+        flights: values.len() as u64,
+        look_ups,
+        time: Repeats::default(),
+    }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn depths_are_the_integrals_of_their_extinction() {
-        /// Steps of the midpoint rule; a jump of the extinction costs at most its height times a step.
-        const STEPS: u32 = 100_000;
-        for profile in &PROFILES {
-            for t in [0.0, 0.1, 0.117, 0.2, 0.346, 0.7, T_MAX] {
-                let step = t / f64::from(STEPS);
-                let at = |i: u32| (profile.extinction)((f64::from(i) + 0.5) * step);
-                let integral = (0..STEPS).map(at).sum::<f64>() * step;
-                let exact = (profile.depth)(t);
-                assert!(
-                    (integral - exact).abs() < 1e-8 + 8.0 * step * profile.greatest,
-                    "{}: {t}",
-                    profile.name
-                );
-                assert!((0..STEPS).all(|i| at(i) <= profile.greatest));
-            }
-        }
-    }
+/// Estimates or flights of a method that draws.
+fn samples(context: &Context<'_>) -> u32 {
+    context.pick(1_000_000, 2000)
 }

@@ -2,4 +2,6 @@
 
 pub mod absorption;
 pub mod free_flight;
+mod methods;
 pub mod phase_functions;
+mod profiles;

@@ -14,6 +14,7 @@ use clerestory_hard_cases::chi_square::{chi_square, chi_square_z};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::nanoseconds_once;
+use crate::experiments::measures::errors::{Errors, greatest};
 use crate::random::Random;
 
 /// Nodes and weights of the five-point rule on [-1, 1].
@@ -158,13 +159,13 @@ impl Row {
         let sample = |u| (phase.sample)(parameter, u);
         let cumulative = |c| (phase.cumulative)(c, parameter);
         let mean = over_sphere(|c| c * density(c));
-        let (mut cosines, mut worst) = (0.0, 0.0_f64);
+        let (mut cosines, mut inversion) = (0.0, Errors::default());
         for i in 0..samples {
             let u = (i as f64 + 0.5) / samples as f64;
             let c = sample(u);
             cosines += c;
             let p = cumulative(c);
-            worst = worst.max((p - u).abs().min((1.0 - p - u).abs()));
+            inversion.add((p - u).abs().min((1.0 - p - u).abs()));
         }
         let mut random = Random::new(seed);
         let mut counts = [0.0; CELLS];
@@ -179,11 +180,11 @@ impl Row {
             integral: over_sphere(density) - 1.0,
             mean_cosine: (phase.mean_cosine)(parameter) - mean,
             mean_of_samples: cosines / samples as f64 - mean,
-            inversion: worst,
+            inversion: inversion.worst(),
             chi_square: chi_square.map(|(statistic, degrees)| chi_square_z(statistic, degrees)),
             samples,
             // All are greatest at a pole.
-            peak: TAU * density(1.0).max(density(-1.0)),
+            peak: TAU * greatest([1.0, -1.0].map(density)),
             ..Self::default()
         }
     }

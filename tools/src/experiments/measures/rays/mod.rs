@@ -3,6 +3,8 @@
 pub mod build_stages;
 pub mod persistent_threads;
 pub mod ray_offsets;
+mod sphere_forms;
 pub mod sphere_tests;
 pub mod tree_quality;
+mod triangle_forms;
 pub mod triangle_tests;

@@ -12,11 +12,12 @@ use clerestory::scene::Camera;
 use clerestory::{Result, scene};
 use glam::Vec3;
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::Table;
+use crate::experiments::measures::context::short_name;
 use crate::geometry;
 use crate::random::Random;
-use crate::timing::{median, timed};
+use crate::timing::timed;
 
 /// The trivial scene first.
 const SCENES: [&str; 4] = [
@@ -26,15 +27,12 @@ const SCENES: [&str; 4] = [
     "builtin:box-city?n=25000",
 ];
 
-/// Pixels across and down, repeats, scenes.
-const FULL: (u32, usize, usize) = (384, 15, SCENES.len());
-const SMOKE: (u32, usize, usize) = (24, 1, 1);
+const ONE_THREAD: &str = "ray per thread";
 
 /// One way to deal out rays, ready to run.
 struct Form {
-    name: String,
+    name: &'static str,
     tracer: RayTracer,
-    seconds: Vec<f64>,
 }
 
 fn ray(origin: Vec3, direction: Vec3, t_min: f32) -> Ray {
@@ -63,7 +61,7 @@ fn diffuse_rays(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
     .collect()
 }
 
-/// The forms, those with a queue tuned to the rays.
+/// The forms, one thread a ray first, those with a queue tuned to the rays.
 fn forms(gpu: &Gpu, index: &Bvh2, rays: &[Ray]) -> Result<Vec<Form>> {
     let threads = PersistentThreads::on(gpu.caps());
     let persistent = |subgroups: u32| {
@@ -80,17 +78,13 @@ fn forms(gpu: &Gpu, index: &Bvh2, rays: &[Ray]) -> Result<Vec<Form>> {
     };
     let mut forms = Vec::new();
     for (name, settings) in [
-        ("ray per thread", TraceSettings::ray_per_thread()),
+        (ONE_THREAD, TraceSettings::ray_per_thread()),
         ("queue, batches of a subgroup", persistent(1)),
         ("queue, batches of 4 subgroups", persistent(4)),
     ] {
         let mut tracer = RayTracer::new(gpu, index, &settings)?;
         tracer.tune(rays)?;
-        forms.push(Form {
-            name: name.into(),
-            tracer,
-            seconds: Vec::new(),
-        });
+        forms.push(Form { name, tracer });
     }
     Ok(forms)
 }
@@ -109,81 +103,137 @@ fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), u, v, hit.triangle]
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (side, repeats, scenes) = if context.smoke { SMOKE } else { FULL };
-    let gpu = (context.gpu)()?;
-    let mut table = Table::new(
-        "Rays by one thread each and by persistent threads",
-        &[
-            "scene",
-            "rays",
-            "form",
-            "hits that differ",
-            "M rays/s",
-            "ratio",
-            "nodes a ray",
-            "triangles a ray",
-            "workgroups",
-            "batches",
-            "dispatches",
-            "rays stopped",
-        ],
-    );
-    for address in &SCENES[..scenes] {
-        let scene = scene::load(address)?;
-        let index = Bvh2::build(&geometry::triangles(&scene), &Bvh2Settings::default())?;
-        let primary = primary_rays(scene.require_camera(None)?, side)?;
-        let hits = RayTracer::new(&gpu, &index, &TraceSettings::ray_per_thread())?
-            .trace(&primary)?
-            .hits;
-        let diffuse = diffuse_rays(&primary, &hits);
-        for (kind, rays) in [("primary", &primary), ("diffuse", &diffuse)] {
-            let mut forms = forms(&gpu, &index, rays)?;
-            for _ in 0..repeats {
-                for form in &mut forms {
-                    let (traced, wall) = timed(|| form.tracer.trace(rays));
-                    let traced = traced?;
-                    let on_device = traced.seconds();
-                    form.seconds.push(if on_device > 0.0 { on_device } else { wall });
-                }
-            }
-            let mut first: Option<(Vec<f64>, Vec<Hit>)> = None;
-            for form in &forms {
-                let traced = count(&gpu, &index, rays, form)?;
-                let seconds = median(form.seconds.clone());
-                let (base, expected) = first.get_or_insert_with(|| (form.seconds.clone(), traced.hits.clone()));
-                // Runs of one repeat lie side by side in time, so that other work on the machine slows both.
-                let ratio = median(base.iter().zip(&form.seconds).map(|(a, b)| a / b).collect());
-                let differ = traced.hits.iter().zip(&*expected).filter(|(a, b)| bits(a) != bits(b));
-                let per_ray = |work: u64| work as f64 / rays.len().max(1) as f64;
-                table.row([
-                    (*address).into(),
-                    kind.into(),
-                    form.name.clone().into(),
-                    (differ.count() as u64).into(),
-                    (rays.len() as f64 / seconds * 1e-6).into(),
-                    ratio.into(),
-                    per_ray(traced.work.nodes).into(),
-                    per_ray(traced.work.triangles).into(),
-                    form.tracer
-                        .groups()
-                        .map_or_else(|| "all".into(), |n| n.to_string())
-                        .into(),
-                    traced.batches.into(),
-                    u64::from(traced.dispatches).into(),
-                    traced.unfinished.into(),
-                ]);
-            }
+rows! {
+    /// A form on rays of a kind in a scene.
+    struct Row = "Rays by one thread each and by persistent threads" by [scene, kind, form] {
+        scene: String = "scene",
+        kind: String = "rays",
+        form: String = "form",
+        differ: u64 = "hits that differ",
+        rate: Repeats = "rate (M rays/s)",
+        ratio: Repeats = "rate over one thread a ray's",
+        nodes: f64 = "nodes per ray",
+        triangles: f64 = "triangles per ray",
+        other_work: u64 = "nodes and triangles more or fewer than one thread a ray's",
+        groups: Option<u64> = "workgroups that stay",
+        batches: u64 = "batches",
+        dispatches: u64 = "dispatches",
+        unfinished: u64 = "rays stopped",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each("no hits differ", Bound::AtMost(0.0), |row: &Row| row.differ.into()).in_every_form(),
+    Criterion::each(
+        "the work is equal: nodes and triangles more or fewer",
+        Bound::AtMost(0.0),
+        |row: &Row| row.other_work.into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "a queue's rate is not below that of one thread a ray",
+        Bound::AtLeast(1.0),
+        |row: &Row| (&row.ratio).into(),
+    )
+    .among(Row::has_queue),
+];
+
+impl Row {
+    fn has_queue(&self) -> bool {
+        self.form != ONE_THREAD
+    }
+
+    /// All but scene, kind and times of a form, beside what one thread a ray found.
+    fn of(form: &Form, traced: &Traced, first: &Traced, rays: usize) -> Self {
+        let per_ray = |work: u64| work as f64 / rays.max(1) as f64;
+        let differ = traced.hits.iter().zip(&first.hits).filter(|(a, b)| bits(a) != bits(b));
+        let steps = |traced: &Traced| traced.work.nodes + traced.work.triangles;
+        Self {
+            form: form.name.into(),
+            differ: differ.count() as u64,
+            nodes: per_ray(traced.work.nodes),
+            triangles: per_ray(traced.work.triangles),
+            other_work: steps(traced).abs_diff(steps(first)),
+            groups: form.tracer.groups().map(u64::from),
+            batches: traced.batches,
+            dispatches: traced.dispatches.into(),
+            unfinished: traced.unfinished,
+            ..Self::default()
         }
     }
-    table.note(
-        "Rates by GPU timestamps, median of repeats in turn; the ratio is the median of those to one thread a ray in the same repeat. Workgroups are the fastest power \
-         of two. Rays stopped by their quota go on in another round, which fetches all batches again.",
-    );
-    table.note(
-        "The source's trees by the surface area heuristic gave ratios of 0.89 on its trivial scene and of 2.16, 1.88, 1.90 and 2.38 on four \
-         others.",
-    );
-    Ok(vec![table])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let side = context.pick(384, 24);
+        let gpu = (context.gpu)()?;
+        let name = |address: &&str| short_name(address).to_owned();
+        context.each(context.first(&SCENES, 1), name, |address| {
+            let scene = scene::load(address)?;
+            let index = Bvh2::build(&geometry::triangles(&scene), &Bvh2Settings::default())?;
+            let primary = primary_rays(scene.require_camera(None)?, side)?;
+            let hits = RayTracer::new(&gpu, &index, &TraceSettings::ray_per_thread())?
+                .trace(&primary)?
+                .hits;
+            let diffuse = diffuse_rays(&primary, &hits);
+            let mut rows = Vec::new();
+            for (kind, rays) in [("primary", &primary), ("diffuse", &diffuse)] {
+                let found = of_rays(context, &gpu, &index, rays)?;
+                rows.extend(found.into_iter().map(|row| Row {
+                    scene: short_name(address).into(),
+                    kind: kind.into(),
+                    ..row
+                }));
+            }
+            Ok(rows)
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let queues = self.iter().filter(|row| row.has_queue());
+        Findings::of(self, CRITERIA)
+            .headline(
+                "rate by queues over one thread a ray's, geometric mean",
+                geometric_mean(queues.map(|row| row.ratio.measured())),
+            )
+            .note(
+                "Rates by GPU timestamps, in turns. Workgroups are the fastest power of two. Rays stopped by their quota go on in another round, \
+                 which fetches all batches again.",
+            )
+            .note(
+                "The source's trees by the surface area heuristic gave ratios of 0.89 on its trivial scene and of 2.16, 1.88, 1.90 and 2.38 on \
+                 four others.",
+            )
+            .bars(
+                "ratio",
+                "Rate over that of one thread a ray",
+                self,
+                |row| [format!("{}, {} rays", row.scene, row.kind), row.form.clone()],
+                |row| row.ratio.measured(),
+            )
+    }
+}
+
+/// All forms on some rays.
+fn of_rays(context: &Context<'_>, gpu: &Gpu, index: &Bvh2, rays: &[Ray]) -> Result<Vec<Row>> {
+    let forms = forms(gpu, index, rays)?;
+    let seconds = context.in_turns(15, forms.len(), |i| {
+        let (traced, wall) = timed(|| forms[i].tracer.trace(rays));
+        let on_device = traced?.seconds();
+        Ok(if on_device > 0.0 { on_device } else { wall })
+    })?;
+    let seconds: Vec<Repeats> = seconds.into_iter().map(Repeats).collect();
+    let first = count(gpu, index, rays, &forms[0])?;
+    let of = |(form, time): (&Form, &Repeats)| {
+        let traced = count(gpu, index, rays, form)?;
+        let rate = |seconds: &f64| rays.len() as f64 / seconds * 1e-6;
+        Ok(Row {
+            rate: time.0.iter().map(rate).collect(),
+            ratio: seconds[0].over(time),
+            ..Row::of(form, &traced, &first, rays.len())
+        })
+    };
+    forms.iter().zip(&seconds).map(of).collect()
 }

@@ -9,11 +9,12 @@ use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::{Ray, RayIndex, TraversalCounters};
 use glam::Vec3;
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::seconds;
+use crate::experiments::measures::context::short_name;
 use crate::experiments::measures::photon_maps::photon_scenes::{Intersection, Surfaces};
-use crate::experiments::table::{Cell, Table};
 use crate::random::Random;
+use crate::timing::timed;
 
 /// Scenes with a light.
 const CASES: [(&str, Vec3); 4] = [
@@ -22,13 +23,17 @@ const CASES: [(&str, Vec3); 4] = [
     ("builtin:materials", Vec3::new(-5.0, 7.0, 5.0)),
     ("builtin:triangle-soup?n=250000&size=0.01", Vec3::new(0.0, 3.0, 0.0)),
 ];
-const SMOKE_CASE: (&str, Vec3) = ("builtin:cornell-box", Vec3::new(0.278, 0.54, 0.28));
+const SMOKE_CASES: &[(&str, Vec3)] = &[("builtin:cornell-box", Vec3::new(0.278, 0.54, 0.28))];
 
 /// Bounces of diffuse rays.
 const BOUNCES: usize = 2;
 
-/// Kinds of rays.
-const KINDS: [&str; 3] = ["primary", "diffuse", "shadow"];
+/// Kinds of rays, and whether any hit will do.
+const KINDS: [(&str, bool); 3] = [("primary", false), ("diffuse", false), ("shadow", true)];
+
+const FAST: &str = "linear, fast";
+const REINSERTED: &str = "high and 3 reinsertions";
+const HIGH: &str = "high: treelets of 5, mini trees of 32";
 
 /// What a tree is built by, the one that others are compared with first.
 fn builders() -> Vec<(String, Option<LbvhSettings>)> {
@@ -48,7 +53,7 @@ fn builders() -> Vec<(String, Option<LbvhSettings>)> {
     };
     let mut all = vec![
         ("binned".to_owned(), None),
-        ("linear, fast".to_owned(), Some(fast)),
+        (FAST.to_owned(), Some(fast)),
         ("treelets of 5".to_owned(), of(5, 1, 0, 0)),
         ("treelets of 9, 3 rounds".to_owned(), of(9, 3, 0, 0)),
         ("reinsertion, 3 rounds".to_owned(), of(5, 0, 0, 3)),
@@ -56,10 +61,10 @@ fn builders() -> Vec<(String, Option<LbvhSettings>)> {
     for mini_tree in [8, 32, 128] {
         all.push((format!("mini trees of {mini_tree}"), of(5, 0, mini_tree, 0)));
     }
-    all.push(("high: treelets of 5, mini trees of 32".to_owned(), Some(high)));
+    all.push((HIGH.to_owned(), Some(high)));
     all.push(("high, treelets of 9".to_owned(), of(9, 1, 32, 0)));
     all.push(("high and one reinsertion".to_owned(), of(5, 1, 32, 1)));
-    all.push(("high and 3 reinsertions".to_owned(), of(5, 1, 32, 3)));
+    all.push((REINSERTED.to_owned(), of(5, 1, 32, 3)));
     all
 }
 
@@ -102,90 +107,158 @@ fn rays(surfaces: &Surfaces, light: Vec3, side: u32) -> Result<[Vec<Ray>; 3]> {
 }
 
 /// Nodes and triangles that rays visit.
-fn work(index: &Bvh2, rays: &[Ray], is_shadow: bool) -> [u64; 2] {
+fn work(index: &Bvh2, rays: &[Ray], any_hit: bool) -> TraversalCounters {
     let mut counters = TraversalCounters::default();
     for ray in rays {
-        if is_shadow {
+        if any_hit {
             index.any_hit_filtered(ray, &mut |_, _| true, &mut counters);
         } else {
             index.closest_hit_filtered(ray, &mut |_, _| true, &mut counters);
         }
     }
-    [counters.nodes, counters.triangles]
+    counters
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let side = if context.smoke { 8 } else { 192 };
-    let smoke = [SMOKE_CASE];
-    let cases = if context.smoke { &smoke[..] } else { &CASES[..] };
-    let mut heads: Vec<String> = [
-        "scene",
-        "triangles",
-        "tree",
-        "build (ms)",
-        "build / binned",
-        "SAH cost",
-        "SAH / binned",
-        "depth",
-    ]
-    .map(str::to_owned)
-    .into();
-    for kind in KINDS {
-        heads.push(format!("nodes a {kind} ray"));
-        heads.push(format!("triangles a {kind} ray"));
-        heads.push(format!("steps / binned, {kind}"));
+rows! {
+    /// A tree of a scene.
+    struct Tree = "Trees for rays by what builds them" by [scene, tree] {
+        scene: String = "scene",
+        triangles: u64 = "triangles",
+        tree: String = "tree",
+        build: Repeats = "build (ms)",
+        build_over: Repeats = "build over the binned one's",
+        cost: f64 = "SAH cost",
+        cost_over: f64 = "SAH cost over the binned tree's",
+        depth: u64 = "depth",
     }
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-    let mut table = Table::new("Trees for rays by what builds them", &heads);
-    for (done, (scene, light)) in cases.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        let name = scene.trim_start_matches("builtin:");
-        context.watch.begin(name, done, cases.len());
-        let surfaces = Surfaces::load(scene)?;
-        let rays = rays(&surfaces, *light, side)?;
-        let mut binned: Option<[f64; 5]> = None;
-        for (tree, settings) in builders() {
-            let index = build(&surfaces.triangles, settings.as_ref())?;
-            let time = seconds(context.smoke, || {
-                build(&surfaces.triangles, settings.as_ref()).map(|index| drop(std::hint::black_box(index)))
-            })?;
-            let statistics = index.statistics();
-            let work: [[u64; 2]; 3] = std::array::from_fn(|kind| work(&index, &rays[kind], kind == 2));
-            let each = |kind: usize, count: u64| count as f64 / rays[kind].len().max(1) as f64;
-            let steps = |kind: usize| each(kind, work[kind].iter().sum());
-            let all = [time, statistics.sah_cost, steps(0), steps(1), steps(2)];
-            let first = *binned.get_or_insert(all);
-            let ratio = |i: usize| if first[i] > 0.0 { all[i] / first[i] } else { 1.0 };
-            let mut row: Vec<Cell> = vec![
-                name.into(),
-                statistics.triangles.into(),
-                tree.into(),
-                (1e3 * time).into(),
-                ratio(0).into(),
-                statistics.sah_cost.into(),
-                ratio(1).into(),
-                u64::from(statistics.max_depth).into(),
-            ];
-            for (kind, counts) in work.iter().enumerate() {
-                row.extend(counts.map(|count| Cell::from(each(kind, count))));
-                row.push(ratio(2 + kind).into());
-            }
-            table.row(row);
+}
+
+rows! {
+    /// Rays of a kind in a tree.
+    struct Visits = "What rays visit in them" by [scene, tree, kind] {
+        scene: String = "scene",
+        tree: String = "tree",
+        kind: String = "rays",
+        nodes: f64 = "nodes per ray",
+        triangles: f64 = "triangles per ray",
+        steps_over: f64 = "steps over the binned tree's",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    trees: Vec<Tree>,
+    visits: Vec<Visits>,
+}
+
+const OF_TREES: &[Criterion<Tree>] = &[Criterion::each(
+    "high quality takes less time to build than the binned tree: over it",
+    Bound::AtMost(1.0),
+    |tree: &Tree| (&tree.build_over).into(),
+)
+.among(|tree| tree.tree == HIGH)];
+
+const OF_VISITS: &[Criterion<Visits>] = &[Criterion::each(
+    "steps by high quality are within 5 % of the binned tree's: over it",
+    Bound::AtMost(1.05),
+    |visits: &Visits| visits.steps_over.into(),
+)
+.among(Visits::is_high)];
+
+impl Visits {
+    fn is_high(&self) -> bool {
+        self.tree == HIGH
+    }
+}
+
+/// A number over the first one's; two of nothing are alike.
+fn over(value: f64, first: f64) -> f64 {
+    if value == first { 1.0 } else { value / first }
+}
+
+/// All trees of a scene, with what rays visit in them.
+fn of_scene(context: &Context<'_>, address: &str, light: Vec3) -> Result<(Vec<Tree>, Vec<Visits>)> {
+    let surfaces = Surfaces::load(address)?;
+    let rays = rays(&surfaces, light, context.pick(192, 8))?;
+    let builders = builders();
+    let times = context.in_turns(7, builders.len(), |i| {
+        let build = || build(&surfaces.triangles, builders[i].1.as_ref());
+        let (built, seconds) = timed(|| build().map(|index| drop(std::hint::black_box(index))));
+        built.map(|()| 1e3 * seconds)
+    })?;
+    let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();
+    let (mut trees, mut visits) = (Vec::<Tree>::new(), Vec::<Visits>::new());
+    for ((tree, settings), time) in builders.iter().zip(&times) {
+        let index = build(&surfaces.triangles, settings.as_ref())?;
+        let statistics = index.statistics();
+        let binned = trees.first().map_or(statistics.sah_cost, |tree| tree.cost);
+        trees.push(Tree {
+            scene: short_name(address).into(),
+            triangles: statistics.triangles,
+            tree: tree.clone(),
+            build: time.clone(),
+            build_over: time.over(&times[0]),
+            cost: statistics.sah_cost,
+            cost_over: over(statistics.sah_cost, binned),
+            depth: statistics.max_depth.into(),
+        });
+        for ((kind, any_hit), rays) in KINDS.iter().zip(&rays) {
+            let work = work(&index, rays, *any_hit);
+            let per_ray = |count: u64| count as f64 / rays.len().max(1) as f64;
+            let (nodes, triangles) = (per_ray(work.nodes), per_ray(work.triangles));
+            let binned = visits.iter().find(|of| of.kind == *kind);
+            let binned = binned.map_or(nodes + triangles, |of| of.nodes + of.triangles);
+            visits.push(Visits {
+                scene: short_name(address).into(),
+                tree: tree.clone(),
+                kind: (*kind).into(),
+                nodes,
+                triangles,
+                steps_over: over(nodes + triangles, binned),
+            });
         }
     }
-    table.note(
-        "Steps are nodes and triangles that a ray visits in the kernels' order, exact counts; ratios are to the tree by binned surface area \
-         heuristic. Primary rays go through the pixels of a square picture, diffuse and shadow rays leave where these and the first bounce \
-         end. Build times are medians by wall clock on all of the host's threads, layout for the kernels and all, and move with the load \
-         of the machine.",
-    );
-    table.note(
-        "The surface area cost does not foretell the steps: treelets alone have the lower cost and the more steps where large triangles lie \
-         among small ones. Rebuilding what is above mini trees takes that away in less than the time of a binned build; reinsertion then \
-         goes below the binned tree's steps, for several times its build.",
-    );
-    Ok(vec![table])
+    Ok((trees, visits))
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let cases = context.pick(&CASES[..], SMOKE_CASES);
+        let name = |(address, _): &(&str, Vec3)| short_name(address).to_owned();
+        let mut visits = Vec::new();
+        let trees = context.each(cases, name, |(address, light)| {
+            let (trees, of_scene) = of_scene(context, address, *light)?;
+            visits.extend(of_scene);
+            Ok(trees)
+        })?;
+        Ok(Self { trees, visits })
+    }
+
+    fn findings(&self) -> Findings {
+        let of_plot = |visits: &&Visits| [FAST, HIGH, REINSERTED].contains(&&*visits.tree);
+        let shown: Vec<Visits> = self.visits.iter().filter(of_plot).cloned().collect();
+        Findings::of(&self.trees, OF_TREES)
+            .headline(
+                "steps by high quality over those of the binned tree, the worst kind of rays and scene",
+                largest(&self.visits, Visits::is_high, |visits| visits.steps_over),
+            )
+            .note(
+                "Ratios are to the tree by the binned surface area heuristic, those of times turn by turn. Build times are by wall clock on all of \
+                 the host's threads, with the layout for the kernels.",
+            )
+            .and(Findings::pivoted(&self.visits, "kind", OF_VISITS))
+            .note(
+                "Steps are nodes and triangles that a ray visits in the kernels' order, exact counts. Primary rays go through the pixels of a \
+                 square picture, diffuse and shadow rays leave where these and the first bounce end.",
+            )
+            .note("The surface area cost does not foretell the steps.")
+            .bars(
+                "steps",
+                "Steps over those of the binned tree",
+                &shown,
+                |visits| [format!("{}, {} rays", visits.scene, visits.kind), visits.tree.clone()],
+                |visits| Measured::exact(visits.steps_over),
+            )
+    }
 }

@@ -7,24 +7,212 @@
 use clerestory::film::z_test::{ACCEPTED_FRACTION, SIGNIFICANCE};
 use clerestory::{Error, Result};
 
-use crate::agreement::{AgreementOptions, AgreementReport, BIAS_Z_MAX, PYTHON_VARIABLE, mitsuba_version, run_with};
+use crate::agreement::{
+    AgreementOptions, AgreementReport, BIAS_Z_MAX, EqualError, PYTHON_VARIABLE, Race, SceneAgreement, Uncompared,
+    mitsuba_version, run_with,
+};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
+use crate::experiments::table::Table;
 
 /// How to get what is missing.
 const INSTALL: &str = "To measure: `python3 -m venv ~/mitsuba && ~/mitsuba/bin/pip install mitsuba==3.9.1 numpy`, then \
                        `CLERESTORY_MITSUBA_PYTHON=~/mitsuba/bin/python`; tools/mitsuba/README.md has the details.";
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let options = options(context);
-    match mitsuba_version(&options.python) {
-        Err(cause) => without_mitsuba(cause, std::env::var_os(PYTHON_VARIABLE).is_some()),
-        Ok(version) => {
-            context.watch.note(&format!("Mitsuba {version}"));
-            let report = run_with(&(context.gpu)()?, &options, context.watch)?;
-            Ok(tables(&report))
+/// What would have to be there.
+const MITSUBA: &str = "Mitsuba";
+
+rows! {
+    /// A scene by both renderers.
+    struct Agreement = "Agreement within noise" by [scene] {
+        scene: String = "scene",
+        shows: String = "what it tests",
+        accepted: Option<f64> = "values accepted (%)",
+        worst_z: Option<f64> = "worst z",
+        blocks: Option<f64> = "blocks accepted (%)",
+        bias: Option<f64> = "bias (%)",
+        bias_z: Option<f64> = "bias z",
+        non_finite: u64 = "samples of ours that were not finite",
+        second_looks: u64 = "calls for another look",
+        uncompared: Option<String> = "not compared because",
+    }
+}
+
+rows! {
+    /// A race on a scene.
+    struct Time = "Time to equal error" by [scene] {
+        scene: String = "scene",
+        sampler: String = "our sampler",
+        error: f64 = "relative MSE to reach",
+        ours: f64 = "our time (s)",
+        best: String = "Mitsuba's best",
+        theirs: f64 = "its time (s)",
+        ratio: f64 = "ratio",
+        ratio_error: Option<f64> = "standard error of the ratio",
+        processor: Option<f64> = "ratio of processor time",
+        scalar: f64 = "ratio to its scalar variant",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    /// Why nothing was measured.
+    cause: Option<String>,
+    agreement: Vec<Agreement>,
+    /// How it was compared, in sentences.
+    compared: Vec<String>,
+    times: Vec<Time>,
+    /// How it was timed, and what came of it, in sentences.
+    timed: Vec<String>,
+}
+
+const OF_AGREEMENT: &[Criterion<Agreement>] = &[
+    Criterion::each(
+        "every scene agrees: values accepted (%)",
+        Bound::AtLeast(100.0 * ACCEPTED_FRACTION),
+        |row: &Agreement| row.accepted.unwrap_or(f64::NAN).into(),
+    )
+    .because("what Mitsuba's own render tests ask for")
+    .needs(MITSUBA),
+    Criterion::each(
+        "every sample is finite: those that are not",
+        Bound::AtMost(0.0),
+        |row: &Agreement| row.non_finite.into(),
+    )
+    .needs(MITSUBA),
+    Criterion::all(
+        "scenes do not call for another look: the share of those that do",
+        Bound::AtMost(0.02),
+        |rows: &[&Agreement]| {
+            let calls: u64 = rows.iter().map(|row| row.second_looks).sum();
+            (!rows.is_empty()).then(|| (calls as f64 / rows.len() as f64).into())
+        },
+    )
+    .because("chance has blocks or the bias of one scene in a hundred call, each")
+    .needs(MITSUBA),
+];
+
+const OF_TIMES: &[Criterion<Time>] = &[Criterion::each(
+    "the ratio of times to equal error is above 1, within 2 standard errors",
+    Bound::AtLeast(1.0),
+    Time::ratio,
+)
+.needs(MITSUBA)];
+
+impl Time {
+    /// The ratio with its interval, by its logarithm, as a lead is told.
+    fn ratio(&self) -> Measured {
+        let error = self.ratio_error.unwrap_or(f64::INFINITY);
+        let margin = (EqualError::STANDARD_ERRORS * error / self.ratio).exp();
+        Measured {
+            value: self.ratio,
+            low: self.ratio / margin,
+            high: self.ratio * margin,
         }
+    }
+
+    fn of(scene: &SceneAgreement, race: &Race) -> Self {
+        let best = &race.against_best;
+        let [ours, _] = race.pair(best);
+        Self {
+            scene: scene.name.clone(),
+            sampler: ours.sampler.clone(),
+            error: best.error,
+            ours: best.our_seconds,
+            best: race.their_best(),
+            theirs: best.their_seconds,
+            ratio: best.ratio,
+            ratio_error: finite(best.ratio_error),
+            processor: best.cpu_ratio.and_then(finite),
+            scalar: race.against_scalar.ratio,
+        }
+    }
+}
+
+impl Agreement {
+    fn of(scene: &SceneAgreement) -> Self {
+        Self {
+            scene: scene.name.clone(),
+            shows: scene.shows.clone(),
+            accepted: Some(scene.values.accepted_fraction * 100.0),
+            worst_z: finite(scene.values.worst_z),
+            blocks: Some(scene.blocks.accepted_fraction * 100.0),
+            bias: finite(scene.relative_bias * 100.0),
+            bias_z: finite(scene.values.bias_z),
+            non_finite: scene.non_finite,
+            second_looks: scene.is_suspicious().into(),
+            uncompared: None,
+        }
+    }
+
+    fn not_compared(one: &Uncompared) -> Self {
+        Self {
+            scene: one.name.clone(),
+            uncompared: Some(one.cause.clone()),
+            ..Self::default()
+        }
+    }
+}
+
+impl Found {
+    fn of(report: &AgreementReport) -> Self {
+        let options = &report.options;
+        let compared = format!(
+            "{0} × {0} pixels, {1} samples a pixel on both sides, {2}. Every value is tested at a significance of {SIGNIFICANCE} for the whole \
+             picture. A rejected 8 × 8 block or |bias z| above {BIAS_Z_MAX} calls for another look.",
+            options.size,
+            options.passes * options.samples_per_pass,
+            report.machine.mitsuba,
+        );
+        let times = |scene: &SceneAgreement| scene.race.as_ref().map(|race| Time::of(scene, race));
+        let rows = report.scenes.iter().map(Agreement::of);
+        Self {
+            cause: None,
+            agreement: rows
+                .chain(report.uncompared.iter().map(Agreement::not_compared))
+                .collect(),
+            compared: vec![compared],
+            times: report.scenes.iter().filter_map(times).collect(),
+            timed: [report.race_method()]
+                .into_iter()
+                .chain(report.race_summary())
+                .collect(),
+        }
+    }
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let options = options(context);
+        match mitsuba_version(&options.python) {
+            Err(cause) => without_mitsuba(cause, std::env::var_os(PYTHON_VARIABLE).is_some()),
+            Ok(version) => {
+                context.watch.note(&format!("Mitsuba {version}"));
+                let report = run_with(&(context.gpu)()?, &options, context.watch)?;
+                Ok(Self::of(&report))
+            }
+        }
+    }
+
+    fn findings(&self) -> Findings {
+        let noted =
+            |findings: Findings, notes: &[String]| notes.iter().fold(findings, |all, note| all.note(note.as_str()));
+        let agreement = match &self.cause {
+            Some(cause) => Findings::from(vec![not_measured(cause)]).judged(&self.agreement, OF_AGREEMENT),
+            None => noted(Findings::of(&self.agreement, OF_AGREEMENT), &self.compared),
+        };
+        let times = Findings::of(&self.times, OF_TIMES).headline(
+            "Mitsuba's time to equal error over ours, geometric mean",
+            geometric_mean(self.times.iter().map(Time::ratio)),
+        );
+        agreement.and(noted(times, &self.timed).bars(
+            "ratio",
+            "Mitsuba's time to equal error over ours",
+            &self.times,
+            |row| ["Mitsuba's best over ours".to_owned(), row.scene.clone()],
+            Time::ratio,
+        ))
     }
 }
 
@@ -51,11 +239,14 @@ fn options(context: &Context<'_>) -> AgreementOptions {
 }
 
 /// What follows from a Python without Mitsuba: an error where somebody named that Python.
-fn without_mitsuba(cause: Error, is_named: bool) -> Result<Vec<Table>> {
+fn without_mitsuba(cause: Error, is_named: bool) -> Result<Found> {
     if is_named {
         return Err(cause);
     }
-    Ok(vec![not_measured(&cause.to_string())])
+    Ok(Found {
+        cause: Some(cause.to_string()),
+        ..Found::default()
+    })
 }
 
 fn not_measured(cause: &str) -> Table {
@@ -65,98 +256,16 @@ fn not_measured(cause: &str) -> Table {
     table
 }
 
-fn tables(report: &AgreementReport) -> Vec<Table> {
-    let options = &report.options;
-    let mut agreement = Table::new(
-        "Agreement within noise",
-        &[
-            "scene",
-            "what it tests",
-            "verdict",
-            "values accepted (%)",
-            "worst z",
-            "blocks accepted (%)",
-            "bias (%)",
-            "bias z",
-        ],
-    );
-    for scene in &report.scenes {
-        agreement.row([
-            scene.name.as_str().into(),
-            scene.shows.as_str().into(),
-            scene.verdict().into(),
-            (scene.values.accepted_fraction * 100.0).into(),
-            finite(scene.values.worst_z),
-            (scene.blocks.accepted_fraction * 100.0).into(),
-            finite(scene.relative_bias * 100.0),
-            finite(scene.values.bias_z),
-        ]);
-    }
-    agreement.note(format!(
-        "{0} × {0} pixels, {1} samples a pixel on both sides, {2}. Every value is tested at a significance of {3} for the whole picture; \
-         with {4} % of them accepted a scene agrees. A rejected 8 × 8 block or |bias z| above {BIAS_Z_MAX} calls for another look: chance \
-         does either about once in 100 scenes.",
-        options.size,
-        options.passes * options.samples_per_pass,
-        report.machine.mitsuba,
-        SIGNIFICANCE,
-        ACCEPTED_FRACTION * 100.0,
-    ));
-    for line in report.uncompared_lines() {
-        agreement.note(line);
-    }
-
-    let mut times = Table::new(
-        "Time to equal error",
-        &[
-            "scene",
-            "our sampler",
-            "relative MSE to reach",
-            "our seconds",
-            "Mitsuba's best",
-            "its seconds",
-            "ratio",
-            "standard error of the ratio",
-            "ratio of processor seconds",
-            "ratio to its scalar variant",
-        ],
-    );
-    for scene in &report.scenes {
-        let Some(race) = &scene.race else { continue };
-        let best = &race.against_best;
-        let [ours, _] = race.pair(best);
-        times.row([
-            scene.name.as_str().into(),
-            ours.sampler.as_str().into(),
-            best.error.into(),
-            best.our_seconds.into(),
-            race.their_best().into(),
-            best.their_seconds.into(),
-            best.ratio.into(),
-            finite(best.ratio_error),
-            best.cpu_ratio.map_or("-".into(), finite),
-            race.against_scalar.ratio.into(),
-        ]);
-    }
-    if times.rows.is_empty() {
-        return vec![agreement];
-    }
-    times.note(report.race_method());
-    for line in report.race_summary() {
-        times.note(line);
-    }
-    vec![agreement, times]
-}
-
-/// A number, or a dash for one that is not there.
-fn finite(number: f64) -> Cell {
-    if number.is_finite() { number.into() } else { "-".into() }
+/// A number, if it is one.
+fn finite(number: f64) -> Option<f64> {
+    number.is_finite().then_some(number)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::agreement::made_up;
+    use crate::experiments::findings::Verdict;
     use crate::experiments::watch::Unwatched;
 
     /// What tells how to get Mitsuba.
@@ -177,7 +286,14 @@ mod tests {
     fn a_named_python_without_mitsuba_is_an_error() {
         let cause = || Error::setting("python", "python3", "did not run Mitsuba 3");
         assert!(without_mitsuba(cause(), true).is_err());
-        assert_eq!(without_mitsuba(cause(), false).unwrap().len(), 1);
+        let found = without_mitsuba(cause(), false).unwrap().findings();
+        assert_eq!(found.tables.len(), 1);
+        assert!(
+            found
+                .verdicts
+                .iter()
+                .all(|judged| judged.rows == 0 && judged.found.is_none())
+        );
     }
 
     #[test]
@@ -189,26 +305,37 @@ mod tests {
     #[test]
     fn a_report_becomes_sound_tables() {
         let report = made_up();
-        let tables = tables(&report);
+        let Findings { tables, verdicts, .. } = Found::of(&report).findings();
         let rows: Vec<usize> = tables.iter().map(|table| table.rows.len()).collect();
         // Two scenes, one of them with times.
         assert_eq!(rows, [2, 1]);
         assert!(tables.iter().all(|table| table.fault().is_none()));
         let text: String = tables.iter().map(Table::markdown).collect();
         for part in [
-            "| raced | nothing | agrees | 100.0 |",
-            "with 99.75 % of them accepted",
+            "| raced | nothing | 100.0 |",
             "|bias z| above 4.5",
             "| raced | sobol | 0.5000 | 2.000 | llvm_ad_rgb, independent | 1.000 | 0.5000 | 0.03536 |",
             "slower in 1, undecided",
         ] {
             assert!(text.contains(part), "{part} in {text}");
         }
+        let holds: Vec<bool> = verdicts.iter().map(|judged| judged.verdict == Verdict::Holds).collect();
+        // Faster to equal error is Mitsuba in this race.
+        assert_eq!(holds, [true, true, true, false], "{verdicts:?}");
         let untimed = AgreementReport {
             scenes: report.scenes[1..].to_vec(),
             ..report
         };
-        assert_eq!(super::tables(&untimed).len(), 1);
+        assert_eq!(Found::of(&untimed).findings().tables.len(), 1);
+        let refused = AgreementReport {
+            uncompared: vec![Uncompared {
+                name: "refused".into(),
+                cause: "is not finite".into(),
+            }],
+            ..untimed
+        };
+        let first = &Found::of(&refused).findings().verdicts[0];
+        assert_eq!((first.failing, first.worst.as_str()), (1, "refused"));
     }
 
     #[test]

@@ -6,3 +6,5 @@ pub mod path_sets;
 pub mod picture_formats;
 pub mod sample_sums;
 pub mod scene_profile;
+mod sums;
+mod unseen_features;

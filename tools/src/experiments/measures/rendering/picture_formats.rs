@@ -5,14 +5,14 @@
 use std::path::{Path, PathBuf};
 
 use clerestory::film::{Picture, ToneMap, exr, hdr, png};
-use clerestory::srgb::linear_from_srgb;
+use clerestory::srgb::{linear_from_srgb, srgb_from_linear};
 use clerestory::{Error, Result};
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::seconds;
-use crate::experiments::measures::errors::Errors;
-use crate::experiments::table::Table;
+use crate::experiments::measures::errors::{Errors, greatest};
 use crate::random::Random;
+use crate::timing::timed;
 
 /// Radiances of a rendered look: large smooth parts, noise of a few per cent and highlights far above one.
 fn picture(size: u32) -> Result<Picture> {
@@ -64,94 +64,166 @@ fn read_values(picture: Picture) -> Result<Vec<f64>> {
     Ok(picture.main_layer()?.values().iter().map(|v| f64::from(*v)).collect())
 }
 
-type Write = fn(&Path, &Picture) -> Result<()>;
-type Read = fn(&Path) -> Result<Vec<f64>>;
+/// A format with its functions.
+struct Format {
+    name: &'static str,
+    ending: &'static str,
+    write: fn(&Path, &Picture) -> Result<()>,
+    read: fn(&Path) -> Result<Vec<f64>>,
+}
 
-const FORMATS: [(&str, &str, Write, Read); 3] = [
-    (
-        "OpenEXR, f32",
-        "exr",
-        |path, picture| exr::write(path, picture),
-        |path| read_values(exr::read(path)?),
-    ),
-    (
-        "Radiance HDR",
-        "hdr",
-        |path, picture| hdr::write(path, picture),
-        |path| read_values(hdr::read(path)?),
-    ),
-    (
-        "PNG, 8 bits, sRGB",
-        "png",
-        |path, picture| {
+const EXR: &str = "OpenEXR, f32";
+const HDR: &str = "Radiance HDR";
+const PNG: &str = "PNG, 8 bits, sRGB";
+
+const FORMATS: [Format; 3] = [
+    Format {
+        name: EXR,
+        ending: "exr",
+        write: |path, picture| exr::write(path, picture),
+        read: |path| read_values(exr::read(path)?),
+    },
+    Format {
+        name: HDR,
+        ending: "hdr",
+        write: |path, picture| hdr::write(path, picture),
+        read: |path| read_values(hdr::read(path)?),
+    },
+    Format {
+        name: PNG,
+        ending: "png",
+        write: |path, picture| {
             let shown = png::tone_mapped(picture.main_layer()?, picture.width(), &ToneMap::default());
             png::write(path, &shown)
         },
-        read_png,
-    ),
+        read: read_png,
+    },
 ];
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let size = if context.smoke { 32 } else { 1024 };
-    let picture = picture(size)?;
-    let values: Vec<f64> = read_values(picture.clone())?;
-    let largest: Vec<f64> = values
-        .chunks(3)
-        .map(|pixel| pixel.iter().copied().fold(0.0, f64::max))
-        .collect();
-    let megabytes = values.len() as f64 * 4e-6;
-    let folder = Folder::new()?;
-    let mut table = Table::new(
-        format!("Radiance of {size} × {size} pixels, written and read back"),
-        &[
-            "format",
-            "values changed",
-            "worst error over the pixel's largest channel",
-            "worst relative error up to 1",
-            "values above 1.01 that were cut",
-            "bytes a pixel",
-            "MB/s written",
-            "MB/s read",
-        ],
-    );
-    for (name, ending, write, read) in FORMATS {
-        let path = folder.0.join(format!("picture.{ending}"));
-        let writing = seconds(context.smoke, || write(&path, &picture))?;
-        let mut back = Vec::new();
-        let reading = seconds(context.smoke, || {
-            back = read(&path)?;
-            Ok::<(), Error>(())
-        })?;
-        let bytes = std::fs::metadata(&path).map_err(|error| Error::io(&path, error))?.len();
-        let (mut of_pixel, mut shown) = (Errors::default(), Errors::default());
-        let (mut changed, mut cut) = (0_u64, 0_u64);
-        for (i, (before, after)) in values.iter().zip(&back).enumerate() {
-            changed += u64::from(before != after);
-            cut += u64::from(*before > 1.01 && *after <= 1.0);
-            of_pixel.add((after - before) / largest[i / 3]);
-            if *before <= 1.0 {
-                shown.add((after - before) / before);
+/// A value that lies this far above 1 is cut where 1 comes back.
+const CUT: f64 = 1.01;
+
+rows! {
+    /// A format.
+    struct Row = "Radiance, written and read back" by [format] {
+        format: String = "format",
+        pixels: u64 = "pixels",
+        changed: u64 = "values changed",
+        of_pixel: f64 = "worst error over the pixel's largest channel",
+        relative: f64 = "worst relative error up to 1",
+        encoded: f64 = "worst error of the sRGB value up to 1 (1/255)",
+        cut: u64 = "values above 1.01 that were cut",
+        bytes: f64 = "bytes per pixel",
+        written: Repeats = "written (MB/s)",
+        read: Repeats = "read (MB/s)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "OpenEXR loses nothing: values changed",
+        Bound::AtMost(0.0),
+        |row: &Row| row.changed.into(),
+    )
+    .among(|row| row.format == EXR)
+    .in_every_form(),
+    Criterion::each(
+        "Radiance HDR loses what 8 bits do, of the pixel's largest channel",
+        Bound::AtMost(1.0 / 128.0),
+        |row: &Row| row.of_pixel.into(),
+    )
+    .among(|row| row.format == HDR)
+    .because("a step of 8 bits, which are cut, of which the largest channel fills half at least: what `clerestory::film::hdr` states")
+    .in_every_form(),
+    Criterion::each(
+        "PNG loses what 8 bits do, of sRGB values up to 1 in 1/255",
+        Bound::AtMost(0.501),
+        |row: &Row| row.encoded.into(),
+    )
+    .among(|row| row.format == PNG)
+    .because("half a step, and roundings of f32")
+    .in_every_form(),
+];
+
+impl Row {
+    /// All but times: what came back of a picture's values.
+    fn of(format: &Format, values: &[f64], back: &[f64], bytes: u64) -> Self {
+        let (mut of_pixel, mut relative, mut encoded) = (Errors::default(), Errors::default(), Errors::default());
+        let (mut changed, mut cut) = (values.len().abs_diff(back.len()) as u64, 0);
+        for (pixel, after) in values.chunks(3).zip(back.chunks(3)) {
+            let largest = greatest(pixel.iter().copied());
+            for (before, after) in pixel.iter().zip(after) {
+                changed += u64::from(before != after);
+                cut += u64::from(*before > CUT && *after <= 1.0);
+                of_pixel.add((after - before) / largest);
+                if *before <= 1.0 {
+                    relative.add((after - before) / before);
+                    encoded.add(255.0 * (srgb_from_linear(*after) - srgb_from_linear(*before)));
+                }
             }
         }
-        if back.len() != values.len() {
+        if values.len() != back.len() {
             of_pixel.add(f64::INFINITY);
         }
-        table.row([
-            name.into(),
-            changed.into(),
-            of_pixel.worst().into(),
-            shown.worst().into(),
-            cut.into(),
-            (bytes as f64 / f64::from(size * size)).into(),
-            (megabytes / writing).into(),
-            (megabytes / reading).into(),
-        ]);
+        let pixels = values.len() / 3;
+        Self {
+            format: format.name.into(),
+            pixels: pixels as u64,
+            changed,
+            of_pixel: of_pixel.worst(),
+            relative: relative.worst(),
+            encoded: encoded.worst(),
+            cut,
+            bytes: bytes as f64 / pixels as f64,
+            ..Self::default()
+        }
     }
-    table.note(format!(
-        "{} values; rates over their {megabytes:.1} MB of f32, files in the system's temporary folder. PNG is written with the curve that shows \
-         [0, 1] exactly.",
-        values.len()
-    ));
-    Ok(vec![table])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let picture = picture(context.pick(1024, 32))?;
+        let values: Vec<f64> = read_values(picture.clone())?;
+        let folder = Folder::new()?;
+        let paths = FORMATS.map(|format| folder.0.join("picture").with_extension(format.ending));
+        // Of f32, a value.
+        let megabytes = values.len() as f64 * 4e-6;
+        let rate = |(result, seconds): (Result<()>, f64)| result.map(|()| megabytes / seconds);
+        let written = context.in_turns(9, FORMATS.len(), |i| {
+            rate(timed(|| (FORMATS[i].write)(&paths[i], &picture)))
+        })?;
+        let mut back = FORMATS.map(|_| Vec::new());
+        let read = context.in_turns(9, FORMATS.len(), |i| {
+            rate(timed(|| {
+                back[i] = (FORMATS[i].read)(&paths[i])?;
+                Ok(())
+            }))
+        })?;
+        let mut rows = Vec::new();
+        for (i, (written, read)) in written.into_iter().zip(read).enumerate() {
+            let bytes = std::fs::metadata(&paths[i])
+                .map_err(|error| Error::io(&paths[i], error))?
+                .len();
+            rows.push(Row {
+                written: Repeats(written),
+                read: Repeats(read),
+                ..Row::of(&FORMATS[i], &values, &back[i], bytes)
+            });
+        }
+        Ok(rows)
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "bytes per pixel of OpenEXR",
+                self.iter().find(|row| row.format == EXR).map(|row| row.bytes.into()),
+            )
+            .note(
+                "Rates are over the values in f32, in turns, files in the system's temporary folder. PNG is written with the curve that shows \
+                 [0, 1] exactly.",
+            )
+    }
 }

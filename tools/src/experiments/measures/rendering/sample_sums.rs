@@ -3,148 +3,162 @@
 //! Oracle: the same samples added in numbers of 106 bits.
 
 use clerestory::Result;
-use clerestory::film::Accumulator;
-use clerestory::film::accumulate::{TwoFloat, two_float_add};
 
+use super::sums::{
+    CASES, EQUAL, Form, KURTOSIS, OF_VARIANCE, PAIRS, SUMS, VARIANCES, exact_sum, exact_variance, samples,
+};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::experiments::measures::wide::Wide;
-use crate::experiments::table::Table;
-use crate::random::Random;
 
-fn plain(samples: &[f32]) -> f64 {
-    samples.iter().fold(0.0_f32, |sum, x| sum + x).into()
-}
-
-/// W. Kahan, "Further Remarks on Reducing Truncation Errors", 1965.
-fn kahan(samples: &[f32]) -> f64 {
-    let (mut sum, mut lost) = (0.0_f32, 0.0_f32);
-    for x in samples {
-        let y = x - lost;
-        let t = sum + y;
-        lost = (t - sum) - y;
-        sum = t;
+rows! {
+    /// A form on samples.
+    struct Sum = "Sums" by [samples, count, form] {
+        samples: String = "samples",
+        count: u64 = "count",
+        form: String = "sum",
+        error: f64 = "relative error",
+        of_noise: Option<f64> = "error over the samples' noise",
+        bytes: u64 = "bytes",
+        time: Repeats = "an addition (ns)",
     }
-    sum.into()
 }
 
-fn pairs(samples: &[f32]) -> f64 {
-    samples
-        .iter()
-        .fold(TwoFloat::ZERO, |sum, x| two_float_add(sum, *x))
-        .to_f64()
-}
-
-fn double(samples: &[f32]) -> f64 {
-    samples.iter().map(|x| f64::from(*x)).sum()
-}
-
-/// Variance of the samples from f32 sums of themselves and of their squares.
-fn plain_variance(samples: &[f32]) -> f64 {
-    let (mut sum, mut squares) = (0.0_f32, 0.0_f32);
-    for x in samples {
-        sum += x;
-        squares += x * x;
+rows! {
+    /// A form on samples.
+    struct Variance = "Variances of samples" by [samples, count, form] {
+        samples: String = "samples",
+        count: u64 = "count",
+        form: String = "sums",
+        error: f64 = "relative error",
+        of_noise: f64 = "error over the samples' noise",
+        bytes: u64 = "bytes",
+        time: Repeats = "a sample (ns)",
     }
-    let n = samples.len() as f64;
-    (f64::from(squares) - f64::from(sum).powi(2) / n) / (n - 1.0)
 }
 
-fn pair_variance(samples: &[f32]) -> f64 {
-    let mut sums = Accumulator::default();
-    samples.iter().for_each(|x| sums.add(*x));
-    sums.variance()
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    sums: Vec<Sum>,
+    variances: Vec<Variance>,
 }
 
-fn exact_sum(samples: &[f32]) -> Wide {
-    samples
-        .iter()
-        .fold(Wide::ZERO, |sum, x| sum + Wide::from(f64::from(*x)))
+/// Errors over the noise that are far below it.
+const FAR_BELOW: Bound = Bound::AtMost(0.01);
+const HUNDREDTH: &str = "far is a hundredth";
+
+const OF_SUMS: &[Criterion<Sum>] = &[
+    Criterion::each(
+        "the error of a sum is far below the noise of the samples: over it",
+        FAR_BELOW,
+        |row: &Sum| row.of_noise.unwrap_or(f64::NAN).into(),
+    )
+    .among(|row| row.form == PAIRS && row.of_noise.is_some())
+    .because(HUNDREDTH)
+    .in_every_form(),
+    Criterion::each("a sum has few bytes", Bound::AtMost(8.0), |row: &Sum| row.bytes.into())
+        .among(Sum::is_the_engines)
+        .because("as many as f64")
+        .in_every_form(),
+];
+
+const OF_VARIANCES: &[Criterion<Variance>] = &[Criterion::each(
+    "the error of a variance is far below the noise of the samples: over it",
+    FAR_BELOW,
+    |row: &Variance| row.of_noise.into(),
+)
+.among(|row| row.form == PAIRS)
+.because(HUNDREDTH)
+.in_every_form()];
+
+impl Sum {
+    fn is_the_engines(&self) -> bool {
+        self.form == PAIRS
+    }
 }
 
-fn exact_variance(samples: &[f32]) -> f64 {
-    let n = Wide::from(samples.len() as f64);
-    let mean = exact_sum(samples) / n;
-    let squares = samples.iter().fold(Wide::ZERO, |sum, x| {
-        let rest = Wide::from(f64::from(*x)) - mean;
-        sum + rest * rest
-    });
-    (squares / (n - Wide::from(1.0))).round()
-}
-
-fn samples(case: &str, count: usize) -> Vec<f32> {
-    let mut random = Random::new(8);
-    let mut draw = |i: usize| match case {
-        "equal, 0.1" => 0.1,
-        "uniform" => random.unit(),
-        "heavy tail" => random.magnitude(1e-6, 1e6),
-        "mean 1000 times the deviation" => 1000.0 + random.range(-1.0, 1.0) * 3_f64.sqrt(),
-        // Large ones that cancel, small ones that count.
-        _ => [1e6, random.unit(), -1e6, random.unit()][i % 4],
-    };
-    (0..count).map(|i| draw(i) as f32).collect()
-}
-
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let counts: &[usize] = if context.smoke { &[1000] } else { &[1 << 20, 10_000_000] };
-    let mut sums = Table::new(
-        "Sums",
-        &["samples", "count", "sum", "relative error", "bytes", "ns an addition"],
-    );
-    let mut variances = Table::new(
-        "Variances of samples",
-        &["samples", "count", "sums", "relative error", "bytes", "ns a sample"],
-    );
-    type Function = fn(&[f32]) -> f64;
-    let forms: [(&str, Function, u64); 4] = [
-        ("f32", plain, 4),
-        ("f32, Kahan", kahan, 8),
-        ("pairs of f32 (engine)", pairs, 8),
-        ("f64", double, 8),
-    ];
-    let variance_forms: [(&str, Function, u64); 2] =
-        [("f32", plain_variance, 8), ("pairs of f32 (engine)", pair_variance, 16)];
-    for case in [
-        "equal, 0.1",
-        "uniform",
-        "heavy tail",
-        "mean 1000 times the deviation",
-        "cancelling",
-    ] {
-        for &count in counts {
-            let samples = samples(case, count);
-            let time = |function: Function| {
-                nanoseconds(context.smoke, std::slice::from_ref(&samples), |all| function(all)) / count as f64
-            };
-            let exact = exact_sum(&samples);
-            for (form, function, bytes) in forms {
-                let error = (Wide::from(function(&samples)) - exact) / exact;
-                sums.row([
-                    case.into(),
-                    (count as u64).into(),
-                    form.into(),
-                    error.round().into(),
-                    bytes.into(),
-                    time(function).into(),
-                ]);
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let counts = context.pick(&[1 << 20, 10_000_000][..], &[1000]);
+        let cases: Vec<(&str, usize)> = CASES
+            .iter()
+            .flat_map(|case| counts.iter().map(|count| (*case, *count)))
+            .collect();
+        let name = |(case, count): &(&str, usize)| format!("{case}, {count}");
+        let mut variances = Vec::new();
+        let sums = context.each(&cases, name, |(case, count)| {
+            let samples = samples(case, *count);
+            let variance = exact_variance(&samples);
+            if OF_VARIANCE.contains(case) {
+                variances.extend(variances_of(context, case, &samples, variance)?);
             }
-            if case == "uniform" || case.starts_with("mean") {
-                let exact = exact_variance(&samples);
-                for (form, function, bytes) in variance_forms {
-                    variances.row([
-                        case.into(),
-                        (count as u64).into(),
-                        form.into(),
-                        (function(&samples) / exact - 1.0).into(),
-                        bytes.into(),
-                        time(function).into(),
-                    ]);
-                }
-            }
+            sums_of(context, case, &samples, variance)
+        })?;
+        Ok(Self { sums, variances })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(&self.sums, OF_SUMS)
+            .headline(
+                "the worst relative error of a sum in pairs of f32",
+                largest(&self.sums, Sum::is_the_engines, |row| row.error.abs()),
+            )
+            .note(
+                "Against sums of 106 bits; the noise is the standard deviation of the sum of so many samples, where they differ. One thread of \
+                 the processor, one sum after the other. Bytes: one sum's.",
+            )
+            .and(Findings::of(&self.variances, OF_VARIANCES))
+            .note(
+                "From the sum and the sum of squares, finished in f64; against two passes in 106 bits. The noise is that of the variance of so \
+                 many uniform numbers.",
+            )
+    }
+}
+
+/// Times of forms, ns a sample.
+fn times(context: &Context<'_>, forms: &[Form], samples: &[f32]) -> Result<Vec<Repeats>> {
+    let times = context.in_turns(9, forms.len(), |i| {
+        let all = nanoseconds_once(&[samples], |samples| (forms[i].1)(samples));
+        Ok(all / samples.len() as f64)
+    })?;
+    Ok(times.into_iter().map(Repeats).collect())
+}
+
+fn sums_of(context: &Context<'_>, case: &str, samples: &[f32], variance: f64) -> Result<Vec<Sum>> {
+    let exact = exact_sum(samples);
+    let noise = (variance * samples.len() as f64).sqrt();
+    let times = times(context, &SUMS, samples)?;
+    let of = |((form, function, bytes), time): (Form, Repeats)| {
+        let error = Wide::from(function(samples)) - exact;
+        Sum {
+            samples: case.into(),
+            count: samples.len() as u64,
+            form: form.into(),
+            error: (error / exact).round(),
+            of_noise: (case != EQUAL).then(|| error.round().abs() / noise),
+            bytes,
+            time,
         }
-    }
-    sums.note("Against sums of 106 bits; one thread of the processor, one sum after the other. Bytes: one sum's.");
-    variances.note("From the sum and the sum of squares, finished in f64; against two passes in 106 bits.");
-    Ok(vec![sums, variances])
+    };
+    Ok(SUMS.into_iter().zip(times).map(of).collect())
+}
+
+fn variances_of(context: &Context<'_>, case: &str, samples: &[f32], exact: f64) -> Result<Vec<Variance>> {
+    let noise = ((KURTOSIS - 1.0) / samples.len() as f64).sqrt();
+    let times = times(context, &VARIANCES, samples)?;
+    let of = |((form, function, bytes), time): (Form, Repeats)| {
+        let error = function(samples) / exact - 1.0;
+        Variance {
+            samples: case.into(),
+            count: samples.len() as u64,
+            form: form.into(),
+            error,
+            of_noise: error.abs() / noise,
+            bytes,
+            time,
+        }
+    };
+    Ok(VARIANCES.into_iter().zip(times).map(of).collect())
 }

@@ -5,106 +5,14 @@
 use clerestory::Result;
 use clerestory::gpu::Category;
 use clerestory::render::Renderer;
-use clerestory::scene::{ConductorIor, Filter, Image as Texels, Material, Scene, Texture, Wrap};
+use clerestory::scene::Scene;
 use clerestory::{gpu::Gpu, scene};
-use clerestory_hard_cases::scenes::point_triangle;
-use glam::{Vec2, Vec3, Vec4};
 
+use super::unseen_features::{CHANGES, Change, FULL};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::context::short_name;
 use crate::experiments::measures::pictures::Image;
-use crate::experiments::table::Table;
-
-/// Adds a triangle without area, which no ray meets; its material counts all the same.
-fn add_unseen(scene: &mut Scene, material: Material, full: bool) {
-    let place = scene.meshes.first().and_then(|mesh| mesh.positions.first()).copied();
-    point_triangle(scene, material, place.unwrap_or_default());
-    if let Some(mesh) = scene.meshes.last_mut().filter(|_| full) {
-        mesh.normals = vec![Vec3::Y; 3];
-        mesh.tangents = vec![Vec4::X; 3];
-        mesh.uv0 = vec![Vec2::ZERO; 3];
-        mesh.colors = vec![Vec4::ONE; 3];
-    }
-}
-
-fn texture(scene: &mut Scene) -> Texture {
-    let image = scene.add_image(Texels {
-        name: "grey".into(),
-        width: 2,
-        height: 2,
-        texels: vec![[128, 128, 255, 255]; 4],
-    });
-    Texture {
-        image,
-        uv_set: 0,
-        wrap: [Wrap::Repeat; 2],
-        filter: Filter::Linear,
-        transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-    }
-}
-
-type Change = fn(&mut Scene);
-
-const CHANGES: [(&str, Change); 6] = [
-    ("as it is", |_| {}),
-    ("metal unseen", |scene| {
-        let metal = Material::mirror("metal", Vec3::ONE);
-        add_unseen(
-            scene,
-            Material {
-                roughness: 0.5,
-                ..metal
-            },
-            false,
-        );
-    }),
-    ("glass unseen", |scene| {
-        add_unseen(
-            scene,
-            Material {
-                attenuation_color: Vec3::splat(0.5),
-                attenuation_distance: 1.0,
-                ..Material::glass("glass", 1.5)
-            },
-            false,
-        );
-    }),
-    ("texture unseen", |scene| {
-        let texture = texture(scene);
-        let mut material = Material::lambert("textured", Vec3::ONE);
-        material.base_color_texture = Some(texture);
-        add_unseen(scene, material, true);
-    }),
-    ("vertex attributes unseen", |scene| {
-        add_unseen(scene, Material::lambert("plain", Vec3::ONE), true);
-    }),
-    ("everything unseen", |scene| {
-        let texture = texture(scene);
-        let material = Material {
-            base_color_texture: Some(texture),
-            normal_texture: Some(texture),
-            metallic: 0.5,
-            roughness: 0.5,
-            transmission: 0.5,
-            thickness: 0.1,
-            attenuation_color: Vec3::splat(0.5),
-            attenuation_distance: 1.0,
-            conductor: Some(ConductorIor {
-                eta: Vec3::splat(0.2),
-                k: Vec3::splat(3.0),
-            }),
-            ..Material::default()
-        };
-        add_unseen(scene, material, true);
-        add_unseen(
-            scene,
-            Material {
-                unlit: true,
-                ..Material::default()
-            },
-            false,
-        );
-    }),
-];
 
 /// Device bytes of a scene alone: geometry, materials with textures and tables, lights.
 fn bytes(gpu: &Gpu, scene: &Scene) -> Result<[u64; 3]> {
@@ -129,58 +37,160 @@ fn features(image: &Image) -> u64 {
     compiled.count() as u64
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (size, spp) = if context.smoke { (8, 4) } else { (64, 64) };
-    let changes = if context.smoke { &CHANGES[..2] } else { &CHANGES[..] };
-    let gpu = (context.gpu)()?;
-    let mut table = Table::new(
-        "One picture, kernels made for the scene and for more",
-        &[
-            "scene",
-            "compiled for",
-            "values that differ",
-            "features in the shading kernel",
-            "kernels",
-            "passes of the picture",
-            "geometry bytes",
-            "material bytes",
-            "light bytes",
-            "million rays/s",
-            "GPU seconds",
-        ],
-    );
-    for address in ["builtin:cornell-box", "builtin:white-furnace?frequency=4&roughness=0.4"] {
-        let lean = scene::load(address)?;
-        let mut first: Option<Vec<u32>> = None;
-        for (what, change) in changes {
+rows! {
+    /// A scene with kernels and buffers for more than it uses.
+    struct Row = "One picture, kernels made for the scene and for more" by [scene, change] {
+        scene: String = "scene",
+        change: String = "compiled for",
+        differ: u64 = "values that differ",
+        features: u64 = "features in the shading kernel",
+        kernels: u64 = "kernels",
+        passes: u64 = "passes of the picture",
+        more_passes: f64 = "passes more than the scene's own",
+        geometry: u64 = "geometry (bytes)",
+        material: u64 = "materials (bytes)",
+        light: u64 = "lights (bytes)",
+        more_bytes: f64 = "bytes more than the scene's own",
+        rays: u64 = "rays",
+        time: Repeats = "GPU time (s)",
+        time_over: Repeats = "GPU time over the scene's own",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "pictures are equal bit by bit: values that differ",
+        Bound::AtMost(0.0),
+        |row: &Row| row.differ.into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "what a scene does not ask for never saves passes: those more than its own",
+        Bound::AtLeast(0.0),
+        |row: &Row| row.more_passes.into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "what a scene does not ask for never saves bytes: those more than its own",
+        Bound::AtLeast(0.0),
+        |row: &Row| row.more_bytes.into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "everything unseen has more passes, or more bytes",
+        Bound::AtLeast(1.0),
+        |row: &Row| (row.more_passes + row.more_bytes).into(),
+    )
+    .among(Row::is_full)
+    .in_every_form(),
+    Criterion::each(
+        "everything unseen takes more time: over the scene's own",
+        Bound::AtLeast(1.0),
+        |row: &Row| (&row.time_over).into(),
+    )
+    .among(Row::is_full),
+];
+
+impl Row {
+    fn is_full(&self) -> bool {
+        self.change == FULL
+    }
+
+    fn bytes(&self) -> u64 {
+        self.geometry + self.material + self.light
+    }
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let changes = context.pick(CHANGES.to_vec(), vec![CHANGES[0], CHANGES[CHANGES.len() - 1]]);
+        let gpu = (context.gpu)()?;
+        let scenes = ["builtin:cornell-box", "builtin:white-furnace?frequency=4&roughness=0.4"];
+        let name = |address: &&str| short_name(address).to_owned();
+        context.each(&scenes, name, |address| of_scene(context, &gpu, address, &changes))
+    }
+
+    fn findings(&self) -> Findings {
+        let full = self.iter().filter(|row| row.is_full());
+        Findings::of(self, CRITERIA)
+            .headline(
+                "GPU time with everything unseen over the scene's own, geometric mean",
+                geometric_mean(full.map(|row| row.time_over.measured())),
+            )
+            .note(
+                "Unseen: on a triangle without area, so that the kernels and buffers hold the feature and no ray meets it. In turns, each time \
+                 after a sample that compiles the kernels.",
+            )
+            .bars(
+                "time",
+                "GPU time over that of kernels made for the scene",
+                self,
+                |row| [row.scene.clone(), row.change.clone()],
+                |row| row.time_over.measured(),
+            )
+    }
+}
+
+/// Values and variances of a picture, as bits.
+fn bits(image: &Image) -> Vec<u32> {
+    let values = image.radiance.iter().chain(&image.variance);
+    values.map(|v| v.to_bits()).collect()
+}
+
+/// All changes of a scene.
+fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str, changes: &[Change]) -> Result<Vec<Row>> {
+    let (size, spp) = context.pick((64, 64), (8, 4));
+    let lean = scene::load(address)?;
+    let scenes: Vec<Scene> = changes
+        .iter()
+        .map(|(_, change)| {
             let mut scene = lean.clone();
             change(&mut scene);
-            let held = bytes(&gpu, &scene)?;
-            let image = Image::render(&Renderer::new(&gpu, &scene)?, size, spp, 5, "all")?;
-            let values = image.radiance.iter().chain(&image.variance);
-            let bits: Vec<u32> = values.map(|v| v.to_bits()).collect();
-            let reference = first.get_or_insert_with(|| bits.clone());
-            let different = bits.iter().zip(reference.iter()).filter(|(a, b)| a != b).count();
-            let passes: u64 = image.report.passes.iter().map(|pass| pass.count).sum();
-            let seconds = image.report.gpu_seconds;
-            let mut cells = vec![
-                address.trim_start_matches("builtin:").into(),
-                (*what).into(),
-                (different as u64).into(),
-                features(&image).into(),
-                (image.report.pipelines.len() as u64).into(),
-                passes.into(),
-            ];
-            cells.extend(held.map(Into::into));
-            let rate = image.count("rays") as f64 * 1e-6 / seconds.max(1e-9);
-            cells.extend([rate.into(), seconds.into()]);
-            table.row(cells);
-        }
+            scene
+        })
+        .collect();
+    let mut rows = Vec::new();
+    // Before there is any other on the device, which might share some.
+    for ((what, _), scene) in changes.iter().zip(&scenes) {
+        let [geometry, material, light] = bytes(gpu, scene)?;
+        rows.push(Row {
+            scene: short_name(address).into(),
+            change: (*what).into(),
+            geometry,
+            material,
+            light,
+            ..Row::default()
+        });
     }
-    table.note(format!(
-        "{size} × {size} pixels, {spp} samples each, after one that compiles the kernels. Unseen: on a triangle without area, so that the \
-         kernels and buffers hold the feature and no ray meets it."
-    ));
-    Ok(vec![table])
+    let renderers: Result<Vec<Renderer>> = scenes.iter().map(|scene| Renderer::new(gpu, scene)).collect();
+    let renderers = renderers?;
+    let mut images: Vec<Option<Image>> = changes.iter().map(|_| None).collect();
+    let seconds = context.in_turns(5, changes.len(), |i| {
+        let image = Image::render(&renderers[i], size, spp, 5, "all")?;
+        let seconds = image.report.gpu_seconds;
+        // The same in each turn.
+        images[i] = Some(image);
+        Ok(seconds)
+    })?;
+    let seconds: Vec<Repeats> = seconds.into_iter().map(Repeats).collect();
+    let images: Vec<Image> = images.into_iter().flatten().collect();
+    let first = bits(&images[0]);
+    for ((row, image), time) in rows.iter_mut().zip(&images).zip(&seconds) {
+        row.differ = bits(image).iter().zip(&first).filter(|(a, b)| a != b).count() as u64;
+        row.features = features(image);
+        row.kernels = image.report.pipelines.len() as u64;
+        row.passes = image.report.passes.iter().map(|pass| pass.count).sum();
+        row.rays = image.count("rays");
+        row.time = time.clone();
+        row.time_over = time.over(&seconds[0]);
+    }
+    let own = rows[0].clone();
+    let more = |value: u64, own: u64| value as f64 - own as f64;
+    for row in &mut rows {
+        row.more_passes = more(row.passes, own.passes);
+        row.more_bytes = more(row.bytes(), own.bytes());
+    }
+    Ok(rows)
 }

@@ -18,6 +18,7 @@ use super::energy::{
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::nanoseconds_once;
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -124,7 +125,7 @@ impl Row {
 
     /// Of the albedo from 1, at the cosine where it is greatest.
     fn difference(&self) -> f64 {
-        (1.0 - self.least).max(self.greatest - 1.0)
+        greatest([1.0 - self.least, self.greatest - 1.0])
     }
 
     /// All but times.
@@ -133,24 +134,24 @@ impl Row {
         let surely = albedos
             .iter()
             .map(|(albedo, _)| albedo.value - ERRORS_OF_42 * albedo.error);
-        let surely = surely.fold(f64::NEG_INFINITY, f64::max);
+        let surely = greatest(surely);
         albedos.sort_by(|a, b| a.0.value.total_cmp(&b.0.value));
-        let [least, .., greatest] = albedos;
-        let reciprocity = directions.iter().fold(0.0_f64, |worst, [a, b]| {
+        let [least, .., most] = albedos;
+        let differences = directions.iter().map(|[a, b]| {
             let (there, back) = (value(form, surface, *a, *b), value(form, surface, *b, *a));
-            worst.max((there - back).abs() / there.abs().max(back.abs()).max(f64::MIN_POSITIVE))
+            (there - back).abs() / there.abs().max(back.abs()).max(f64::MIN_POSITIVE)
         });
         Self {
             form: name.into(),
             roughness,
             least: least.0.value,
             least_at: least.1,
-            greatest: greatest.0.value,
-            error: greatest.0.error,
+            greatest: most.0.value,
+            error: most.0.error,
             surely,
-            greatest_at: greatest.1,
+            greatest_at: most.1,
             samples: samples.into(),
-            reciprocity,
+            reciprocity: greatest(differences),
             pairs: directions.len() as u64,
             ..Self::default()
         }

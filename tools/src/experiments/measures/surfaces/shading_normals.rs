@@ -15,6 +15,7 @@ use super::energy::{WHITE, context as bsdf, direction, numbers};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::nanoseconds_once;
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 
 /// A frame about a normal.
@@ -168,17 +169,17 @@ impl Row {
     fn of((name, adapted): (&str, bool), tilt: f64, directions: &[DVec3], samples: u32, time: Vec<f64>) -> Self {
         let ns = tilted(tilt);
         let all: Vec<Seen> = directions.iter().map(|wo| seen(ns, *wo, adapted, samples)).collect();
-        let greatest = |value: fn(&Seen) -> f64| all.iter().map(value).fold(0.0, f64::max);
+        let of_all = |value: fn(&Seen) -> f64| greatest(all.iter().map(value));
         let black = all.iter().filter(|seen| seen.reflected + seen.through == 0.0).count();
         let beams = directions.iter().map(|wi| beam(ns, *wi, adapted, samples));
         Self {
             normal: name.into(),
             tilt,
-            greatest: greatest(|seen| seen.reflected),
+            greatest: of_all(|seen| seen.reflected),
             mean: all.iter().map(|seen| seen.reflected).sum::<f64>() / all.len() as f64,
             black: black as f64 / all.len() as f64,
-            through: greatest(|seen| seen.through),
-            scattered_up: beams.fold(0.0, f64::max),
+            through: of_all(|seen| seen.through),
+            scattered_up: greatest(beams),
             views: all.len() as u64,
             samples: samples.into(),
             time: Repeats(time),
