@@ -128,13 +128,13 @@ measures! {
     on_host rows "coupled-reflection" surfaces::coupled_reflection;
     on_device tables "device-model" device::device_model;
     on_host tables "free-flight" media::free_flight;
-    on_device tables "kd-caches" kd::kd_caches.of_any_scenes();
+    on_device rows "kd-caches" kd::kd_caches.of_any_scenes();
     on_device tables "kd-heuristics" kd::kd_heuristics.of_any_scenes();
     on_device tables "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
     on_host tables "kd-probability" kd::kd_probability;
     on_device tables "kd-rays" kd::kd_rays.of_any_scenes();
     on_device tables "kd-threads" kd::kd_threads.of_any_scenes();
-    on_device tables "kd-traversal" kd::kd_traversal.of_any_scenes();
+    on_device rows "kd-traversal" kd::kd_traversal.of_any_scenes();
     on_host tables "leaf-sizes" photon_maps::leaf_sizes;
     on_device tables "live-map-pictures" preview::live_map_pictures;
     on_device tables "live-maps" preview::live_maps.of_any_scenes();

@@ -1,6 +1,7 @@
 //! kd-trees: probabilities of their nodes, what the heuristics and the traversals cost rays, whether all find the same hits, and where they
 //! beat bounding volumes.
 
+mod cache_ranking;
 pub mod flights;
 mod hit_errors;
 pub mod kd_caches;
@@ -11,7 +12,9 @@ pub mod kd_rays;
 pub mod kd_threads;
 pub mod kd_traversal;
 mod ray_kinds;
+mod published;
 mod real_models;
+mod restarts;
 
 #[cfg(test)]
 mod tests {
