@@ -55,7 +55,7 @@ const CRITERIA: &[Criterion<Row>] = &[
     )
     .among(|row| row.published().is_some() && row.on_hardware)
     .needs("a device with a scheduler of its own")
-    .because("about 2 is 1.5 to 2.5 by rounding, and the source's four ratios about 2 lie within a fifth of it"),
+    .because("about, for a ratio: within a factor of 1.5 either way"),
 ];
 
 impl Row {
