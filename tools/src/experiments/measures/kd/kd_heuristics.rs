@@ -4,52 +4,17 @@
 //! weigh triangles by their boxes; ours do also by what of them lies in a node.
 
 use clerestory::Result;
-use clerestory::accel::kd::{Heuristic, KdCaches, KdCounters, KdSettings, KdTree, Scheme};
+use clerestory::accel::kd::{Heuristic, KdCaches, KdCounters, KdTree, Scheme};
 use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::{Ray, RayIndex};
 
 use super::flights::{Flight, TURNS, cases, changes, each_flight, fly, outside, race, trace};
-use super::published::{Changes, TREES, Trees, of_source};
+use super::heuristic_trees::{FORMS, Grown, NEAREST, OF_TREES, grow, published, published_changes};
+use super::published::{Changes, Trees};
 use crate::experiments::findings::{
     Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows,
 };
 use crate::experiments::measures::Context;
-use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
-use crate::timing::timed;
-
-/// Heuristics, the one that others are compared with first.
-const HEURISTICS: [Heuristic; 3] = [Heuristic::SurfaceArea, Heuristic::Regions, Heuristic::InteriorOrigin];
-/// Triangles up to which trees are built by 26 regions, which takes twenty times as long as the others.
-const MANY_TRIANGLES: usize = 100_000;
-
-/// How triangles are weighed, and how many a node may hold to be a leaf whatever it costs.
-struct Form {
-    words: &'static str,
-    clip: bool,
-    leaf_size: u32,
-}
-
-const FORMS: [Form; 3] = [
-    Form {
-        words: "boxes, leaves of 4",
-        clip: false,
-        leaf_size: 4,
-    },
-    Form {
-        words: "boxes, leaves of 1",
-        clip: false,
-        leaf_size: 1,
-    },
-    Form {
-        words: "parts in a node, leaves of 4",
-        clip: true,
-        leaf_size: 4,
-    },
-];
-/// The form whose numbers of nodes are nearest to the source's.
-const NEAREST: &str = FORMS[1].words;
-/// The form that the source does not have.
-const OURS_ALONE: &str = FORMS[2].words;
 
 rows! {
     /// What rays visit of a tree.
@@ -72,26 +37,6 @@ rows! {
     beside "source: triangle tests per ray by surface area" = |row| row.published().map(|trees| trees.tests).into();
     beside "source: change of tests (%)" = |row| row.changes().map(|changes| changes.tests).into();
     beside "source: speed, change (%)" = |row| row.changes().map(|changes| changes.speed).into();
-}
-
-rows! {
-    /// A tree.
-    struct Grown = "Trees by heuristic" by [scene, form, heuristic] {
-        scene: String = "scene",
-        counterpart: String = "counterpart",
-        triangles: u64 = "triangles",
-        form: String = "weighed by",
-        heuristic: String = "heuristic",
-        build: Repeats = "build (ms)",
-        build_change: Repeats = "build, change (%)",
-        nodes: u64 = "inner nodes",
-        nodes_change: f64 = "change of nodes (%)",
-        references: u64 = "references",
-        depth: u64 = "depth",
-        longest_leaf: u64 = "longest leaf",
-    }
-    beside "source: inner nodes by surface area" = |row| published(&row.counterpart, &row.form).map(|trees| trees.nodes).into();
-    beside "source: change of nodes (%)" = |row| row.changes().and_then(|changes| changes.nodes).into();
 }
 
 rows! {
@@ -124,29 +69,6 @@ const OF_VISITS: &[Criterion<Visits>] = &[Criterion::all(
 )
 .among(Visits::is_judged)];
 
-const OF_TREES: &[Criterion<Grown>] = &[Criterion::each(
-    "trees by SIROH have the size of those by surface area: change of inner nodes (%)",
-    Bound::Between(-2.0, 2.0),
-    |tree: &Grown| tree.nodes_change.into(),
-)
-.among(|tree| tree.form == NEAREST && tree.heuristic == Heuristic::InteriorOrigin.name())
-.because("the source's are −1.0 to 1.5")];
-
-/// The source's boxes stand beside ours alone.
-fn published(counterpart: &str, form: &str) -> Option<&'static Trees> {
-    of_source(&TREES, counterpart).filter(|_| form != OURS_ALONE)
-}
-
-fn published_changes(counterpart: &str, form: &str, heuristic: &str) -> Option<&'static Changes> {
-    let trees = published(counterpart, form)?;
-    let changes = [
-        (Heuristic::Regions, &trees.regions),
-        (Heuristic::InteriorOrigin, &trees.siroh),
-    ];
-    let known = changes.into_iter().find(|(of, _)| of.name() == heuristic);
-    known.map(|(_, changes)| changes)
-}
-
 impl Visits {
     fn published(&self) -> Option<&'static Trees> {
         published(&self.counterpart, &self.form)
@@ -161,45 +83,9 @@ impl Visits {
     }
 }
 
-impl Grown {
-    fn changes(&self) -> Option<&'static Changes> {
-        published_changes(&self.counterpart, &self.form, &self.heuristic)
-    }
-}
-
 /// Exact work of rays on the host, by a stack.
 fn work(tree: &KdTree, rays: [&[Ray]; 2]) -> Result<KdCounters> {
     Ok(trace(tree, Scheme::Stack, KdCaches::default(), rays)?.1)
-}
-
-/// Trees by heuristic with the times of their builds, milliseconds.
-fn grow(context: &Context<'_>, surfaces: &Surfaces, form: &Form) -> Result<Vec<(Heuristic, KdTree, Repeats)>> {
-    let is_large = surfaces.triangles.len() > MANY_TRIANGLES;
-    let wanted = HEURISTICS.into_iter().filter(|h| *h != Heuristic::Regions || !is_large);
-    let wanted: Vec<Heuristic> = wanted.collect();
-    let mut trees: Vec<Option<KdTree>> = wanted.iter().map(|_| None).collect();
-    let times = context.in_turns(TURNS, wanted.len(), |i| {
-        let settings = KdSettings {
-            heuristic: wanted[i],
-            clip: form.clip,
-            leaf_size: form.leaf_size,
-            ..KdSettings::default()
-        };
-        let (tree, time) = timed(|| KdTree::build(&surfaces.triangles, &settings));
-        trees[i] = Some(tree?);
-        Ok(1e3 * time)
-    })?;
-    let trees = trees.into_iter().flatten();
-    let grown = wanted.into_iter().zip(trees).zip(times);
-    Ok(grown
-        .map(|((heuristic, tree), times)| (heuristic, tree, Repeats(times)))
-        .collect())
-}
-
-/// Inner nodes of a tree.
-fn inner_nodes(tree: &KdTree) -> u64 {
-    let statistics = tree.statistics();
-    statistics.nodes - statistics.leaves
 }
 
 impl Study for Found {
@@ -213,17 +99,16 @@ impl Study for Found {
                 let grown = grow(context, surfaces, form)?;
                 let contenders = grown
                     .iter()
-                    .map(|(_, tree, _)| (tree as &dyn RayIndex, TraceSettings::ray_per_thread()));
+                    .map(|one| (&one.tree as &dyn RayIndex, TraceSettings::ray_per_thread()));
                 let raced = race(context, &gpu, flight, TURNS, contenders)?;
-                let of = |(_, tree, _): &(Heuristic, KdTree, Repeats)| work(tree, [&closest, &flight.shadow]);
-                let works = grown.iter().map(of).collect::<Result<Vec<_>>>()?;
-                let (_, first_tree, first_build) = &grown[0];
-                for (((heuristic, tree, build), work), timed) in grown.iter().zip(&works).zip(&raced) {
+                let works = grown.iter().map(|one| work(&one.tree, [&closest, &flight.shadow]));
+                let works = works.collect::<Result<Vec<_>>>()?;
+                for ((one, work), timed) in grown.iter().zip(&works).zip(&raced) {
                     visits.push(Visits {
                         scene: case.name().into(),
                         counterpart: case.counterpart.into(),
                         form: form.words.into(),
-                        heuristic: heuristic.name().into(),
+                        heuristic: one.heuristic.name().into(),
                         rays: flight.rays() as u64,
                         nodes: flight.per_ray(work.nodes),
                         nodes_change: change(work.nodes as f64, works[0].nodes as f64),
@@ -233,23 +118,10 @@ impl Study for Found {
                         rate: timed.rates[2].clone(),
                         speed: changes(&timed.rates[2], &raced[0].rates[2]),
                     });
-                    trees.push(Grown {
-                        scene: case.name().into(),
-                        counterpart: case.counterpart.into(),
-                        triangles: tree.statistics().triangles,
-                        form: form.words.into(),
-                        heuristic: heuristic.name().into(),
-                        build: build.clone(),
-                        build_change: changes(build, first_build),
-                        nodes: inner_nodes(tree),
-                        nodes_change: change(inner_nodes(tree) as f64, inner_nodes(first_tree) as f64),
-                        references: tree.references().len() as u64,
-                        depth: tree.statistics().max_depth.into(),
-                        longest_leaf: tree.longest_leaf().into(),
-                    });
+                    trees.push(Grown::of(case, form, one, &grown[0]));
                 }
                 if form.words == NEAREST {
-                    let pair = [first_tree, &grown[grown.len() - 1].1];
+                    let pair = [&grown[0].tree, &grown[grown.len() - 1].tree];
                     let lit_from_outside = fly(context, case, surfaces, outside(surfaces))?;
                     for (light, flight) in [("inside", flight), ("outside", &lit_from_outside)] {
                         lights.push(shadows(case.name(), light, pair, flight)?);
@@ -284,10 +156,10 @@ impl Study for Found {
                  leaves; its numbers of nodes are nearer to those of trees that split such nodes too, so both stand here.",
             )
             .and(Findings::of(&self.trees, OF_TREES))
-            .note(format!(
+            .note(
                 "Build times by wall clock on all of the host's threads, layout for the kernels and all, in turns. Trees by 26 regions are not \
-                 built above {MANY_TRIANGLES} triangles: they take twenty times as long as the others."
-            ))
+                 built above 100,000 triangles: they take twenty times as long as the others.",
+            )
             .and(Findings::of(&self.lights, &[]))
             .note(
                 "Trees over boxes with leaves of 1. SIROH takes origins to lie among the surfaces. The source found frames with a light inside \

@@ -3,6 +3,7 @@
 
 mod cache_ranking;
 pub mod flights;
+mod heuristic_trees;
 mod hit_errors;
 pub mod kd_caches;
 pub mod kd_heuristics;
