@@ -16,6 +16,7 @@ mod ray_kinds;
 mod published;
 mod real_models;
 mod restarts;
+mod tree_kinds;
 
 #[cfg(test)]
 mod tests {
