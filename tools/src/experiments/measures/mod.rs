@@ -132,7 +132,7 @@ measures! {
     on_device rows "kd-heuristics" kd::kd_heuristics.of_any_scenes();
     on_device rows "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
     on_host rows "kd-probability" kd::kd_probability;
-    on_device tables "kd-rays" kd::kd_rays.of_any_scenes();
+    on_device rows "kd-rays" kd::kd_rays.of_any_scenes();
     on_device rows "kd-threads" kd::kd_threads.of_any_scenes();
     on_device rows "kd-traversal" kd::kd_traversal.of_any_scenes();
     on_host tables "leaf-sizes" photon_maps::leaf_sizes;
