@@ -15,6 +15,7 @@ pub mod kd_traversal;
 mod kd_variants;
 mod named_nodes;
 mod published;
+mod ray_checks;
 mod ray_kinds;
 mod real_models;
 mod restarts;
