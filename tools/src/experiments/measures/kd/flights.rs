@@ -13,15 +13,16 @@ use clerestory::accel::kd::{KdCaches, KdCounters, KdSettings, KdTraversal, KdTre
 use clerestory::accel::trace::{Query, RayTracer, TraceSettings};
 use clerestory::accel::{Aabb, Hit, Ray, RayIndex};
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::{Category, Gpu, TexelView};
+use clerestory::gpu::{Category, DeviceKind, Gpu, TexelView};
 use clerestory::scene::Camera;
 use clerestory::{Error, Result, scene};
 use glam::{DAffine3, DQuat, Vec3};
 
+use crate::experiments::findings::{Repeats, change};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
 use crate::geometry;
-use crate::timing::{median, timed};
+use crate::timing::timed;
 
 /// A scene with a light, and what it stands for in the source's tables.
 #[derive(Clone)]
@@ -87,9 +88,9 @@ impl Case {
     }
 }
 
-/// The scenes that a run looks at: those that it was told, or the source's, of a quick look the first alone.
+/// The scenes that a run looks at: those that it was told, or the source's, in a smoke run the first alone.
 pub fn cases(context: &Context<'_>) -> Vec<Case> {
-    told(context).unwrap_or_else(|| if context.smoke { &CASES[..1] } else { &CASES[..] }.to_vec())
+    told(context).unwrap_or_else(|| context.first(&CASES, 1).to_vec())
 }
 
 /// The scenes that a run was told to look at.
@@ -98,25 +99,26 @@ pub fn told(context: &Context<'_>) -> Option<Vec<Case>> {
     (!context.scenes.is_empty()).then(|| told.collect())
 }
 
-/// Loads each scene, flies through it, and measures that, until it is stopped.
+/// Loads each scene and flies through it: rows of all, until it is stopped.
 ///
 /// # Errors
-/// Those of scenes, and the measure's first.
-pub fn each_flight(
+/// Those of scenes, and the first of `rows`.
+pub fn each_flight<R>(
     context: &Context<'_>,
     cases: &[Case],
-    mut measure: impl FnMut(&Case, &Surfaces, &Flight) -> Result<()>,
-) -> Result<()> {
-    for (done, case) in cases.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, cases.len());
+    mut rows: impl FnMut(&Case, &Surfaces, &Flight) -> Result<Vec<R>>,
+) -> Result<Vec<R>> {
+    let name = |case: &Case| case.name().to_owned();
+    context.each(cases, name, |case| {
         let surfaces = Surfaces::load(&case.scene)?;
         let flight = fly(context, case, &surfaces, case.light(&surfaces))?;
-        measure(case, &surfaces, &flight)?;
-    }
-    Ok(())
+        rows(case, &surfaces, &flight)
+    })
+}
+
+/// Whether the device is one of its own: then times say what its memories and its scheduler gain, and its divisions need not be exact.
+pub fn on_hardware(gpu: &Gpu) -> bool {
+    gpu.caps().kind != DeviceKind::Cpu
 }
 
 /// The rays of a flight.
@@ -134,6 +136,11 @@ impl Flight {
     /// All rays.
     pub fn rays(&self) -> usize {
         self.camera.len() + self.reflection.len() + self.shadow.len()
+    }
+
+    /// A count of all rays, per ray.
+    pub fn per_ray(&self, count: u64) -> f64 {
+        count as f64 / self.rays().max(1) as f64
     }
 
     /// Those that ask for the closest hit.
@@ -185,12 +192,12 @@ fn around(camera: &Camera, surfaces: &Surfaces, count: u32) -> Vec<Camera> {
     (0..count).map(frame).collect()
 }
 
-/// The rays of a flight with the light in this place: 10 frames of 96 × 96 pixels, 2 of 8 × 8 in a quick look.
+/// The rays of a flight with the light in this place: 10 frames of 96 × 96 pixels, 2 of 8 × 8 in a smoke run.
 ///
 /// # Errors
 /// Those of scenes, and [`Error::Setting`] for one without a camera.
 pub fn fly(context: &Context<'_>, case: &Case, surfaces: &Surfaces, light: Vec3) -> Result<Flight> {
-    let (count, side) = if context.smoke { (2, 8) } else { (10, 96) };
+    let (count, side) = context.pick((10, 96), (2, 8));
     let scene = scene::load(&case.scene)?;
     let mut flight = Flight::default();
     let cameras = match &scene.cameras[..] {
@@ -287,38 +294,28 @@ pub fn different_of_both(hits: &[Vec<Hit>; 2], expected: &[Vec<Hit>; 2]) -> u64 
     pairs.map(|(hits, expected)| different(hits, expected)).sum()
 }
 
-/// What a value changes in the first, in per cent; nothing where that is nothing.
-pub fn change(value: f64, first: f64) -> f64 {
-    if first > 0.0 {
-        100.0 * (value / first - 1.0)
-    } else {
-        0.0
-    }
+/// What rates change in the first's, in per cent, turn by turn.
+pub fn changes(rates: &Repeats, first: &Repeats) -> Repeats {
+    let ratios = rates.over(first).0;
+    ratios.into_iter().map(|ratio| change(ratio, 1.0)).collect()
 }
 
-/// Traces of a race: 5 after one to warm up, a single one in a quick look.
-const REPEATS: usize = 5;
-const SMOKE_REPEATS: usize = 1;
+/// Turns of a race.
+pub const TURNS: usize = 5;
 
 /// What a race found of one index.
 pub struct Raced {
-    /// Millions of rays a second, medians: closest hits, any hits, both together.
-    pub rates: [f64; 3],
-    /// What the last of the timed runs found, closest hits and any hits.
+    /// Millions of rays a second: closest hits, any hits, both together.
+    pub rates: [Repeats; 3],
+    /// What the last of the timed turns found, closest hits and any hits.
     pub hits: [Vec<Hit>; 2],
 }
 
-/// Lets the device trace the same rays in several indexes in turns, with settings but for the query.
-///
-/// # Errors
-/// Those of uploads and of submissions.
-pub fn race<'a>(
-    context: &Context<'_>,
+/// Tracers of closest and of any hits with these settings but for the query; an index that takes part with several is on the device once.
+fn tracers<'a>(
     gpu: &Gpu,
-    flight: &Flight,
     indexes: impl IntoIterator<Item = (&'a dyn RayIndex, TraceSettings)>,
-) -> Result<Vec<Raced>> {
-    // An index that takes part with several settings is on the device once.
+) -> Result<Vec<[RayTracer; 2]>> {
     let mut uploaded: Vec<(&dyn RayIndex, TexelView)> = Vec::new();
     let mut tracers = Vec::new();
     for (index, settings) in indexes {
@@ -339,29 +336,41 @@ pub fn race<'a>(
         };
         tracers.push([of(Query::Closest)?, of(Query::Any)?]);
     }
-    let mut seconds = vec![[Vec::new(), Vec::new()]; tracers.len()];
+    Ok(tracers)
+}
+
+/// Lets the device trace the same rays in several indexes in so many turns, with settings but for the query.
+///
+/// # Errors
+/// Those of uploads and of submissions.
+pub fn race<'a>(
+    context: &Context<'_>,
+    gpu: &Gpu,
+    flight: &Flight,
+    turns: usize,
+    indexes: impl IntoIterator<Item = (&'a dyn RayIndex, TraceSettings)>,
+) -> Result<Vec<Raced>> {
+    let tracers = tracers(gpu, indexes)?;
     let mut hits = vec![[Vec::new(), Vec::new()]; tracers.len()];
     let rays = [&flight.closest(), &flight.shadow];
-    for repeat in 0..=if context.smoke { SMOKE_REPEATS } else { REPEATS } {
-        for (tracer, one) in tracers.iter().enumerate() {
-            for query in 0..one.len() {
-                let (traced, wall) = timed(|| one[query].trace(rays[query]));
-                let traced = traced?;
-                let on_device = traced.seconds();
-                if repeat > 0 {
-                    seconds[tracer][query].push(if on_device > 0.0 { on_device } else { wall });
-                    hits[tracer][query] = traced.hits;
-                }
-            }
+    let seconds = context.in_turns(turns, tracers.len(), |contender| {
+        let mut seconds = [0.0; 2];
+        for (query, rays) in rays.into_iter().enumerate() {
+            let (traced, wall) = timed(|| tracers[contender][query].trace(rays));
+            let traced = traced?;
+            let on_device = traced.seconds();
+            seconds[query] = if on_device > 0.0 { on_device } else { wall };
+            hits[contender][query] = traced.hits;
         }
-    }
+        Ok(seconds)
+    })?;
     let [closest, any] = rays.map(|rays| 1e-6 * rays.len() as f64);
-    let raced = seconds.into_iter().zip(hits).map(|(both, hits)| {
-        let [of_closest, of_any] = both.map(median);
+    let raced = seconds.into_iter().zip(hits).map(|(turns, hits)| {
+        let rate = |of: &dyn Fn([f64; 2]) -> f64| -> Repeats { turns.iter().copied().map(of).collect() };
         let rates = [
-            closest / of_closest,
-            any / of_any,
-            (closest + any) / (of_closest + of_any),
+            rate(&|[of_closest, _]| closest / of_closest),
+            rate(&|[_, of_any]| any / of_any),
+            rate(&|[of_closest, of_any]| (closest + any) / (of_closest + of_any)),
         ];
         Raced { rates, hits }
     });

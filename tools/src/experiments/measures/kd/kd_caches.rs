@@ -5,12 +5,20 @@
 
 use clerestory::Result;
 use clerestory::accel::RayIndex;
-use clerestory::accel::kd::{KdCaches, KdCounters, Scheme};
+use clerestory::accel::kd::{KdCaches, KdCounters, KdTree, Scheme};
 use clerestory::accel::trace::TraceSettings;
+use clerestory::gpu::Gpu;
 
-use super::flights::{SOURCE_LEAVES, cases, change, different_of_both, each_flight, race, source_tree, trace};
+use super::cache_ranking::{OF_ORDERS, orders};
+use super::flights::{
+    Case, Flight, SOURCE_LEAVES, TURNS, cases, changes, different_of_both, each_flight, on_hardware, race, source_tree,
+    trace,
+};
+use super::published::{CACHES, Caches, of_source};
+use crate::experiments::findings::{
+    Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows,
+};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
 
 /// The forms of [`KdCaches::COMPARED`].
 pub(super) const NAMES: [&str; 7] = [
@@ -22,156 +30,202 @@ pub(super) const NAMES: [&str; 7] = [
     "nodes with boxes, entries as bytes",
     "nodes, a leaf that waits",
 ];
+/// The best of the source's.
+const BEST: &str = NAMES[4];
+/// Leaves of the trees whose numbers of nodes are nearest to the source's.
+const NEAREST_LEAVES: u64 = 1;
 
-/// What the source says of a scene without caches, a ray: inner nodes fetched, entries of the stack accessed, bytes; and what the six
-/// other forms change in these and in frames a second, in per cent.
-struct Published {
-    counterpart: &'static str,
-    none: [f64; 3],
-    nodes: [f64; 6],
-    entries: [f64; 6],
-    bytes: [f64; 6],
-    speed: [f64; 6],
+rows! {
+    /// A form of caches in a tree over a scene.
+    struct Row = "Caches of a kd-tree in persistent threads" by [scene, leaf_size, caches] {
+        scene: String = "scene",
+        counterpart: String = "counterpart",
+        leaf_size: u64 = "leaves of",
+        caches: String = "caches",
+        different: u64 = "hits of the host that differ",
+        timed_different: u64 = "hits of the kernels that differ",
+        nodes: f64 = "inner nodes per ray from memory",
+        nodes_change: f64 = "change of nodes (%)",
+        entries: f64 = "entries per ray written to and read from memory",
+        entries_change: f64 = "change of entries (%)",
+        bytes: f64 = "bytes per ray",
+        bytes_change: f64 = "change of bytes (%)",
+        all_nodes: f64 = "inner nodes per ray in all",
+        rate: Repeats = "M rays/s",
+        speed: Repeats = "speed, change (%)",
+        on_hardware: bool = "on a device of its own",
+    }
+    beside "source without caches: inner nodes per ray" = |row| row.without(0).into();
+    beside "source without caches: entries per ray" = |row| row.without(1).into();
+    beside "source without caches: bytes per ray" = |row| row.without(2).into();
+    beside "source: change of nodes (%)" = |row| row.of_source(|caches| &caches.nodes).into();
+    beside "source: change of entries (%)" = |row| row.of_source(|caches| &caches.entries).into();
+    beside "source: change of bytes (%)" = |row| row.of_source(|caches| &caches.bytes).into();
+    beside "source: speed, change (%)" = |row| row.of_source(|caches| &caches.speed).into();
 }
+/// What was found.
+pub type Found = Vec<Row>;
 
-const PUBLISHED: [Published; 5] = [
-    Published {
-        counterpart: "Scene 6",
-        none: [7.31, 2.01, 74.51],
-        nodes: [-96.4, 0.0, 16.0, -96.4, -93.2, -94.3],
-        entries: [0.0, -88.7, 2.2, -88.7, -88.1, 2.2],
-        bytes: [-75.6, -19.1, 13.0, -94.7, -92.1, -73.5],
-        speed: [2.4, 3.8, -6.2, 6.1, 2.5, -3.2],
-    },
-    Published {
-        counterpart: "Sponza",
-        none: [29.81, 12.31, 336.95],
-        nodes: [-63.8, 0.0, 13.6, -63.8, -49.9, -52.0],
-        entries: [0.0, -63.7, 8.9, -63.7, -48.1, 8.9],
-        bytes: [-45.2, -18.6, 12.2, -63.8, -49.4, -34.2],
-        speed: [-0.3, 1.3, -29.2, 2.3, -4.3, -29.1],
-    },
-    Published {
-        counterpart: "Sibenik",
-        none: [37.63, 14.46, 416.72],
-        nodes: [-60.9, 0.0, 11.1, -60.9, -43.8, -49.1],
-        entries: [0.0, -60.4, 5.0, -60.4, -37.1, 5.0],
-        bytes: [-44.0, -16.8, 9.4, -60.8, -41.9, -34.1],
-        speed: [-1.0, 1.2, -27.1, 1.8, -6.0, -27.2],
-    },
-    Published {
-        counterpart: "Fairy",
-        none: [37.43, 16.96, 435.06],
-        nodes: [-62.6, 0.0, 13.0, -62.6, -52.5, -53.4],
-        entries: [0.0, -68.6, 4.1, -68.6, -48.7, 4.1],
-        bytes: [-43.1, -21.4, 10.2, -64.5, -51.3, -35.5],
-        speed: [-1.5, 1.5, -51.7, 1.0, -5.9, -52.5],
-    },
-    Published {
-        counterpart: "Conference",
-        none: [19.57, 6.69, 210.03],
-        nodes: [-77.7, 0.0, 12.5, -77.7, -64.3, -68.9],
-        entries: [0.0, -74.1, 5.8, -74.1, -59.7, 5.8],
-        bytes: [-57.9, -18.9, 10.8, -76.8, -63.2, -49.9],
-        speed: [-0.1, 0.4, -42.1, 0.8, -2.9, -42.0],
-    },
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "all caches leave the hits of the host as they are",
+        Bound::AtMost(0.0),
+        |row: &Row| row.different.into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "kernels find the hits of the host without caches, to the bit",
+        Bound::AtMost(0.0),
+        |row: &Row| row.timed_different.into(),
+    )
+    .among(|row| !row.on_hardware)
+    .needs("a device whose division is exact")
+    .in_every_form(),
+    Criterion::each(
+        "changes of nodes, entries and bytes with another sign than the source's",
+        Bound::AtMost(0.0),
+        |row: &Row| row.other_signs().into(),
+    )
+    .among(Row::is_compared),
+    Criterion::each(
+        "the speed changes to the source's side: its change, or the opposite of it where the source's is a loss (%)",
+        Bound::AtLeast(0.0),
+        Row::speed_to_its_side,
+    )
+    .among(|row| row.is_compared() && row.on_hardware)
+    .needs("a device of its own"),
 ];
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let mut table = Table::new(
-        "Caches of a kd-tree in persistent threads",
-        &[
-            "scene",
-            "counterpart",
-            "leaves of",
-            "caches",
-            "hits that differ",
-            "timed hits that differ",
-            "inner nodes a ray from memory",
-            "change of nodes (%)",
-            "source: nodes (%)",
-            "entries a ray written to and read from memory",
-            "change of entries (%)",
-            "source: entries (%)",
-            "bytes a ray",
-            "change of bytes (%)",
-            "source: bytes (%)",
-            "inner nodes a ray in all",
-            "M rays/s",
-            "speed, change (%)",
-            "source: speed (%)",
-        ],
-    );
-    each_flight(context, &cases(context), |case, surfaces, flight| {
-        let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
-        for leaf_size in SOURCE_LEAVES {
-            let tree = source_tree(surfaces, leaf_size)?;
-            let settings = KdCaches::COMPARED.map(|caches| TraceSettings {
-                caches,
-                ..TraceSettings::persistent(gpu.caps())
-            });
-            let contenders = settings.map(|settings| (&tree as &dyn RayIndex, settings));
-            let raced = race(context, &gpu, flight, contenders)?;
-            let closest = flight.closest();
-            let of = |caches| trace(&tree, Scheme::Stack, caches, [&closest, &flight.shadow]);
-            let traced = KdCaches::COMPARED.into_iter().map(of).collect::<Result<Vec<_>>>()?;
-            let each = |count: u64| count as f64 / flight.rays().max(1) as f64;
-            let of = |work: &KdCounters| {
-                [
-                    each(work.nodes - work.cached_nodes),
-                    each(work.pushes + work.pops),
-                    each(work.bytes()),
-                ]
-            };
-            let (expected, without) = (&traced[0].0, of(&traced[0].1));
-            for (i, (name, (hits, work))) in NAMES.into_iter().zip(&traced).enumerate() {
-                let of_source = |of: fn(&Published) -> &[f64; 6]| {
-                    Cell::from(published.zip(i.checked_sub(1)).map(|(row, i)| of(row)[i]))
-                };
-                let mut row: Vec<Cell> = vec![
-                    case.name().into(),
-                    case.counterpart.into(),
-                    u64::from(leaf_size).into(),
-                    name.into(),
-                    different_of_both(hits, expected).into(),
-                    different_of_both(&raced[i].hits, expected).into(),
-                ];
-                let sources: [fn(&Published) -> &[f64; 6]; 3] =
-                    [|row| &row.nodes, |row| &row.entries, |row| &row.bytes];
-                for ((value, first), source) in of(work).into_iter().zip(without).zip(sources) {
-                    row.extend([value.into(), change(value, first).into(), of_source(source)]);
-                }
-                let rate = |i: usize| raced[i].rates[2];
-                row.extend([
-                    each(work.nodes).into(),
-                    rate(i).into(),
-                    change(rate(i), rate(0)).into(),
-                    of_source(|row| &row.speed),
-                ]);
-                table.row(row);
+impl Row {
+    fn published(&self) -> Option<&'static Caches> {
+        of_source(&CACHES, &self.counterpart)
+    }
+
+    fn without(&self, column: usize) -> Option<f64> {
+        self.published().map(|caches| caches.none[column])
+    }
+
+    /// What it says of these caches.
+    pub(super) fn of_source(&self, of: fn(&Caches) -> &[f64; 6]) -> Option<f64> {
+        let form = NAMES[1..].iter().position(|name| *name == self.caches)?;
+        Some(of(self.published()?)[form])
+    }
+
+    /// Whether it is held against the source.
+    pub(super) fn is_compared(&self) -> bool {
+        self.leaf_size == NEAREST_LEAVES && self.of_source(|caches| &caches.bytes).is_some()
+    }
+
+    fn other_signs(&self) -> u64 {
+        let changes = [self.nodes_change, self.entries_change, self.bytes_change];
+        let of_source: [fn(&Caches) -> &[f64; 6]; 3] =
+            [|caches| &caches.nodes, |caches| &caches.entries, |caches| &caches.bytes];
+        let pairs = changes.into_iter().zip(of_source);
+        let differ = pairs.filter(|(ours, of)| self.of_source(*of).is_some_and(|theirs| sign(theirs) != sign(*ours)));
+        differ.count() as u64
+    }
+
+    fn speed_to_its_side(&self) -> Measured {
+        let theirs = self.of_source(|caches| &caches.speed).map_or(0, sign);
+        self.speed.scaled(f64::from(theirs)).measured()
+    }
+}
+
+/// −1, 0 or 1.
+fn sign(change: f64) -> i8 {
+    i8::from(change > 0.0) - i8::from(change < 0.0)
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        each_flight(context, &cases(context), |case, surfaces, flight| {
+            let mut rows = Vec::new();
+            for leaf_size in SOURCE_LEAVES {
+                let tree = source_tree(surfaces, leaf_size)?;
+                rows.extend(forms(context, &gpu, case, flight, (leaf_size, &tree))?);
             }
+            Ok(rows)
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let shown: Vec<Row> = self
+            .iter()
+            .filter(|row| row.leaf_size == NEAREST_LEAVES)
+            .cloned()
+            .collect();
+        let best = shown.iter().filter(|row| row.caches == BEST);
+        Findings::of(self, CRITERIA)
+            .headline(
+                "bytes with nodes and the last entry cached over those without caches, leaves of 1, geometric mean",
+                geometric_mean(best.map(|row| (1.0 + 0.01 * row.bytes_change).into())),
+            )
+            .bars(
+                "bytes",
+                "Bytes per ray from memory, leaves of 1",
+                &shown,
+                |row| [row.scene.clone(), row.caches.clone()],
+                |row| row.bytes.into(),
+            )
+            .note(
+                "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer \
+                 to the numbers of nodes that it gives (see there). Traversal with a stack. Hits, of closest and of any hits, are compared \
+                 with those of the host without caches: first the host's, then those of the kernels that were timed. Counts are exact and \
+                 the same on every machine; bytes by the source's model of 8 for each node fetched from memory and each entry written or \
+                 read there. The nodes that a workgroup loads into its cache beforehand are in none of these counts. On a software driver \
+                 shared memory and registers are ordinary cached memory, and its cap on loops lets a workgroup trace only some dozens of \
+                 rays for each of these loads: there the times say what the forms cost, nothing about what they would gain on a device with \
+                 such memories. Instructions are not counted.",
+            )
+            .and(Findings::of(&orders(self), OF_ORDERS))
+            .note("Pairs of the six forms that have caches, of which the source has one before the other. An interval is of pairs whose own do not overlap.")
+    }
+}
+
+/// All forms in one tree, by its leaf size.
+fn forms(
+    context: &Context<'_>,
+    gpu: &Gpu,
+    case: &Case,
+    flight: &Flight,
+    (leaf_size, tree): (u32, &KdTree),
+) -> Result<Vec<Row>> {
+    let settings = KdCaches::COMPARED.map(|caches| TraceSettings {
+        caches,
+        ..TraceSettings::persistent(gpu.caps())
+    });
+    let contenders = settings.map(|settings| (tree as &dyn RayIndex, settings));
+    let raced = race(context, gpu, flight, TURNS, contenders)?;
+    let closest = flight.closest();
+    let of = |caches| trace(tree, Scheme::Stack, caches, [&closest, &flight.shadow]);
+    let traced = KdCaches::COMPARED.into_iter().map(of).collect::<Result<Vec<_>>>()?;
+    let counts = |work: &KdCounters| {
+        let counts = [work.nodes - work.cached_nodes, work.pushes + work.pops, work.bytes()];
+        counts.map(|count| flight.per_ray(count))
+    };
+    let (expected, without) = (&traced[0].0, counts(&traced[0].1));
+    let forms = NAMES.into_iter().zip(&traced).zip(&raced);
+    let rows = forms.map(|((caches, (hits, work)), timed)| {
+        let [nodes, entries, bytes] = counts(work);
+        Row {
+            scene: case.name().into(),
+            counterpart: case.counterpart.into(),
+            leaf_size: leaf_size.into(),
+            caches: caches.into(),
+            different: different_of_both(hits, expected),
+            timed_different: different_of_both(&timed.hits, expected),
+            nodes,
+            nodes_change: change(nodes, without[0]),
+            entries,
+            entries_change: change(entries, without[1]),
+            bytes,
+            bytes_change: change(bytes, without[2]),
+            all_nodes: flight.per_ray(work.nodes),
+            rate: timed.rates[2].clone(),
+            speed: changes(&timed.rates[2], &raced[0].rates[2]),
+            on_hardware: on_hardware(gpu),
         }
-        if let Some(published) = published {
-            let [nodes, entries, bytes] = published.none;
-            table.note(format!(
-                "{}: without caches the source's {} has {nodes} nodes, {entries} entries and {bytes} bytes a ray.",
-                case.name(),
-                case.counterpart
-            ));
-        }
-        Ok(())
-    })?;
-    table.note(
-        "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer to \
-         the numbers of nodes that it gives (see there). Traversal with a stack. Hits, of closest and of any hits, are compared with \
-         those of the host without caches: first the host's, then those of the kernels that were timed. Counts are exact and the same on \
-         every machine; bytes by the source's model of 8 for each node fetched from memory and each entry written or read there. The \
-         nodes that a workgroup loads into its cache beforehand are in none of these counts. On a software driver shared memory and \
-         registers are ordinary cached memory, and its cap on loops lets a workgroup trace only some dozens of rays for each of these \
-         loads: the times say what the forms cost there, nothing about what they would gain on a device with such memories, where the \
-         source found +6 to −52 %. Instructions are not counted.",
-    );
-    Ok(vec![table])
+    });
+    Ok(rows.collect())
 }

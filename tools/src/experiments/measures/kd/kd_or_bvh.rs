@@ -5,20 +5,16 @@
 //! optimised linear hierarchy.
 
 use clerestory::Result;
-use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
-use clerestory::accel::kd::{Heuristic, KdSettings, Scheme};
-use clerestory::accel::lbvh::BuildQuality;
-use clerestory::accel::trace::TraceSettings;
-use clerestory::accel::{IndexKind, Ray, RayIndex, TraversalCounters};
+use clerestory::accel::RayIndex;
+use clerestory::gpu::Gpu;
 use glam::Vec3;
 
-use super::flights::{CASES, Case, Flight, different, each_flight, race, told};
-use super::kd_traversal::SCHEMES;
+use super::flights::{CASES, Case, Flight, Raced, TURNS, different, each_flight, race, told};
 use super::real_models;
+use super::tree_kinds::{Built, Kind, Way, build, kinds, layers, steps};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
-use crate::experiments::table::{Cell, Table};
-use crate::timing::{median, timed};
 
 const fn soup(scene: &'static str) -> Case {
     Case::of_our_own(scene, Vec3::new(0.0, 3.0, 0.0))
@@ -33,273 +29,228 @@ static SOUPS: [Case; 4] = [
 ];
 static SMOKE_SOUP: Case = soup("builtin:triangle-soup?n=500&size=0.1");
 
-/// A tree that took longer to build than these seconds is not built again for a median.
-const LONG_BUILD: f64 = 3.0;
-/// Timed builds of others, after one to warm up.
-const REPEATS: usize = 3;
+/// Turns of the two that are the best.
+const TURNS_OF_BEST: usize = 11;
+const MIB: f64 = 1_048_576.0;
+/// The place of both kinds of rays among a race's rates.
+const BOTH: usize = 2;
 
-/// An index and the ways through it that are timed.
-struct Kind {
-    words: &'static str,
-    index: IndexKind,
-    ways: &'static [(&'static str, Scheme)],
-}
-
-const BY_STACK: [(&str, Scheme); 1] = [("stack", Scheme::Stack)];
-
-/// Indexes by name, kd-trees first.
-fn kinds() -> [Kind; 6] {
-    let kd = |words, heuristic, leaf_size| Kind {
-        words,
-        index: IndexKind::Kd(KdSettings {
-            heuristic,
-            leaf_size,
-            ..KdSettings::default()
-        }),
-        ways: &SCHEMES,
-    };
-    let bvh = |words, index| Kind {
-        words,
-        index,
-        ways: &BY_STACK,
-    };
-    [
-        kd("kd, SIROH", Heuristic::InteriorOrigin, 4),
-        kd("kd, surface area", Heuristic::SurfaceArea, 4),
-        kd("kd, SIROH, leaves of 1", Heuristic::InteriorOrigin, 1),
-        kd("kd, surface area, leaves of 1", Heuristic::SurfaceArea, 1),
-        bvh("BVH, binned", IndexKind::Bvh2(Bvh2Settings::default())),
-        bvh("BVH, linear and optimised", IndexKind::lbvh(BuildQuality::High)),
-    ]
-}
-/// How many of them are kd-trees.
-const KD_TREES: usize = 4;
-
-/// Triangles along a ray, all of them.
-fn layers(index: &Bvh2, rays: &[Ray]) -> f64 {
-    let mut met = 0_u64;
-    let mut counters = TraversalCounters::default();
-    for ray in rays {
-        index.any_hit_filtered(
-            ray,
-            &mut |_, _| {
-                met += 1;
-                false
-            },
-            &mut counters,
-        );
+rows! {
+    /// An index over a scene.
+    struct Index = "kd-trees and bounding volumes" by [scene, index] {
+        scene: String = "scene",
+        triangles: u64 = "triangles",
+        layers: f64 = "triangles along a ray",
+        index: String = "index",
+        different: u64 = "timed closest hits that differ",
+        build: Repeats = "build (ms)",
+        size: f64 = "MiB",
+        closest_steps: f64 = "steps per ray, closest",
+        any_steps: f64 = "steps per ray, any",
+        closest: Repeats = "closest hits by a stack (M rays/s)",
+        any: Repeats = "any hits by a stack (M rays/s)",
+        both: Repeats = "both by a stack (M rays/s)",
+        fastest: String = "fastest traversal",
+        by_fastest: Repeats = "both by it (M rays/s)",
     }
-    met as f64 / rays.len().max(1) as f64
 }
 
-/// One index over one scene.
-struct Measured {
-    build: f64,
-    bytes: u64,
-    /// Nodes and triangles a ray, of closest and of any hits.
-    steps: [f64; 2],
-}
-
-fn steps(index: &dyn RayIndex, flight: &Flight) -> [f64; 2] {
-    let mut work = [TraversalCounters::default(); 2];
-    let closest = flight.closest();
-    for ray in &closest {
-        index.closest_hit_filtered(ray, &mut |_, _| true, &mut work[0]);
+rows! {
+    /// A scene's answer.
+    struct Answer = "Best kd-tree beside best bounding volumes" by [scene] {
+        scene: String = "scene",
+        layers: f64 = "triangles along a ray",
+        kd: String = "best kd-tree",
+        bvh: String = "best BVH",
+        closest: Repeats = "closest hits: kd / BVH",
+        any: Repeats = "any hits: kd / BVH",
+        both: Repeats = "both: kd / BVH",
+        build: Repeats = "build: kd / BVH",
+        pays_after: Option<f64> = "kd pays for its build after (M rays)",
     }
-    for ray in &flight.shadow {
-        index.any_hit_filtered(ray, &mut |_, _| true, &mut work[1]);
-    }
-    let counts = [closest.len(), flight.shadow.len()];
-    std::array::from_fn(|i| (work[i].nodes + work[i].triangles) as f64 / counts[i].max(1) as f64)
 }
 
-/// Millions of rays after which the better rate has paid for the longer build.
-fn pays_after(kd: (f64, f64), bvh: (f64, f64)) -> Option<f64> {
-    let ((kd_build, kd_rate), (bvh_build, bvh_rate)) = (kd, bvh);
-    // Milliseconds against microseconds a ray.
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    indexes: Vec<Index>,
+    answers: Vec<Answer>,
+    /// Whose the real models are.
+    models: Option<String>,
+}
+
+const OF_INDEXES: &[Criterion<Index>] = &[Criterion::each(
+    "closest hits are the same to the bit by every index and every way",
+    Bound::AtMost(0.0),
+    |index: &Index| index.different.into(),
+)
+.in_every_form()];
+
+const OF_ANSWERS: &[Criterion<Answer>] = &[Criterion::each(
+    "the ratio of both is known: the upper end of its interval over the lower",
+    Bound::AtMost(1.1),
+    |answer: &Answer| {
+        let both = answer.both.measured();
+        (both.high / both.low).into()
+    },
+)
+.because("ten per cent apart is alike")];
+
+/// Millions of rays after which the better rate has paid for the longer build; `None` where it never does.
+fn pays_after([kd_build, bvh_build]: [f64; 2], [kd_rate, bvh_rate]: [f64; 2]) -> Option<f64> {
+    // Milliseconds against microseconds per ray.
     (kd_rate > bvh_rate).then(|| (1e-3 * (kd_build - bvh_build)).max(0.0) / (1.0 / bvh_rate - 1.0 / kd_rate))
 }
 
-/// A way through one of the indexes.
-struct Way {
-    /// Which.
-    index: usize,
-    words: &'static str,
-    by: &'static str,
-    scheme: Scheme,
+/// Closest hits, any hits or both of a race, by the median.
+fn rate(raced: &Raced, query: usize) -> f64 {
+    raced.rates[query].measured().value
 }
 
-impl Way {
-    fn all(index: usize, kind: &Kind) -> impl Iterator<Item = Self> {
-        let words = kind.words;
-        kind.ways.iter().map(move |(by, scheme)| Self {
-            index,
-            words,
-            by,
-            scheme: *scheme,
+/// The fastest of the ways that fit.
+fn fastest(ways: &[Way], raced: &[Raced], query: usize, fit: impl Fn(&Way) -> bool) -> usize {
+    let fit = (0..ways.len()).filter(|way| fit(&ways[*way]));
+    fit.max_by(|a, b| rate(&raced[*a], query).total_cmp(&rate(&raced[*b], query)))
+        .unwrap_or_default()
+}
+
+/// A scene with its indexes.
+struct Place<'a> {
+    context: &'a Context<'a>,
+    gpu: &'a Gpu,
+    scene: &'a str,
+    surfaces: &'a Surfaces,
+    flight: &'a Flight,
+    layers: f64,
+    kinds: &'a [Kind],
+    built: &'a [Built],
+    ways: &'a [Way],
+}
+
+impl Place<'_> {
+    fn race<'w>(&self, turns: usize, ways: impl Iterator<Item = &'w Way>) -> Result<Vec<Raced>> {
+        let contenders = ways.map(|way| (&*self.built[way.index].0, way.settings()));
+        race(self.context, self.gpu, self.flight, turns, contenders)
+    }
+
+    fn index(&self, index: usize, raced: &[Raced]) -> Index {
+        let (built, build) = &self.built[index];
+        let is_of_it = |way: &Way| way.index == index;
+        let by_stack = fastest(self.ways, raced, BOTH, |way| is_of_it(way) && way.is_by_stack());
+        let [closest, any, both] = raced[by_stack].rates.clone();
+        let fastest = fastest(self.ways, raced, BOTH, is_of_it);
+        let of_it = self.ways.iter().zip(raced).filter(|(way, _)| is_of_it(way));
+        let [closest_steps, any_steps] = steps(&**built, self.flight);
+        Index {
+            scene: self.scene.into(),
+            triangles: self.surfaces.triangles.len() as u64,
+            layers: self.layers,
+            index: self.kinds[index].words.into(),
+            different: of_it.map(|(_, one)| different(&one.hits[0], &raced[0].hits[0])).sum(),
+            build: build.clone(),
+            size: built.statistics().bytes as f64 / MIB,
+            closest_steps,
+            any_steps,
+            closest,
+            any,
+            both,
+            fastest: self.ways[fastest].by.into(),
+            by_fastest: raced[fastest].rates[BOTH].clone(),
+        }
+    }
+
+    /// The best kd-tree and the best BVH of each kind of rays race again: the turns that chose them flatter them.
+    fn answer(&self, raced: &[Raced]) -> Result<Answer> {
+        let best = |query| [true, false].map(|kd| fastest(self.ways, raced, query, |way| way.is_kd() == kd));
+        let pairs = [0, 1, 2].map(best);
+        let again = self.race(TURNS_OF_BEST, pairs.iter().flatten().map(|way| &self.ways[*way]))?;
+        let ratio = |query: usize| {
+            let [kd, bvh] = [0, 1].map(|side| &again[2 * query + side].rates[query]);
+            kd.over(bvh)
+        };
+        let [kd, bvh] = pairs[BOTH].map(|way| &self.ways[way]);
+        let builds = [kd, bvh].map(|way| &self.built[way.index].1);
+        let rates = [0, 1].map(|side| rate(&again[2 * BOTH + side], BOTH));
+        Ok(Answer {
+            scene: self.scene.into(),
+            layers: self.layers,
+            kd: format!("{}; {}", kd.words, kd.by),
+            bvh: bvh.words.into(),
+            closest: ratio(0),
+            any: ratio(1),
+            both: ratio(BOTH),
+            build: builds[0].over(builds[1]),
+            pays_after: pays_after(builds.map(|build| build.measured().value), rates),
         })
     }
 }
 
-/// An index and the median of its builds, milliseconds.
-fn build(context: &Context<'_>, kind: &Kind, surfaces: &Surfaces) -> Result<(Box<dyn RayIndex>, f64)> {
-    let once = || {
-        let (index, time) = timed(|| kind.index.build(&surfaces.triangles));
-        index.map(|index| (index, 1e3 * time))
-    };
-    let (mut index, first) = once()?;
-    if context.smoke || first > 1e3 * LONG_BUILD {
-        return Ok((index, first));
-    }
-    let mut times = Vec::new();
-    for _ in 0..REPEATS {
-        let (again, time) = once()?;
-        index = again;
-        times.push(time);
-    }
-    Ok((index, median(times)))
-}
-
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let mut indexes = Table::new(
-        "kd-trees and bounding volumes",
-        &[
-            "scene",
-            "triangles",
-            "triangles along a ray",
-            "index",
-            "timed closest hits that differ",
-            "build (ms)",
-            "MiB",
-            "steps a ray, closest",
-            "steps a ray, any",
-            "closest hits (M rays/s)",
-            "any hits (M rays/s)",
-            "both (M rays/s)",
-            "fastest traversal",
-            "both by it (M rays/s)",
-        ],
-    );
-    let mut answer = Table::new(
-        "Best kd-tree beside best bounding volumes",
-        &[
-            "scene",
-            "triangles along a ray",
-            "best kd-tree",
-            "best BVH",
-            "closest hits: kd / BVH",
-            "any hits: kd / BVH",
-            "both: kd / BVH",
-            "build: kd / BVH",
-            "kd pays for its build after (M rays)",
-        ],
-    );
-    let mut models = None;
-    let scenes = match (told(context), context.smoke) {
-        (Some(told), _) => told,
-        (None, true) => vec![SMOKE_SOUP.clone()],
-        (None, false) => {
-            let found = models.insert(real_models::find());
-            [&CASES[..], &SOUPS, &found.cases].concat()
-        }
-    };
-    each_flight(context, &scenes, |case, surfaces, flight| {
-        let name = case.name();
-        let layers = layers(surfaces.index(), &flight.camera);
-        let mut measured = Vec::new();
-        let mut built = Vec::new();
-        for kind in &kinds() {
-            let (index, build) = build(context, kind, surfaces)?;
-            measured.push(Measured {
-                build,
-                bytes: index.statistics().bytes,
-                steps: steps(&*index, flight),
-            });
-            built.push(index);
-        }
-        let ways: Vec<Way> = kinds()
-            .iter()
-            .enumerate()
-            .flat_map(|(index, kind)| Way::all(index, kind))
-            .collect();
-        let contenders = ways.iter().map(|way| {
-            let settings = TraceSettings {
-                scheme: way.scheme,
-                ..TraceSettings::ray_per_thread()
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let kinds = kinds();
+        let ways = Way::all(&kinds);
+        let mut models = None;
+        let scenes = match (told(context), context.smoke) {
+            (Some(told), _) => told,
+            (None, true) => vec![SMOKE_SOUP.clone()],
+            (None, false) => {
+                let found = real_models::find();
+                models = Some(found.words);
+                [&CASES[..], &SOUPS, &found.cases].concat()
+            }
+        };
+        let mut answers = Vec::new();
+        let indexes = each_flight(context, &scenes, |case, surfaces, flight| {
+            let place = Place {
+                context,
+                gpu: &gpu,
+                scene: case.name(),
+                surfaces,
+                flight,
+                layers: layers(surfaces.index(), &flight.camera),
+                kinds: &kinds,
+                built: &build(context, &kinds, surfaces)?,
+                ways: &ways,
             };
-            (&*built[way.index], settings)
-        });
-        let raced = race(context, &gpu, flight, contenders)?;
-        let fastest = |fit: &dyn Fn(&Way) -> bool, query: usize| {
-            let fit = (0..ways.len()).filter(|way| fit(&ways[*way]));
-            fit.max_by(|a, b| raced[*a].rates[query].total_cmp(&raced[*b].rates[query]))
-                .unwrap_or_default()
-        };
-        for (index, (kind, one)) in kinds().iter().zip(&measured).enumerate() {
-            let is_of_it = |way: &Way| way.index == index;
-            let by_stack = fastest(&|way| is_of_it(way) && way.scheme == Scheme::Stack, 2);
-            let rates = raced[by_stack].rates;
-            let fastest = fastest(&is_of_it, 2);
-            let hits = ways.iter().zip(&raced).filter(|(way, _)| is_of_it(way));
-            let differ = hits
-                .map(|(_, one)| different(&one.hits[0], &raced[0].hits[0]))
-                .sum::<u64>();
-            indexes.row([
-                name.into(),
-                (surfaces.triangles.len() as u64).into(),
-                layers.into(),
-                kind.words.into(),
-                differ.into(),
-                one.build.into(),
-                (one.bytes as f64 / f64::from(1 << 20)).into(),
-                one.steps[0].into(),
-                one.steps[1].into(),
-                rates[0].into(),
-                rates[1].into(),
-                rates[2].into(),
-                ways[fastest].by.into(),
-                raced[fastest].rates[2].into(),
-            ]);
-        }
-        let is_kd = |way: &Way| way.index < KD_TREES;
-        let pair = |query| [fastest(&is_kd, query), fastest(&|way| !is_kd(way), query)];
-        let ratio = |query| {
-            let [kd, bvh] = pair(query);
-            Cell::from(raced[kd].rates[query] / raced[bvh].rates[query])
-        };
-        let [kd, bvh] = pair(2);
-        let of = |way: usize| (measured[ways[way].index].build, raced[way].rates[2]);
-        answer.row([
-            name.into(),
-            layers.into(),
-            format!("{}; {}", ways[kd].words, ways[kd].by).into(),
-            ways[bvh].words.into(),
-            ratio(0),
-            ratio(1),
-            ratio(2),
-            (of(kd).0 / of(bvh).0).into(),
-            pays_after(of(kd), of(bvh)).map_or("never".into(), Into::into),
-        ]);
-        Ok(())
-    })?;
-    indexes.note(
-        "Flights as in `kd-heuristics`; the soups have as many triangles each, of growing size, but the last fewer, whose kd-trees would not fit the device, and a camera that stands still. Steps are \
-         inner nodes and triangles, exact counts: a step of a kd-tree reads a plane of 8 bytes, one of a bounding volume hierarchy two \
-         boxes in 64. kd-trees weigh triangles by their parts, with leaves of 4 (the default) and of 1; steps and rates are those by a \
-         stack, and beside them stands the fastest of the five schemes. Hits are those of the timed kernels by every scheme, held against \
-         the first one's. Times are medians of runs that take turns; builds on all of the host's threads, after one to warm up, but those \
-         of more than 3 s, which are timed once.",
-    );
-    if let Some(models) = models {
-        indexes.note(models.words);
+            let raced = place.race(TURNS, ways.iter())?;
+            answers.push(place.answer(&raced)?);
+            Ok((0..kinds.len()).map(|index| place.index(index, &raced)).collect())
+        })?;
+        Ok(Self {
+            indexes,
+            answers,
+            models,
+        })
     }
-    answer.note(
-        "By medians of the same run: the kd-tree with its traversal and the hierarchy with the highest rate of each kind of rays; those named \
-         are the best of both kinds together. A kd-tree is worth its build where the ratio is above one and more \
-         rays are traced than the last column says: occlusion rays, which end at any hit, and rays through many triangles that overlap \
-         each other's boxes favour it; scenes of few large triangles favour the hierarchy.",
-    );
-    Ok(vec![indexes, answer])
+
+    fn findings(&self) -> Findings {
+        let findings = Findings::of(&self.indexes, OF_INDEXES).note(
+            "Flights as in `kd-heuristics`; the soups have as many triangles each, of growing size, but the last fewer, whose kd-trees would \
+             not fit the device, and a camera that stands still. Steps are inner nodes and triangles, exact counts: a step of a kd-tree reads a \
+             plane of 8 bytes, one of a bounding volume hierarchy two boxes in 64. kd-trees weigh triangles by their parts, with leaves of 4 \
+             (the default) and of 1; steps and rates are those by a stack, and beside them stands the fastest of the five schemes. Hits are \
+             those of the timed kernels by every scheme, held against the first one's. All ways take turns; builds, on all of the host's \
+             threads, take turns too, but those of more than 3 s, which are timed once.",
+        );
+        let findings = self.models.iter().fold(findings, Findings::note);
+        findings
+            .and(Findings::of(&self.answers, OF_ANSWERS))
+            .headline(
+                "rays a second of the best kd-tree over those of the best BVH, geometric mean over the scenes",
+                geometric_mean(self.answers.iter().map(|answer| answer.both.measured())),
+            )
+            .bars(
+                "ratio",
+                "Rays a second of the best kd-tree over those of the best BVH",
+                &self.answers,
+                |answer| ["both kinds of rays".into(), answer.scene.clone()],
+                |answer| answer.both.measured(),
+            )
+            .note(
+                "The kd-tree with its traversal and the hierarchy with the highest rate of each kind of rays, which then race again by \
+                 themselves; those named are the best of both kinds of rays together. A kd-tree is worth its build where the ratio is above one \
+                 and more rays are traced than the last column says.",
+            )
+    }
 }

@@ -8,67 +8,74 @@ use clerestory::accel::kd::Heuristic;
 use clerestory::accel::kd::bounds::Bounds;
 use glam::DVec3;
 
+use super::named_nodes::{NODES, Node, SCENES, grid};
+use crate::experiments::findings::{Bound, Criterion, Findings, Study, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
 
-const CUBE: DVec3 = DVec3::ONE;
-const ROOM: DVec3 = DVec3::new(10.0, 6.0, 3.0);
-
-/// A node of a scene that begins at the origin, and its exact probability by 4·10⁶ samples, ±2·10⁻⁴.
-struct Node {
-    name: &'static str,
-    scene: DVec3,
-    lower: [f64; 3],
-    upper: [f64; 3],
-    sampled: f64,
-}
-
-const fn node(name: &'static str, scene: DVec3, lower: [f64; 3], upper: [f64; 3], sampled: f64) -> Node {
-    Node {
-        name,
-        scene,
-        lower,
-        upper,
-        sampled,
-    }
-}
-
-const NODES: [Node; 12] = [
-    node("cube, all", CUBE, [0.0; 3], [1.0; 3], 1.0),
-    node("cube, x < 0.5", CUBE, [0.0; 3], [0.5, 1.0, 1.0], 0.6240),
-    node("cube, x < 0.1", CUBE, [0.0; 3], [0.1, 1.0, 1.0], 0.2605),
-    node("cube, an eighth in a corner", CUBE, [0.0; 3], [0.5; 3], 0.2180),
-    node("cube, half-sized in the middle", CUBE, [0.25; 3], [0.75; 3], 0.2683),
-    node("cube, tenth-sized in the middle", CUBE, [0.45; 3], [0.55; 3], 0.00971),
-    node("cube, tenth-sized in a corner", CUBE, [0.0; 3], [0.1; 3], 0.00412),
-    node("cube, flat at x = 0.5", CUBE, [0.5, 0.0, 0.0], [0.5, 1.0, 1.0], 0.2480),
-    node("cube, flat at x = 0", CUBE, [0.0; 3], [0.0, 1.0, 1.0], 0.16667),
-    node(
-        "10 × 6 × 3, unit cube in the middle",
-        ROOM,
-        [4.5, 2.5, 1.0],
-        [5.5, 3.5, 2.0],
-        0.0277,
-    ),
-    node("10 × 6 × 3, left half", ROOM, [0.0; 3], [5.0, 6.0, 3.0], 0.5719),
-    node(
-        "10 × 6 × 3, floor slab z < 0.3",
-        ROOM,
-        [0.0; 3],
-        [10.0, 6.0, 0.3],
-        0.3576,
-    ),
-];
-
-/// Cells of the grid along an axis.
-const GRID: u32 = 8;
-const SMOKE_GRID: u32 = 3;
 /// Nodes are sorted by their exact probability: below each of these, and above the last.
 const CLASSES: [f64; 3] = [0.01, 0.1, 0.5];
 /// Heuristics that are judged by the exact one.
 const JUDGED: [Heuristic; 3] = [Heuristic::Regions, Heuristic::InteriorOrigin, Heuristic::SurfaceArea];
 
-/// Signed relative errors: sum, sum of magnitudes, greatest magnitude, count.
+rows! {
+    /// A named node.
+    struct Named = "Probabilities of named nodes" by [node] {
+        node: String = "scene, node",
+        exact: f64 = "exact",
+        sampled: f64 = "by samples",
+        regions: f64 = "26 regions",
+        siroh: f64 = "SIROH",
+        area: f64 = "surface area",
+    }
+}
+
+rows! {
+    /// A heuristic on the nodes of a scene whose exact probability lies between two.
+    struct Class = "Errors over a grid of nodes" by [scene, class, heuristic] {
+        scene: String = "scene",
+        class: String = "exact probability",
+        nodes: u64 = "nodes",
+        heuristic: String = "heuristic",
+        mean: f64 = "mean error (%)",
+        magnitude: f64 = "mean magnitude (%)",
+        worst: f64 = "worst (%)",
+    }
+}
+
+rows! {
+    /// A heuristic on all nodes of a scene.
+    struct Whole = "Errors over all nodes of the grid" by [scene, heuristic] {
+        scene: String = "scene",
+        heuristic: String = "heuristic",
+        nodes: u64 = "nodes",
+        magnitude: f64 = "mean magnitude (%)",
+        of_area: f64 = "mean magnitude over that of the surface area",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    named: Vec<Named>,
+    classes: Vec<Class>,
+}
+
+const OF_NAMED: &[Criterion<Named>] = &[Criterion::each(
+    "the exact probability is that of four million samples: the difference",
+    Bound::AtMost(8e-4),
+    |node: &Named| (node.exact - node.sampled).abs().into(),
+)
+.because("the largest of twelve is beyond 3.3 standard errors of 2·10⁻⁴ once in a hundred times, and samples are rounded to 10⁻⁴")
+.in_every_form()];
+
+const OF_WHOLES: &[Criterion<Whole>] = &[Criterion::each(
+    "heuristics for origins in the scene err less than the surface area: mean magnitude over its own",
+    Bound::AtMost(1.0),
+    |whole: &Whole| whole.of_area.into(),
+)
+.among(|whole| whole.heuristic != Heuristic::SurfaceArea.name())];
+
+/// Signed relative errors in per cent: sum, sum of magnitudes, greatest magnitude, count.
 #[derive(Clone, Copy, Default)]
 struct Errors {
     sum: f64,
@@ -77,24 +84,13 @@ struct Errors {
     count: u64,
 }
 
-/// All boxes with corners on a grid over a scene, flat ones left out.
-fn grid(scene: DVec3, cells: u32) -> Vec<Bounds> {
-    let ranges: Vec<[f64; 2]> = (0..cells)
-        .flat_map(|from| (from + 1..=cells).map(move |to| [from, to].map(|at| f64::from(at) / f64::from(cells))))
-        .collect();
-    let mut all = Vec::with_capacity(ranges.len().pow(3));
-    for x in &ranges {
-        for y in &ranges {
-            for z in &ranges {
-                let corner = |side: usize| scene * DVec3::new(x[side], y[side], z[side]);
-                all.push(Bounds {
-                    lower: corner(0),
-                    upper: corner(1),
-                });
-            }
-        }
+impl Errors {
+    fn add(&mut self, error: f64) {
+        self.sum += error;
+        self.magnitudes += error.abs();
+        self.worst = self.worst.max(error.abs());
+        self.count += 1;
     }
-    all
 }
 
 /// Words for the classes.
@@ -105,92 +101,112 @@ fn classes() -> Vec<String> {
     words
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let mut named = Table::new(
-        "Probabilities of named nodes",
-        &[
-            "scene, node",
-            "exact",
-            "by samples",
-            "26 regions",
-            "SIROH",
-            "surface area",
-        ],
-    );
-    for node in &NODES {
-        let of = |lower: DVec3, upper: DVec3| Bounds { lower, upper };
-        let (scene, bounds) = (of(DVec3::ZERO, node.scene), of(node.lower.into(), node.upper.into()));
-        let by = |heuristic: Heuristic| Cell::from(heuristic.probability(&bounds, &scene));
-        let [regions, siroh, area] = JUDGED.map(by);
-        named.row([
-            node.name.into(),
-            by(Heuristic::Exact),
-            node.sampled.into(),
-            regions,
-            siroh,
-            area,
-        ]);
+fn named(node: &Node) -> Named {
+    let of = |lower: DVec3, upper: DVec3| Bounds { lower, upper };
+    let (scene, bounds) = (of(DVec3::ZERO, node.scene), of(node.lower.into(), node.upper.into()));
+    let by = |heuristic: Heuristic| heuristic.probability(&bounds, &scene);
+    let [regions, siroh, area] = JUDGED.map(by);
+    Named {
+        node: node.name.into(),
+        exact: by(Heuristic::Exact),
+        sampled: node.sampled,
+        regions,
+        siroh,
+        area,
     }
-    named.note(
-        "Origins uniform in the scene, directions uniform, nothing in the way: the share of rays that visit the node.",
-    );
-    let mut table = Table::new(
-        "Errors over a grid of nodes",
-        &[
-            "scene",
-            "exact probability",
-            "nodes",
-            "heuristic",
-            "mean error (%)",
-            "mean magnitude (%)",
-            "worst (%)",
-        ],
-    );
-    let cells = if context.smoke { SMOKE_GRID } else { GRID };
-    for (name, scene) in [("cube", CUBE), ("10 × 6 × 3", ROOM)] {
-        let whole = Bounds {
-            lower: DVec3::ZERO,
-            upper: scene,
+}
+
+/// Errors of all heuristics over the grid of a scene, by class.
+fn over_grid(name: &str, scene: DVec3, cells: u32) -> Vec<Class> {
+    let whole = Bounds {
+        lower: DVec3::ZERO,
+        upper: scene,
+    };
+    let mut found = [[Errors::default(); JUDGED.len()]; CLASSES.len() + 1];
+    for bounds in grid(scene, cells) {
+        let exact = Heuristic::Exact.probability(&bounds, &whole);
+        let class = CLASSES.partition_point(|end| *end <= exact);
+        for (errors, heuristic) in found[class].iter_mut().zip(JUDGED) {
+            errors.add(100.0 * (heuristic.probability(&bounds, &whole) / exact - 1.0));
+        }
+    }
+    let mut rows = Vec::new();
+    for (class, found) in classes().into_iter().zip(found) {
+        let of = |(errors, heuristic): (Errors, Heuristic)| Class {
+            scene: name.into(),
+            class: class.clone(),
+            nodes: errors.count,
+            heuristic: heuristic.name().into(),
+            mean: errors.sum / errors.count as f64,
+            magnitude: errors.magnitudes / errors.count as f64,
+            worst: errors.worst,
         };
-        let mut found = [[Errors::default(); CLASSES.len() + 1]; JUDGED.len()];
-        for bounds in grid(scene, cells) {
-            let exact = Heuristic::Exact.probability(&bounds, &whole);
-            let class = CLASSES.partition_point(|end| *end <= exact);
-            for (errors, heuristic) in found.iter_mut().zip(JUDGED) {
-                let error = 100.0 * (heuristic.probability(&bounds, &whole) / exact - 1.0);
-                let errors = &mut errors[class];
-                errors.sum += error;
-                errors.magnitudes += error.abs();
-                errors.worst = errors.worst.max(error.abs());
-                errors.count += 1;
-            }
-        }
-        for (class, words) in classes().into_iter().enumerate() {
-            for (found, heuristic) in found.iter().zip(JUDGED) {
-                let Errors {
-                    sum,
-                    magnitudes,
-                    worst,
-                    count,
-                } = found[class];
-                if count > 0 {
-                    table.row([
-                        name.into(),
-                        words.as_str().into(),
-                        count.into(),
-                        heuristic.name().into(),
-                        (sum / count as f64).into(),
-                        (magnitudes / count as f64).into(),
-                        worst.into(),
-                    ]);
-                }
-            }
-        }
+        let with_nodes = found.into_iter().zip(JUDGED).filter(|(errors, _)| errors.count > 0);
+        rows.extend(with_nodes.map(of));
     }
-    table.note(
-        "All boxes between the planes of a grid of 8 cells along each axis (3 in a quick look), flat ones left out; errors relative to the \
-         exact probability. SIROH lets its regions overlap, which is too much in corners and too little far from all sides.",
-    );
-    Ok(vec![named, table])
+    rows
+}
+
+/// The same over all classes.
+fn wholes(classes: &[Class]) -> Vec<Whole> {
+    let of = |scene: &str, heuristic: Heuristic| {
+        let of_it = classes
+            .iter()
+            .filter(|class| class.scene == scene && class.heuristic == heuristic.name());
+        let (nodes, sum) = of_it.fold((0, 0.0), |(nodes, sum), class| {
+            (nodes + class.nodes, sum + class.nodes as f64 * class.magnitude)
+        });
+        (nodes, sum / nodes as f64)
+    };
+    let mut rows = Vec::new();
+    for scene in classes.chunk_by(|a, b| a.scene == b.scene) {
+        let name = &scene[0].scene;
+        rows.extend(JUDGED.map(|heuristic| {
+            let (nodes, magnitude) = of(name, heuristic);
+            Whole {
+                scene: name.clone(),
+                heuristic: heuristic.name().into(),
+                nodes,
+                magnitude,
+                of_area: magnitude / of(name, Heuristic::SurfaceArea).1,
+            }
+        }));
+    }
+    rows
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let cells = context.pick(8, 3);
+        let name = |(name, _): &(&str, DVec3)| (*name).to_owned();
+        Ok(Self {
+            named: NODES.iter().map(named).collect(),
+            classes: context.each(&SCENES, name, |(name, scene)| Ok(over_grid(name, *scene, cells)))?,
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let wholes = wholes(&self.classes);
+        let is_siroh = |whole: &Whole| whole.heuristic == Heuristic::InteriorOrigin.name();
+        Findings::of(&self.named, OF_NAMED)
+            .note("Origins uniform in the scene, directions uniform, nothing in the way: the share of rays that visit the node.")
+            .and(Findings::of(&wholes, OF_WHOLES))
+            .headline(
+                "SIROH's mean error over the surface area's, the worse of the scenes",
+                largest(&wholes, is_siroh, |whole| whole.of_area),
+            )
+            .bars(
+                "errors",
+                "Mean magnitude of errors by exact probability (%)",
+                &self.classes,
+                |class| [format!("{}: {}", class.scene, class.class), class.heuristic.clone()],
+                |class| class.magnitude.into(),
+            )
+            .note(
+                "All boxes between the planes of a grid of 8 cells along each axis (3 in a smoke run), flat ones left out; errors relative to \
+                 the exact probability.",
+            )
+            .and(Findings::of(&self.classes, &[]))
+            .note("SIROH lets its regions overlap, which is too much in corners and too little far from all sides.")
+    }
 }

@@ -1,6 +1,6 @@
-//! Persistent threads in kd-trees beside one thread a ray: rates of both on flights through the source's scenes.
+//! Persistent threads in kd-trees beside one thread per ray: rates of both on flights through the source's scenes.
 //!
-//! Oracle: the hits of one thread a ray, to the bit. Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity
+//! Oracle: the hits of one thread per ray, to the bit. Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity
 //! College Dublin, 2011, table 4.1 and appendix A.1, whose code bases I and II are the two models of execution.
 
 use clerestory::Result;
@@ -9,23 +9,64 @@ use clerestory::accel::kd::{Heuristic, KdCaches, KdSettings, KdTree};
 use clerestory::accel::trace::{Execution, RayTracer, TraceSettings};
 use clerestory::gpu::Gpu;
 
-use super::flights::{Flight, cases, different_of_both, each_flight, race};
+use super::flights::{Case, Flight, TURNS, cases, different_of_both, each_flight, on_hardware, race};
+use super::published::{THREADS, of_source};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
 
-/// Frames a second of the source's persistent threads over those of one thread a ray, trees by surface area (table 4.1).
-const PUBLISHED: [(&str, f64); 5] = [
-    ("Scene 6", 341.8 / 382.2),
-    ("Sponza", 215.6 / 99.6),
-    ("Sibenik", 189.4 / 101.0),
-    ("Fairy", 144.1 / 75.9),
-    ("Conference", 171.0 / 71.9),
-];
+const BY_RAY: &str = "ray per thread";
+const QUEUE: &str = "queue";
 
 /// The best of the source's caches: nodes and the last entry of the stack.
 const BEST_CACHES: KdCaches = KdCaches::COMPARED[4];
 
-/// A form by name, one thread a ray first.
+rows! {
+    /// A form of execution in a scene.
+    struct Row = "Rays in kd-trees by one thread each and by persistent threads" by [scene, form] {
+        scene: String = "scene",
+        counterpart: String = "counterpart",
+        rays: u64 = "rays",
+        form: String = "form",
+        different: u64 = "hits that differ",
+        closest: Repeats = "closest hits (M rays/s)",
+        any: Repeats = "any hits (M rays/s)",
+        both: Repeats = "both (M rays/s)",
+        ratio: Repeats = "both, over one thread per ray",
+        groups: Option<u64> = "workgroups",
+        batch: Option<u64> = "rays per workgroup and dispatch",
+        on_hardware: bool = "on a device of its own",
+    }
+    beside "source: queue over one thread per ray" = |row| row.published().into();
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "hits are those of one thread per ray",
+        Bound::AtMost(0.0),
+        |row: &Row| row.different.into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "the queue's ratio is about the source's: over it",
+        Bound::Between(2.0 / 3.0, 1.5),
+        |row: &Row| row.ratio.scaled(1.0 / row.published().unwrap_or(f64::NAN)).measured(),
+    )
+    .among(|row| row.published().is_some() && row.on_hardware)
+    .needs("a device with a scheduler of its own")
+    .because("about, for a ratio: within a factor of 1.5 either way"),
+];
+
+impl Row {
+    fn published(&self) -> Option<f64> {
+        of_source(&THREADS, &self.counterpart)
+            .copied()
+            .filter(|_| self.form == QUEUE)
+    }
+}
+
+/// A form by name, one thread per ray first.
 fn forms(gpu: &Gpu) -> Vec<(&'static str, TraceSettings)> {
     let queue = TraceSettings::persistent(gpu.caps());
     let cached = TraceSettings {
@@ -33,8 +74,8 @@ fn forms(gpu: &Gpu) -> Vec<(&'static str, TraceSettings)> {
         ..queue
     };
     let mut forms = vec![
-        ("ray per thread", TraceSettings::ray_per_thread()),
-        ("queue", queue),
+        (BY_RAY, TraceSettings::ray_per_thread()),
+        (QUEUE, queue),
         ("queue, nodes and last entry cached", cached),
     ];
     if gpu.caps().subgroup.vote {
@@ -52,74 +93,73 @@ fn tuned(gpu: &Gpu, tree: &KdTree, settings: TraceSettings, flight: &Flight) -> 
     Ok(tracer.settings())
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let mut table = Table::new(
-        "Rays in kd-trees by one thread each and by persistent threads",
-        &[
-            "scene",
-            "counterpart",
-            "rays",
-            "form",
-            "timed hits that differ",
-            "closest hits (M rays/s)",
-            "any hits (M rays/s)",
-            "both (M rays/s)",
-            "ratio",
-            "source: ratio",
-            "workgroups",
-            "rays a workgroup and dispatch",
-        ],
-    );
-    each_flight(context, &cases(context), |case, surfaces, flight| {
-        let settings = KdSettings {
-            heuristic: Heuristic::SurfaceArea,
-            clip: false,
-            leaf_size: 1,
-            ..KdSettings::default()
-        };
-        let tree = KdTree::build(&surfaces.triangles, &settings)?;
-        let forms = forms(&gpu).into_iter();
-        let forms = forms.map(|(name, settings)| Ok((name, tuned(&gpu, &tree, settings, flight)?)));
-        let forms = forms.collect::<Result<Vec<_>>>()?;
-        let contenders = forms.iter().map(|(_, settings)| (&tree as &dyn RayIndex, *settings));
-        let raced = race(context, &gpu, flight, contenders)?;
-        let published = PUBLISHED
-            .iter()
-            .find(|(counterpart, _)| *counterpart == case.counterpart);
-        for (i, ((name, settings), one)) in forms.iter().zip(&raced).enumerate() {
-            let (groups, rays) = match settings.execution {
-                Execution::RayPerThread => ("all".into(), Cell::from("none")),
-                Execution::Persistent(threads) => (
-                    Cell::from(u64::from(threads.groups)),
-                    (u64::from(threads.batch) * u64::from(threads.fetches)).into(),
-                ),
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        each_flight(context, &cases(context), |case, surfaces, flight| {
+            let settings = KdSettings {
+                heuristic: Heuristic::SurfaceArea,
+                clip: false,
+                leaf_size: 1,
+                ..KdSettings::default()
             };
-            table.row([
-                case.name().into(),
-                case.counterpart.into(),
-                (flight.rays() as u64).into(),
-                (*name).into(),
-                different_of_both(&one.hits, &raced[0].hits).into(),
-                one.rates[0].into(),
-                one.rates[1].into(),
-                one.rates[2].into(),
-                (one.rates[2] / raced[0].rates[2]).into(),
-                published.filter(|_| i == 1).map(|(_, ratio)| *ratio).into(),
-                groups,
-                rays,
-            ]);
+            let tree = KdTree::build(&surfaces.triangles, &settings)?;
+            in_scene(context, &gpu, case, &tree, flight)
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let queues = self.iter().filter(|row| row.form == QUEUE);
+        Findings::of(self, CRITERIA)
+            .headline(
+                "rays a second by the queue over those by one thread per ray, geometric mean",
+                geometric_mean(queues.map(|row| row.ratio.measured())),
+            )
+            .bars(
+                "rates",
+                "Rays a second over those by one thread per ray",
+                self,
+                |row| [row.scene.clone(), row.form.clone()],
+                |row| row.ratio.measured(),
+            )
+            .note(
+                "Flights as in `kd-heuristics`; trees by surface area over boxes with leaves of 1, which come nearest to the source's, traversal \
+                 by a stack. Forms take turns; workgroups are the fastest power of two on the rays that ask for the closest hit. The source's \
+                 ratio is of frames a second on one device of 2011, where persistent threads spare the scheduler's work for warps whose rays \
+                 end at different times. A software driver has no such scheduler: it runs workgroups one after the other on each of the host's \
+                 threads, and its cap on loops lets a workgroup trace only some dozens of rays per dispatch, so there the ratio says what the \
+                 queue costs.",
+            )
+    }
+}
+
+/// All forms in one tree.
+fn in_scene(context: &Context<'_>, gpu: &Gpu, case: &Case, tree: &KdTree, flight: &Flight) -> Result<Vec<Row>> {
+    let forms = forms(gpu).into_iter();
+    let forms = forms.map(|(form, settings)| Ok((form, tuned(gpu, tree, settings, flight)?)));
+    let forms = forms.collect::<Result<Vec<_>>>()?;
+    let contenders = forms.iter().map(|(_, settings)| (tree as &dyn RayIndex, *settings));
+    let raced = race(context, gpu, flight, TURNS, contenders)?;
+    let rows = forms.iter().zip(&raced).map(|((form, settings), timed)| {
+        let threads = match settings.execution {
+            Execution::RayPerThread => None,
+            Execution::Persistent(threads) => Some(threads),
+        };
+        let [closest, any, both] = timed.rates.clone();
+        Row {
+            scene: case.name().into(),
+            counterpart: case.counterpart.into(),
+            rays: flight.rays() as u64,
+            form: (*form).into(),
+            different: different_of_both(&timed.hits, &raced[0].hits),
+            closest,
+            any,
+            ratio: both.over(&raced[0].rates[2]),
+            both,
+            groups: threads.map(|threads| threads.groups.into()),
+            batch: threads.map(|threads| u64::from(threads.batch) * u64::from(threads.fetches)),
+            on_hardware: on_hardware(gpu),
         }
-        Ok(())
-    })?;
-    table.note(
-        "Flights as in `kd-heuristics`; trees by surface area over boxes with leaves of 1, which come nearest to the source's, traversal \
-         by a stack. Times are medians of runs that take turns; workgroups are the fastest power of two on the rays that ask for the \
-         closest hit. The source's ratio is of frames a second on one device of 2011, where persistent threads spare the scheduler's work \
-         for warps whose rays end at different times. A software driver has no such scheduler: it runs workgroups one after the other on \
-         each of the host's threads, and its cap on loops lets a workgroup trace only some dozens of rays a dispatch, so here the ratio \
-         says what the queue costs.",
-    );
-    Ok(vec![table])
+    });
+    Ok(rows.collect())
 }
