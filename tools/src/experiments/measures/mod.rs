@@ -142,9 +142,9 @@ measures! {
     on_host tables "map-choice" maps::map_choice;
     on_device tables "map-construction" photon_maps::map_construction;
     on_host tables "map-density" maps::map_density;
-    on_host tables "map-error" maps::map_error;
+    on_host rows "map-error" maps::map_error;
     on_device tables "map-glossiness" maps::map_glossiness;
-    on_host tables "map-levels" maps::map_levels;
+    on_host rows "map-levels" maps::map_levels;
     on_host tables "map-quality" photon_maps::map_quality;
     on_device tables "map-rendering" maps::map_rendering;
     on_host rows "merge-example" photon_maps::merge_example;
