@@ -14,4 +14,5 @@ pub mod map_levels;
 pub mod map_rendering;
 mod needs;
 mod seam_levels;
+mod seams;
 mod sphere;
