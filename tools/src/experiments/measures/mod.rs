@@ -141,7 +141,7 @@ measures! {
     on_host rows "map-borders" maps::map_borders;
     on_host tables "map-choice" maps::map_choice;
     on_device tables "map-construction" photon_maps::map_construction;
-    on_host tables "map-density" maps::map_density;
+    on_host rows "map-density" maps::map_density;
     on_host rows "map-error" maps::map_error;
     on_device tables "map-glossiness" maps::map_glossiness;
     on_host rows "map-levels" maps::map_levels;
