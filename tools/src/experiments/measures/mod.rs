@@ -161,7 +161,7 @@ measures! {
     on_host rows "ray-offsets" rays::ray_offsets;
     on_host tables "sample-sums" rendering::sample_sums;
     on_device tables "scene-profile" rendering::scene_profile;
-    on_device tables "shadow-maps" preview::shadow_maps.of_any_scenes();
+    on_device rows "shadow-maps" preview::shadow_maps.of_any_scenes();
     on_host rows "shading-normals" surfaces::shading_normals;
     on_host tables "sphere-tests" rays::sphere_tests;
     on_host rows "tangents" surfaces::tangents;

@@ -77,7 +77,9 @@ pub fn of_document(map: &str, figure: usize) -> Option<&'static str> {
 
 /// What the document says of a member of the family.
 pub fn of_family(c: f64, figure: usize) -> Option<&'static str> {
-    let (_, stated) = FAMILY.iter().find(|(known, _)| (known - c).abs() < f64::from(f32::EPSILON))?;
+    let (_, stated) = FAMILY
+        .iter()
+        .find(|(known, _)| (known - c).abs() < f64::from(f32::EPSILON))?;
     Some(stated[figure])
 }
 

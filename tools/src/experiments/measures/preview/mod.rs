@@ -3,3 +3,4 @@
 pub mod live_map_pictures;
 pub mod live_maps;
 pub mod shadow_maps;
+mod shadow_places;
