@@ -137,7 +137,7 @@ measures! {
     on_device tables "kd-traversal" kd::kd_traversal.of_any_scenes();
     on_host tables "leaf-sizes" photon_maps::leaf_sizes;
     on_device tables "live-map-pictures" preview::live_map_pictures;
-    on_device tables "live-maps" preview::live_maps.of_any_scenes();
+    on_device rows "live-maps" preview::live_maps.of_any_scenes();
     on_host rows "map-borders" maps::map_borders;
     on_host tables "map-choice" maps::map_choice;
     on_device tables "map-construction" photon_maps::map_construction;

@@ -2,5 +2,6 @@
 
 pub mod live_map_pictures;
 pub mod live_maps;
+mod live_stages;
 pub mod shadow_maps;
 mod shadow_places;
