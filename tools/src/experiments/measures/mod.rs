@@ -136,7 +136,7 @@ measures! {
     on_device tables "kd-threads" kd::kd_threads.of_any_scenes();
     on_device tables "kd-traversal" kd::kd_traversal.of_any_scenes();
     on_host tables "leaf-sizes" photon_maps::leaf_sizes;
-    on_device tables "live-map-pictures" preview::live_map_pictures;
+    on_device rows "live-map-pictures" preview::live_map_pictures;
     on_device rows "live-maps" preview::live_maps.of_any_scenes();
     on_host rows "map-borders" maps::map_borders;
     on_host tables "map-choice" maps::map_choice;

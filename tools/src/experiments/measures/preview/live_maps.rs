@@ -23,6 +23,7 @@ const SIDES: [u32; 3] = [128, 256, 512];
 const TURNS: usize = 5;
 /// The size that one number tells of.
 const TYPICAL: u64 = 256;
+
 rows! {
     /// Frames of a map.
     struct Row = "Live maps" by [scene, side] {
