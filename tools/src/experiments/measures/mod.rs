@@ -139,7 +139,7 @@ measures! {
     on_device rows "live-map-pictures" preview::live_map_pictures;
     on_device rows "live-maps" preview::live_maps.of_any_scenes();
     on_host rows "map-borders" maps::map_borders;
-    on_host tables "map-choice" maps::map_choice;
+    on_host rows "map-choice" maps::map_choice;
     on_device tables "map-construction" photon_maps::map_construction;
     on_host rows "map-density" maps::map_density;
     on_host rows "map-error" maps::map_error;

@@ -1,6 +1,8 @@
 //! Directional maps: how even they are, how well they hold a light field, which one to take, and look-ups in them.
 
+mod choice;
 mod choice_plot;
+mod environment_look_ups;
 mod environments;
 mod filled_maps;
 mod heat;
