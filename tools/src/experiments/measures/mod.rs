@@ -143,7 +143,7 @@ measures! {
     on_device tables "map-construction" photon_maps::map_construction;
     on_host rows "map-density" maps::map_density;
     on_host rows "map-error" maps::map_error;
-    on_device tables "map-glossiness" maps::map_glossiness;
+    on_device rows "map-glossiness" maps::map_glossiness;
     on_host rows "map-levels" maps::map_levels;
     on_host tables "map-quality" photon_maps::map_quality;
     on_device tables "map-rendering" maps::map_rendering;
