@@ -146,7 +146,7 @@ measures! {
     on_device rows "map-glossiness" maps::map_glossiness;
     on_host rows "map-levels" maps::map_levels;
     on_host tables "map-quality" photon_maps::map_quality;
-    on_device tables "map-rendering" maps::map_rendering;
+    on_device rows "map-rendering" maps::map_rendering;
     on_host rows "merge-example" photon_maps::merge_example;
     on_device tables "mitsuba" rendering::mitsuba;
     on_host rows "multiple-scattering" surfaces::multiple_scattering;
