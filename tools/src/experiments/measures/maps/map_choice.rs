@@ -8,7 +8,7 @@ use glam::{DVec3, UVec2};
 
 use super::choice::{ALIKE, best, sign};
 use super::choice_plot::{self, Bars, Panel, Subject};
-use super::environment_look_ups::{MAPS, TURNS, errors, name, size, texels};
+use super::environment_look_ups::{Errors, MAPS, TURNS, errors, name, size, texels};
 use super::environments::{self, Environment, LIGHTS};
 use super::needs::need;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
@@ -117,7 +117,7 @@ fn needs(look_ups: &[LookUps]) -> Vec<Need> {
         };
         let (own, cube) = (curves(of_map), curves(of_first));
         let budgets = own[0].len();
-        for end in budgets + 1 - BUDGETS.min(budgets - 1)..=budgets {
+        for end in budgets + 1 - BUDGETS.min(budgets.saturating_sub(1))..=budgets {
             // By environment; of all turns, then of each.
             let of = |error: &dyn Fn(&LookUps) -> f64| -> Vec<f64> {
                 let curve = |rows: &[LookUps]| -> Vec<(f64, f64)> {
@@ -255,7 +255,7 @@ fn storage(map: Parametrization, rows: u32) -> Storage {
 fn look_ups(map: Parametrization, budget: u64, environments: &[Environment], directions: &[DVec3]) -> Vec<LookUps> {
     let size = size(map, budget);
     let errors = errors(map, size, environments, directions);
-    let row = |(environment, errors): (&Environment, super::environment_look_ups::Errors)| LookUps {
+    let row = |(environment, errors): (&Environment, Errors)| LookUps {
         map: name(map),
         environment: environment.name.into(),
         budget,
@@ -273,19 +273,19 @@ impl Study for Found {
         let environments = environments::all()?;
         let mut random = Random::new(61);
         let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
-        let mut found = Self::default();
-        found.look_ups = context.each(
+        let mut maps = Vec::new();
+        let look_ups = context.each(
             &MAPS,
             |map| name(*map),
             |map| {
-                found.maps.push(storage(*map, context.pick(DENSITY_ROWS, 16)));
+                maps.push(storage(*map, context.pick(DENSITY_ROWS, 16)));
                 let rows = powers
                     .iter()
-                    .flat_map(|power| look_ups(*map, 1 << power, &environments, &directions));
+                    .flat_map(|power| look_ups(*map, 1 << *power, &environments, &directions));
                 Ok(rows.collect())
             },
         )?;
-        Ok(found)
+        Ok(Self { maps, look_ups })
     }
 
     fn findings(&self) -> Findings {

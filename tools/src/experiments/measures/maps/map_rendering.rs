@@ -194,7 +194,7 @@ fn compare(context: &Context<'_>, gpu: &Gpu, (address, share): (&str, Vec3)) -> 
     let (side, points) = context.pick(FULL, SMOKE);
     let live = FilledScene::load(gpu, address, share)?;
     let points = shadow_points(&live, points);
-    let scene = short_name(address).to_string();
+    let scene = short_name(address).to_owned();
     let mut seen: Vec<(Parametrization, Seen)> = Vec::new();
     let (mut drawn, mut fillings) = (Vec::new(), Vec::new());
     for variant in variants(side, LEVEL) {
@@ -262,7 +262,7 @@ fn unsplit(context: &Context<'_>, gpu: &Gpu, (address, share): (&str, Vec3)) -> 
             let seen = live.seen(map, variant.size);
             let quality = quality(&variant, &live.fill(gpu, &variant)?, &seen, &points);
             rows.push(Unsplit {
-                scene: short_name(address).to_string(),
+                scene: short_name(address).to_owned(),
                 map: name.into(),
                 level: level.into(),
                 edge: edge_length(&live, level),
@@ -300,7 +300,7 @@ impl Study for Found {
         let mut scenes = Vec::new();
         let ways = context.each(
             context.first(&SCENES, 1),
-            |(address, _)| short_name(address).to_string(),
+            |(address, _)| short_name(address).to_owned(),
             |scene| {
                 let (rows, summary) = compare(context, &gpu, *scene)?;
                 scenes.push(summary);

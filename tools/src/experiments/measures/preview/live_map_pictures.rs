@@ -156,7 +156,7 @@ fn pictures(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>>
         let errors = |reference: &Picture| compare(&picture, reference, &CompareOptions::default());
         let (twice, all) = (errors(&twice)?, errors(&all)?);
         rows.push(Row {
-            scene: short_name(address).to_string(),
+            scene: short_name(address).to_owned(),
             place: name.clone(),
             time: Repeats(turns).scaled(1e3),
             mse_twice: twice.relative_mse,
@@ -173,7 +173,7 @@ impl Study for Found {
         let gpu = (context.gpu)()?;
         context.each(
             context.first(&SCENES, 1),
-            |address| short_name(address).to_string(),
+            |address| short_name(address).to_owned(),
             |address| pictures(context, &gpu, address),
         )
     }

@@ -155,13 +155,9 @@ impl Study for Found {
         let mut found = Self::default();
         context.each(
             &scenes,
-            |(address, _)| short_name(address).to_string(),
+            |(address, _)| short_name(address).to_owned(),
             |(address, share)| {
-                found.add(
-                    context,
-                    &short_name(address).to_string(),
-                    &Stage::new(&gpu, address, *share)?,
-                )?;
+                found.add(context, short_name(address), &Stage::new(&gpu, address, *share)?)?;
                 Ok(Vec::<()>::new())
             },
         )?;

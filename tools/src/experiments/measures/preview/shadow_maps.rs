@@ -214,10 +214,10 @@ impl Study for Found {
         };
         context.each(
             &scenes,
-            |(address, _)| short_name(address).to_string(),
+            |(address, _)| short_name(address).to_owned(),
             |(address, share)| {
                 let subject = Subject::new(&gpu, address, *share, context.pick(PLACES, 2000))?;
-                let scene = short_name(address).to_string();
+                let scene = short_name(address).to_owned();
                 let mut rows = Vec::new();
                 for side in context.first(&SIDES, 2) {
                     rows.extend(beside_each_other(context, &gpu, &scene, &subject, *side)?);
