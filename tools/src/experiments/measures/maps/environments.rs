@@ -11,11 +11,17 @@ use crate::geometry;
 pub struct Environment {
     /// Its name.
     pub name: &'static str,
-    /// What it stands for, in a few words.
-    pub about: &'static str,
     /// Radiance by unit direction.
     pub radiance: Box<dyn Fn(DVec3) -> f64 + Sync>,
 }
+
+/// Names of all, and what each stands for, in a few words.
+pub const LIGHTS: [(&str, &str); 4] = [
+    ("smooth sky", "polynomials and a lobe of 40°"),
+    ("sun", "that sky and a sun of 2.9°, 40 times as bright"),
+    ("sharp edges", "black and white cells of 0.4 along each axis"),
+    ("live map", SCENE),
+];
 
 /// 1/variance of the sun's angle: a standard deviation of 0.05 rad.
 const SUN: f64 = 400.0;
@@ -69,21 +75,9 @@ fn live() -> Result<Box<dyn Fn(DVec3) -> f64 + Sync>> {
     }))
 }
 
-/// Those that maps are chosen by.
+/// Those that maps are chosen by, in the order of [`LIGHTS`].
 pub fn all() -> Result<Vec<Environment>> {
-    let of = |name, about, radiance: fn(DVec3) -> f64| Environment {
-        name,
-        about,
-        radiance: Box::new(radiance),
-    };
-    Ok(vec![
-        of("smooth sky", "polynomials and a lobe of 40°", sky),
-        of("sun", "that sky and a sun of 2.9°, 40 times as bright", sunny),
-        of("sharp edges", "black and white cells of 0.4 along each axis", edges),
-        Environment {
-            name: "live map",
-            about: SCENE,
-            radiance: live()?,
-        },
-    ])
+    let radiances: [Box<dyn Fn(DVec3) -> f64 + Sync>; 4] = [Box::new(sky), Box::new(sunny), Box::new(edges), live()?];
+    let of = |((name, _), radiance)| Environment { name, radiance };
+    Ok(LIGHTS.into_iter().zip(radiances).map(of).collect())
 }

@@ -3,242 +3,205 @@
 //! Oracle: exact solid angles of texels ([`clerestory::maps`]) and what T. Engelhardt's thesis states (2013, chapters 5 and 7), with its sums worked out.
 
 use clerestory::Result;
-use clerestory::film::{atomic, png};
+use clerestory::film::png;
+use clerestory::maps::Parametrization;
 use clerestory::maps::packed_direction::{pack_octahedral, pack_octahedral_nearest, packed_error, unpack_octahedral};
-use clerestory::maps::statistics::anisotropy;
-use clerestory::maps::{MapPoint, Parametrization};
-use glam::{DVec2, DVec3, UVec2};
 
 use super::heat;
-use crate::experiments::lines::{self, Line};
+use super::meridians::with_plots;
+use super::stated_densities::{FAMILY, Figure, OF_FIGURES, STATED, of_document, of_family, statistics};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::plot::Words;
-use crate::experiments::table::Table;
 use crate::random::Random;
-
-/// Maps with what the thesis states: least and greatest ratio, RMS, greatest shear.
-const STATED: [(Parametrization, [&str; 4]); 8] = [
-    (Parametrization::LatLong, ["0", "1.571", "0.483", "∞"]),
-    (Parametrization::Sphere, ["1", "1", "0", "∞"]),
-    (Parametrization::Cube, ["0.368", "1.910", "0.380", "1.732"]),
-    (Parametrization::DualParaboloid, ["0.5", "2.0", "0.408", "1.0"]),
-    (Parametrization::Nusselt, ["0.5", "∞", "∞", "∞"]),
-    (
-        Parametrization::OctahedronQuadratic,
-        ["0.318", "1.654", "0.327", "2.618"],
-    ),
-    (
-        Parametrization::OctahedronRectangular,
-        ["0.318", "1.654", "0.327", "2.618"],
-    ),
-    (Parametrization::EqualArea, ["1", "1", "0", "none"]),
-];
-
-/// The perspective family: c, and least ratio, greatest ratio and RMS as stated.
-const FAMILY: [(f64, [&str; 3]); 5] = [
-    (0.5, ["0.080", "2.149", "0.571"]),
-    (std::f64::consts::FRAC_1_SQRT_2, ["0.159", "1.779", "0.403"]),
-    (1.0, ["0.318", "1.654", "0.327"]),
-    (std::f64::consts::SQRT_2, ["0.225", "1.801", "0.411"]),
-    (2.0, ["0.159", "2.339", "0.621"]),
-];
 
 /// Pixels of a picture of the strip.
 const SIDE: u32 = 192;
-/// Points of a great circle.
-const STEPS: u32 = 720;
-/// Steps of plots, and the degrees of each.
-const AXIS: (u32, f64) = (4, 45.0);
-/// Where plots end: the ratio and the shear.
-const TOPS: [f64; 2] = [2.7, 5.0];
+/// Bits of each coordinate of packed directions.
+const BITS: [u32; 5] = [8, 12, 13, 15, 16];
+/// Rows of a layer.
+const ROWS: u32 = 512;
 
-fn statistics(context: &Context<'_>, size: u32) -> Table {
-    let mut table = Table::new(
-        "Density of maps against uniform sampling",
-        &[
-            "map",
-            "texels",
-            "of them used (%)",
-            "least ratio",
-            "stated",
-            "greatest ratio",
-            "stated",
-            "greatest over least",
-            "RMS of ratio − 1",
-            "stated",
-            "greatest shear",
-            "stated",
-            "error of Σ solid angles (sr)",
-        ],
-    );
-    for (done, (map, [min, max, rms, shear])) in STATED.into_iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(&map.to_string(), done, STATED.len());
-        let size = UVec2::new(size * map.aspect(), size);
-        let found = map.density_statistics(size);
-        table.row([
-            map.to_string().into(),
-            u64::from(size.element_product() * map.layers()).into(),
-            (100.0 * found.coverage).into(),
-            found.min_ratio.into(),
-            min.into(),
-            found.max_ratio.into(),
-            max.into(),
-            (found.max_ratio / found.min_ratio).into(),
-            found.rms.into(),
-            rms.into(),
-            found.anisotropy.into(),
-            shear.into(),
-            (found.solid_angle - map.solid_angle()).into(),
-        ]);
+rows! {
+    /// A map.
+    struct Density = "Density of maps against uniform sampling" by [map] {
+        map: String = "map",
+        texels: u64 = "texels",
+        used: f64 = "used texels (%)",
+        least: f64 = "least ratio",
+        greatest: f64 = "greatest ratio",
+        spread: f64 = "greatest ratio over the least",
+        rms: f64 = "RMS of ratio − 1",
+        shear: f64 = "greatest shear",
+        sum_error: f64 = "error of Σ solid angles (sr)",
     }
-    table.note(format!(
-        "Ratios of exact solid angles of texels, {size} rows a layer, to the mean of the part that holds directions; above 1 a texel is too coarse. \
-         Stated extremes are those of points, which texels approach as they shrink: where those are 0 or ∞, the figure is that of this size. Shear \
-         is the ratio of the axes of the ellipse that a small round spot on the map is on the sphere, at centres of texels."
-    ));
-    table.note(
-        "The document calls the sphere map one that always undersamples: 4/π against its square, which is the unused corners alone. Its \
-         area is even and its shape is not. The cube stays within a factor of two along great circles through edges only: at corners it oversamples 2.72 \
-         times. A central projection onto an octahedron is the planar one (c = 1 below).",
-    );
-    table
+    beside "document: least ratio" = |row| of_document(&row.map, 0).into();
+    beside "document: greatest ratio" = |row| of_document(&row.map, 1).into();
+    beside "document: RMS of ratio − 1" = |row| of_document(&row.map, 2).into();
+    beside "document: greatest shear" = |row| of_document(&row.map, 3).into();
 }
 
-fn family(size: u32) -> Table {
-    let mut table = Table::new(
-        "The perspective family of octahedra",
-        &[
-            "c",
-            "least ratio",
-            "stated",
-            "greatest ratio",
-            "stated",
-            "RMS of ratio − 1",
-            "stated",
-            "greatest shear",
-        ],
-    );
-    for (c, [min, max, rms]) in FAMILY {
-        let found = Parametrization::OctahedronPerspective { c }.density_statistics(UVec2::splat(size));
-        table.row([
-            c.into(),
-            found.min_ratio.into(),
-            min.into(),
-            found.max_ratio.into(),
-            max.into(),
-            found.rms.into(),
-            rms.into(),
-            found.anisotropy.into(),
-        ]);
+rows! {
+    /// An octahedron of the perspective family.
+    struct Member = "The perspective family of octahedra" by [c] {
+        c: f64 = "c",
+        least: f64 = "least ratio",
+        greatest: f64 = "greatest ratio",
+        rms: f64 = "RMS of ratio − 1",
+        shear: f64 = "greatest shear",
     }
-    table.note("(x, y)/(|x| + |y| + c|z|) an octant. The planar projection, c = 1, is the most balanced.");
-    table
+    beside "document: least ratio" = |row| of_family(row.c, 0).into();
+    beside "document: greatest ratio" = |row| of_family(row.c, 1).into();
+    beside "document: RMS of ratio − 1" = |row| of_family(row.c, 2).into();
 }
 
-fn packed(count: u32) -> Table {
-    let mut table = Table::new(
-        "Directions in a word",
-        &[
-            "bits",
-            "stated bound (rad)",
-            "greatest error (rad)",
-            "of the nearest of four (rad)",
-            "greatest error (degrees)",
-        ],
-    );
-    for bits in [8, 12, 13, 15, 16] {
-        let mut random = Random::new(bits);
-        let (mut plain, mut nearest) = (0.0f64, 0.0f64);
-        for i in 0..count {
-            let d = random.direction();
-            // Every second one near the middle of a face, where the map stretches most.
-            let d = if i % 2 == 0 {
-                (d.signum() + 0.05 * random.vector()).normalize()
-            } else {
-                d
-            };
-            let off = |word| (unpack_octahedral(word, bits) - d).length();
-            plain = plain.max(off(pack_octahedral(d.as_vec3(), bits)));
-            nearest = nearest.max(off(pack_octahedral_nearest(d, bits)));
-        }
-        table.row([
-            format!("2 × {bits}").into(),
-            packed_error(bits).into(),
-            plain.into(),
-            nearest.into(),
-            plain.to_degrees().into(),
-        ]);
-    }
-    table.note(format!(
-        "{count} directions, half of them in the middle of faces. Octahedron map, signed normalized integers."
-    ));
-    table
-}
-
-/// A function of places along the meridian of an azimuth, from the pole on.
-fn meridian(map: Parametrization, azimuth: f64, value: impl Fn(MapPoint) -> f64) -> Line {
-    let along = DVec2::from_angle(azimuth.to_radians());
-    let point = |step: u32| {
-        let degrees = 180.0 * (f64::from(step) + 0.5) / f64::from(STEPS);
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        let d: DVec3 = (sin * along).extend(cos);
-        (degrees, map.encode(d).map_or(f64::NAN, &value))
-    };
-    Line {
-        name: map.to_string(),
-        points: (0..STEPS).map(point).collect(),
+rows! {
+    /// Directions of so many bits.
+    struct Word = "Directions in a word" by [bits] {
+        bits: u64 = "bits of each coordinate",
+        bound: f64 = "stated bound (rad)",
+        worst: f64 = "greatest error (rad)",
+        nearest: f64 = "greatest error of the nearest of four (rad)",
+        degrees: f64 = "greatest error (degrees)",
+        directions: u64 = "directions",
     }
 }
 
-fn plots(context: &Context<'_>) -> Result<()> {
-    let maps = || STATED.iter().map(|(map, _)| *map);
-    let x = "angle from the pole (degrees)";
-    for azimuth in [0.0, 45.0] {
-        let title = format!("Density along the meridian of azimuth {azimuth}°");
-        let words = Words {
-            title: &title,
-            x,
-            y: "solid angle of a texel over the mean",
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    maps: Vec<Density>,
+    family: Vec<Member>,
+    figures: Vec<Figure>,
+    words: Vec<Word>,
+}
+
+const OF_WORDS: &[Criterion<Word>] = &[Criterion::each(
+    "packed directions are within their stated bound: the greatest error over it",
+    Bound::AtMost(1.0),
+    |row: &Word| (row.worst / row.bound).into(),
+)
+.in_every_form()];
+
+/// A map's row.
+fn density(map: Parametrization, rows: u32) -> Density {
+    let found = statistics(map, rows);
+    Density {
+        map: map.to_string(),
+        texels: u64::from(rows * rows * map.aspect() * map.layers()),
+        used: 100.0 * found.coverage,
+        least: found.min_ratio,
+        greatest: found.max_ratio,
+        spread: found.max_ratio / found.min_ratio,
+        rms: found.rms,
+        shear: found.anisotropy,
+        sum_error: found.solid_angle - map.solid_angle(),
+    }
+}
+
+/// Greatest errors of directions in a word.
+fn word(bits: u32, count: u32) -> Word {
+    let mut random = Random::new(bits);
+    let (mut plain, mut nearest) = (0.0f64, 0.0f64);
+    for i in 0..count {
+        let d = random.direction();
+        // Every second one near the middle of a face, where the map stretches most.
+        let d = if i % 2 == 0 {
+            (d.signum() + 0.05 * random.vector()).normalize()
+        } else {
+            d
         };
-        let curves: Vec<Line> = maps()
-            .map(|map| meridian(map, azimuth, |at| map.density_ratio(at)))
-            .collect();
-        let svg = lines::draw(words, AXIS, TOPS[0], &curves)?;
-        atomic::write(&context.file(&format!("density-{azimuth}.svg"))?, svg.as_bytes())?;
-        let title = format!("Shear along the meridian of azimuth {azimuth}°");
-        let words = Words {
-            title: &title,
-            x,
-            y: "ratio of the axes of a spot",
-        };
-        let shear = |map: Parametrization, at| anisotropy(map.texel_derivatives(UVec2::new(map.aspect(), 1), at));
-        let curves: Vec<Line> = maps().map(|map| meridian(map, azimuth, |at| shear(map, at))).collect();
-        let svg = lines::draw(words, AXIS, TOPS[1], &curves)?;
-        atomic::write(&context.file(&format!("shear-{azimuth}.svg"))?, svg.as_bytes())?;
+        let off = |word| (unpack_octahedral(word, bits) - d).length();
+        plain = plain.max(off(pack_octahedral(d.as_vec3(), bits)));
+        nearest = nearest.max(off(pack_octahedral_nearest(d, bits)));
     }
-    Ok(())
+    Word {
+        bits: bits.into(),
+        bound: packed_error(bits),
+        worst: plain,
+        nearest,
+        degrees: plain.to_degrees(),
+        directions: count.into(),
+    }
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (size, side, directions) = if context.smoke {
-        (32, 16, 2000)
-    } else {
-        (512, SIDE, 1 << 20)
-    };
-    plots(context)?;
-    let maps = STATED.map(|(map, _)| map);
-    png::write(context.file("density.png")?, &heat::strip(&maps, side))?;
-    let mut first = statistics(context, size);
-    let names: Vec<String> = maps.iter().map(ToString::to_string).collect();
-    first.note(format!(
-        "Pictures beside this table: `density.png`, from left to right {}, above on the sphere, below on the map, red too coarse and blue too fine, \
-         white as the mean, full colour at a factor of {}; `density-0.svg`, `density-45.svg`, `shear-0.svg` and `shear-45.svg` along meridians.",
-        names.join(", "),
-        heat::FULL_COLOR,
-    ));
-    Ok(vec![first, family(size), packed(directions)])
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let (rows, side, directions) = context.pick((ROWS, SIDE, 1 << 20), (32, 16, 2000));
+        png::write(
+            context.file("density.png")?,
+            &heat::strip(&STATED.map(|(map, _)| map), side),
+        )?;
+        let mut figures = Vec::new();
+        let maps = context.each(
+            &STATED,
+            |(map, _)| map.to_string(),
+            |(map, stated)| {
+                figures.extend(Figure::all(&map.to_string(), *map, rows, stated));
+                Ok(vec![density(*map, rows)])
+            },
+        )?;
+        let family = context.each(
+            &FAMILY,
+            |(c, _)| format!("c = {c}"),
+            |(c, stated)| {
+                let map = Parametrization::OctahedronPerspective { c: *c };
+                figures.extend(Figure::all(&format!("perspective, c = {c:.3}"), map, rows, stated));
+                let found = statistics(map, rows);
+                Ok(vec![Member {
+                    c: *c,
+                    least: found.min_ratio,
+                    greatest: found.max_ratio,
+                    rms: found.rms,
+                    shear: found.anisotropy,
+                }])
+            },
+        )?;
+        let words = context.each(
+            &BITS,
+            |bits| format!("{bits} bits"),
+            |bits| Ok(vec![word(*bits, directions)]),
+        )?;
+        Ok(Self {
+            maps,
+            family,
+            figures,
+            words,
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let quadratic = Parametrization::OctahedronQuadratic.to_string();
+        let quadratic = self.maps.iter().find(|row| row.map == quadratic);
+        let names = STATED.map(|(map, _)| map.to_string()).join(", ");
+        let full = heat::FULL_COLOR;
+        let maps = Findings::of(&self.maps, &[])
+            .headline(
+                "RMS deviation of solid angles of the square octahedron's texels, of their mean",
+                quadratic.map(|row| Measured::exact(row.rms)),
+            )
+            .note(format!(
+                "Ratios of exact solid angles of texels, {ROWS} rows a layer, to the mean of the part that holds directions; above 1 a texel is too \
+                 coarse. Extremes of the document are those of points, which texels approach as they shrink: where those are 0 or ∞, the figure is \
+                 that of this size. Shear is the ratio of the axes of the ellipse that a small round spot on the map is on the sphere, at centres of \
+                 texels. In the picture, from left to right {names}, full colour is a factor of {full}."
+            ))
+            .note(
+                "The document calls the sphere map one that always undersamples: 4/π against its square, which is the unused corners alone. Its \
+                 area is even and its shape is not. The cube stays within a factor of two along great circles through edges only: at corners it \
+                 oversamples 2.72 times. A central projection onto an octahedron is the planar one (c = 1 below).",
+            );
+        let maps = if self.maps.is_empty() {
+            maps
+        } else {
+            with_plots(maps.picture(
+                "density.png",
+                "Maps from left to right: above on the sphere, below on the map. Red is too coarse, blue too fine, white the mean.",
+            ))
+        };
+        maps.and(Findings::of(&self.family, &[]))
+            .note("(x, y)/(|x| + |y| + c|z|) an octant. The planar projection is c = 1.")
+            .and(Findings::of(&self.figures, OF_FIGURES).long())
+            .and(Findings::of(&self.words, OF_WORDS))
+            .note("Half of the directions are in the middle of faces. Octahedron map, signed normalized integers.")
+    }
 }

@@ -4,16 +4,18 @@
 //! sky that fades to the horizon.
 
 use clerestory::Result;
-use clerestory::film::atomic;
-use clerestory::maps::irradiance::IrradianceSource;
-use clerestory::maps::{MapImage, Parametrization};
+use clerestory::maps::Parametrization;
 use glam::{DVec3, UVec2};
+use std::f64::consts::PI;
 
+use super::light_fields::{CONCENTRATIONS, LOBES, LobeField, deviation, errors_of_irradiance, held, irradiance_of_sky};
+use super::needs::need;
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Study, curves, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::plot::{self, Curve, PlotPoint, Words};
-use crate::experiments::table::Table;
+use crate::experiments::slope::least_squares;
 use crate::random::Random;
 
+/// The first is what the others are compared with.
 const MAPS: [Parametrization; 8] = [
     Parametrization::Cube,
     Parametrization::EqualArea,
@@ -24,22 +26,98 @@ const MAPS: [Parametrization; 8] = [
     Parametrization::LatLong,
     Parametrization::Sphere,
 ];
-/// Concentrations of the lobes, exp(κ(cos − 1)); widths are 1/√κ.
-const CONCENTRATIONS: [f64; 3] = [4.0, 64.0, 1024.0];
-const LOBES: usize = 32;
+/// Budgets of texels from which an exponent is found, the largest ones.
+const LARGEST: usize = 3;
 
-/// Lobes: concentration, middle.
-fn field() -> Vec<(f64, DVec3)> {
-    let mut random = Random::new(11);
-    let mut lobes = Vec::new();
-    for concentration in CONCENTRATIONS {
-        lobes.extend((0..LOBES).map(|_| (concentration, random.direction())));
+rows! {
+    /// Look-ups in a map of a number of texels.
+    struct LookUps = "Error of bilinear look-ups" by [map, budget] {
+        map: String = "map",
+        budget: u64 = "budget (texels)",
+        size: String = "size of a layer",
+        texels: u64 = "texels",
+        rms: f64 = "RMS error over the field's deviation",
+        worst: f64 = "greatest error over the field's deviation",
     }
-    lobes
 }
 
-fn radiance(field: &[(f64, DVec3)], d: DVec3) -> f64 {
-    field.iter().map(|(k, middle)| (k * (middle.dot(d) - 1.0)).exp()).sum()
+rows! {
+    /// How the error of a map falls.
+    struct Fall = "Fall of the error with texels" by [map] {
+        map: String = "map",
+        exponent: f64 = "power of texels by which the error grows",
+        need: f64 = "texels for the cube's error, over the cube's",
+    }
+}
+
+rows! {
+    /// Irradiance by a map of a number of texels.
+    struct Lit = "Error of irradiance" by [map, texels] {
+        map: String = "map",
+        texels: u64 = "texels",
+        even: f64 = "constant radiance: greatest error over π",
+        even_middles: f64 = "constant radiance, by texels' middles",
+        sky: f64 = "sky: greatest error over 2π/3",
+        sky_middles: f64 = "sky, by texels' middles",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    look_ups: Vec<LookUps>,
+    irradiance: Vec<Lit>,
+}
+
+const CRITERIA: &[Criterion<Fall>] = &[
+    Criterion::each(
+        "the error falls as one over the texels: its exponent",
+        Bound::Between(-1.1, -0.9),
+        |row: &Fall| row.exponent.into(),
+    )
+    .among(|row| !row.is_of_the_sphere_map())
+    .because("a tenth tells −1 from the −¾ of a light with a kink in it"),
+    Criterion::each(
+        "it does not in the sphere map: its exponent",
+        Bound::AtLeast(-0.9),
+        |row: &Fall| row.exponent.into(),
+    )
+    .among(Fall::is_of_the_sphere_map)
+    .because("a tenth from −1"),
+];
+const OF_IRRADIANCE: &[Criterion<Lit>] = &[Criterion::each(
+    "constant radiance is integrated: the greatest error over π",
+    Bound::AtMost(3e-4),
+    |row: &Lit| row.even.into(),
+)
+.because("what `clerestory::maps::irradiance` states of the map of the greatest shear")];
+
+impl Fall {
+    fn is_of_the_sphere_map(&self) -> bool {
+        self.map == Parametrization::Sphere.to_string()
+    }
+}
+
+/// How errors fall, by the last budgets of each map.
+fn falls(look_ups: &[LookUps]) -> Vec<Fall> {
+    let curve = |map: &Parametrization| -> Vec<(f64, f64)> {
+        let rows = look_ups.iter().filter(|row| row.map == map.to_string());
+        rows.map(|row| (row.texels as f64, row.rms)).collect()
+    };
+    let of_first = curve(&MAPS[0]);
+    let curves = MAPS.iter().map(|map| (map, curve(map)));
+    curves
+        .filter(|(_, curve)| !curve.is_empty())
+        .map(|(map, curve)| {
+            let last = curve.iter().rev().take(LARGEST);
+            let logarithms: Vec<(f64, f64)> = last.map(|(texels, error)| (texels.ln(), error.ln())).collect();
+            Fall {
+                map: map.to_string(),
+                exponent: least_squares(&logarithms).unwrap_or(f64::NAN),
+                need: need(&curve, &of_first),
+            }
+        })
+        .collect()
 }
 
 /// The size of a layer that comes closest to a number of texels in all, of even height.
@@ -47,179 +125,96 @@ fn size(map: Parametrization, texels: u64) -> UVec2 {
     2 * map.size_for(0.25 * texels as f64)
 }
 
-/// A map, the irradiance under what it holds by the normal, and the most that this is.
-type Light<'a> = (MapImage, &'a dyn Fn(&DVec3) -> f64, f64);
-
-/// Greatest errors of irradiance for random normals: by the function and by texels of one direction each.
-fn irradiance(context: &Context<'_>) -> Result<Table> {
-    let (budgets, count): (&[u64], u32) = if context.smoke {
-        (&[256], 5)
-    } else {
-        (&[256, 1024, 4096, 16384], 100)
-    };
-    let mut random = Random::new(13);
-    let normals: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
-    // ∫ over the half spaces about z and about the normal.
-    let of_sky = |n: &DVec3| {
-        let gamma = n.z.clamp(-1.0, 1.0).acos();
-        2.0 / 3.0 * ((std::f64::consts::PI - gamma) * gamma.cos() + gamma.sin())
-    };
-    let mut table = Table::new(
-        "Error of irradiance",
-        &[
-            "map",
-            "texels",
-            "constant radiance: greatest error over π",
-            "by texels' middles",
-            "sky: greatest error over 2π/3",
-            "by texels' middles",
-        ],
-    );
-    for (done, map) in MAPS.into_iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(&format!("irradiance of {map}"), done, MAPS.len());
-        for budget in budgets {
-            let size = size(map, *budget);
-            let sky = |d: DVec3| d.z.max(0.0);
-            let held = |of: &(dyn Fn(DVec3) -> f64 + Sync)| {
-                MapImage::from_fn(map, size, |texel| {
-                    // At the rim of a disc, the texel's point next to the middle.
-                    let [lower, upper] = texel.bounds(size);
-                    let uv = glam::DVec2::splat(0.5).clamp(lower, upper);
-                    let inside = clerestory::maps::MapPoint { layer: texel.layer, uv };
-                    let d = map.texel_direction(size, texel).or_else(|| map.decode(inside));
-                    DVec3::splat(d.map_or(0.0, of))
-                })
-            };
-            let mut row = vec![
-                map.to_string().into(),
-                u64::from(size.element_product() * map.layers()).into(),
-            ];
-            let constant = |_: &DVec3| std::f64::consts::PI;
-            let lights: [Light<'_>; 2] = [
-                (held(&|_| 1.0)?, &constant, std::f64::consts::PI),
-                (held(&sky)?, &of_sky, 2.0 * std::f64::consts::PI / 3.0),
-            ];
-            for (image, right, most) in &lights {
-                let source = IrradianceSource::new(image);
-                let parts: Vec<(DVec3, f64)> = map
-                    .texels(size)
-                    .filter_map(|texel| {
-                        let angle = map.texel_solid_angle(size, texel);
-                        let d = map.texel_direction(size, texel)?;
-                        Some((d, angle * f64::from(image.at(texel).x)))
-                    })
-                    .collect();
-                let mut worst = [0.0f64; 2];
-                for n in &normals {
-                    let exact = source.irradiance(*n).unwrap_or_default().x;
-                    let middles: f64 = parts.iter().map(|(d, light)| light * n.dot(*d).max(0.0)).sum();
-                    for (worst, found) in worst.iter_mut().zip([exact, middles]) {
-                        *worst = worst.max((found - right(n)).abs() / most);
-                    }
-                }
-                row.extend(worst.map(Into::into));
-            }
-            table.row(row);
-        }
-    }
-    table.note(format!(
-        "{count} random normals. Texels hold the light at their centres, which for the sky is an error of its own; constant radiance shows that of the integral alone. By middles each \
-         texel counts with its exact solid angle and one direction, as prefiltered maps on the device do."
-    ));
-    Ok(table)
-}
-
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let (budgets, count) = if context.smoke {
-        (10..=12, 300)
-    } else {
-        (10..=18, 40_000)
-    };
-    let budgets: Vec<u64> = budgets.step_by(2).map(|power| 1u64 << power).collect();
-    let field = field();
-    let mut random = Random::new(12);
-    let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
-    let exact: Vec<f64> = directions.iter().map(|d| radiance(&field, *d)).collect();
-    let mean = exact.iter().sum::<f64>() / f64::from(count);
-    let spread = (exact.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / f64::from(count)).sqrt();
-    let mut table = Table::new(
-        "Error of bilinear look-ups",
-        &[
-            "map",
-            "budget (texels)",
-            "size of a layer",
-            "texels",
-            "RMS error over the field's deviation",
-            "greatest error over it",
-            "RMS error × texels over that of the first",
-        ],
-    );
-    let mut curves: Vec<Curve> = Vec::new();
-    let mut first = vec![f64::NAN; budgets.len()];
-    for (done, map) in MAPS.into_iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(&format!("look-ups of {map}"), done, MAPS.len());
-        let mut points = Vec::new();
-        for (at, budget) in budgets.iter().enumerate() {
-            let size = size(map, *budget);
-            let texels = f64::from(size.element_product() * map.layers());
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let (budgets, count): (&[u64], u32) = context.pick(
+            (&[1 << 10, 1 << 12, 1 << 14, 1 << 16, 1 << 18], 40_000),
+            (&[1 << 10, 1 << 12], 300),
+        );
+        let field = LobeField::new(11);
+        let mut random = Random::new(12);
+        let directions: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
+        let right: Vec<f64> = directions.iter().map(|d| field.radiance(*d)).collect();
+        let spread = deviation(&right);
+        let look_ups = context.grid(&MAPS, budgets, |map, budget| {
+            let size = size(*map, *budget);
             let (mut squares, mut worst) = (0.0, 0.0f64);
-            for (d, value) in directions.iter().zip(&exact) {
-                let taps = map.taps(size, *d);
-                let taps = taps.iter().flatten().filter(|tap| tap.weight > 0.0);
-                // The texel of a rim whose centre is outside of the disc holds what is at the rim.
-                let held = taps.map(|tap| {
-                    let centre = map.texel_direction(size, tap.texel).unwrap_or(*d);
-                    tap.weight * radiance(&field, centre)
-                });
-                let error = held.sum::<f64>() - value;
+            for (d, right) in directions.iter().zip(&right) {
+                let error = field.error(*map, size, *d, *right);
                 squares += error * error;
                 worst = worst.max(error.abs());
             }
-            let rms = (squares / f64::from(count)).sqrt() / spread;
-            if first[at].is_nan() {
-                first[at] = rms * texels;
-            }
-            points.push(PlotPoint {
-                x: texels,
-                y: rms,
-                y_range: [rms; 2],
-                ringed: false,
-            });
-            table.row([
-                map.to_string().into(),
-                (*budget).into(),
-                format!("{} × {}", size.x, size.y).into(),
-                (texels as u64).into(),
-                rms.into(),
-                (worst / spread).into(),
-                (rms * texels / first[at]).into(),
-            ]);
-        }
-        curves.push(Curve {
-            name: map.to_string(),
-            points,
-        });
+            Ok(LookUps {
+                map: map.to_string(),
+                budget: *budget,
+                size: format!("{} × {}", size.x, size.y),
+                texels: u64::from(size.element_product() * map.layers()),
+                rms: (squares / f64::from(count)).sqrt() / spread,
+                worst: worst / spread,
+            })
+        })?;
+        Ok(Self {
+            look_ups,
+            irradiance: irradiance(context)?,
+        })
     }
-    table.note(format!(
-        "The field: {LOBES} lobes each of widths {}, in random directions, the same for all maps; {count} uniform directions. Texels hold \
-         the field at their centres; borders are those of each map. All texels of a layer count, those outside of discs as well. \
-         The last column is how many times the texels of the first map give as small an error, where errors fall as one over the texels. Plot beside this table: `error.svg`.",
-        CONCENTRATIONS.map(|k| format!("{:.2}", 1.0 / k.sqrt())).join(", "),
-    ));
-    let words = Words {
-        title: "Bilinear look-ups of a light field",
-        x: "texels, unused ones included",
-        y: "RMS error over the field's deviation",
-    };
-    if let Some(svg) = plot::log_log(words, &curves)? {
-        atomic::write(&context.file("error.svg")?, svg.as_bytes())?;
+
+    fn findings(&self) -> Findings {
+        let falls = falls(&self.look_ups);
+        let octahedron = Parametrization::OctahedronQuadratic.to_string();
+        let need = falls.iter().find(|fall| fall.map == octahedron).map(|fall| fall.need);
+        let widths = CONCENTRATIONS.map(|k| format!("{:.2}", 1.0 / k.sqrt())).join(", ");
+        Findings::of(&falls, CRITERIA)
+            .headline(
+                "texels of the octahedron map for the cube's error, over the cube's",
+                need.map(Measured::exact),
+            )
+            .curves(
+                "error",
+                "Bilinear look-ups of a light field",
+                Axes::falling("texels, unused ones included", "RMS error over the field's deviation"),
+                curves(
+                    &self.look_ups,
+                    |row| row.map.clone(),
+                    |row| (row.texels as f64, row.rms.into()),
+                ),
+            )
+            .note(format!(
+                "Exponents by the {LARGEST} largest budgets; texels for the cube's error by its slope at the largest."
+            ))
+            .and(Findings::of(&self.look_ups, &[]))
+            .note(format!(
+                "The field: {LOBES} lobes each of widths {widths}, in random directions, the same for all maps; looked up in uniform directions. \
+                 Texels hold the field at their centres; borders are those of each map. All texels of a layer count, those outside of discs too."
+            ))
+            .and(Findings::of(&self.irradiance, OF_IRRADIANCE))
+            .note(
+                "Random normals. Texels hold the light at their centres, which for the sky is an error of its own; constant radiance shows that \
+                 of the integral alone. By middles each texel counts with its exact solid angle and one direction, as prefiltered maps on the \
+                 device do.",
+            )
     }
-    Ok(vec![table, irradiance(context)?])
+}
+
+/// Greatest errors of irradiance for random normals.
+fn irradiance(context: &Context<'_>) -> Result<Vec<Lit>> {
+    let (budgets, count): (&[u64], u32) = context.pick((&[1 << 8, 1 << 10, 1 << 12, 1 << 14], 100), (&[1 << 8], 5));
+    let mut random = Random::new(13);
+    let normals: Vec<DVec3> = (0..count).map(|_| random.direction()).collect();
+    context.grid(&MAPS, budgets, |map, budget| {
+        let size = size(*map, *budget);
+        let (constant, sky) = (held(*map, size, |_| 1.0)?, held(*map, size, |d| d.z.max(0.0))?);
+        let of_constant = errors_of_irradiance(&constant, &normals, |_| PI);
+        let of_sky = errors_of_irradiance(&sky, &normals, irradiance_of_sky);
+        let [even, even_middles] = of_constant.map(|error| error / PI);
+        let [sky, sky_middles] = of_sky.map(|error| error / (2.0 * PI / 3.0));
+        Ok(Lit {
+            map: map.to_string(),
+            texels: u64::from(size.element_product() * map.layers()),
+            even,
+            even_middles,
+            sky,
+            sky_middles,
+        })
+    })
 }

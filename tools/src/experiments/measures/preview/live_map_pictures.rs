@@ -2,19 +2,16 @@
 //!
 //! Sources: those of [`clerestory::techniques::preview`]. Oracle: the path tracer on the same light paths.
 
-use clerestory::film::{CompareOptions, ErrorReport, Picture, compare};
+use clerestory::film::{CompareOptions, Picture, compare};
 use clerestory::gpu::Gpu;
-use clerestory::raster::ShadowLayout;
-use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Camera, LightKind, Scene};
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows};
-use clerestory::{Error, Result, scene};
+use clerestory::{Result, scene};
 use glam::Vec3;
-use serde_json::json;
 
+use super::previewed::{MAP, Quality, Subject};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::Table;
-use crate::timing::{Spread, median, repeated};
+use crate::experiments::measures::context::short_name;
+use crate::timing::Spread;
 
 /// Scenes that a point light alone lights.
 const SCENES: [&str; 5] = [
@@ -24,202 +21,189 @@ const SCENES: [&str; 5] = [
     "builtin:cathedral?source=point",
     "builtin:conference?source=point",
 ];
-/// Pixels along a side, and samples a pixel of the references.
-const SIZE: (u32, u32) = (128, 1024);
-const SMOKE_SIZE: (u32, u32) = (16, 16);
-/// Texels along a side of shadow maps, and samples along a side of a pixel.
-const QUALITY: (u32, u32) = (2048, 4);
-const SMOKE_QUALITY: (u32, u32) = (256, 1);
-const MAP: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
-/// Places of live maps along each axis of the box around a scene, as shares of it: nine at half its height.
-const SHARES: [f32; 3] = [0.25, 0.5, 0.75];
-const REFERENCE_SEED: u32 = 2;
+/// Previews, and samples per pixel of the references.
+const FULL: (Quality, u32) = ((128, 2048, 4), 1024);
+const SMOKE: (Quality, u32) = ((16, 256, 1), 16);
 /// Light scattered twice at most.
 const TWICE: &str = "bounces=0..2";
+const TURNS: usize = 5;
+const ALONE: &str = "lights alone";
+const WITH: &str = "with a live map";
 
-fn errors(picture: &Picture, reference: &Picture) -> Result<ErrorReport> {
-    compare(picture, reference, &CompareOptions::default())
+rows! {
+    /// A picture, with a live map at a place or without one.
+    struct Row = "Pictures by place of the live map" by [scene, place] {
+        scene: String = "scene",
+        place: String = "place (shares of width and depth)",
+        time: Repeats = "GPU time (ms)",
+        mse_twice: f64 = "relative MSE, light scattered twice at most",
+        bias_twice: f64 = "relative bias, light scattered twice at most",
+        mse: f64 = "relative MSE, all light",
+        bias: f64 = "relative bias, all light",
+    }
 }
 
-/// A scene for the preview and for the path tracer.
-struct Subject<'a> {
-    gpu: &'a Gpu,
-    renderer: Renderer,
-    camera: Camera,
-    lights: Vec<LightKind>,
+rows! {
+    /// Pictures of a scene with live maps or without: medians of the places, least … greatest.
+    struct Way = "Light between surfaces, by a live map" by [scene, way] {
+        scene: String = "scene",
+        way: String = "way",
+        time: Measured = "GPU time (ms)",
+        mse_twice: Measured = "relative MSE, light scattered twice at most",
+        bias_twice: Measured = "relative bias, light scattered twice at most",
+        mse: Measured = "relative MSE, all light",
+        bias: Measured = "relative bias, all light",
+        off: Measured = "size of the relative bias, all light",
+    }
 }
 
-impl<'a> Subject<'a> {
-    fn new(gpu: &'a Gpu, scene: &Scene) -> Result<Self> {
-        Ok(Self {
-            gpu,
-            renderer: Renderer::new(gpu, scene)?,
-            camera: scene.require_camera(None)?.clone(),
-            lights: scene.lights.iter().map(|light| light.kind).collect(),
+rows! {
+    /// Live maps of a scene beside lights alone.
+    struct Gain = "Live maps over lights alone, against all light" by [scene] {
+        scene: String = "scene",
+        off: f64 = "size of the bias at the median place over that by lights alone",
+        places: u64 = "places",
+        nearer: u64 = "places with a mean that is nearer",
+        less: u64 = "places with less relative MSE",
+    }
+}
+
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Gain>] = &[Criterion::each(
+    "a live map brings the mean nearer to that of all light: size of the bias over that by lights alone",
+    Bound::AtMost(1.0),
+    |row: &Gain| row.off.into(),
+)
+.because("at the median of nine places, of which some lie inside bodies")];
+
+impl Row {
+    fn is_alone(&self) -> bool {
+        self.place == ALONE
+    }
+}
+
+/// The median of values, least … greatest.
+fn spread(rows: &[&Row], of: impl Fn(&Row) -> f64) -> Measured {
+    let Spread {
+        median,
+        least,
+        greatest,
+    } = Spread::of(rows.iter().map(|row| of(row)).collect());
+    Measured {
+        value: median,
+        low: least,
+        high: greatest,
+    }
+}
+
+/// Pictures of each scene without a live map and with one.
+fn by_way(rows: &[Row]) -> Vec<[Vec<&Row>; 2]> {
+    let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
+    scenes
+        .map(|rows| {
+            let (alone, with) = rows.iter().partition(|row| row.is_alone());
+            [alone, with]
         })
-    }
+        .collect()
+}
 
-    /// The path tracer's picture.
-    fn traced(&self, (size, spp): (u32, u32), paths: &str) -> Result<Picture> {
-        let rendered = self.renderer.render(&RenderOptions {
-            technique: Some("path".into()),
-            size: [size; 2],
-            spp,
-            seed: REFERENCE_SEED,
-            settings: json!({"path_set": paths}).into(),
-            ..RenderOptions::default()
-        })?;
-        Ok(rendered.picture)
-    }
-
-    /// A preview's picture, and seconds of the device: lights, the live map at a place, if one is asked for, and what the camera sees.
-    fn previewed(&self, size: u32, (side, samples): (u32, u32), place: Option<Vec3>) -> Result<(Picture, f64)> {
-        let scene = self.renderer.gpu_scene();
-        let desc = PreviewDesc {
-            size: [size; 2],
-            samples,
-            lights: self.lights.len() as u32,
-            shadows: Some(PreviewShadows {
-                layout: ShadowLayout::Octahedron,
-                side,
-                width: 0,
-            }),
-            has_probes: place.is_some(),
-        };
-        let mut preview = Preview::new(self.gpu, scene, desc)?;
-        let live = place
-            .map(|place| LiveProbe::new(self.gpu, scene, &preview, MAP, false).map(|live| (live, place)))
-            .transpose()?;
-        let surfaces = scene.surfaces();
-        let ((), seconds) = repeated(1, || {
-            let mut recorder = self.gpu.recorder("frame")?;
-            preview.record_lights(&mut recorder, &surfaces, &self.lights)?;
-            if let Some((live, place)) = &live {
-                live.record(&mut recorder, scene, &surfaces, &preview, *place, None)?;
-            }
-            let part = PreviewPart {
-                triangles: 0..surfaces.triangles,
-                background: true,
-                probe: live.as_ref().map(|(live, _)| live.probe()),
-            };
-            preview.record(&mut recorder, scene, &surfaces, &self.camera, &[part])?;
-            let timings = recorder.submit()?.wait()?;
-            Ok::<_, Error>(((), timings.seconds()))
-        })?;
-        Ok((preview.picture()?, median(seconds)))
-    }
-
-    /// Where live maps are drawn.
-    fn places(&self) -> Vec<Vec3> {
-        let [lower, upper] = self.renderer.gpu_scene().bounds();
-        let shares = SHARES
-            .iter()
-            .flat_map(|x| SHARES.iter().map(|z| Vec3::new(*x, 0.5, *z)));
-        shares.map(|share| lower + share * (upper - lower)).collect()
+fn way((rows, name): (&Vec<&Row>, &str)) -> Way {
+    Way {
+        scene: rows.first().map(|row| row.scene.clone()).unwrap_or_default(),
+        way: name.into(),
+        time: spread(rows, |row| row.time.measured().value),
+        mse_twice: spread(rows, |row| row.mse_twice),
+        bias_twice: spread(rows, |row| row.bias_twice),
+        mse: spread(rows, |row| row.mse),
+        bias: spread(rows, |row| row.bias),
+        off: spread(rows, |row| row.bias.abs()),
     }
 }
 
-/// A picture by lights alone, and those with a live map at each of the places.
-fn by_live_map(subject: &Subject<'_>, size: (u32, u32), quality: (u32, u32)) -> Result<[Vec<Lit>; 2]> {
-    let (twice, all) = (subject.traced(size, TWICE)?, subject.traced(size, "all")?);
-    let lit = |place| {
-        let (picture, seconds) = subject.previewed(size.0, quality, place)?;
-        Ok(Lit {
-            seconds,
-            twice: errors(&picture, &twice)?,
-            all: errors(&picture, &all)?,
-        })
-    };
-    let with: Result<Vec<Lit>> = subject.places().into_iter().map(|place| lit(Some(place))).collect();
-    Ok([vec![lit(None)?], with?])
+fn gain([alone, with]: &[Vec<&Row>; 2]) -> Option<Gain> {
+    let alone = alone.first()?;
+    let count = |is_better: &dyn Fn(&Row) -> bool| with.iter().filter(|row| is_better(row)).count() as u64;
+    Some(Gain {
+        scene: alone.scene.clone(),
+        off: spread(with, |row| row.bias.abs()).value / alone.bias.abs(),
+        places: with.len() as u64,
+        nearer: count(&|row| row.bias.abs() < alone.bias.abs()),
+        less: count(&|row| row.mse < alone.mse),
+    })
 }
 
-/// A picture's seconds, and its errors against light scattered twice at most and against all light.
-struct Lit {
-    seconds: f64,
-    twice: ErrorReport,
-    all: ErrorReport,
-}
-
-fn spread(all: &[Lit], of: impl Fn(&Lit) -> f64) -> Spread {
-    Spread::of(all.iter().map(of).collect())
-}
-
-/// At how many places a live map brings a picture nearer to all light.
-fn of_live_maps(scene: &str, alone: &[Lit], with: &[Lit]) -> String {
-    let nearer = |of: fn(&Lit) -> f64| {
-        let without = spread(alone, of).median;
-        with.iter().filter(|lit| of(lit) < without).count()
-    };
-    format!(
-        "{scene}: of {} places, a live map brings the mean nearer to that of all light at {}, and the relative MSE down at {}.",
-        with.len(),
-        nearer(|lit| lit.all.relative_bias.abs()),
-        nearer(|lit| lit.all.relative_mse)
-    )
-}
-
-/// The measure.
-///
-/// # Errors
-/// Those of scenes, rendering and files.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let (size, quality, scenes) = if context.smoke {
-        (SMOKE_SIZE, SMOKE_QUALITY, &SCENES[..1])
-    } else {
-        (SIZE, QUALITY, &SCENES[..])
-    };
-    let mut interreflection = Table::new(
-        "Light between surfaces, by a live map",
-        &[
-            "scene",
-            "way",
-            "GPU time (ms)",
-            "relative MSE, light scattered twice at most",
-            "its least of the places",
-            "its greatest",
-            "relative bias, light scattered twice at most",
-            "relative MSE, all light",
-            "least of the places",
-            "greatest",
-            "relative bias, all light",
-        ],
-    );
-    for (done, address) in scenes.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(address, done, scenes.len());
-        let subject = Subject::new(&gpu, &scene::load(address)?)?;
-        let [alone, with] = by_live_map(&subject, size, quality)?;
-        for (way, all) in [("lights alone", &alone), ("with a live map", &with)] {
-            let [twice, of_all] = [
-                spread(all, |lit| lit.twice.relative_mse),
-                spread(all, |lit| lit.all.relative_mse),
-            ];
-            interreflection.row([
-                (*address).into(),
-                way.into(),
-                (1e3 * spread(all, |lit| lit.seconds).median).into(),
-                twice.median.into(),
-                twice.least.into(),
-                twice.greatest.into(),
-                spread(all, |lit| lit.twice.relative_bias).median.into(),
-                of_all.median.into(),
-                of_all.least.into(),
-                of_all.greatest.into(),
-                spread(all, |lit| lit.all.relative_bias).median.into(),
-            ]);
-        }
-        interreflection.note(of_live_maps(address, &alone, &with));
+/// Pictures of a scene: by lights alone, and with a live map at each of the places, in turns.
+fn pictures(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>> {
+    let (quality, spp) = context.pick(FULL, SMOKE);
+    let subject = Subject::new(gpu, &scene::load(address)?)?;
+    let references = [TWICE, "all"].map(|paths| subject.traced((quality.0, spp), paths));
+    let [twice, all] = references;
+    let (twice, all) = (twice?, all?);
+    let mut previews = [subject.previewed(quality, false)?, subject.previewed(quality, true)?];
+    let mut places = vec![(ALONE.to_owned(), Vec3::ZERO)];
+    places.extend(subject.places());
+    let preview_of = |place: usize| usize::from(place > 0);
+    let turns = context.in_turns(TURNS, places.len(), |place| {
+        previews[preview_of(place)].frame(places[place].1)
+    })?;
+    let mut rows = Vec::new();
+    for (at, ((name, place), turns)) in places.iter().zip(turns).enumerate() {
+        let preview = &mut previews[preview_of(at)];
+        preview.frame(*place)?;
+        let picture = preview.picture()?;
+        let errors = |reference: &Picture| compare(&picture, reference, &CompareOptions::default());
+        let (twice, all) = (errors(&twice)?, errors(&all)?);
+        rows.push(Row {
+            scene: short_name(address).to_owned(),
+            place: name.clone(),
+            time: Repeats(turns).scaled(1e3),
+            mse_twice: twice.relative_mse,
+            bias_twice: twice.relative_bias,
+            mse: all.relative_mse,
+            bias: all.relative_bias,
+        });
     }
-    let side = MAP.side;
-    interreflection.note(format!(
-        "A live map of {side}², of light scattered once, lights all surfaces; nothing stands in its way, and it comes from infinity. It is drawn at nine places at half \
-         the height of the box around the scene, at a quarter, a half and three quarters of its other sides; those inside bodies see nothing. Columns without a name \
-         of their own are medians of the places. {0}² pixels against path-traced ones of {1} samples a pixel; shadow maps of {2}², and {3}² samples a pixel.",
-        size.0, size.1, quality.0, quality.1
-    ));
-    Ok(vec![interreflection])
+    Ok(rows)
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        context.each(
+            context.first(&SCENES, 1),
+            |address| short_name(address).to_owned(),
+            |address| pictures(context, &gpu, address),
+        )
+    }
+
+    fn findings(&self) -> Findings {
+        let scenes = by_way(self);
+        let gains: Vec<Gain> = scenes.iter().filter_map(gain).collect();
+        let both = scenes.iter().flat_map(|ways| ways.iter().zip([ALONE, WITH]));
+        let ways: Vec<Way> = both.map(way).collect();
+        let ((size, shadows, samples), spp) = FULL;
+        Findings::of(&gains, CRITERIA)
+            .headline(
+                "size of the bias with a live map over that by lights alone (geometric mean over scenes)",
+                geometric_mean(gains.iter().map(|gain| gain.off.into())),
+            )
+            .bars(
+                "bias",
+                "Size of the relative bias against all light",
+                &ways,
+                |row| [row.scene.clone(), row.way.clone()],
+                |row| row.off,
+            )
+            .and(Findings::of(&ways, &[]))
+            .note(format!(
+                "Medians of the places, least … greatest. A live map of {0}², of light scattered once, lights all surfaces; nothing stands in its way, \
+                 and it comes from infinity. It is drawn at nine places at half the height of the box around the scene, at a quarter, a half and three \
+                 quarters of its other sides; those inside bodies see nothing. {size}² pixels against path-traced ones of {spp} samples per pixel; \
+                 shadow maps of {shadows}², and {samples}² samples per pixel.",
+                MAP.side
+            ))
+            .and(Findings::of(self, &[]).long())
+    }
 }

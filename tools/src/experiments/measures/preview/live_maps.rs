@@ -2,22 +2,15 @@
 //!
 //! Sources: T. Engelhardt and C. Dachsbacher, VMV 2008; B. Karis, SIGGRAPH 2013. Oracle: sums of the lobes over a map of 1024² texels in f64.
 
-use clerestory::gpu::Gpu;
-use clerestory::maps::MapImage;
-use clerestory::maps::prefilter::{ggx_mean, weighted_texels};
-use clerestory::raster::ShadowLayout;
-use clerestory::scene::{LightKind, Scene};
-use clerestory::techniques::preview::probe::probe_level;
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewShadows};
-use clerestory::transport::GpuScene;
-use clerestory::{Result, scene};
-use glam::{DVec3, Vec3, Vec4};
-use rayon::prelude::*;
+use clerestory::Result;
+use clerestory::techniques::preview::{LightProbeDesc, LiveProbe};
+use glam::Vec3;
 
+use super::live_stages::{DIRECTIONS, FINEST, IRRADIANCE, MIRROR, REFERENCE, Reference, SUMMED, Stage};
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::Table;
-use crate::random::Random;
-use crate::timing::{median, repeated};
+use crate::experiments::measures::context::short_name;
+use crate::experiments::slope::least_squares;
 
 /// Scenes, and the map's place as a share of the box around each.
 const SCENES: [(&str, Vec3); 4] = [
@@ -27,200 +20,174 @@ const SCENES: [(&str, Vec3); 4] = [
     ("builtin:divider-room", Vec3::new(0.3, 0.5, 0.4)),
 ];
 const SIDES: [u32; 3] = [128, 256, 512];
-const REFERENCE: u32 = 1024;
-/// Means of the reference that lobes are summed over, texels along a side: lobes are many times wider.
-const SUMMED: u32 = 256;
-/// Widths of lobes: irradiance, two of the levels' own, one between them, and narrower ones than the narrowest.
-const ALPHAS: [f64; 7] = [1.0, 0.35355, 0.125, 0.2, 0.06, 0.03, 0.01];
-const DIRECTIONS: usize = 300;
-const REPEATS: usize = 5;
-/// The parts of a map's frame by the names of their passes.
-const PARTS: [&str; 5] = [
-    "raster: surfaces",
-    "preview: shade live map",
-    "probe: levels and borders",
-    "probe: copy",
-    "probe: filter",
-];
+const TURNS: usize = 5;
+/// The size that one number tells of.
+const TYPICAL: u64 = 256;
 
-fn lights(scene: &Scene) -> Vec<LightKind> {
-    scene.lights.iter().map(|light| light.kind).collect()
-}
-
-struct Stage<'a> {
-    gpu: &'a Gpu,
-    scene: GpuScene,
-    preview: Preview,
-    place: Vec3,
-}
-
-impl<'a> Stage<'a> {
-    fn new(gpu: &'a Gpu, address: &str, share: Vec3) -> Result<Self> {
-        let source = scene::load(address)?;
-        let lights = lights(&source);
-        let scene = GpuScene::new(gpu, &source)?;
-        let desc = PreviewDesc {
-            size: [8, 8],
-            samples: 1,
-            lights: lights.len() as u32,
-            shadows: (!lights.is_empty()).then_some(PreviewShadows {
-                layout: ShadowLayout::Octahedron,
-                side: 1024,
-                width: 0,
-            }),
-            has_probes: false,
-        };
-        let mut preview = Preview::new(gpu, &scene, desc)?;
-        let mut recorder = gpu.recorder("lights")?;
-        preview.record_lights(&mut recorder, &scene.surfaces(), &lights)?;
-        recorder.submit()?.wait()?;
-        let [lower, upper] = scene.bounds();
-        Ok(Self {
-            gpu,
-            preview,
-            place: lower + share * (upper - lower),
-            scene,
-        })
-    }
-
-    /// A map of the size, and milliseconds of its parts.
-    fn draw(&self, desc: LightProbeDesc, repeats: usize) -> Result<(LiveProbe, [f64; PARTS.len()])> {
-        let live = LiveProbe::new(self.gpu, &self.scene, &self.preview, desc, false)?;
-        let mut times: [Vec<f64>; PARTS.len()] = Default::default();
-        repeated(repeats, || {
-            let mut recorder = self.gpu.recorder("live map")?;
-            live.record(
-                &mut recorder,
-                &self.scene,
-                &self.scene.surfaces(),
-                &self.preview,
-                self.place,
-                None,
-            )?;
-            let timings = recorder.submit()?.wait()?;
-            for (time, part) in times.iter_mut().zip(PARTS) {
-                time.push(1e3 * timings.seconds_of(part));
-            }
-            Ok::<_, clerestory::Error>(((), 0.0))
-        })?;
-        // The first warms up.
-        let times = times.map(|time| median(time[1.min(time.len() - 1)..].to_vec()));
-        Ok((live, times))
+rows! {
+    /// Frames of a map.
+    struct Row = "Live maps" by [scene, side] {
+        scene: String = "scene",
+        side: u64 = "texels a side",
+        draw: Repeats = "draw (ms)",
+        shade: Repeats = "shade (ms)",
+        levels: Repeats = "levels, borders (ms)",
+        copy: Repeats = "copy (ms)",
+        filter: Repeats = "filter (ms)",
+        all: Repeats = "all parts (ms)",
+        size: f64 = "MiB",
     }
 }
 
-fn truth(map: &MapImage, directions: &[DVec3], alpha: f64) -> Vec<DVec3> {
-    let texels = weighted_texels(map);
-    directions.par_iter().map(|r| ggx_mean(&texels, *r, alpha)).collect()
+rows! {
+    /// Look-ups of one width in a map.
+    struct LookUp = "RMS error of look-ups over the mean" by [scene, side, lobe] {
+        scene: String = "scene",
+        side: u64 = "texels a side",
+        lobe: String = "lobe",
+        error: f64 = "RMS error over the mean",
+    }
 }
 
-/// RMS of differences over the mean.
-fn error(values: &[Vec3], truth: &[DVec3]) -> f64 {
-    let mean = truth.iter().sum::<DVec3>().element_sum() / (3 * truth.len()) as f64;
-    let squares: f64 = values
-        .iter()
-        .zip(truth)
-        .map(|(value, right)| (value.as_dvec3() - *right).length_squared())
-        .sum();
-    (squares / (3 * truth.len()) as f64).sqrt() / mean.max(f64::MIN_POSITIVE)
+rows! {
+    /// Mirrors in a scene.
+    struct Fall = "Fall of the mirror's error with texels" by [scene] {
+        scene: String = "scene",
+        exponent: f64 = "power of texels along a side by which it grows",
+    }
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let (sides, reference, summed) = if context.smoke {
-        (&SIDES[..1], 256, 64)
-    } else {
-        (&SIDES[..], REFERENCE, SUMMED)
-    };
-    let repeats = if context.smoke { 1 } else { REPEATS };
-    let own: Vec<(String, Vec3)> = if context.scenes.is_empty() {
-        let count = if context.smoke { 1 } else { SCENES.len() };
-        SCENES[..count]
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    frames: Vec<Row>,
+    look_ups: Vec<LookUp>,
+}
+
+const OF_LOOK_UPS: &[Criterion<LookUp>] = &[Criterion::each(
+    "irradiance is within a hundredth",
+    Bound::AtMost(0.01),
+    |row: &LookUp| row.error.into(),
+)
+.among(|row| row.lobe == IRRADIANCE)];
+const OF_FALLS: &[Criterion<Fall>] = &[Criterion::each(
+    "the mirror's error falls with texels along a side: its exponent",
+    Bound::AtMost(-0.4),
+    |row: &Fall| row.exponent.into(),
+)
+.because("sharp edges fall as −½, and a tenth is left for texels that meet them by chance")];
+
+impl Found {
+    /// Adds a scene's maps, whose sizes take turns.
+    fn add(&mut self, context: &Context<'_>, scene: &str, stage: &Stage<'_>) -> Result<()> {
+        let reference = Reference::new(stage, context.pick((REFERENCE, SUMMED), (512, 64)))?;
+        let sides = context.first(&SIDES, 2);
+        let maps: Vec<LiveProbe> = sides
             .iter()
-            .map(|(address, share)| ((*address).to_owned(), *share))
-            .collect()
-    } else {
-        context
-            .scenes
-            .iter()
-            .map(|address| (address.clone(), Vec3::splat(0.5)))
-            .collect()
-    };
-    let mut found = Table::new(
-        "Live maps",
-        &[
-            "scene",
-            "texels a side",
-            "draw (ms)",
-            "shade (ms)",
-            "levels, borders (ms)",
-            "copy (ms)",
-            "filter (ms)",
-            "MiB",
-            "error of irradiance",
-            "of α = 0.35",
-            "of α = 0.125",
-            "of α = 0.2",
-            "of α = 0.06",
-            "of α = 0.03",
-            "of α = 0.01",
-            "of the mirror",
-        ],
-    );
-    let mut random = Random::new(5);
-    let directions: Vec<DVec3> = (0..DIRECTIONS).map(|_| random.direction()).collect();
-    for (done, (address, share)) in own.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(address, done, own.len());
-        let stage = Stage::new(&gpu, address, *share)?;
-        let finest = LightProbeDesc {
-            side: reference,
-            finest: 32,
-        };
-        let (right, _) = stage.draw(finest, 0)?;
-        let mirror = right.probe().map().read(0)?;
-        let mut image = mirror.clone();
-        while image.size().x > summed {
-            image = image.coarser()?;
-        }
-        let truths: Vec<Vec<DVec3>> = ALPHAS.iter().map(|alpha| truth(&image, &directions, *alpha)).collect();
-        let sharp: Vec<DVec3> = directions.iter().filter_map(|d| mirror.look_up(*d)).collect();
-        for side in sides {
-            let desc = LightProbeDesc {
-                side: *side,
-                finest: 128,
-            };
-            let (live, times) = stage.draw(desc, repeats)?;
-            let probe = live.probe();
-            let errors: Vec<f64> = ALPHAS
-                .iter()
-                .zip(&truths)
-                .map(|(alpha, truth)| {
-                    let level = probe_level(probe.alphas(), *alpha) as f32;
-                    let queries: Vec<Vec4> = directions.iter().map(|d| d.as_vec3().extend(level)).collect();
-                    Ok(error(&probe.filtered().look_up(&queries)?, truth))
+            .map(|side| {
+                stage.live(LightProbeDesc {
+                    side: *side,
+                    finest: FINEST,
                 })
-                .collect::<Result<_>>()?;
-            let queries: Vec<Vec4> = directions.iter().map(|d| d.as_vec3().extend(0.0)).collect();
-            let of_mirror = error(&probe.filtered().look_up(&queries)?, &sharp);
-            found.row(
-                [address.as_str().into(), u64::from(*side).into()]
-                    .into_iter()
-                    .chain(times.map(Into::into))
-                    .chain([(live.bytes() as f64 / f64::from(1 << 20)).into()])
-                    .chain(errors.into_iter().chain([of_mirror]).map(Into::into)),
-            );
+            })
+            .collect::<Result<_>>()?;
+        let turns = context.in_turns(TURNS, maps.len(), |map| stage.milliseconds(&maps[map]))?;
+        for ((side, live), turns) in sides.iter().zip(&maps).zip(&turns) {
+            let side = u64::from(*side);
+            let look_up = |(lobe, error): (&str, f64)| LookUp {
+                scene: scene.into(),
+                side,
+                lobe: lobe.into(),
+                error,
+            };
+            self.look_ups.extend(reference.errors(live)?.into_iter().map(look_up));
+            let [draw, shade, levels, copy, filter, all] = Repeats::by_part(turns);
+            self.frames.push(Row {
+                scene: scene.into(),
+                side,
+                draw,
+                shade,
+                levels,
+                copy,
+                filter,
+                all,
+                size: live.bytes() as f64 / f64::from(1 << 20),
+            });
         }
+        Ok(())
     }
-    found.note(format!(
-        "One map a frame at a place in each scene, lit by the scene's lights through octahedron shadow maps of 1024², as an octahedron of that many texels a \
-         side. Times are of the device's timestamps, medians of {REPEATS}. Errors are RMS over {DIRECTIONS} directions, over the mean: of look-ups filtered by lobes of width α \
-         (irradiance is α = 1; 0.2 lies between two levels, and from 0.06 down between the finest filtered one and mirrors) against the sum of the lobe over a map of {REFERENCE}² texels, by means of {SUMMED}² in f64; \
-         of unfiltered ones against that map itself, where edges of surfaces lie between texels. The divider room's panel is no light of the preview: its map is dark but \
-         for that, the hardest light for lobes. Maps of 128² have no level between α = 0.35 and mirrors."
-    ));
-    Ok(vec![found])
+
+    fn mirrors(&self) -> Vec<LookUp> {
+        let mirrors = self.look_ups.iter().filter(|row| row.lobe == MIRROR);
+        mirrors.cloned().collect()
+    }
+}
+
+/// How the mirror's error falls; none of scenes of one size.
+fn falls(mirrors: &[LookUp]) -> Vec<Fall> {
+    let of_a_scene = mirrors.chunk_by(|a, b| a.scene == b.scene);
+    let fall = |rows: &[LookUp]| {
+        let points: Vec<(f64, f64)> = rows
+            .iter()
+            .map(|row| ((row.side as f64).ln(), row.error.ln()))
+            .collect();
+        Some(Fall {
+            scene: rows.first()?.scene.clone(),
+            exponent: least_squares(&points)?,
+        })
+    };
+    of_a_scene.filter_map(fall).collect()
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let own = context
+            .first(&SCENES, 1)
+            .iter()
+            .map(|(address, share)| ((*address).to_owned(), *share));
+        let told = context.scenes.iter().map(|address| (address.clone(), Vec3::splat(0.5)));
+        let scenes: Vec<(String, Vec3)> = if context.scenes.is_empty() {
+            own.collect()
+        } else {
+            told.collect()
+        };
+        let mut found = Self::default();
+        context.each(
+            &scenes,
+            |(address, _)| short_name(address).to_owned(),
+            |(address, share)| {
+                found.add(context, short_name(address), &Stage::new(&gpu, address, *share)?)?;
+                Ok(Vec::<()>::new())
+            },
+        )?;
+        Ok(found)
+    }
+
+    fn findings(&self) -> Findings {
+        let mirrors = self.mirrors();
+        Findings::pivoted(&self.look_ups, "lobe", OF_LOOK_UPS)
+            .headline(
+                "GPU time of a map of 256² in the slowest scene (ms)",
+                largest(&self.frames, |row| row.side == TYPICAL, |row| row.all.measured().value),
+            )
+            .curves(
+                "mirrors",
+                "Mirrors by live maps",
+                Axes::falling("texels a side", "RMS error over the mean"),
+                curves(&mirrors, |row| row.scene.clone(), |row| (row.side as f64, row.error.into())),
+            )
+            .note(format!(
+                "Over {DIRECTIONS} directions: look-ups filtered by lobes of width α (irradiance is α = 1; 0.2 lies between two levels, and from 0.06 \
+                 down between the finest filtered one and mirrors) against the sum of the lobe over a map of {REFERENCE}² texels, by means of {SUMMED}² \
+                 in f64; unfiltered ones against that map itself, where edges of surfaces lie between texels. The divider room's panel is no light of \
+                 the preview: its map is dark but for that, the hardest light for lobes. Maps of {FINEST}² have no level between α = 0.35 and mirrors."
+            ))
+            .and(Findings::of(&falls(&mirrors), OF_FALLS))
+            .and(Findings::of(&self.frames, &[]))
+            .note(
+                "One map per frame at a place in each scene, an octahedron of that many texels a side, lit by the scene's lights through octahedron \
+                 shadow maps of 1024². Times are of the device's timestamps; sizes take turns.",
+            )
+    }
 }

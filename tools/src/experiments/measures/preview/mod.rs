@@ -2,4 +2,7 @@
 
 pub mod live_map_pictures;
 pub mod live_maps;
+mod live_stages;
+mod previewed;
 pub mod shadow_maps;
+mod shadow_places;

@@ -3,21 +3,18 @@
 //!
 //! Sources: L. Williams, SIGGRAPH 1978; T. Engelhardt and C. Dachsbacher, VMV 2008. Oracle: a ray from each place to the light.
 
-use clerestory::accel::bvh2::Bvh2;
-use clerestory::accel::offset::{offset_ray_origin, scene_reach, surface_point};
-use clerestory::accel::trace::{Query, RayTracer, TraceSettings};
-use clerestory::accel::{NO_HIT, Ray};
+use clerestory::Result;
 use clerestory::gpu::Gpu;
-use clerestory::gpu::shaders::types::SceneTriangle;
-use clerestory::raster::{OmniShadowDesc, OmniShadowMaps, ShadowLayout, ShadowPlace};
-use clerestory::transport::GpuScene;
-use clerestory::{Result, scene};
+use clerestory::raster::{OmniShadowDesc, OmniShadowMaps, ShadowLayout};
 use glam::Vec3;
 
+use super::shadow_places::Subject;
+use crate::experiments::findings::{
+    Axes, Bound, Criterion, Findings, Measured, Repeats, Study, curves, geometric_mean, rows,
+};
 use crate::experiments::measures::Context;
-use crate::experiments::table::Table;
-use crate::random::Random;
-use crate::timing::{median, repeated};
+use crate::experiments::measures::context::short_name;
+use crate::experiments::slope::least_squares;
 
 /// Scenes, and the light's place as a share of the box around each.
 const SCENES: [(&str, Vec3); 5] = [
@@ -27,292 +24,234 @@ const SCENES: [(&str, Vec3); 5] = [
     ("builtin:cornell-box", Vec3::new(0.5, 0.9, 0.55)),
     ("builtin:conference", Vec3::new(0.45, 0.85, 0.55)),
 ];
+/// The light's place in scenes that are told.
+const TOLD: Vec3 = Vec3::new(0.5, 0.6, 0.5);
 /// Texels along a side of a cube's faces; octahedra have as many in all.
 const SIDES: [u32; 6] = [32, 64, 128, 256, 512, 1024];
 const PLACES: usize = 200_000;
-/// Draws a place, until one faces the light.
-const DRAWS: usize = 100;
-const REPEATS: usize = 5;
+const TURNS: usize = 5;
 /// Width of the filter that is compared with none.
 const WIDTH: u32 = 2;
+/// Standard errors of an interval that holds 95 % of normal numbers.
+const ERRORS: f64 = 1.96;
 
-/// A scene, places on its surfaces and what rays say of them.
-struct Subject {
-    scene: GpuScene,
-    places: Vec<ShadowPlace>,
-    light: Vec3,
-    lit: Vec<bool>,
-    /// Seconds of a ray.
-    ray: f64,
-}
-
-/// Places evenly over what turns its outer side to the light: bottoms and insides, which no light reaches, would dilute errors. Fewer than `count` where
-/// that is next to nothing.
-fn places(corners: &[[Vec3; 3]], bounds: [Vec3; 2], light: Vec3, count: usize) -> Vec<ShadowPlace> {
-    let mut random = Random::new(77);
-    let mut sum = 0.0;
-    let areas: Vec<f64> = corners
-        .iter()
-        .map(|[a, b, c]| {
-            sum += f64::from((*b - *a).cross(*c - *a).length());
-            sum
-        })
-        .collect();
-    (0..DRAWS * count)
-        .map(|_| {
-            let wanted = sum * random.unit();
-            let triangle = areas.partition_point(|area| *area <= wanted).min(corners.len() - 1);
-            let (mut u, mut v) = (random.unit() as f32, random.unit() as f32);
-            if u + v > 1.0 {
-                (u, v) = (1.0 - u, 1.0 - v);
-            }
-            let [a, b, c] = corners[triangle];
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            let reach = scene_reach(a + u * (b - a) + v * (c - a), bounds[0], bounds[1]);
-            let point = surface_point(&corners[triangle], [u, v], reach);
-            ShadowPlace {
-                position: point.position,
-                normal,
-                slack: normal.abs().dot(point.error),
-            }
-        })
-        .filter(|place| place.normal.dot(light - place.position) > 0.0)
-        .take(count)
-        .collect()
-}
-
-fn shadow_ray(place: &ShadowPlace, light: Vec3) -> Ray {
-    let error = Vec3::splat(place.slack / place.normal.abs().element_sum().max(f32::MIN_POSITIVE));
-    let start = offset_ray_origin(place.position, error, place.normal, light - place.position);
-    Ray {
-        origin: start.to_array(),
-        t_min: 0.0,
-        direction: (light - start).to_array(),
-        t_max: 1.0,
+rows! {
+    /// A shadow map.
+    struct Row = "Shadow maps of one light" by [scene, layout, side] {
+        scene: String = "scene",
+        layout: String = "layout",
+        side: u64 = "side of the cube's faces (texels)",
+        texels: u64 = "texels",
+        places: u64 = "places",
+        lit: f64 = "share of lit places",
+        wrong: f64 = "share of wrong places",
+        filtered: f64 = "mean difference, filtered",
+        draw: Repeats = "draw (ms)",
+        look_up: Repeats = "look-up (ns)",
+        filter: Repeats = "filtered look-up (ns)",
+        ray: Repeats = "shadow ray (ns)",
     }
 }
 
-impl Subject {
-    fn new(gpu: &Gpu, address: &str, share: Vec3, context: &Context<'_>) -> Result<Self> {
-        let scene = GpuScene::new(gpu, &scene::load(address)?)?;
-        let surfaces = scene.surfaces();
-        let triangles: Vec<SceneTriangle> = gpu.read(
-            surfaces.set.scene_triangles.buffer().view(),
-            surfaces.triangles as usize,
-        )?;
-        let corners: Vec<_> = triangles
-            .iter()
-            .map(|t| [t.a, t.b, t.c].map(Vec3::from_array))
-            .collect();
-        let bounds = scene.bounds();
-        let light = bounds[0] + share * (bounds[1] - bounds[0]);
-        let count = if context.smoke { 2000 } else { PLACES };
-        let places = places(&corners, bounds, light, count);
-        if places.len() < count {
-            let cause = "turns next to nothing towards the light";
-            return Err(clerestory::Error::setting("scene", address, cause));
+rows! {
+    /// How a layout's errors fall in a scene.
+    struct Rate = "Rates of errors" by [scene, layout] {
+        scene: String = "scene",
+        layout: String = "layout",
+        exponent: Measured = "power of texels along a side by which errors grow",
+    }
+}
+
+rows! {
+    /// An octahedron beside a cube.
+    struct Pair = "Octahedra beside cubes of as many texels (geometric means over sides)" by [scene] {
+        scene: String = "scene",
+        wrong: f64 = "octahedron's error over the cube's",
+        draw: Measured = "octahedron's time to draw over the cube's",
+    }
+}
+
+/// What was found.
+pub type Found = Vec<Row>;
+
+const OF_RATES: &[Criterion<Rate>] = &[Criterion::each(
+    "errors fall as one over the texels along a side: their exponent",
+    Bound::Between(-1.1, -0.9),
+    |row: &Rate| row.exponent,
+)
+.because("a tenth is four standard errors of 200,000 places")];
+const OF_PAIRS: &[Criterion<Pair>] = &[Criterion::each(
+    "an octahedron's error is within a fifth of the cube's: their ratio",
+    Bound::Between(0.8, 1.2),
+    |row: &Pair| row.wrong.into(),
+)];
+
+/// The exponent of errors against texels along a side, by least squares in logarithms, with its margin by chance: that of counts of places.
+fn exponent(rows: &[&Row]) -> Measured {
+    let point = |row: &&Row| (0.5 * (row.texels as f64).ln(), row.wrong.ln());
+    let rows: Vec<&Row> = rows.iter().copied().filter(|row| row.wrong > 0.0).collect();
+    let points: Vec<(f64, f64)> = rows.iter().map(point).collect();
+    let mean = points.iter().map(|(x, _)| x).sum::<f64>() / points.len() as f64;
+    let spread: f64 = points.iter().map(|(x, _)| (x - mean).powi(2)).sum();
+    let variance = |(row, (x, _)): (&&Row, &(f64, f64))| {
+        ((x - mean) / spread).powi(2) * (1.0 - row.wrong) / (row.wrong * row.places as f64)
+    };
+    let variance: f64 = rows.iter().zip(&points).map(variance).sum();
+    Measured::within(least_squares(&points).unwrap_or(f64::NAN), ERRORS * variance.sqrt())
+}
+
+fn rates(rows: &[Row]) -> Vec<Rate> {
+    let mut rates: Vec<Rate> = Vec::new();
+    for row in rows {
+        let is_same = |rate: &Rate| (&rate.scene, &rate.layout) == (&row.scene, &row.layout);
+        if rates.iter().any(is_same) {
+            continue;
         }
-        let index = Bvh2::build(&corners, &Default::default())?;
-        let settings = TraceSettings {
-            query: Query::Any,
-            ..TraceSettings::ray_per_thread()
+        let same = rows
+            .iter()
+            .filter(|other| (&other.scene, &other.layout) == (&row.scene, &row.layout));
+        rates.push(Rate {
+            scene: row.scene.clone(),
+            layout: row.layout.clone(),
+            exponent: exponent(&same.collect::<Vec<_>>()),
+        });
+    }
+    rates
+}
+
+/// Octahedra beside the cubes of as many texels, by scene.
+fn pairs(rows: &[Row]) -> Vec<Pair> {
+    let [cube, octahedron] = ShadowLayout::ALL.map(ShadowLayout::name);
+    let mut scenes: Vec<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
+    scenes.dedup();
+    let pair = |scene: &&str| {
+        let of = |layout: &'static str| {
+            rows.iter()
+                .filter(move |row| row.scene == *scene && row.layout == layout)
         };
-        let tracer = RayTracer::new(gpu, &index, &settings)?;
-        let rays: Vec<Ray> = places.iter().map(|place| shadow_ray(place, light)).collect();
-        let (hits, seconds) = repeated(if context.smoke { 1 } else { REPEATS }, || {
-            let traced = tracer.trace(&rays)?;
-            let seconds = traced.seconds();
-            Ok::<_, clerestory::Error>((traced.hits, seconds))
-        })?;
-        Ok(Self {
-            light,
-            lit: hits.iter().map(|hit| hit.triangle == NO_HIT).collect(),
-            ray: median(seconds) / places.len() as f64,
-            places,
-            scene,
-        })
-    }
-
-    /// Share of places that light reaches.
-    fn lit_share(&self) -> f64 {
-        self.lit.iter().filter(|lit| **lit).count() as f64 / self.lit.len() as f64
-    }
-}
-
-/// What a map is worth and costs.
-struct Found {
-    texels: u64,
-    /// Share of places that are wrong.
-    wrong: f64,
-    /// Mean difference of the filtered share.
-    filtered: f64,
-    /// Seconds.
-    draw: f64,
-    look_up: f64,
-    filter: f64,
-}
-
-fn run(gpu: &Gpu, subject: &Subject, layout: ShadowLayout, side: u32, repeats: usize) -> Result<Found> {
-    let surfaces = subject.scene.surfaces();
-    let desc = OmniShadowDesc { layout, side, maps: 1 };
-    let maps = OmniShadowMaps::new(gpu, &surfaces, desc)?;
-    let ((), draws) = repeated(repeats, || {
-        let mut recorder = gpu.recorder("shadow map")?;
-        maps.record(&mut recorder, &surfaces, &[subject.light])?;
-        let seconds = recorder.submit()?.wait()?.seconds();
-        Ok::<_, clerestory::Error>(((), seconds))
-    })?;
-    let look_ups = |width| {
-        repeated(repeats, || {
-            let (shares, timings) = maps.look_up_timed(0, subject.light, width, &subject.places)?;
-            Ok::<_, clerestory::Error>((shares, timings.seconds()))
-        })
+        let both: Vec<(&Row, &Row)> = of(octahedron).zip(of(cube)).collect();
+        let wrong = both.iter().map(|(a, b)| a.wrong / b.wrong);
+        let wrong = geometric_mean(
+            wrong
+                .filter(|ratio| *ratio > 0.0 && ratio.is_finite())
+                .map(Measured::exact),
+        );
+        let draw = geometric_mean(both.iter().map(|(a, b)| a.draw.over(&b.draw).measured()));
+        Pair {
+            scene: (*scene).into(),
+            wrong: wrong.map_or(f64::NAN, |ratio| ratio.value),
+            draw: draw.unwrap_or(Measured::exact(f64::NAN)),
+        }
     };
-    let (plain, plain_seconds) = look_ups(0)?;
-    let (smooth, smooth_seconds) = look_ups(WIDTH)?;
-    let count = subject.places.len() as f64;
-    let off = |shares: &[f32]| {
-        let pairs = shares.iter().zip(&subject.lit);
-        let sum: f64 = pairs
-            .map(|(share, lit)| (f64::from(*share) - f64::from(u8::from(*lit))).abs())
-            .sum();
-        sum / count
-    };
-    Ok(Found {
-        texels: desc.texels(),
-        wrong: off(&plain),
-        filtered: off(&smooth),
-        draw: median(draws),
-        look_up: median(plain_seconds) / count,
-        filter: median(smooth_seconds) / count,
-    })
+    scenes.iter().map(pair).collect()
 }
 
-/// Slope of errors against texels along a side, both in logarithms.
-fn rate(line: &[Found]) -> f64 {
-    let points: Vec<_> = line
-        .iter()
-        .filter(|found| found.wrong > 0.0)
-        .map(|found| ((found.texels as f64).sqrt().ln(), found.wrong.ln()))
-        .collect();
-    let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let (xy, xx) = points.iter().fold((0.0, 0.0), |(xy, xx), p| {
-        (xy + (p.0 - x) * (p.1 - y), xx + (p.0 - x).powi(2))
+/// Seconds of the device: to draw a map, for a look-up and for a filtered one.
+fn seconds(gpu: &Gpu, subject: &Subject, maps: &OmniShadowMaps) -> Result<[f64; 3]> {
+    let mut recorder = gpu.recorder("shadow map")?;
+    maps.record(&mut recorder, &subject.scene.surfaces(), &[subject.light])?;
+    let draw = recorder.submit()?.wait()?.seconds();
+    let look_up = |width| -> Result<f64> {
+        let (_, timings) = maps.look_up_timed(0, subject.light, width, &subject.places)?;
+        Ok(timings.seconds() / subject.places.len() as f64)
+    };
+    Ok([draw, look_up(0)?, look_up(WIDTH)?])
+}
+
+/// Both layouts of as many texels, in turns with shadow rays.
+fn beside_each_other(context: &Context<'_>, gpu: &Gpu, scene: &str, subject: &Subject, side: u32) -> Result<Vec<Row>> {
+    let texels = 6 * u64::from(side) * u64::from(side);
+    let descs = ShadowLayout::ALL.map(|layout| OmniShadowDesc {
+        layout,
+        side: layout.side_for(texels),
+        maps: 1,
     });
-    xy / xx
-}
-
-/// What was measured, beside what is expected of borders as wide as texels, and of the layouts.
-fn slopes_and_ratios(slopes: &[f64], ratios: &[f64]) -> String {
-    let range = |values: &[f64]| {
-        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        format!("from {low:.2} to {high:.2}")
-    };
-    let within = ratios.iter().filter(|ratio| (0.8..=1.2).contains(*ratio)).count();
-    format!(
-        "Slopes are {} (−1 is that of errors as wide as a texel); an octahedron's error is {} of that of the cube of as many texels, and within a fifth of it, \
-         as the document expects, in {within} of {} scenes.",
-        range(slopes),
-        range(ratios),
-        ratios.len()
-    )
-}
-
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let (sides, repeats) = if context.smoke {
-        (&SIDES[..2], 1)
-    } else {
-        (&SIDES[..], REPEATS)
-    };
-    let own: Vec<(String, Vec3)> = if context.scenes.is_empty() {
-        let count = if context.smoke { 1 } else { SCENES.len() };
-        SCENES[..count]
-            .iter()
-            .map(|(address, share)| ((*address).to_owned(), *share))
-            .collect()
-    } else {
-        let middle = Vec3::new(0.5, 0.6, 0.5);
-        context.scenes.iter().map(|address| (address.clone(), middle)).collect()
-    };
-    let mut all = Table::new(
-        "Shadow maps of one light",
-        &[
-            "scene",
-            "layout",
-            "texels",
-            "lit places",
-            "wrong places",
-            "mean difference, filtered",
-            "draw (ms)",
-            "look-up (ns)",
-            "filtered look-up (ns)",
-            "shadow ray (ns)",
-        ],
-    );
-    let mut rates = Table::new(
-        "Rates of errors, and octahedra beside cubes",
-        &[
-            "scene",
-            "slope by texels along a side, cube",
-            "octahedron",
-            "octahedron's error over the cube's (geometric mean)",
-            "its time to draw over the cube's (geometric mean)",
-        ],
-    );
-    let (mut slopes, mut ratios) = (Vec::new(), Vec::new());
-    for (address, share) in &own {
-        let subject = Subject::new(&gpu, address, *share, context)?;
-        let mut lines = [Vec::new(), Vec::new()];
-        for cube in sides {
-            for (line, layout) in lines.iter_mut().zip(ShadowLayout::ALL) {
-                let side = layout.side_for(6 * u64::from(*cube) * u64::from(*cube));
-                let found = run(&gpu, &subject, layout, side, repeats)?;
-                all.row([
-                    address.as_str().into(),
-                    layout.name().into(),
-                    found.texels.into(),
-                    subject.lit_share().into(),
-                    found.wrong.into(),
-                    found.filtered.into(),
-                    (1e3 * found.draw).into(),
-                    (1e9 * found.look_up).into(),
-                    (1e9 * found.filter).into(),
-                    (1e9 * subject.ray).into(),
-                ]);
-                line.push(found);
-            }
-        }
-        let mean = |of: fn(&Found) -> f64| {
-            let pairs = lines[0].iter().zip(&lines[1]);
-            let logs: Vec<f64> = pairs
-                .map(|(cube, octahedron)| (of(octahedron) / of(cube)).ln())
-                .filter(|log| log.is_finite())
-                .collect();
-            (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
+    let maps: Vec<OmniShadowMaps> = descs
+        .iter()
+        .map(|desc| OmniShadowMaps::new(gpu, &subject.scene.surfaces(), *desc))
+        .collect::<Result<_>>()?;
+    let turns = context.in_turns(TURNS, maps.len() + 1, |contender| match maps.get(contender) {
+        Some(maps) => seconds(gpu, subject, maps),
+        None => Ok([subject.ray_seconds()?; 3]),
+    })?;
+    let times: Vec<[Repeats; 3]> = turns.iter().map(|turns| Repeats::by_part(turns)).collect();
+    let row = |(at, desc): (usize, &OmniShadowDesc)| {
+        let off = |width| -> Result<f64> {
+            let (shares, _) = maps[at].look_up_timed(0, subject.light, width, &subject.places)?;
+            Ok(subject.error(&shares))
         };
-        let both = [rate(&lines[0]), rate(&lines[1])];
-        let ratio = mean(|found| found.wrong);
-        slopes.extend(both);
-        ratios.push(ratio);
-        rates.row([
-            address.as_str().into(),
-            both[0].into(),
-            both[1].into(),
-            ratio.into(),
-            mean(|found| found.draw).into(),
-        ]);
+        let [draw, look_up, filter] = &times[at];
+        Ok(Row {
+            scene: scene.into(),
+            layout: desc.layout.name().into(),
+            side: side.into(),
+            texels: desc.texels(),
+            places: subject.places.len() as u64,
+            lit: subject.lit_share(),
+            wrong: off(0)?,
+            filtered: off(WIDTH)?,
+            draw: draw.scaled(1e3),
+            look_up: look_up.scaled(1e9),
+            filter: filter.scaled(1e9),
+            ray: times[maps.len()][0].scaled(1e9),
+        })
+    };
+    descs.iter().enumerate().map(row).collect()
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let own = context
+            .first(&SCENES, 1)
+            .iter()
+            .map(|(address, share)| ((*address).to_owned(), *share));
+        let told = context.scenes.iter().map(|address| (address.clone(), TOLD));
+        let scenes: Vec<(String, Vec3)> = if context.scenes.is_empty() {
+            own.collect()
+        } else {
+            told.collect()
+        };
+        context.each(
+            &scenes,
+            |(address, _)| short_name(address).to_owned(),
+            |(address, share)| {
+                let subject = Subject::new(&gpu, address, *share, context.pick(PLACES, 2000))?;
+                let scene = short_name(address).to_owned();
+                let mut rows = Vec::new();
+                for side in context.first(&SIDES, 2) {
+                    rows.extend(beside_each_other(context, &gpu, &scene, &subject, *side)?);
+                }
+                Ok(rows)
+            },
+        )
     }
-    all.note(format!(
-        "Places are spread evenly over what turns its outer side to the light, {PLACES} a scene (bottoms and insides of bodies are none); light reaches the \
-         share of them that is lit; a place is wrong where the nearest texel says otherwise than the ray from it to the light. \
-         The filter averages {WIDTH} texels each way. Times are of the device's timestamps, medians of {REPEATS}; rays are traced by the same device, one an \
-         invocation, through the binary hierarchy, and look-ups are of the same places. A cube is drawn by one draw of six instances where the device can, an \
-         octahedron by one draw of eight."
-    ));
-    rates.note(slopes_and_ratios(&slopes, &ratios));
-    Ok(vec![all, rates])
+
+    fn findings(&self) -> Findings {
+        let pairs = pairs(self);
+        Findings::of(&rates(self), OF_RATES)
+            .headline(
+                "an octahedron's error over the cube's (geometric mean over scenes)",
+                geometric_mean(pairs.iter().map(|pair| pair.wrong.into())),
+            )
+            .curves(
+                "wrong",
+                "Places that shadow maps get wrong",
+                Axes::rates("texels along a side", "share of wrong places"),
+                curves(
+                    self,
+                    |row| format!("{}, {}", row.scene, row.layout),
+                    |row| ((row.texels as f64).sqrt(), row.wrong.into()),
+                ),
+            )
+            .note("Exponents by least squares over all sizes; intervals of 95 % by the number of places that are wrong.")
+            .and(Findings::of(&pairs, OF_PAIRS))
+            .and(Findings::of(self, &[]))
+            .note(format!(
+                "Places are spread evenly over what turns its outer side to the light (bottoms and insides of bodies are none). A place is wrong where \
+                 the nearest texel says otherwise than the ray from it to the light. The filter averages {WIDTH} texels each way. Times are of the \
+                 device's timestamps; cube, octahedron and rays take turns, each for the same places, one ray per invocation through the binary \
+                 hierarchy. A cube is drawn by one draw of six instances where the device can, an octahedron by one draw of eight."
+            ))
+    }
 }
