@@ -153,7 +153,7 @@ measures! {
     on_device tables "path-sets" rendering::path_sets;
     on_device tables "persistent-threads" rays::persistent_threads;
     on_host rows "phase-functions" media::phase_functions;
-    on_device tables "photon-frame" photons::photon_frame;
+    on_device rows "photon-frame" photons::photon_frame;
     on_device tables "photon-peers" photons::photon_peers;
     on_device tables "photon-queues" photons::photon_queues;
     on_device tables "photon-statistics" photons::photon_statistics;
