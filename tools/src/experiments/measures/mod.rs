@@ -155,7 +155,7 @@ measures! {
     on_host rows "phase-functions" media::phase_functions;
     on_device rows "photon-frame" photons::photon_frame;
     on_device tables "photon-peers" photons::photon_peers;
-    on_device tables "photon-queues" photons::photon_queues;
+    on_device rows "photon-queues" photons::photon_queues;
     on_device tables "photon-statistics" photons::photon_statistics;
     on_host tables "picture-formats" rendering::picture_formats;
     on_host rows "ray-offsets" rays::ray_offsets;
