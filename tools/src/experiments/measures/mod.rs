@@ -156,7 +156,7 @@ measures! {
     on_device rows "photon-frame" photons::photon_frame;
     on_device tables "photon-peers" photons::photon_peers;
     on_device rows "photon-queues" photons::photon_queues;
-    on_device tables "photon-statistics" photons::photon_statistics;
+    on_device rows "photon-statistics" photons::photon_statistics;
     on_host tables "picture-formats" rendering::picture_formats;
     on_host rows "ray-offsets" rays::ray_offsets;
     on_host tables "sample-sums" rendering::sample_sums;
