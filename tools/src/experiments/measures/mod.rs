@@ -154,7 +154,7 @@ measures! {
     on_device tables "persistent-threads" rays::persistent_threads;
     on_host rows "phase-functions" media::phase_functions;
     on_device rows "photon-frame" photons::photon_frame;
-    on_device tables "photon-peers" photons::photon_peers;
+    on_device rows "photon-peers" photons::photon_peers;
     on_device rows "photon-queues" photons::photon_queues;
     on_device rows "photon-statistics" photons::photon_statistics;
     on_host tables "picture-formats" rendering::picture_formats;
