@@ -8,11 +8,11 @@ use clerestory::accel::photon_map::compact_bvh::COMPACT_PAIR_BYTES;
 use clerestory::accel::photon_map::complete_bvh::COMPLETE_NODE_BYTES;
 use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
 
+use super::changes;
 use super::map_quality::SOURCE_SHARE;
-use super::photon_kernels::{Map, Prepared, Shape, Work, prepared};
+use super::photon_kernels::{Gather, Map, Prepared, Work, of_each_prepared};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, change, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
-use crate::experiments::table::{Cell, Table};
 
 /// A row of the source's table: a query of complete nodes, and what compact pairs change in per cent.
 struct Published {
@@ -52,35 +52,67 @@ const PUBLISHED: [Published; 3] = [
     },
 ];
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let mut table = Table::new(
-        "Point queries of compact pairs beside those of complete nodes",
-        &[
-            "scene",
-            "counterpart",
-            "kernels' shape",
-            "pairs whose planes are not recovered",
-            "queries that test other kernels",
-            "storage (%)",
-            "nodes a query",
-            "source: nodes",
-            "anywhere: nodes a query",
-            "stack entries, complete",
-            "stack entries, compact (%)",
-            "source: stack entries, compact (%)",
-            "bytes, complete",
-            "bytes, compact (%)",
-            "source: bytes, complete",
-            "source: bytes, compact (%)",
-            "µs a query, complete",
-            "speed, compact (%)",
-            "speed of the tree alone, compact (%)",
-            "source: speed (%)",
-            "deviation",
-        ],
-    );
-    for prepared in prepared(context, &Shape::ALL) {
+/// Complete nodes, compact pairs, and both again without the tests of kernels.
+const FORMS: [Gather; 4] = [
+    Map::gather_complete,
+    Map::gather_compact,
+    Map::visit_complete,
+    Map::visit_compact,
+];
+
+rows! {
+    /// A scene with kernels of a shape.
+    struct Row = "Point queries of compact pairs beside those of complete nodes" by [scene, shape] {
+        scene: String = "scene",
+        counterpart: String = "counterpart",
+        shape: String = "kernels' shape",
+        lost: u64 = "pairs whose planes are not recovered",
+        different: u64 = "queries that test other kernels",
+        storage: f64 = "storage (%)",
+        nodes: f64 = "nodes per query",
+        nodes_anywhere: f64 = "anywhere: nodes per query",
+        entries: f64 = "stack entries, complete",
+        compact_entries: f64 = "stack entries, compact (%)",
+        bytes: f64 = "bytes, complete",
+        compact_bytes: f64 = "bytes, compact (%)",
+        time: Repeats = "a query, complete (µs)",
+        speed: Repeats = "speed, compact (%)",
+        speed_of_tree: Repeats = "speed of the tree alone, compact (%)",
+    }
+    beside "source: nodes per query" = |row| row.published().map(|source| source.nodes).into();
+    beside "source: stack entries, compact (%)" = |row| row.published().map(|source| source.compact_entries).into();
+    beside "source: bytes, complete" = |row| row.published().map(|source| source.bytes).into();
+    beside "source: bytes, compact (%)" = |row| row.published().map(|source| source.compact_bytes).into();
+    beside "source: speed, compact (%)" = |row| row.published().map(|source| source.compact_speed).into();
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "answers are equal: pairs that are not recovered, and queries that test other kernels",
+        Bound::AtMost(0.0),
+        |row: &Row| (row.lost + row.different).into(),
+    )
+    .in_every_form(),
+    Criterion::each("half the bytes (%)", Bound::Between(-55.0, -45.0), |row: &Row| {
+        row.compact_bytes.into()
+    })
+    .because("five points to either side, ten times what the source's scenes differ by"),
+    Criterion::each(
+        "70 % fewer stack entries (%)",
+        Bound::Between(-75.0, -65.0),
+        |row: &Row| row.compact_entries.into(),
+    )
+    .because("five points to either side; the source's scenes have −68.4 to −72.5"),
+];
+
+impl Row {
+    fn published(&self) -> Option<&'static Published> {
+        PUBLISHED.iter().find(|source| source.counterpart == self.counterpart)
+    }
+
+    fn of(context: &Context<'_>, prepared: &Prepared) -> Result<Self> {
         let Prepared {
             case,
             surfaces,
@@ -88,14 +120,13 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             shape,
             points,
             anywhere,
-        } = prepared?;
+        } = prepared;
         let leaf_size = automatic_leaf_size(kernels.areas(), surfaces.area, SOURCE_SHARE);
-        let map = Map::new(&kernels, &kernels.linear(leaf_size))?;
+        let map = Map::new(kernels, &kernels.linear(leaf_size))?;
         let decoded = map.compact.decode();
         let reached = map.complete.pairs.iter().zip(&decoded);
-        let lost = reached.filter(|(complete, compact)| complete != compact).count() as u64;
         let (mut complete, mut compact, mut different) = (Work::default(), Work::default(), 0_u64);
-        for point in &points {
+        for point in points {
             let before = [complete, compact];
             map.gather_complete(*point, &mut complete);
             map.gather_compact(*point, &mut compact);
@@ -109,77 +140,52 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             };
             different += u64::from(answer(complete, before[0]) != answer(compact, before[1]));
         }
-        let time = |gather: fn(&Map, glam::Vec3, &mut Work)| {
-            nanoseconds(context.smoke, &points, |point| {
-                let mut work = Work::default();
-                gather(&map, *point, &mut work);
-                work
-            })
-        };
-        let times = [time(Map::gather_complete), time(Map::gather_compact)];
-        let times_of_trees = [time(Map::visit_complete), time(Map::visit_compact)];
-        let mut everywhere = Work::default();
-        for point in &anywhere {
-            map.gather_complete(*point, &mut everywhere);
-        }
+        let times = context.in_turns(9, FORMS.len(), |i| Ok(1e-3 * map.nanoseconds(points, FORMS[i])))?;
+        let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();
         let each = |count: u64| count as f64 / points.len().max(1) as f64;
-        let less = |[first, second]: [u64; 2]| 100.0 * (second as f64 / first.max(1) as f64 - 1.0);
-        let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
-        let theirs = |of: fn(&Published) -> f64| Cell::from(published.map(of));
-        let pairs = map.complete.pairs.len() as u64;
-        let bytes = less([complete.tree.bytes, compact.tree.bytes]);
-        let speed = |[first, second]: [f64; 2]| 100.0 * (first / second - 1.0);
-        table.row([
-            case.name().into(),
-            case.counterpart().into(),
-            shape.word().into(),
-            lost.into(),
-            different.into(),
-            less([2 * COMPLETE_NODE_BYTES * pairs, COMPACT_PAIR_BYTES * pairs]).into(),
-            each(complete.tree.nodes).into(),
-            theirs(|row| row.nodes),
-            (everywhere.tree.nodes as f64 / anywhere.len().max(1) as f64).into(),
-            each(complete.tree.pushes).into(),
-            less([complete.tree.pushes, compact.tree.pushes]).into(),
-            theirs(|row| row.compact_entries),
-            each(complete.tree.bytes).into(),
-            bytes.into(),
-            theirs(|row| row.bytes),
-            theirs(|row| row.compact_bytes),
-            (1e-3 * times[0]).into(),
-            speed(times).into(),
-            speed(times_of_trees).into(),
-            theirs(|row| row.compact_speed),
-            published.map_or("no counterpart".into(), |row| {
-                deviation(bytes, [speed(times), speed(times_of_trees)], row).into()
-            }),
-        ]);
+        let change = |second: u64, first: u64| change(second as f64, first.max(1) as f64);
+        let everywhere = map.work(anywhere, Map::gather_complete);
+        Ok(Self {
+            scene: case.name().into(),
+            counterpart: case.counterpart().into(),
+            shape: shape.word().into(),
+            lost: reached.filter(|(complete, compact)| complete != compact).count() as u64,
+            different,
+            storage: change(COMPACT_PAIR_BYTES, 2 * COMPLETE_NODE_BYTES),
+            nodes: each(complete.tree.nodes),
+            nodes_anywhere: everywhere.tree.nodes as f64 / anywhere.len().max(1) as f64,
+            entries: each(complete.tree.pushes),
+            compact_entries: change(compact.tree.pushes, complete.tree.pushes),
+            bytes: each(complete.tree.bytes),
+            compact_bytes: change(compact.tree.bytes, complete.tree.bytes),
+            speed: changes(&times[0], &times[1]),
+            speed_of_tree: changes(&times[2], &times[3]),
+            time: times[0].clone(),
+        })
     }
-    table.note(
-        "Linear hierarchy over synthetic kernels about the second and third hits of 2¹⁷ photons (2⁹ in a quick look), as many about a \
-         point as in the source's Table 5.1: spheres, and ellipsoids stretched by the incidence. Counts are exact and the same on every \
-         machine; bytes are of nodes and stack, not of kernels. The source's byte changes are what its own counts give: it prints −71.4 % for one scene, \
-         which is that scene's stack column. Anywhere: as many points evenly on all surfaces.",
-    );
-    table.note(
-        "Speed is of the query alone on one thread of a processor, whose cache takes the bytes that the source's GPU had to fetch; the source's \
-         is of whole frames. The tree alone: the same queries without the tests of kernels, which both layouts share. Instructions are not counted here.",
-    );
-    Ok(vec![table])
 }
 
-/// Whether bytes and speed change as in the source.
-fn deviation(bytes: f64, [speed, of_tree]: [f64; 2], theirs: &Published) -> String {
-    let bytes = format!("bytes {:+.1} points", bytes - theirs.compact_bytes);
-    let sign = if speed.signum() == theirs.compact_speed.signum() {
-        "speed's sign as there"
-    } else {
-        "speed's sign turned"
-    };
-    let reason = if of_tree > speed {
-        ", less of it than the tree alone has, by the tests of kernels"
-    } else {
-        ""
-    };
-    format!("{bytes}; {sign}{reason}")
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        of_each_prepared(context, |prepared| Ok(vec![Row::of(context, prepared)?]))
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "change of a query's bytes by compact pairs, the worst scene (%)",
+                largest(self, |_| true, |row| row.compact_bytes),
+            )
+            .note(
+                "Linear hierarchy over synthetic kernels about the second and third hits of 2¹⁷ photons (2⁹ in a smoke run), as many about a \
+                 point as in the source's Table 5.1: spheres, and ellipsoids stretched by the incidence. Counts are exact and the same on every \
+                 machine; bytes are of nodes and stack, not of kernels. The source's byte changes are what its own counts give: it prints \
+                 −71.4 % for one scene, which is that scene's stack column. Anywhere: as many points evenly on all surfaces.",
+            )
+            .note(
+                "Speed is of the query alone on one thread of a processor, whose cache takes the bytes that the source's GPU had to fetch; \
+                 the source's is of whole frames. The tree alone: the same queries without the tests of kernels, which both layouts share. \
+                 Instructions are not counted here.",
+            )
+    }
 }

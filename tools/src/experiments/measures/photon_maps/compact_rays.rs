@@ -4,25 +4,18 @@
 //! model in which every access is served by itself (§4.3.3): 28 bytes a node of a complete pair, 32 a compact pair, stack entries of 8
 //! bytes (4 for shadow rays) and 12.
 
-use clerestory::accel::Aabb;
-use clerestory::accel::photon_map::compact_bvh::{COMPACT_PAIR_BYTES, COMPACT_RAY_STACK_ENTRY_BYTES, CompactBvh};
-use clerestory::accel::photon_map::complete_bvh::{
-    CompleteBvh, QueryCounters, RAY_STACK_ENTRY_BYTES, RayPair, SlabRay,
-};
-use clerestory::accel::photon_map::vvh::{Heuristic, sweep_tree};
-use clerestory::accel::triangle::{intersect_triangle, ray_shear};
-use clerestory::{Error, Result};
+use clerestory::Result;
+use clerestory::accel::photon_map::compact_bvh::{COMPACT_PAIR_BYTES, COMPACT_RAY_STACK_ENTRY_BYTES};
+use clerestory::accel::photon_map::complete_bvh::{RAY_STACK_ENTRY_BYTES, RayPair};
 use glam::Vec3;
 
+use super::changes;
 use super::photon_scenes::Surfaces;
+use super::ray_layouts::{LEAF_SIZE, SHADOW_ENTRY_SPARES, Trees, queries};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, change, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::clock::nanoseconds;
-use crate::experiments::table::{Cell, Table};
-
-/// As the source's trees.
-const LEAF_SIZE: u32 = 5;
-/// Bytes that shadow rays spare on a complete pair's stack entry: they need no distance.
-const SHADOW_ENTRY_SPARES: u64 = 4;
+use crate::experiments::measures::clock::nanoseconds_once;
+use crate::experiments::measures::context::short_name;
 
 /// What the source says of a ray with complete pairs, by its code base II, and what compact ones change in per cent.
 struct Published {
@@ -96,26 +89,6 @@ const CASES: [Case; 7] = [
     case("builtin:sphere-flake?depth=3&frequency=4", [4.0, 6.0, 4.0], None),
 ];
 
-/// Points within which changes of bytes are taken for the same.
-const SAME_BYTES: f64 = 3.0;
-
-/// What is behind a difference to the source, by what was measured.
-fn deviation(published: &Published, bytes: f64, same_work: bool, speed: f64) -> String {
-    let of_counts = bytes - by_its_counts(published);
-    let bytes = if of_counts.abs() <= SAME_BYTES {
-        format!("bytes as by its counts ({of_counts:+.1} points)")
-    } else {
-        format!("bytes {of_counts:+.1} points of its counts: another share of stack entries")
-    };
-    let print = published.compact_bytes - by_its_counts(published);
-    let speed = match (same_work, speed < 0.0) {
-        (true, true) => "sign of the speed as there: the same nodes and triangles, so the pair's own code takes it",
-        (true, false) => "faster, not slower: the same nodes and triangles, so the bytes pay here",
-        (false, _) => "other nodes or triangles",
-    };
-    format!("{bytes}, from which its print differs by {print:+.1}; {speed}")
-}
-
 /// Change of bytes in per cent that the source's nodes and stack entries give with the sizes that it states.
 fn by_its_counts(published: &Published) -> f64 {
     let compact =
@@ -123,236 +96,125 @@ fn by_its_counts(published: &Published) -> f64 {
     100.0 * (compact / published.bytes - 1.0)
 }
 
-/// A ray and whether it only asks for any hit.
-#[derive(Clone, Copy)]
-struct Query {
-    origin: Vec3,
-    direction: Vec3,
-    t_max: f32,
-    is_shadow: bool,
+rows! {
+    /// A scene.
+    struct Row = "Ray queries of compact pairs beside those of complete pairs" by [scene] {
+        scene: String = "scene",
+        counterpart: Option<String> = "counterpart",
+        rays: u64 = "rays",
+        different: u64 = "rays that end elsewhere",
+        tree_nodes: u64 = "nodes of the tree",
+        storage: f64 = "storage (%)",
+        nodes: f64 = "nodes per ray, complete",
+        compact_nodes: f64 = "nodes, compact (%)",
+        entries: f64 = "stack entries per ray",
+        tests: f64 = "triangles tested per ray, complete",
+        compact_tests: f64 = "triangles tested, compact (%)",
+        bytes: f64 = "bytes per ray, complete",
+        compact_bytes: f64 = "bytes, compact (%)",
+        compact_bytes_both_ways: f64 = "bytes, compact, entries for push and pop (%)",
+        time: Repeats = "a ray, complete (ns)",
+        speed: Repeats = "speed, compact (%)",
+    }
+    beside "source: nodes per ray" = |row| row.published().map(|source| source.nodes).into();
+    beside "source: stack entries per ray" = |row| row.published().map(|source| source.entries).into();
+    beside "source: bytes per ray, complete" = |row| row.published().map(|source| source.bytes).into();
+    beside "source: bytes, compact (%)" = |row| row.published().map(|source| source.compact_bytes).into();
+    beside "source by its own counts: bytes, compact (%)" = |row| row.published().map(by_its_counts).into();
+    beside "source: speed, compact (%)" = |row| row.published().map(|source| source.compact_speed).into();
 }
+/// What was found.
+pub type Found = Vec<Row>;
 
-/// Triangles in leaf order with their trees.
-struct Trees {
-    complete: CompleteBvh,
-    compact: CompactBvh,
-    triangles: Vec<[Vec3; 3]>,
-}
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "every ray ends at the same place: rays that end elsewhere",
+        Bound::AtMost(0.0),
+        |row: &Row| row.different.into(),
+    )
+    .in_every_form(),
+    Criterion::each("43 % less storage (%)", Bound::Between(-43.5, -42.5), |row: &Row| {
+        row.storage.into()
+    })
+    .in_every_form(),
+    Criterion::each(
+        "a third fewer bytes per ray (%)",
+        Bound::Between(-38.0, -28.0),
+        |row: &Row| row.compact_bytes.into(),
+    )
+    .because("five points to either side; the source prints −27.5 to −32.9, and its own counts give −37 to −39"),
+    Criterion::each(
+        "a small gain or loss of speed (%)",
+        Bound::Between(-10.0, 10.0),
+        |row: &Row| (&row.speed).into(),
+    )
+    .because("the source's scenes lose 6.2 to 9.2"),
+];
 
-/// What a ray found and how: parameter of the hit or infinity, triangles tested, work of the tree.
-#[derive(Clone, Copy, PartialEq)]
-struct Answer {
-    t: f32,
-    tests: u64,
-    tree: QueryCounters,
-}
+impl Row {
+    fn published(&self) -> Option<&'static Published> {
+        let mut all = CASES.iter().filter_map(|case| case.published.as_ref());
+        all.find(|source| Some(source.counterpart) == self.counterpart.as_deref())
+    }
 
-impl Trees {
-    fn new(triangles: &[[Vec3; 3]]) -> Result<Self> {
-        let corners = |t: &[Vec3; 3]| t.iter().fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner));
-        let boxes: Vec<Aabb> = triangles.iter().map(corners).collect();
-        let complete = CompleteBvh::new(&sweep_tree(&boxes, LEAF_SIZE, Heuristic::Area))?;
-        let compact = CompactBvh::encode(&complete)
-            .map_err(|fault| Error::setting("tree", "compact", format!("is not tight: {fault:?}")))?;
+    fn of(context: &Context<'_>, case: &Case) -> Result<Self> {
+        let surfaces = Surfaces::load(case.scene)?;
+        let trees = Trees::new(&surfaces.triangles)?;
+        let queries = queries(&surfaces, case.light, context.pick(192, 8))?;
+        let [complete, compact] = [false, true].map(|is_compact| trees.counts(&queries, is_compact));
+        let times = context.in_turns(9, 2, |i| {
+            Ok(nanoseconds_once(&queries, |query| trees.answer(query, i == 1).t))
+        })?;
+        let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();
+        let each = |count: u64| count as f64 / queries.len().max(1) as f64;
+        let change = |second: u64, first: u64| change(second as f64, first.max(1) as f64);
+        let both_ways = compact.bytes + COMPACT_RAY_STACK_ENTRY_BYTES * compact.entries;
         Ok(Self {
-            triangles: complete.order.iter().map(|i| triangles[*i as usize]).collect(),
-            complete,
-            compact,
+            scene: short_name(case.scene).into(),
+            counterpart: case.published.as_ref().map(|source| source.counterpart.into()),
+            rays: queries.len() as u64,
+            different: queries.iter().filter(|query| trees.differ(query)).count() as u64,
+            tree_nodes: 2 * trees.complete.pairs.len() as u64 + 1,
+            storage: change(COMPACT_PAIR_BYTES, size_of::<RayPair>() as u64),
+            nodes: each(complete.nodes),
+            compact_nodes: change(compact.nodes, complete.nodes),
+            entries: each(complete.entries),
+            tests: each(complete.tests),
+            compact_tests: change(compact.tests, complete.tests),
+            bytes: each(complete.bytes),
+            compact_bytes: change(compact.bytes, complete.bytes),
+            compact_bytes_both_ways: change(both_ways, complete.bytes),
+            speed: changes(&times[0], &times[1]),
+            time: times[0].clone(),
         })
     }
-
-    fn answer(&self, query: &Query, is_compact: bool) -> Answer {
-        let mut answer = Answer {
-            t: f32::INFINITY,
-            tests: 0,
-            tree: QueryCounters::default(),
-        };
-        let shear = ray_shear(query.origin, query.direction);
-        let mut nearest = query.t_max;
-        let (mut t, mut tests) = (f32::INFINITY, 0);
-        let leaf = |first: u32, t_max: &mut f32| {
-            let places = self.triangles.iter().zip(&self.complete.ends).skip(first as usize);
-            for (triangle, is_last) in places {
-                tests += 1;
-                if let Some(hit) = intersect_triangle(&shear, triangle, 0.0, nearest) {
-                    (nearest, t) = (hit.t, hit.t);
-                    // A shadow ray ends at any hit: nothing lies before its begin.
-                    *t_max = if query.is_shadow { -1.0 } else { hit.t };
-                    if query.is_shadow {
-                        break;
-                    }
-                }
-                if *is_last {
-                    break;
-                }
-            }
-        };
-        let ray = SlabRay::new(query.origin, query.direction, 0.0, query.t_max);
-        if is_compact {
-            self.compact.ray_query(&ray, &mut answer.tree, leaf);
-        } else {
-            self.complete.ray_query(&ray, &mut answer.tree, leaf);
-        }
-        (answer.t, answer.tests) = (t, tests);
-        answer
-    }
 }
 
-/// Up to four rays a pixel: the camera's, its reflection, and a shadow ray from where each ends.
-fn queries(surfaces: &Surfaces, light: Vec3, side: u32) -> Result<Vec<Query>> {
-    let mut all = Vec::new();
-    for (origin, direction) in surfaces.camera_rays(side)? {
-        for (origin, direction, meeting) in surfaces.follow(origin, direction).into_iter().take(2) {
-            all.push(Query {
-                origin,
-                direction,
-                t_max: f32::INFINITY,
-                is_shadow: false,
-            });
-            if let Some(meeting) = meeting {
-                let (origin, direction, t_max) = surfaces.shadow_ray(&meeting, light);
-                all.push(Query {
-                    origin,
-                    direction,
-                    t_max,
-                    is_shadow: true,
-                });
-            }
-        }
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let name = |case: &Case| short_name(case.scene).to_owned();
+        context.each(context.first(&CASES, 1), name, |case| Ok(vec![Row::of(context, case)?]))
     }
-    Ok(all)
-}
 
-/// Counts over all rays: nodes, stack entries, bytes, triangles tested.
-fn counts(trees: &Trees, queries: &[Query], is_compact: bool) -> [u64; 4] {
-    let mut counts = [0; 4];
-    for query in queries {
-        let answer = trees.answer(query, is_compact);
-        let spared = if query.is_shadow && !is_compact {
-            SHADOW_ENTRY_SPARES * answer.tree.pushes
-        } else {
-            0
-        };
-        let of_ray = [
-            answer.tree.nodes,
-            answer.tree.pushes,
-            answer.tree.bytes - spared,
-            answer.tests,
-        ];
-        for (count, more) in counts.iter_mut().zip(of_ray) {
-            *count += more;
-        }
+    fn findings(&self) -> Findings {
+        Findings::of(self, CRITERIA)
+            .headline(
+                "change of a ray's bytes by compact pairs, the worst scene (%)",
+                largest(self, |_| true, |row| row.compact_bytes),
+            )
+            .note(format!(
+                "Trees by full sweeps of the surface area heuristic, at most {LEAF_SIZE} triangles per leaf. Up to four rays per pixel: camera, \
+                 reflection at mirrors, and a shadow ray from the end of each. Node and stack counts and bytes are exact; entries of complete \
+                 pairs have {} bytes, of shadow rays {}. A stack entry counts once for push and pop, unless the column says otherwise.",
+                RAY_STACK_ENTRY_BYTES,
+                RAY_STACK_ENTRY_BYTES - SHADOW_ENTRY_SPARES
+            ))
+            .note(
+                "The source prints −27.5 % to −32.9 % bytes over its scenes, mean −31.3 %, and −9.1 % to −6.2 % frames per second; its Scene 6 \
+                 has the size, triangles and mirror of the box room, its own furniture and flight; for its other scenes, whose files are not \
+                 here, generated ones of the same kind and number of triangles stand in. Its own counts with the 12 bytes that it states for a \
+                 compact stack entry give −37 % to −39 %; what it prints needs 20 to 24 bytes, as if an entry counted for push and pop. Times \
+                 are on one thread of a processor, whose cache makes bytes cheap.",
+            )
     }
-    counts
-}
-
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let side = if context.smoke { 8 } else { 192 };
-    let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
-    let mut table = Table::new(
-        "Ray queries of compact pairs beside those of complete pairs",
-        &[
-            "scene",
-            "counterpart",
-            "rays",
-            "rays that end elsewhere",
-            "nodes of the tree",
-            "storage (%)",
-            "nodes a ray, complete",
-            "nodes, compact (%)",
-            "source: nodes",
-            "stack entries a ray",
-            "source: stack entries",
-            "triangles tested a ray",
-            "bytes a ray, complete",
-            "bytes, compact (%)",
-            "bytes, compact, entries for push and pop (%)",
-            "source: bytes, complete",
-            "source: compact (%)",
-            "source by its own counts: compact (%)",
-            "ns a ray, complete",
-            "speed, compact (%)",
-            "source: speed (%)",
-            "deviation",
-        ],
-    );
-    for (
-        done,
-        Case {
-            scene,
-            light,
-            published,
-        },
-    ) in cases.iter().enumerate()
-    {
-        if context.watch.stopped() {
-            break;
-        }
-        let name = scene.trim_start_matches("builtin:");
-        context.watch.begin(name, done, cases.len());
-        let surfaces = Surfaces::load(scene)?;
-        let trees = Trees::new(&surfaces.triangles)?;
-        let queries = queries(&surfaces, *light, side)?;
-        let differs = |query: &&Query| {
-            let [a, b] = [false, true].map(|is_compact| trees.answer(query, is_compact).t);
-            if query.is_shadow {
-                a.is_finite() != b.is_finite()
-            } else {
-                a.to_bits() != b.to_bits()
-            }
-        };
-        let different = queries.iter().filter(differs).count() as u64;
-        let [complete, compact] = [false, true].map(|is_compact| counts(&trees, &queries, is_compact));
-        let times = [false, true]
-            .map(|is_compact| nanoseconds(context.smoke, &queries, |query| trees.answer(query, is_compact).t));
-        let speed = 100.0 * (times[0] / times[1] - 1.0);
-        let each = |count: u64| count as f64 / queries.len().max(1) as f64;
-        let change = |second: u64, first: u64| 100.0 * (second as f64 / first.max(1) as f64 - 1.0);
-        let theirs = |of: fn(&Published) -> f64| Cell::from(published.as_ref().map(of));
-        let pairs = trees.complete.pairs.len() as u64;
-        table.row([
-            name.into(),
-            published.as_ref().map_or("none", |row| row.counterpart).into(),
-            (queries.len() as u64).into(),
-            different.into(),
-            (2 * pairs + 1).into(),
-            change(COMPACT_PAIR_BYTES, size_of::<RayPair>() as u64).into(),
-            each(complete[0]).into(),
-            change(compact[0], complete[0]).into(),
-            theirs(|row| row.nodes),
-            each(complete[1]).into(),
-            theirs(|row| row.entries),
-            each(complete[3]).into(),
-            each(complete[2]).into(),
-            change(compact[2], complete[2]).into(),
-            change(compact[2] + COMPACT_RAY_STACK_ENTRY_BYTES * compact[1], complete[2]).into(),
-            theirs(|row| row.bytes),
-            theirs(|row| row.compact_bytes),
-            theirs(by_its_counts),
-            times[0].into(),
-            speed.into(),
-            theirs(|row| row.compact_speed),
-            published.as_ref().map_or("no counterpart".into(), |row| {
-                let same_work = [0, 3].into_iter().all(|i| complete[i] == compact[i]);
-                deviation(row, change(compact[2], complete[2]), same_work, speed).into()
-            }),
-        ]);
-    }
-    table.note(format!(
-        "Trees by full sweeps of the surface area heuristic, at most {LEAF_SIZE} triangles a leaf. Up to four rays a pixel: camera, reflection \
-         at mirrors, and a shadow ray from the end of each. Node and stack counts and bytes are exact; entries of complete pairs have {} \
-         bytes, of shadow rays {}. A stack entry counts once for push and pop.",
-        RAY_STACK_ENTRY_BYTES,
-        RAY_STACK_ENTRY_BYTES - SHADOW_ENTRY_SPARES
-    ));
-    table.note(
-        "The source prints −27.5 % to −32.9 % bytes over its scenes, mean −31.3 %, and −9.1 % to −6.2 % frames a second; its Scene 6 has the \
-         size, triangles and mirror of the box room, its own furniture and flight; for its other scenes, whose files are not here, generated \
-         ones of the same kind and number of triangles stand in. Its own counts with \
-         the 12 bytes that it states for a compact stack entry give −37 % to −39 %, near ours; what it prints needs 20 to 24 bytes, as if an entry \
-         counted for push and pop. Times on one \
-         thread of a processor, whose cache makes bytes cheap, so that the longer code shows, as on the source's GPU.",
-    );
-    Ok(vec![table])
 }

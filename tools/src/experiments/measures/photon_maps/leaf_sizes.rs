@@ -2,101 +2,126 @@
 //!
 //! Source of the sweep: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.1.
 
-use std::hint::black_box;
-
 use clerestory::Result;
+use clerestory::accel::box_tree::BoxTree;
 use clerestory::accel::photon_map::leaf_threshold::{LEAF_SHARE, automatic_leaf_size};
-use glam::Vec3;
 
-use super::photon_kernels::{Kernels, Map, Prepared, SOURCE_SHAPE, Shape, Work, prepared};
+use super::leaf_frames::{BY_VOLUME, LINEAR, Published, SIZES};
+use super::photon_kernels::{Kernels, Map, Prepared, SOURCE_SHAPE, Work, of_each_prepared};
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Repeats, Study, curves, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::Table;
-use crate::least_squares::{Fit, non_negative};
-use crate::timing::{median, timed};
 
-const SIZES: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
 /// The share that the source's own leaf sizes need.
 const SMALL_SHARE: f64 = 1.0 / 16.0;
-/// What chose the automatic sizes.
+/// What chose a size.
+const SWEEP: &str = "sweep";
 const LARGE: &str = "share 1/8";
 const SMALL: &str = "share 1/16";
-const REPEATS: usize = 5;
-/// What automatic sizes reach of the best of the sweep, in the source's frames a second.
-const AIM: f64 = 0.97;
+/// Half of the turns choose the best size by time, the others say what it takes: no size is the best by the luck of its own turns.
+const TURNS: usize = 10;
 
-/// A row of the source's table: frames in a hundred seconds.
-struct Published {
-    counterpart: &'static str,
-    tree: &'static str,
-    /// By the leaf sizes of the sweep.
-    sweep: [u32; SIZES.len()],
-    /// With its automatic leaf size.
-    automatic: u32,
+type Build = fn(&Kernels, u32) -> BoxTree;
+const TREES: [(&str, Build); 2] = [(BY_VOLUME, Kernels::by_volume), (LINEAR, Kernels::linear)];
+
+rows! {
+    /// A size of a tree's leaves.
+    struct Size = "Queries of photon maps by leaf size" by [scene, tree, size, by] {
+        scene: String = "scene",
+        counterpart: String = "counterpart",
+        tree: String = "tree",
+        size: u64 = "leaf size",
+        by: String = "chosen by",
+        nodes: f64 = "nodes per query",
+        kernels: f64 = "kernels tested per query",
+        contributions: f64 = "kernels that count",
+        reached: f64 = "nodes + kernels: best of the sweep / this",
+        time: Repeats = "a query (µs)",
+        speed: Repeats = "speed / best of the sweep",
+    }
+    beside "source: frames/s / best of its sweep" = |row| row.of_source().into();
 }
 
-impl Published {
-    /// Some of these rates over the most of the sweep.
-    fn reached(&self, rate: u32) -> f64 {
-        f64::from(rate) / f64::from(self.sweep.into_iter().fold(1, u32::max))
+rows! {
+    /// The sweep of a tree.
+    struct Sweep = "The best of the sweep by nodes + kernels" by [scene, shape, tree] {
+        scene: String = "scene",
+        shape: String = "kernels' shape",
+        tree: String = "tree",
+        best: u64 = "best leaf size",
+        out_of_order: u64 = "neighbouring sizes that do not fall to the best or rise from it",
+        ends: u64 = "ends of the sweep that are the best",
     }
 }
 
-const PUBLISHED: [Published; 4] = [
-    Published {
-        counterpart: "Scene 6",
-        tree: "volume heuristic",
-        sweep: [260, 327, 349, 371, 374, 368, 355, 328],
-        automatic: 374,
-    },
-    Published {
-        counterpart: "Scene 6",
-        tree: "linear",
-        sweep: [256, 291, 323, 350, 356, 355, 335, 314],
-        automatic: 359,
-    },
-    Published {
-        counterpart: "Passage",
-        tree: "volume heuristic",
-        sweep: [478, 517, 539, 558, 569, 572, 554, 528],
-        automatic: 567,
-    },
-    Published {
-        counterpart: "Passage",
-        tree: "linear",
-        sweep: [446, 473, 495, 519, 528, 521, 501, 452],
-        automatic: 522,
-    },
+rows! {
+    /// An automatic size of a tree.
+    struct Automatic = "Automatic leaf sizes" by [scene, shape, tree, share] {
+        scene: String = "scene",
+        counterpart: String = "counterpart",
+        shape: String = "kernels' shape",
+        tree: String = "tree",
+        share: String = "share",
+        size: u64 = "leaf size",
+        cover: f64 = "mean cover",
+        contributions: f64 = "kernels that count where the camera looks",
+        contributions_anywhere: f64 = "kernels that count anywhere",
+        reached: f64 = "nodes + kernels: best / this, where the camera looks",
+        reached_anywhere: f64 = "nodes + kernels: best / this, anywhere",
+        reached_in_time: Option<Repeats> = "time: best / this, where the camera looks",
+        frames_without: Option<f64> = "source's frames: share without queries (%)",
+        frames_error: Option<f64> = "source's frames: error of the fit (%)",
+        reached_in_frames: Option<f64> = "source's frames by our counts: best / this",
+    }
+    beside "source: best / this" = |row| {
+        Published::of(&row.counterpart, &row.tree).map(|source| source.reached(source.automatic)).into()
+    };
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    sweeps: Vec<Sweep>,
+    automatic: Vec<Automatic>,
+    sizes: Vec<Size>,
+}
+
+const OF_SWEEPS: &[Criterion<Sweep>] = &[Criterion::each(
+    "one best size, with more nodes + kernels to both sides: exceptions",
+    Bound::AtMost(0.0),
+    |sweep: &Sweep| (sweep.out_of_order + sweep.ends).into(),
+)];
+const CRITERIA: &[Criterion<Automatic>] = &[
+    Criterion::each(
+        "the automatic size is within 3 % of the best by nodes + kernels: best / this",
+        Bound::AtLeast(0.97),
+        |row: &Automatic| row.reached.into(),
+    )
+    .among(Automatic::is_the_default),
+    Criterion::each(
+        "the automatic size is within 3 % of the best by time: best / this",
+        Bound::AtLeast(0.97),
+        |row: &Automatic| row.reached_in_time.as_ref().map_or(f64::NAN.into(), Repeats::measured),
+    )
+    .among(|row| row.is_the_default() && row.reached_in_time.is_some()),
 ];
 
-/// Nanoseconds a query of every map, medians of runs that take turns.
-pub fn query_times(maps: &[Map], points: &[Vec3], repeats: usize, gather: fn(&Map, Vec3, &mut Work)) -> Vec<f64> {
-    let mut times = vec![Vec::new(); maps.len()];
-    for repeat in 0..=repeats {
-        for (map, times) in maps.iter().zip(&mut times) {
-            let mut work = Work::default();
-            let ((), seconds) = timed(|| {
-                for point in points {
-                    gather(map, black_box(*point), &mut work);
-                }
-            });
-            black_box(work);
-            // The first run warms up.
-            if repeat > 0 {
-                times.push(1e9 * seconds / points.len().max(1) as f64);
-            }
-        }
+impl Automatic {
+    fn is_the_default(&self) -> bool {
+        self.share == LARGE
     }
-    times.into_iter().map(median).collect()
 }
 
-/// Work of queries at all points in every map.
-fn work_of(maps: &[Map], points: &[Vec3]) -> Vec<Work> {
-    let gather = |map: &Map| {
-        let mut work = Work::default();
-        points.iter().for_each(|point| map.gather_compact(*point, &mut work));
-        work
-    };
-    maps.iter().map(gather).collect()
+impl Size {
+    /// The source's frames a second over the best of its sweep; its own sizes are those of the smaller share.
+    fn of_source(&self) -> Option<f64> {
+        let source = Published::of(&self.counterpart, &self.tree)?;
+        let place = SIZES.iter().position(|size| u64::from(*size) == self.size);
+        match self.by.as_str() {
+            SWEEP => Some(source.reached(source.sweep[place?])),
+            SMALL => Some(source.reached(source.automatic)),
+            _ => None,
+        }
+    }
 }
 
 /// Nodes and kernels at the same price.
@@ -104,138 +129,36 @@ fn steps(work: &Work) -> f64 {
     (work.tree.nodes + work.tests) as f64
 }
 
-/// What a size takes over the best of the sweep, turned round: 1 is the best.
+/// What the best of the sweep costs, over what a size does: 1 is the best.
 fn reached(cost: impl Fn(&Work) -> f64, works: &[Work], sizes: usize, chosen: usize) -> f64 {
     let least = works[..sizes].iter().map(&cost).fold(f64::INFINITY, f64::min);
     least / cost(&works[chosen])
 }
 
-/// The source's frame times as a sum of our counts: a constant, nodes and kernels a query.
-fn source_frames(published: &Published, works: &[Work], points: usize) -> Fit<3> {
-    let rows = published.sweep.iter().zip(works).map(|(rate, work)| {
-        let each = |count: u64| count as f64 / points.max(1) as f64;
-        ([1.0, each(work.tree.nodes), each(work.tests)], 100.0 / f64::from(*rate))
-    });
-    non_negative(&rows.collect::<Vec<_>>())
-}
-
-/// One tree of one scene, all sizes of the sweep and the automatic ones.
-struct Sweep<'a> {
-    scene: &'a str,
-    shape: Shape,
-    tree: &'static str,
-    published: Option<&'static Published>,
-    /// Sizes with what chose them.
-    wanted: &'a [(u32, &'static str)],
-    /// How many of them are of the sweep.
-    sizes: usize,
-    works: Vec<Work>,
-    works_anywhere: Vec<Work>,
-    points: usize,
-    cover: f64,
-}
-
-impl Sweep<'_> {
-    /// Rows of both automatic sizes.
-    fn automatic(&self, table: &mut Table) {
-        let theirs = self.published.map(|row| row.reached(row.automatic));
-        // A quick look has too few sizes.
-        let frames = self
-            .published
-            .filter(|_| self.sizes == SIZES.len())
-            .map(|row| source_frames(row, &self.works, self.points));
-        let each = |count: u64| count as f64 / self.points.max(1) as f64;
-        let best = (0..self.sizes).min_by(|a, b| steps(&self.works[*a]).total_cmp(&steps(&self.works[*b])));
-        for (chosen, (size, by)) in self.wanted.iter().enumerate().skip(self.sizes) {
-            let seen = reached(steps, &self.works, self.sizes, chosen);
-            let anywhere = reached(steps, &self.works_anywhere, self.sizes, chosen);
-            let in_frames = frames.as_ref().map(|fit| {
-                let [frame, node, kernel] = fit.coefficients;
-                let cost = |work: &Work| frame + node * each(work.tree.nodes) + kernel * each(work.tests);
-                reached(cost, &self.works, self.sizes, chosen)
-            });
-            let count = self.works[chosen].contributions;
-            table.row([
-                self.scene.into(),
-                self.shape.word().into(),
-                self.tree.into(),
-                (*by).into(),
-                u64::from(*size).into(),
-                best.map(|best| u64::from(self.wanted[best].0)).into(),
-                self.cover.into(),
-                each(count).into(),
-                each(self.works_anywhere[chosen].contributions).into(),
-                seen.into(),
-                anywhere.into(),
-                frames
-                    .as_ref()
-                    .map(|fit| {
-                        let [frame, ..] = fit.coefficients;
-                        frame * self.published.map_or(0.0, |row| f64::from(row.automatic))
-                    })
-                    .into(),
-                frames.as_ref().map(|fit| 100.0 * fit.relative_error).into(),
-                in_frames.into(),
-                theirs.into(),
-                deviation(by, seen, anywhere, in_frames).into(),
-            ]);
+/// Neighbours of a sweep whose costs do not fall to the place of the best or rise from it.
+fn out_of_order(costs: &[f64], best: usize) -> u64 {
+    let wrong = |(i, pair): &(usize, &[f64])| {
+        if *i < best {
+            pair[0] <= pair[1]
+        } else {
+            pair[0] >= pair[1]
         }
-    }
+    };
+    costs.windows(2).enumerate().filter(wrong).count() as u64
 }
 
-/// Why a size is not within the aim, by what was measured.
-fn deviation(by: &str, seen: f64, anywhere: f64, in_frames: Option<f64>) -> &'static str {
-    match in_frames {
-        _ if seen >= AIM => "within 3 %",
-        _ if anywhere >= AIM => "within 3 % anywhere on the surfaces: the camera sees other cover than the mean",
-        Some(frames) if frames >= AIM => "within 3 % of frames, which hold more than queries",
-        _ if by == LARGE => "beyond 3 %: twice the source's share",
-        _ => "beyond 3 %, not explained by frames or by what the camera sees",
-    }
+/// The best of the sweep over all in time: it is chosen by every other turn, and the remaining ones count.
+fn over_best(times: &[Vec<f64>], sizes: usize) -> Vec<Repeats> {
+    let turns = |times: &[f64], first: usize| times.iter().skip(first).step_by(2).copied().collect::<Repeats>();
+    let chosen_by = |i: &usize| turns(&times[*i], 0).measured().value;
+    let best = (0..sizes).min_by(|a, b| chosen_by(a).total_cmp(&chosen_by(b)));
+    let best = turns(&times[best.unwrap_or(0)], 1);
+    times.iter().map(|times| best.over(&turns(times, 1))).collect()
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let sizes = if context.smoke { &SIZES[..3] } else { &SIZES[..] };
-    let mut sweep = Table::new(
-        "Queries of photon maps by leaf size",
-        &[
-            "scene",
-            "tree",
-            "leaf size",
-            "chosen by",
-            "nodes a query",
-            "kernels tested a query",
-            "kernels that count",
-            "nodes + kernels: best of the sweep / this",
-            "µs a query",
-            "speed / best of the sweep",
-            "source: frames/s / best of its sweep",
-        ],
-    )
-    .long();
-    let mut automatic_sizes = Table::new(
-        "Automatic leaf sizes",
-        &[
-            "scene",
-            "kernels' shape",
-            "tree",
-            "share",
-            "leaf size",
-            "best of the sweep",
-            "mean cover",
-            "kernels that count where the camera looks",
-            "kernels that count anywhere",
-            "nodes + kernels: best / this, where the camera looks",
-            "nodes + kernels: best / this, anywhere",
-            "source's frames: share without queries (%)",
-            "source's frames: error of the fit (%)",
-            "source's frames by our counts: best / this",
-            "source: best / this",
-            "deviation",
-        ],
-    );
-    for prepared in prepared(context, &Shape::ALL) {
+impl Found {
+    /// Adds one tree of one scene: all sizes of the sweep, and the automatic ones.
+    fn add(&mut self, context: &Context<'_>, prepared: &Prepared, (tree, build): (&str, Build)) -> Result<()> {
         let Prepared {
             case,
             surfaces,
@@ -243,81 +166,146 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             shape,
             points,
             anywhere,
-        } = prepared?;
+        } = prepared;
         let automatic = |share| automatic_leaf_size(kernels.areas(), surfaces.area, share);
-        let mut wanted: Vec<(u32, &str)> = sizes.iter().map(|size| (*size, "sweep")).collect();
+        let swept = context.first(&SIZES, 3);
+        let sizes = swept.len();
+        let mut wanted: Vec<(u32, &str)> = swept.iter().map(|size| (*size, SWEEP)).collect();
         wanted.extend([(automatic(LEAF_SHARE), LARGE), (automatic(SMALL_SHARE), SMALL)]);
-        for (tree, build) in [
-            ("volume heuristic", Kernels::by_volume as fn(&Kernels, u32) -> _),
-            ("linear", Kernels::linear),
-        ] {
-            let maps = wanted
-                .iter()
-                .map(|(size, _)| Map::new(&kernels, &build(&kernels, *size)));
-            let maps: Vec<Map> = maps.collect::<Result<_>>()?;
-            let repeats = match (shape, context.smoke) {
-                // Only counts go into the table of automatic sizes.
-                (shape, _) if shape != SOURCE_SHAPE => 0,
-                (_, true) => 1,
-                _ => REPEATS,
-            };
-            let times = query_times(&maps, &points, repeats, Map::gather_compact);
-            let best = times[..sizes.len()].iter().copied().fold(f64::INFINITY, f64::min);
-            let published = PUBLISHED
-                .iter()
-                .find(|row| row.counterpart == case.counterpart && row.tree == tree);
-            let found = Sweep {
-                scene: case.name(),
-                shape,
-                tree,
-                published,
-                wanted: &wanted,
-                sizes: sizes.len(),
-                works: work_of(&maps, &points),
-                works_anywhere: work_of(&maps, &anywhere),
-                points: points.len(),
+        let maps = wanted.iter().map(|(size, _)| Map::new(kernels, &build(kernels, *size)));
+        let maps: Vec<Map> = maps.collect::<Result<_>>()?;
+        let [works, works_anywhere] = [points, anywhere].map(|points| {
+            maps.iter()
+                .map(|map| map.work(points, Map::gather_compact))
+                .collect::<Vec<Work>>()
+        });
+        let each = |count: u64| count as f64 / points.len().max(1) as f64;
+        let costs: Vec<f64> = works[..sizes].iter().map(steps).collect();
+        let best = (0..sizes).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0);
+        self.sweeps.push(Sweep {
+            scene: case.name().into(),
+            shape: shape.word().into(),
+            tree: tree.into(),
+            best: wanted[best].0.into(),
+            out_of_order: out_of_order(&costs, best),
+            ends: u64::from(best == 0) + u64::from(best + 1 == sizes),
+        });
+        // Of other shapes, counts alone.
+        let times = if *shape == SOURCE_SHAPE {
+            context.in_turns(TURNS, maps.len(), |i| {
+                Ok(1e-3 * maps[i].nanoseconds(points, Map::gather_compact))
+            })?
+        } else {
+            Vec::new()
+        };
+        let speeds = if times.is_empty() {
+            Vec::new()
+        } else {
+            over_best(&times, sizes)
+        };
+        // A smoke run has too few sizes.
+        let source = Published::of(case.counterpart, tree).filter(|_| sizes == SIZES.len());
+        let frames = source.map(|source| (source, source.frames(&works, points.len())));
+        for (chosen, (size, share)) in wanted.iter().enumerate().skip(sizes) {
+            self.automatic.push(Automatic {
+                scene: case.name().into(),
+                counterpart: case.counterpart().into(),
+                shape: shape.word().into(),
+                tree: tree.into(),
+                share: (*share).into(),
+                size: (*size).into(),
                 cover: case.cover,
-            };
-            found.automatic(&mut automatic_sizes);
-            if shape != SOURCE_SHAPE {
-                continue;
-            }
-            for (i, (work, time)) in found.works.iter().zip(&times).enumerate() {
-                let each = |count: u64| count as f64 / points.len().max(1) as f64;
-                let (size, by) = wanted[i];
-                let theirs = published.and_then(|row| match by {
-                    "sweep" => Some(row.reached(row.sweep[i])),
-                    SMALL => Some(row.reached(row.automatic)),
-                    _ => None,
-                });
-                sweep.row([
-                    case.name().into(),
-                    tree.into(),
-                    u64::from(size).into(),
-                    by.into(),
-                    each(work.tree.nodes).into(),
-                    each(work.tests).into(),
-                    each(work.contributions).into(),
-                    reached(steps, &found.works, sizes.len(), i).into(),
-                    (1e-3 * time).into(),
-                    (best / time).into(),
-                    theirs.into(),
-                ]);
-            }
+                contributions: each(works[chosen].contributions),
+                contributions_anywhere: each(works_anywhere[chosen].contributions),
+                reached: reached(steps, &works, sizes, chosen),
+                reached_anywhere: reached(steps, &works_anywhere, sizes, chosen),
+                reached_in_time: speeds.get(chosen).cloned(),
+                frames_without: frames
+                    .as_ref()
+                    .map(|(source, fit)| fit.coefficients[0] * f64::from(source.automatic)),
+                frames_error: frames.as_ref().map(|(_, fit)| 100.0 * fit.relative_error),
+                reached_in_frames: frames.as_ref().map(|(_, fit)| {
+                    let [frame, node, kernel] = fit.coefficients;
+                    let cost = |work: &Work| frame + node * each(work.tree.nodes) + kernel * each(work.tests);
+                    reached(cost, &works, sizes, chosen)
+                }),
+            });
         }
+        for (i, (time, speed)) in times.into_iter().zip(speeds).enumerate() {
+            self.sizes.push(Size {
+                scene: case.name().into(),
+                counterpart: case.counterpart().into(),
+                tree: tree.into(),
+                size: wanted[i].0.into(),
+                by: wanted[i].1.into(),
+                nodes: each(works[i].tree.nodes),
+                kernels: each(works[i].tests),
+                contributions: each(works[i].contributions),
+                reached: reached(steps, &works, sizes, i),
+                time: Repeats(time),
+                speed,
+            });
+        }
+        Ok(())
     }
-    sweep.note(
-        "Synthetic kernels: ellipsoids about the second and third hits of 2¹⁷ photons (2⁹ in a quick look), radii by the fourth root of the \
-         photon's way, scaled so that a surface point lies in as many as the source's Table 5.1 says of the counterpart. Queries at the \
-         points that the scene's camera sees, on compact pairs, one thread, medians of runs that take turns. Node and kernel counts are exact, \
-         and the same on every machine; times move with its load. Frames a second of the source's Table 6.1 stand over their best in the \
-         sweep, its automatic size in the row of share 1/16, which its own sizes need.",
-    );
-    automatic_sizes.note(
-        "Counts are exact, nodes and kernels at the same price. The rule takes the mean cover of all surfaces, whatever the camera sees: \
-         anywhere are as many points evenly on all surfaces. The source judges by frames, which hold rays and shading too: its eight frame \
-         times are fitted as a constant and our counts of nodes and kernels, none with a negative price, and the automatic size is judged by \
-         the sum.",
-    );
-    Ok(vec![sweep, automatic_sizes])
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let mut found = Self::default();
+        of_each_prepared(context, |prepared| {
+            TREES
+                .into_iter()
+                .try_for_each(|tree| found.add(context, prepared, tree))?;
+            Ok(Vec::<Size>::new())
+        })?;
+        Ok(found)
+    }
+
+    fn findings(&self) -> Findings {
+        let of_default = self.automatic.iter().filter(|row| row.is_the_default());
+        let swept: Vec<Size> = self.sizes.iter().filter(|row| row.by == SWEEP).cloned().collect();
+        Findings::of(&self.automatic, CRITERIA)
+            .headline(
+                "best of the sweep over the automatic size by nodes + kernels, the worst tree",
+                of_default.map(|row| row.reached).reduce(f64::min).map(Measured::exact),
+            )
+            .curves(
+                "steps",
+                "Queries of photon maps by leaf size",
+                Axes::rates("kernels in a leaf at most", "nodes + kernels per query"),
+                curves(&swept, |row| format!("{}, {}", row.scene, row.tree), |row| {
+                    (row.size as f64, (row.nodes + row.kernels).into())
+                }),
+            )
+            .note(
+                "Counts are exact, nodes and kernels at the same price. The rule takes the mean cover of all surfaces, whatever the camera sees: \
+                 anywhere are as many points evenly on all surfaces. The source judges by frames, which hold rays and shading too: its eight \
+                 frame times are fitted as a constant and our counts of nodes and kernels, none with a negative price, and the automatic size \
+                 is judged by the sum. By time, the best size is chosen by half of the turns, and compared in the others.",
+            )
+            .and(Findings::of(&self.sweeps, OF_SWEEPS))
+            .and(Findings::of(&self.sizes, &[]))
+            .note(
+                "Synthetic kernels: ellipsoids about the second and third hits of 2¹⁷ photons (2⁹ in a smoke run), radii by the fourth root of \
+                 the photon's way, scaled so that a surface point lies in as many as the source's Table 5.1 says of the counterpart. Queries at \
+                 the points that the scene's camera sees, on compact pairs, one thread. Node and kernel counts are the same on every machine. \
+                 Frames per second of the source's Table 6.1 stand over their best in the sweep, its automatic size in the row of share 1/16, \
+                 which its own sizes need.",
+            )
+            .long()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sweeps_have_one_valley_and_the_best_is_chosen_by_other_turns() {
+        assert_eq!(out_of_order(&[3.0, 2.0, 1.0, 2.0], 2), 0);
+        assert_eq!(out_of_order(&[3.0, 4.0, 1.0, 2.0, 2.0], 2), 2);
+        let times = [vec![1.0, 6.0, 1.0, 6.0], vec![2.0, 3.0, 2.0, 3.0]];
+        assert_eq!(over_best(&times, 2), [Repeats(vec![1.0; 2]), Repeats(vec![2.0; 2])]);
+    }
 }

@@ -6,14 +6,13 @@ use clerestory::Result;
 use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
 use glam::Vec3;
 
-use super::leaf_sizes::query_times;
-use super::photon_kernels::{Map, Prepared, Shape, Work, prepared};
+use super::changes;
+use super::photon_kernels::{Map, Prepared, SOURCE_SHAPE, Shape, of_each_prepared};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, change, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
 
 /// The share of a point's kernels in a leaf that the source's leaf sizes need.
 pub const SOURCE_SHARE: f64 = 1.0 / 16.0;
-const REPEATS: usize = 5;
 
 /// A row of the source's table: a query by the volume heuristic, and what the linear hierarchy changes in per cent.
 struct Published {
@@ -53,38 +52,113 @@ const PUBLISHED: [Published; 3] = [
         linear_speed: -12.7,
     },
 ];
+/// Means of all nine scenes of the source: nodes, kernels tested, frames a second.
+const PUBLISHED_MEANS: [f64; 3] = [13.3, 9.4, -8.5];
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let mut table = Table::new(
-        "Queries of the linear hierarchy beside those of the volume heuristic",
-        &[
-            "scene",
-            "counterpart",
-            "kernels' shape",
-            "kernels",
-            "leaf size",
-            "nodes, volume heuristic",
-            "nodes, linear (%)",
-            "source: nodes",
-            "source: nodes, linear (%)",
-            "kernels tested, volume heuristic",
-            "kernels tested, linear (%)",
-            "source: kernels tested",
-            "source: kernels tested, linear (%)",
-            "volume cost, linear / heuristic",
-            "anywhere: nodes, linear (%)",
-            "anywhere: kernels tested, linear (%)",
-            "µs a query, volume heuristic",
-            "speed, linear (%)",
-            "source: speed (%)",
-            "deviation",
-        ],
-    );
-    let mut sums = [[0.0; 5]; 2];
-    let mut stretches = Vec::new();
-    let mut rows = [0_u32; 2];
-    for prepared in prepared(context, &Shape::ALL) {
+rows! {
+    /// A scene with kernels of a shape.
+    struct Row = "Queries of the linear hierarchy beside those of the volume heuristic" by [scene, shape] {
+        scene: String = "scene",
+        counterpart: String = "counterpart",
+        shape: String = "kernels' shape",
+        kernels: u64 = "kernels",
+        stretch: f64 = "length of a kernel over its width, mean",
+        leaf_size: u64 = "leaf size",
+        nodes: f64 = "nodes, volume heuristic",
+        linear_nodes: f64 = "nodes, linear (%)",
+        tests: f64 = "kernels tested, volume heuristic",
+        linear_tests: f64 = "kernels tested, linear (%)",
+        cost: f64 = "volume cost, linear / heuristic",
+        linear_nodes_anywhere: f64 = "anywhere: nodes, linear (%)",
+        linear_tests_anywhere: f64 = "anywhere: kernels tested, linear (%)",
+        time: Repeats = "a query, volume heuristic (µs)",
+        linear_speed: Repeats = "speed, linear (%)",
+    }
+    beside "source: nodes, volume heuristic" = |row| row.published().map(|source| source.nodes).into();
+    beside "source: nodes, linear (%)" = |row| row.published().map(|source| source.linear_nodes).into();
+    beside "source: kernels tested, volume heuristic" = |row| row.published().map(|source| source.kernels).into();
+    beside "source: kernels tested, linear (%)" = |row| row.published().map(|source| source.linear_kernels).into();
+    beside "source: speed, linear (%)" = |row| row.published().map(|source| source.linear_speed).into();
+}
+
+rows! {
+    /// All scenes with kernels of a shape.
+    struct Mean = "What the linear hierarchy changes, means of the scenes" by [shape] {
+        shape: String = "kernels' shape",
+        nodes: f64 = "nodes (%)",
+        tests: f64 = "kernels tested (%)",
+        speed: Measured = "speed (%)",
+        nodes_anywhere: f64 = "anywhere: nodes (%)",
+        tests_anywhere: f64 = "anywhere: kernels tested (%)",
+    }
+    beside "source: nodes (%)" = |_row| PUBLISHED_MEANS[0].into();
+    beside "source: kernels tested (%)" = |_row| PUBLISHED_MEANS[1].into();
+    beside "source: speed (%)" = |_row| PUBLISHED_MEANS[2].into();
+}
+
+/// What was found.
+pub type Found = Vec<Row>;
+
+const AS_FAR: &str = "about the source's mean: between no change and the worst of its scenes beside";
+
+const CRITERIA: &[Criterion<Mean>] = &[
+    Criterion::each(
+        "nodes, mean of the scenes (%)",
+        Bound::Between(0.0, 21.0),
+        |mean: &Mean| mean.nodes.into(),
+    )
+    .among(Mean::is_as_the_source)
+    .because(AS_FAR),
+    Criterion::each(
+        "kernels tested, mean of the scenes (%)",
+        Bound::Between(0.0, 13.1),
+        |mean: &Mean| mean.tests.into(),
+    )
+    .among(Mean::is_as_the_source)
+    .because(AS_FAR),
+    Criterion::each(
+        "speed, mean of the scenes (%)",
+        Bound::Between(-12.7, 0.0),
+        |mean: &Mean| mean.speed,
+    )
+    .among(Mean::is_as_the_source)
+    .because(AS_FAR),
+];
+
+impl Mean {
+    fn is_as_the_source(&self) -> bool {
+        self.shape == SOURCE_SHAPE.word()
+    }
+
+    /// Of each shape that has rows.
+    fn all(rows: &[Row]) -> Vec<Self> {
+        let of = |shape: Shape| {
+            let of_shape: Vec<&Row> = rows.iter().filter(|row| row.shape == shape.word()).collect();
+            let mean =
+                |of: &dyn Fn(&Row) -> f64| of_shape.iter().map(|row| of(row)).sum::<f64>() / of_shape.len() as f64;
+            (!of_shape.is_empty()).then(|| Self {
+                shape: shape.word().into(),
+                nodes: mean(&|row| row.linear_nodes),
+                tests: mean(&|row| row.linear_tests),
+                speed: Measured {
+                    value: mean(&|row| row.linear_speed.measured().value),
+                    low: mean(&|row| row.linear_speed.measured().low),
+                    high: mean(&|row| row.linear_speed.measured().high),
+                },
+                nodes_anywhere: mean(&|row| row.linear_nodes_anywhere),
+                tests_anywhere: mean(&|row| row.linear_tests_anywhere),
+            })
+        };
+        Shape::ALL.into_iter().filter_map(of).collect()
+    }
+}
+
+impl Row {
+    fn published(&self) -> Option<&'static Published> {
+        PUBLISHED.iter().find(|source| source.counterpart == self.counterpart)
+    }
+
+    fn of(context: &Context<'_>, prepared: &Prepared) -> Result<Self> {
         let Prepared {
             case,
             surfaces,
@@ -92,107 +166,67 @@ pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
             shape,
             points,
             anywhere,
-        } = prepared?;
-        if shape == Shape::Ellipsoids {
-            stretches.push(kernels.mean_stretch());
-        }
+        } = prepared;
         let leaf_size = automatic_leaf_size(kernels.areas(), surfaces.area, SOURCE_SHARE);
         let trees = [kernels.by_volume(leaf_size), kernels.linear(leaf_size)];
-        let maps = trees.iter().map(|tree| Map::new(&kernels, tree));
-        let maps: Vec<Map> = maps.collect::<Result<_>>()?;
-        let repeats = if context.smoke { 1 } else { REPEATS };
-        let times = query_times(&maps, &points, repeats, Map::gather_complete);
-        let all_work = |points: &[Vec3]| {
-            [0, 1].map(|i| {
-                let mut work = Work::default();
-                points
-                    .iter()
-                    .for_each(|point| maps[i].gather_complete(*point, &mut work));
-                work
-            })
-        };
-        let (work, work_anywhere) = (all_work(&points), all_work(&anywhere));
+        let maps = [Map::new(kernels, &trees[0])?, Map::new(kernels, &trees[1])?];
+        let times = context.in_turns(9, maps.len(), |i| {
+            Ok(1e-3 * maps[i].nanoseconds(points, Map::gather_complete))
+        })?;
+        let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();
+        let work = |points: &[Vec3]| [0, 1].map(|i: usize| maps[i].work(points, Map::gather_complete));
+        let (work, work_anywhere) = (work(points), work(anywhere));
         let each = |count: u64| count as f64 / points.len().max(1) as f64;
-        let more = |[first, second]: [u64; 2]| 100.0 * (second as f64 / first.max(1) as f64 - 1.0);
-        let published = PUBLISHED.iter().find(|row| row.counterpart == case.counterpart);
-        let theirs = |of: fn(&Published) -> f64| Cell::from(published.map(of));
-        let (nodes, tests) = (work.map(|w| w.tree.nodes), work.map(|w| w.tests));
-        let ours = [
-            more(nodes),
-            more(tests),
-            100.0 * (times[0] / times[1] - 1.0),
-            more(work_anywhere.map(|w| w.tree.nodes)),
-            more(work_anywhere.map(|w| w.tests)),
-        ];
-        let of_shape = usize::from(shape == Shape::Ellipsoids);
-        for (sum, value) in sums[of_shape].iter_mut().zip(ours) {
-            *sum += value;
-        }
-        rows[of_shape] += 1;
-        table.row([
-            case.name().into(),
-            case.counterpart().into(),
-            shape.word().into(),
-            (kernels.len() as u64).into(),
-            u64::from(leaf_size).into(),
-            each(nodes[0]).into(),
-            ours[0].into(),
-            theirs(|row| row.nodes),
-            theirs(|row| row.linear_nodes),
-            each(tests[0]).into(),
-            ours[1].into(),
-            theirs(|row| row.kernels),
-            theirs(|row| row.linear_kernels),
-            (trees[1].volume_cost() / trees[0].volume_cost()).into(),
-            ours[3].into(),
-            ours[4].into(),
-            (1e-3 * times[0]).into(),
-            ours[2].into(),
-            theirs(|row| row.linear_speed),
-            published.map_or("no counterpart".into(), |row| deviation(shape, &ours, row).into()),
-        ]);
+        let more = |[first, second]: [u64; 2]| change(second as f64, first.max(1) as f64);
+        Ok(Self {
+            scene: case.name().into(),
+            counterpart: case.counterpart().into(),
+            shape: shape.word().into(),
+            kernels: kernels.len() as u64,
+            stretch: kernels.mean_stretch(),
+            leaf_size: leaf_size.into(),
+            nodes: each(work[0].tree.nodes),
+            linear_nodes: more(work.map(|work| work.tree.nodes)),
+            tests: each(work[0].tests),
+            linear_tests: more(work.map(|work| work.tests)),
+            cost: trees[1].volume_cost() / trees[0].volume_cost(),
+            linear_nodes_anywhere: more(work_anywhere.map(|work| work.tree.nodes)),
+            linear_tests_anywhere: more(work_anywhere.map(|work| work.tests)),
+            linear_speed: changes(&times[0], &times[1]),
+            time: times[0].clone(),
+        })
     }
-    for (of_shape, shape) in Shape::ALL.iter().enumerate() {
-        let [nodes, tests, speed, nodes_anywhere, tests_anywhere] =
-            sums[of_shape].map(|sum| sum / f64::from(rows[of_shape].max(1)));
-        table.note(format!(
-            "Means of {}: nodes {nodes:+.1} %, kernels tested {tests:+.1} %, queries a second {speed:+.1} % where the camera looks; nodes \
-             {nodes_anywhere:+.1} %, kernels tested {tests_anywhere:+.1} % anywhere on the surfaces; the source's over its nine rows are +13.3 %, +9.4 % and \
-             −8.5 % of its frames a second.",
-            shape.word()
-        ));
-    }
-    let stretch = stretches.iter().sum::<f64>() / stretches.len().max(1) as f64;
-    table.note(format!(
-        "Synthetic kernels about the second and third hits of 2¹⁷ photons (2⁹ in a quick look) in scenes of the source's sizes, as many about a \
-         point as in its Table 5.1: spheres, and ellipsoids of the same area that are stretched as the footprint of a beam is by its incidence, \
-         {stretch:.2} times as long as wide on average and at most 20 times, the source's bound. The source's come from photon differentials \
-         in its own scenes. Counts are exact: nodes fetched, two a pair; times on one thread, complete nodes. Anywhere: as many points evenly on \
-         all surfaces. The shape alone moves the linear hierarchy's loss from below the source's means to above them."
-    ));
-    Ok(vec![table])
 }
 
-/// Whether nodes, kernels and speed change as in the source, and by how much less or more.
-fn deviation(shape: Shape, ours: &[f64; 5], theirs: &Published) -> String {
-    let pairs = [
-        (ours[0], theirs.linear_nodes),
-        (ours[1], theirs.linear_kernels),
-        (ours[2], theirs.linear_speed),
-    ];
-    let turned = pairs.iter().filter(|(ours, theirs)| ours.signum() != theirs.signum());
-    let signs = match turned.count() {
-        0 => "signs as there".to_owned(),
-        count => format!("{count} signs turned"),
-    };
-    let ratio = |(ours, theirs): (f64, f64)| format!("{:.1}", ours / theirs);
-    let reason = match shape {
-        Shape::Spheres => "rounder kernels",
-        Shape::Ellipsoids => "boxes of kernels askew",
-    };
-    format!(
-        "{signs}; nodes {} and kernels {} times theirs: {reason}",
-        ratio(pairs[0]),
-        ratio(pairs[1])
-    )
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        of_each_prepared(context, |prepared| Ok(vec![Row::of(context, prepared)?]))
+    }
+
+    fn findings(&self) -> Findings {
+        let means = Mean::all(self);
+        let of_source = means.iter().find(|mean| mean.is_as_the_source());
+        Findings::of(&means, CRITERIA)
+            .headline(
+                "change of a query's speed by the linear hierarchy, mean of the scenes (%)",
+                of_source.map(|mean| mean.speed),
+            )
+            .note(
+                "The source's means are over its nine scenes, of frames a second. Its kernels come from photon differentials in its own scenes.",
+            )
+            .bars(
+                "nodes",
+                "Nodes of a query in the linear hierarchy, over those in the tree of the volume heuristic",
+                self,
+                |row| [row.scene.clone(), row.shape.clone()],
+                |row| (1.0 + row.linear_nodes / 100.0).into(),
+            )
+            .and(Findings::of(self, &[]))
+            .note(
+                "Synthetic kernels about the second and third hits of 2¹⁷ photons (2⁹ in a smoke run) in scenes of the source's sizes, as many \
+                 about a point as in its Table 5.1: spheres, and ellipsoids of the same area that are stretched as the footprint of a beam is \
+                 by its incidence, at most 20 times as long as wide, the source's bound. Counts are exact: nodes fetched, two per pair; times \
+                 on one thread, complete nodes. Anywhere: as many points evenly on all surfaces.",
+            )
+    }
 }

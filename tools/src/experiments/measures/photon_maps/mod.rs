@@ -1,12 +1,22 @@
 //! Photon maps: construction of their trees, leaf sizes, and queries of every layout, beside the figures of their source.
 //!
-//! [`photon_scenes`] and [`photon_kernels`] make what is measured; the other modules are measures.
+//! [`photon_scenes`], [`photon_kernels`], [`ray_layouts`], [`leaf_frames`] and [`construction_stages`] make what is measured; the other modules are measures.
 
 pub mod compact_map;
 pub mod compact_rays;
+pub mod construction_stages;
+pub mod leaf_frames;
 pub mod leaf_sizes;
 pub mod map_construction;
 pub mod map_quality;
 pub mod merge_example;
 pub mod photon_kernels;
 pub mod photon_scenes;
+pub mod ray_layouts;
+
+use crate::experiments::findings::{Repeats, change};
+
+/// What one contender changes in another's values, %, turn by turn; of times the other way round, it is the change of speed.
+pub fn changes(of: &Repeats, from: &Repeats) -> Repeats {
+    of.0.iter().zip(&from.0).map(|(of, from)| change(*of, *from)).collect()
+}

@@ -22,6 +22,7 @@ use glam::{Vec3, Vec4};
 
 use super::photon_scenes::{CASES, Case, Surfaces};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::clock::nanoseconds_once;
 use crate::random::Random;
 
 /// Probability that a diffuse surface scatters a photon.
@@ -228,6 +229,9 @@ pub struct Work {
     pub contributions: u64,
 }
 
+/// A way to query a [`Map`] at a point.
+pub type Gather = fn(&Map, Vec3, &mut Work);
+
 /// A photon map in both layouts, records in leaf order.
 pub struct Map {
     /// Complete nodes.
@@ -296,6 +300,22 @@ impl Map {
         self.compact.point_query(point, &mut work.tree, |_| {});
     }
 
+    /// Work of queries at all points.
+    pub fn work(&self, points: &[Vec3], gather: Gather) -> Work {
+        let mut work = Work::default();
+        points.iter().for_each(|point| gather(self, *point, &mut work));
+        work
+    }
+
+    /// Nanoseconds of a query, by one run over all points.
+    pub fn nanoseconds(&self, points: &[Vec3], gather: Gather) -> f64 {
+        nanoseconds_once(points, |point| {
+            let mut work = Work::default();
+            gather(self, *point, &mut work);
+            work
+        })
+    }
+
     /// Gathers at a point by compact pairs.
     pub fn gather_compact(&self, point: Vec3, work: &mut Work) {
         let mut tree = work.tree;
@@ -321,24 +341,24 @@ pub struct Prepared {
     pub anywhere: Vec<Vec3>,
 }
 
-/// The cases that a measure takes, in each shape, each made when its turn comes, until the measure is stopped.
-pub fn prepared<'a>(context: &'a Context<'_>, shapes: &'a [Shape]) -> impl Iterator<Item = Result<Prepared>> + 'a {
+/// Rows of each case in each shape, each made when its turn comes, until the measure is stopped.
+///
+/// # Errors
+/// Those of scenes, and the first of a case.
+pub fn of_each_prepared<R>(context: &Context<'_>, mut rows: impl FnMut(&Prepared) -> Result<Vec<R>>) -> Result<Vec<R>> {
     // Photons sent out, and pixels on a side of the camera.
-    let (photons, side) = if context.smoke { (1 << 9, 8) } else { (1 << 17, 96) };
-    let cases = if context.smoke { &CASES[..1] } else { &CASES[..] };
-    let all = cases
-        .iter()
-        .flat_map(move |case| shapes.iter().map(move |shape| (case, *shape)));
-    let count = cases.len() * shapes.len();
-    let going_on = all.enumerate().take_while(|_| !context.watch.stopped());
-    going_on.map(move |(done, (case, shape))| {
-        context.watch.begin(case.name(), done, count);
+    let (photons, side) = context.pick((1 << 17, 96), (1 << 9, 8));
+    let cases: &'static [Case] = &CASES;
+    let cases = context.first(cases, 1).iter();
+    let all: Vec<(&'static Case, Shape)> = cases.flat_map(|case| Shape::ALL.map(|shape| (case, shape))).collect();
+    let name = |(case, shape): &(&Case, Shape)| format!("{}, {}", case.name(), shape.word());
+    context.each(&all, name, |(case, shape)| {
         let surfaces = Surfaces::load(case.scene)?;
         let points = surfaces.seen(side)?;
-        Ok(Prepared {
-            case,
-            shape,
-            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover, shape),
+        rows(&Prepared {
+            case: *case,
+            shape: *shape,
+            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover, *shape),
             anywhere: surfaces.anywhere(points.len()),
             points,
             surfaces,

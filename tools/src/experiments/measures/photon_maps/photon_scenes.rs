@@ -11,6 +11,7 @@ use clerestory::scene::{Camera, Scene};
 use clerestory::{Result, scene};
 use glam::Vec3;
 
+use crate::experiments::measures::context::short_name;
 use crate::geometry::{self, area, triangles_with_materials};
 use crate::random::Random;
 
@@ -68,7 +69,7 @@ pub static CASES: [Case; 5] = [
 impl Case {
     /// The scene's name.
     pub fn name(&self) -> &'static str {
-        self.scene.trim_start_matches("builtin:")
+        short_name(self.scene)
     }
 
     /// Its counterpart, for a table's cell.

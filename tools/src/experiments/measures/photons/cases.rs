@@ -11,6 +11,9 @@ use clerestory::scene::Scene;
 use clerestory::techniques::photon_mapping::kernel::{KernelProfile, KernelShape};
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 
+use crate::experiments::measures::Context;
+use crate::experiments::measures::context::short_name;
+
 /// Photons land twice after they were scattered first, as the source's: light of two bounces before the eye's.
 const PATHS: &str = "bounces=0..3";
 /// The source's greatest axis and unit of the dampening, m.
@@ -141,10 +144,22 @@ pub static CASES: [Case; 7] = [
     },
 ];
 
+/// All cases, or those with these counterparts in a smoke run.
+pub fn cases(context: &Context<'_>, smoke: &[&str]) -> Vec<&'static Case> {
+    let is_in = |case: &&Case| !context.smoke || smoke.contains(&case.published.name);
+    CASES.iter().filter(is_in).collect()
+}
+
+/// What the source says of a scene by its name there.
+pub fn published(counterpart: &str) -> Option<&'static Published> {
+    let mut all = CASES.iter().map(|case| &case.published);
+    all.find(|published| published.name == counterpart)
+}
+
 impl Case {
     /// The scene's name.
     pub fn name(&self) -> &'static str {
-        self.scene.trim_start_matches("builtin:")
+        short_name(self.scene)
     }
 
     /// The source's settings. Smoke forms have fewer photons with kernels of the same size.

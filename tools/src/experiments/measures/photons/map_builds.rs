@@ -3,20 +3,68 @@
 
 use std::time::Instant;
 
-use clerestory::gpu::Gpu;
+use clerestory::gpu::{DeviceKind, Gpu};
 use clerestory::techniques::photon_mapping::{MapBuild, PhotonMapper, PhotonSettings};
-use clerestory::{Error, Result, scene};
+use clerestory::{Result, scene};
 
 use super::cases::{Case, mapper};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
-use crate::timing::{Spread, median};
 
-/// Passes that count, of each kind in turn, after one that compiles kernels and allocates memory.
-const PASSES: u32 = 11;
-const SMOKE_PASSES: u32 = 2;
+/// Passes of each kind.
+const TURNS: usize = 11;
 /// Stages of the device's builds.
 const STAGES: [&str; 8] = ["boxes", "codes", "sort", "blocks", "split", "ranks", "pairs", "records"];
+
+rows! {
+    /// A scene's passes, with the map built both ways.
+    struct Row = "Maps built by the device and by the host" by [scene] {
+        scene: String = "scene",
+        on_hardware: bool = "on a device of its own",
+        records: f64 = "records",
+        host: Repeats = "map by the host (ms)",
+        device: Repeats = "map by the device (ms)",
+        ratio: Repeats = "device over host, map",
+        pass_host: Repeats = "pass, map by the host (ms)",
+        pass_device: Repeats = "pass, map by the device (ms)",
+        pass_ratio: Repeats = "device over host, pass",
+        different: u64 = "values of the picture that differ",
+    }
+}
+
+rows! {
+    /// A stage of the device's builds.
+    struct Stage = "Stages of the maps built by the device" by [scene, stage] {
+        scene: String = "scene",
+        stage: String = "stage",
+        time: Repeats = "time (ms)",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    builds: Vec<Row>,
+    stages: Vec<Stage>,
+}
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "the device's map changes no value of the picture",
+        Bound::AtMost(0.0),
+        |row: &Row| row.different.into(),
+    )
+    .because("both build the same map of the same photons")
+    .in_every_form(),
+    Criterion::each(
+        "a pass is not slower with the device's map: over that with the host's",
+        Bound::AtMost(1.0),
+        |row: &Row| (&row.pass_ratio).into(),
+    )
+    .among(|row| row.on_hardware)
+    .needs("a device of its own")
+    .because("what is built where it is used spares both copies"),
+];
 
 /// Milliseconds of a pass.
 #[derive(Debug, Clone, Copy, Default)]
@@ -27,42 +75,39 @@ struct Pass {
     stages: [f64; STAGES.len()],
 }
 
-/// The table without rows.
-pub fn table() -> Table {
-    let mut heads: Vec<String> = [
-        "scene",
-        "records",
-        "map by the host (ms)",
-        "map by the device (ms)",
-        "device over host",
-        "least … greatest",
-        "pass, map by the host (ms)",
-        "pass, map by the device (ms)",
-        "device over host, pass",
-        "least … greatest, pass",
-    ]
-    .map(String::from)
-    .to_vec();
-    heads.extend(STAGES.map(|stage| format!("{stage} (ms)")));
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-    Table::new("Maps built by the device and by the host", &heads)
+impl Found {
+    /// Renders these scenes both ways.
+    pub fn measure(context: &Context<'_>, gpu: &Gpu, cases: &[&Case], size: [u32; 2]) -> Result<Self> {
+        let mut stages = Vec::new();
+        let name = |case: &&Case| format!("{}, maps", case.name());
+        let builds = context.each(cases, name, |case| {
+            let (row, of_device) = build(context, gpu, case, size)?;
+            stages.extend(STAGES.iter().zip(of_device).map(|(stage, time)| Stage {
+                scene: case.name().into(),
+                stage: (*stage).into(),
+                time,
+            }));
+            Ok(vec![row])
+        })?;
+        Ok(Self { builds, stages })
+    }
+
+    /// What these rows say.
+    pub fn findings(&self) -> Findings {
+        Findings::of(&self.builds, CRITERIA)
+            .note(
+                "Passes of one progressive rendering each, whose pictures are compared at the end. The host's map takes the photons' way back, \
+                 the build and the copy to the device; the device's the recording of its build and its passes.",
+            )
+            .and(Findings::pivoted(&self.stages, "stage", &[]))
+    }
 }
 
-/// What the table says beside its rows.
-pub fn note(table: &mut Table, smoke: bool) {
-    table.note(format!(
-        "Medians of {} passes of each kind, in turn, of one progressive rendering each, whose pictures were compared to the bit. The host's map \
-         takes the photons' way back, the build and the copy to the device; the device's the recording of its build and its passes, which are \
-         the last columns. Ratios are of neighbouring passes: median, least and greatest.",
-        if smoke { SMOKE_PASSES } else { PASSES },
-    ));
-}
-
-/// A row: renders a case both ways.
-pub fn row(context: &Context<'_>, gpu: &Gpu, case: &Case, size: [u32; 2]) -> Result<Vec<Cell>> {
+/// A case both ways, and the stages of the device's builds.
+fn build(context: &Context<'_>, gpu: &Gpu, case: &Case, size: [u32; 2]) -> Result<(Row, [Repeats; STAGES.len()])> {
     let scene = scene::load(case.scene)?;
     let settings = case.settings(context.smoke)?;
-    let build = if gpu.caps().float64 {
+    let on_device = if gpu.caps().float64 {
         MapBuild::Device
     } else {
         MapBuild::Auto
@@ -74,43 +119,42 @@ pub fn row(context: &Context<'_>, gpu: &Gpu, case: &Case, size: [u32; 2]) -> Res
         };
         mapper(gpu, &scene, size, settings)
     };
-    let (mut host, mut device) = (with(MapBuild::Host)?, with(build)?);
-    let count = if context.smoke { SMOKE_PASSES } else { PASSES };
-    let (mut of_host, mut of_device) = (Vec::new(), Vec::new());
-    for number in 0..=count {
-        let passes = [pass(&mut host, number + 1)?, pass(&mut device, number + 1)?];
-        if number > 0 {
-            of_host.push(passes[0]);
-            of_device.push(passes[1]);
-        }
-    }
-    let pictures = [host.picture()?.0, device.picture()?.0];
-    let [first, second] = pictures.map(|picture| picture.layer("radiance").map(|layer| layer.values().to_vec()));
-    if first != second {
-        return Err(Error::setting("map_build", case.name(), "changes the picture"));
-    }
-    let middle = |passes: &[Pass], field: &dyn Fn(&Pass) -> f64| median(passes.iter().map(field).collect());
-    let ratios = |field: &dyn Fn(&Pass) -> f64| {
-        let pairs = of_device.iter().zip(&of_host);
-        Spread::of(pairs.map(|(device, host)| field(device) / field(host)).collect())
+    let mut mappers = [with(MapBuild::Host)?, with(on_device)?];
+    let mut passes = [0; 2];
+    let turns = context.in_turns(TURNS, mappers.len(), |i| {
+        passes[i] += 1;
+        pass(&mut mappers[i], passes[i])
+    })?;
+    let of = |i: usize, value: fn(&Pass) -> f64| turns[i].iter().map(value).collect::<Repeats>();
+    let [host, device] = [0, 1].map(|i| of(i, |pass| pass.map));
+    let [pass_host, pass_device] = [0, 1].map(|i| of(i, |pass| pass.all));
+    let stages: Vec<[f64; STAGES.len()]> = turns[1].iter().map(|pass| pass.stages).collect();
+    let row = Row {
+        scene: case.name().into(),
+        on_hardware: gpu.caps().kind != DeviceKind::Cpu,
+        records: mappers[1].counts().records as f64 / f64::from(passes[1]),
+        ratio: device.over(&host),
+        pass_ratio: pass_device.over(&pass_host),
+        host,
+        device,
+        pass_host,
+        pass_device,
+        different: differing(&mut mappers)?,
     };
-    let mut row: Vec<Cell> = vec![
-        case.name().into(),
-        (device.counts().records as f64 / f64::from(count + 1)).into(),
-    ];
-    let fields: [&dyn Fn(&Pass) -> f64; 2] = [&|pass| pass.map, &|pass| pass.all];
-    for field in fields {
-        let ratio = ratios(field);
-        let range = [ratio.least, ratio.greatest].map(|value| Cell::Number(value).to_string());
-        row.extend([
-            middle(&of_host, field).into(),
-            middle(&of_device, field).into(),
-            ratio.median.into(),
-            range.join(" … ").into(),
-        ]);
-    }
-    row.extend((0..STAGES.len()).map(|stage| Cell::from(middle(&of_device, &|pass| pass.stages[stage]))));
-    Ok(row)
+    Ok((row, Repeats::by_part(&stages)))
+}
+
+/// Values in which the pictures differ.
+fn differing([first, second]: &mut [PhotonMapper; 2]) -> Result<u64> {
+    let values = |mapper: &mut PhotonMapper| -> Result<Vec<f32>> {
+        let (picture, _) = mapper.picture()?;
+        Ok(picture
+            .layer("radiance")
+            .map_or_else(Vec::new, |layer| layer.values().to_vec()))
+    };
+    let (first, second) = (values(first)?, values(second)?);
+    let different = first.iter().zip(&second).filter(|(a, b)| a != b).count();
+    Ok((different + first.len().abs_diff(second.len())) as u64)
 }
 
 /// The next pass.

@@ -1,6 +1,7 @@
 //! Photon mapping on surfaces as a whole: what photons and kernels come to, and what a frame costs; pictures are compared by sweeps.
 
 mod cases;
+mod kernel_statistics;
 pub mod map_builds;
 pub mod photon_frame;
 pub mod photon_peers;

@@ -1,7 +1,7 @@
 //! Photons traced a second beside other renderers: Mitsuba 3's particle tracer and LuxCore's photon cache, on exported scenes, in turns.
 //!
 //! Peers run in processes of their own through `tools/mitsuba/photons.py`, with the Python that has Mitsuba; one that is not there is left out,
-//! and the table says so.
+//! and a table says so.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,11 +14,12 @@ use clerestory::{Error, Result, scene};
 
 use super::cases::mapper;
 use crate::agreement::PYTHON_VARIABLE;
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
+use crate::experiments::measures::context::short_name;
 use crate::mitsuba::{self, ExportOptions};
 use crate::python;
-use crate::timing::{Spread, median};
+use crate::timing::median;
 
 const SCENES: [&str; 4] = [
     "builtin:cornell-box",
@@ -26,12 +27,14 @@ const SCENES: [&str; 4] = [
     "builtin:box-room?mirror=no",
     "builtin:conference",
 ];
-const SMOKE_SCENES: usize = 1;
-const PEERS: [&str; 2] = ["mitsuba", "luxcore"];
+const MITSUBA: &str = "mitsuba";
+const LUXCORE: &str = "luxcore";
+/// Ours first.
+const RENDERERS: [&str; 3] = ["clerestory", MITSUBA, LUXCORE];
 const PHOTONS: u32 = 1 << 17;
 const SMOKE_PHOTONS: u32 = 1 << 12;
 /// Each renderer's turns, and its rounds in each.
-const TURNS: u32 = 3;
+const TURNS: usize = 5;
 const ROUNDS: u32 = 3;
 /// Edges of a light path at most.
 const DEPTH: u32 = 8;
@@ -45,15 +48,70 @@ const SCRIPTS: [(&str, &str); 2] = [
 const SCRIPT: &str = "photons.py";
 const NEEDED: &str = "Mitsuba 3 or pyluxcore; see tools/mitsuba/README.md";
 
-/// What a renderer's turns gave, by round.
-#[derive(Default)]
-struct Turns {
+rows! {
+    /// A renderer on a scene.
+    struct Row = "Photons traced a second" by [scene, renderer] {
+        scene: String = "scene",
+        renderer: String = "renderer",
+        version: String = "version",
+        photons: f64 = "photons per round",
+        segments: Option<Repeats> = "segments per photon",
+        rate: Repeats = "thousand photons/s",
+        segment_rate: Option<Repeats> = "thousand segments/s",
+        map: Option<Repeats> = "map (ms)",
+        ours_over: Repeats = "photons/s, ours over this",
+        our_segments_over: Option<Repeats> = "segments/s, ours over this",
+    }
+}
+
+rows! {
+    /// A renderer that did not trace a scene, or not in all turns.
+    struct LeftOut = "Left out" by [scene, renderer] {
+        scene: String = "scene",
+        renderer: String = "renderer",
+        turns: u64 = "turns measured",
+        cause: String = "cause",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    rates: Vec<Row>,
+    left_out: Vec<LeftOut>,
+}
+
+const SMALL_FACTOR: &str = "a small factor is half an order of magnitude at most";
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "photons per second are a third of Mitsuba's or more",
+        Bound::AtLeast(1.0 / 3.0),
+        |row: &Row| (&row.ours_over).into(),
+    )
+    .among(|row| row.renderer == MITSUBA)
+    .needs("Mitsuba")
+    .because(SMALL_FACTOR),
+    Criterion::each(
+        "photons per second are a third of LuxCore's or more",
+        Bound::AtLeast(1.0 / 3.0),
+        |row: &Row| (&row.ours_over).into(),
+    )
+    .among(|row| row.renderer == LUXCORE)
+    .needs("LuxCore")
+    .because(SMALL_FACTOR),
+];
+
+/// Medians of the rounds of a renderer's turn.
+#[derive(Debug, Clone, Default)]
+struct Turn {
     version: String,
-    photons: Vec<f64>,
+    photons: f64,
+    /// Photons a second.
+    rate: f64,
     /// Closest-hit rays of photons; of a peer its landings, which are no more.
-    segments: Vec<f64>,
-    trace: Vec<f64>,
-    map: Vec<f64>,
+    segments: Option<f64>,
+    segment_rate: Option<f64>,
+    map_seconds: Option<f64>,
 }
 
 /// What the script prints.
@@ -66,102 +124,143 @@ struct Answer {
     map_seconds: Option<Vec<f64>>,
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let python: PathBuf = std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from);
-    for (name, text) in SCRIPTS {
-        atomic::write(&context.file(name)?, text.as_bytes())?;
-    }
-    let scenes = if context.smoke {
-        &SCENES[..SMOKE_SCENES]
-    } else {
-        &SCENES[..]
-    };
-    let mut table = Table::new(
-        "Photons traced a second",
-        &[
-            "scene",
-            "renderer",
-            "photons",
-            "segments a photon",
-            "thousand photons a second",
-            "least … greatest",
-            "thousand segments a second",
-            "map (ms)",
-            "photons a second, of ours",
-            "segments a second, of ours",
-        ],
-    );
-    for (done, address) in scenes.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
+impl From<Answer> for Turn {
+    fn from(answer: Answer) -> Self {
+        let rate = |counts: &[f64]| {
+            let rates = counts.iter().zip(&answer.trace_seconds);
+            median(rates.map(|(count, seconds)| count / seconds).collect())
+        };
+        // Medians of nothing are no numbers.
+        let known = |values: Option<&[f64]>| {
+            values
+                .map(|values| median(values.to_vec()))
+                .filter(|value| !value.is_nan())
+        };
+        Self {
+            photons: median(answer.photons.clone()),
+            rate: rate(&answer.photons),
+            segments: known(answer.landings.as_deref()),
+            segment_rate: answer.landings.as_deref().map(rate).filter(|rate| !rate.is_nan()),
+            map_seconds: known(answer.map_seconds.as_deref()),
+            version: answer.version,
         }
-        context.watch.begin(address, done, scenes.len());
-        rows(context, &gpu, &python, address, &mut table)?;
     }
-    table.note(format!(
-        "{PHOTONS} photons a round, {DEPTH} edges of a light path asked for at most, every renderer in {TURNS} turns of {ROUNDS} rounds; medians. Photons \
-         of different renderers are of different length: ours meet Russian roulette at every landing, Mitsuba's from the fifth on and are joined to the \
-         camera at every vertex, by a shadow ray each, LuxCore's go on without roulette. A segment is a ray from one landing to the next; LuxCore tells \
-         landings alone, which are no more than segments, Mitsuba neither. Ours is wall clock of tracing alone; the map is that of kernels, LuxCore's of \
-         radiance photons where the camera sees.",
-    ));
-    Ok(vec![table])
 }
 
-fn rows(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str, table: &mut Table) -> Result<()> {
+impl Row {
+    /// Of turns of a renderer beside ours, of which it may have left some out; none without any.
+    fn of(scene: &str, renderer: &str, turns: &[Option<Turn>], ours: &[Option<Turn>]) -> Option<Self> {
+        let both = turns.iter().zip(ours);
+        let both: Vec<(&Turn, &Turn)> = both
+            .filter_map(|(this, ours)| this.as_ref().zip(ours.as_ref()))
+            .collect();
+        let (first, _) = both.first()?;
+        let known = |of: &dyn Fn(&Turn, &Turn) -> Option<f64>| {
+            both.iter()
+                .map(|(this, ours)| of(this, ours))
+                .collect::<Option<Repeats>>()
+        };
+        Some(Self {
+            scene: scene.into(),
+            renderer: renderer.into(),
+            version: first.version.clone(),
+            photons: first.photons,
+            segments: known(&|this, _| Some(this.segments? / this.photons)),
+            rate: both.iter().map(|(this, _)| 1e-3 * this.rate).collect(),
+            segment_rate: known(&|this, _| Some(1e-3 * this.segment_rate?)),
+            map: known(&|this, _| Some(1e3 * this.map_seconds?)),
+            ours_over: both.iter().map(|(this, ours)| ours.rate / this.rate).collect(),
+            our_segments_over: known(&|this, ours| Some(ours.segment_rate? / this.segment_rate?)),
+        })
+    }
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let python: PathBuf = std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from);
+        for (name, text) in SCRIPTS {
+            atomic::write(&context.file(name)?, text.as_bytes())?;
+        }
+        let mut left_out = Vec::new();
+        let name = |address: &&str| short_name(address).to_owned();
+        let rates = context.each(context.first(&SCENES, 1), name, |address| {
+            let (rows, others) = renderers(context, &gpu, &python, address)?;
+            left_out.extend(others);
+            Ok(rows)
+        })?;
+        Ok(Self { rates, left_out })
+    }
+
+    fn findings(&self) -> Findings {
+        let mitsubas = self.rates.iter().filter(|row| row.renderer == MITSUBA);
+        Findings::of(&self.rates, CRITERIA)
+            .headline(
+                "photons per second over Mitsuba's, geometric mean",
+                geometric_mean(mitsubas.map(|row| row.ours_over.measured())),
+            )
+            .bars(
+                "rates",
+                "Thousand photons traced a second",
+                &self.rates,
+                |row| [row.scene.clone(), row.renderer.clone()],
+                |row| row.rate.measured(),
+            )
+            .note(format!(
+                "{DEPTH} edges of a light path asked for at most; a turn is the median of {ROUNDS} rounds. Photons of different renderers are of \
+                 different length: ours meet Russian roulette at every landing, Mitsuba's from the fifth on and are joined to the camera at every \
+                 vertex, by a shadow ray each, LuxCore's go on without roulette. A segment is a ray from one landing to the next; LuxCore tells \
+                 landings alone, which are no more than segments, Mitsuba neither. Ours is wall clock of tracing alone; the map is that of \
+                 kernels, LuxCore's of radiance photons where the camera sees.",
+            ))
+            .and(Findings::of(&self.left_out, &[]))
+    }
+}
+
+/// All renderers on a scene, in turns, and those that were left out. A smoke run has ours alone.
+fn renderers(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> Result<(Vec<Row>, Vec<LeftOut>)> {
     let scene = scene::load(address)?;
-    let name = address.trim_start_matches("builtin:");
-    let photons = if context.smoke { SMOKE_PHOTONS } else { PHOTONS };
-    let turns = if context.smoke { 1 } else { TURNS };
+    let name = short_name(address);
+    let photons = context.pick(PHOTONS, SMOKE_PHOTONS);
     let folder = context.folder.join(name.replace(['?', '='], "-"));
     // Renderers bend directions at smooth surfaces differently, which is nothing to rates.
     let options = ExportOptions { shading_normals: true };
     let exported = mitsuba::export_with(&scene, "", SIZE.map(|side| 4 * side), &folder, options);
-    let mut ours = Turns {
-        version: "clerestory".into(),
-        ..Turns::default()
-    };
-    let mut peers = PEERS.map(|_| Turns::default());
-    let mut left_out = [const { None }; PEERS.len()];
-    for _ in 0..turns {
-        trace(gpu, &scene, photons, &mut ours)?;
-        for (index, peer) in PEERS.iter().enumerate().filter(|_| !context.smoke) {
-            if left_out[index].is_some() || context.watch.stopped() {
-                continue;
-            }
-            let answer = match &exported {
-                Ok(exported) => ask(context, python, peer, &exported.scene, photons),
-                Err(cause) => Err(Error::setting("scene", address, cause.to_string())),
-            };
-            match answer {
-                Ok(Some(answer)) => peers[index].add(answer),
-                Ok(None) => {}
-                Err(cause) => left_out[index] = Some(cause),
-            }
+    let renderers = context.first(&RENDERERS, 1);
+    let mut causes: Vec<Option<String>> = vec![None; renderers.len()];
+    let turns = context.in_turns(TURNS, renderers.len(), |i| {
+        if i == 0 {
+            return trace(gpu, &scene, photons).map(Some);
         }
-    }
-    let our_rates = ours.rates();
-    table.row(ours.row(name, our_rates));
-    for (index, peer) in PEERS.iter().enumerate() {
-        if let Some(cause) = &left_out[index] {
-            let what = if peers[index].trace.is_empty() {
-                "not measured"
-            } else {
-                "in some turns only"
-            };
-            table.note(format!("{name}, {peer}: {what}: {cause}"));
+        if causes[i].is_some() || context.watch.stopped() {
+            return Ok(None);
         }
-        if !peers[index].trace.is_empty() {
-            table.row(peers[index].row(name, our_rates));
-        }
-    }
-    Ok(())
+        let answer = match &exported {
+            Ok(exported) => ask(context, python, renderers[i], &exported.scene, photons),
+            Err(cause) => Err(Error::setting("scene", address, cause.to_string())),
+        };
+        Ok(answer.unwrap_or_else(|cause| {
+            causes[i] = Some(cause.to_string());
+            None
+        }))
+    })?;
+    let all = renderers.iter().zip(&turns);
+    let rows = all
+        .clone()
+        .filter_map(|(renderer, of)| Row::of(name, renderer, of, &turns[0]));
+    let left_out = all.zip(causes).filter_map(|((renderer, of), cause)| {
+        Some(LeftOut {
+            scene: name.into(),
+            renderer: (*renderer).into(),
+            turns: of.iter().flatten().count() as u64,
+            cause: cause?,
+        })
+    });
+    Ok((rows.collect(), left_out.collect()))
 }
 
 /// A turn of ours: rounds after one that compiles kernels.
-fn trace(gpu: &Gpu, scene: &Scene, photons: u32, turns: &mut Turns) -> Result<()> {
+fn trace(gpu: &Gpu, scene: &Scene, photons: u32) -> Result<Turn> {
     let settings = PhotonSettings {
         path_set: format!("bounces=0..{DEPTH}").parse()?,
         photons,
@@ -169,21 +268,27 @@ fn trace(gpu: &Gpu, scene: &Scene, photons: u32, turns: &mut Turns) -> Result<()
     };
     let mut mapper = mapper(gpu, scene, SIZE, settings)?;
     let mut before = MapperCounts::default();
+    let (mut rays, mut trace_seconds, mut map_seconds) = (Vec::new(), Vec::new(), Vec::new());
     for round in 0..=ROUNDS {
         while mapper.step(round + 1)?.is_some() {}
         let counts = mapper.counts();
         if round > 0 {
-            turns.photons.push(f64::from(photons));
-            turns.segments.push((counts.photons.rays - before.photons.rays) as f64);
-            turns.trace.push(counts.trace_seconds - before.trace_seconds);
-            turns.map.push(counts.map_seconds - before.map_seconds);
+            rays.push((counts.photons.rays - before.photons.rays) as f64);
+            trace_seconds.push(counts.trace_seconds - before.trace_seconds);
+            map_seconds.push(counts.map_seconds - before.map_seconds);
         }
         before = counts;
     }
-    Ok(())
+    Ok(Turn::from(Answer {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        photons: vec![f64::from(photons); rays.len()],
+        landings: Some(rays),
+        trace_seconds,
+        map_seconds: Some(map_seconds),
+    }))
 }
 
-fn ask(context: &Context<'_>, python: &Path, peer: &str, scene: &Path, photons: u32) -> Result<Option<Answer>> {
+fn ask(context: &Context<'_>, python: &Path, peer: &str, scene: &Path, photons: u32) -> Result<Option<Turn>> {
     let mut command = Command::new(python);
     command
         .arg(context.folder.join(SCRIPT))
@@ -194,55 +299,8 @@ fn ask(context: &Context<'_>, python: &Path, peer: &str, scene: &Path, photons: 
     let Some(text) = python::run(python, &mut command, NEEDED, context.watch)? else {
         return Ok(None);
     };
-    let answer = serde_json::from_str(&text);
+    let answer = serde_json::from_str::<Answer>(&text);
     answer
-        .map(Some)
+        .map(|answer| Some(answer.into()))
         .map_err(|cause| Error::setting(peer, text, cause.to_string()))
-}
-
-impl Turns {
-    fn add(&mut self, answer: Answer) {
-        self.version = answer.version;
-        self.photons.extend(answer.photons);
-        self.segments.extend(answer.landings.unwrap_or_default());
-        self.trace.extend(answer.trace_seconds);
-        self.map.extend(answer.map_seconds.unwrap_or_default());
-    }
-
-    /// Thousands of `counts` a second.
-    fn rate(&self, counts: &[f64]) -> Spread {
-        let rate = |(count, seconds): (&f64, &f64)| 1e-3 * count / seconds;
-        Spread::of(counts.iter().zip(&self.trace).map(rate).collect())
-    }
-
-    /// Of photons and of segments, medians.
-    fn rates(&self) -> [f64; 2] {
-        [&self.photons, &self.segments].map(|counts| self.rate(counts).median)
-    }
-
-    fn row(&self, scene: &str, ours: [f64; 2]) -> Vec<Cell> {
-        // Medians of nothing are no numbers.
-        let known = |value: f64| {
-            if value.is_nan() {
-                Cell::from("unknown")
-            } else {
-                value.into()
-            }
-        };
-        let spread = self.rate(&self.photons);
-        let range = [spread.least, spread.greatest].map(|value| Cell::Number(value).to_string());
-        let [photons, segments] = self.rates();
-        vec![
-            scene.into(),
-            self.version.as_str().into(),
-            median(self.photons.clone()).into(),
-            known(median(self.segments.clone()) / median(self.photons.clone())),
-            photons.into(),
-            range.join(" … ").into(),
-            known(segments),
-            known(1e3 * median(self.map.clone())),
-            (photons / ours[0]).into(),
-            known(segments / ours[1]),
-        ]
-    }
 }

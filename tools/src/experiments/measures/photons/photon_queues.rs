@@ -5,19 +5,18 @@
 
 use clerestory::gpu::Gpu;
 use clerestory::techniques::photon_mapping::{MapQuery, MapQueue, PhotonMapper, PhotonSettings};
-use clerestory::{Error, Result, scene};
+use clerestory::{Result, scene};
 
 use super::cases::{mapper, settings};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
-use crate::timing::{Spread, median};
+use crate::experiments::measures::context::short_name;
+use crate::experiments::measures::photon_maps::changes;
 
 const SIZE: [u32; 2] = [128, 96];
 const SMOKE_SIZE: [u32; 2] = [16, 12];
-/// Frames that count, after one that compiles kernels.
-const FRAMES: u32 = 7;
-const SMOKE_FRAMES: u32 = 2;
-const SMOKE_SCENES: usize = 1;
+/// Frames of each form that count, after one that compiles kernels.
+const TURNS: u32 = 7;
 /// How passes of queries and their queues are called.
 const GATHER_PASSES: &str = "photon: gather";
 /// And their queues alone.
@@ -31,153 +30,208 @@ const SCENES: [(&str, &str, u32, f32); 4] = [
     ("mirrors and glass", "builtin:materials", 1 << 17, 20.0),
 ];
 
-/// Queue, query, and what it is called.
-const FORMS: [(MapQueue, MapQuery, &str); 6] = [
-    (MapQueue::Slots, MapQuery::Single, "I, slots"),
-    (MapQueue::Compacted, MapQuery::Single, "II, compacted"),
-    (MapQueue::Blocks, MapQuery::Single, "III, blocks"),
-    (MapQueue::Slots, MapQuery::Packet, "packets, I"),
-    (MapQueue::Compacted, MapQuery::Packet, "packets, II"),
-    (MapQueue::Blocks, MapQuery::Packet, "packets, III"),
+const SLOTS: &str = "I, slots";
+const COMPACTED: &str = "II, compacted";
+const BLOCKS: &str = "III, blocks";
+
+/// A queue with a query, and what they are called.
+struct Form {
+    queue: MapQueue,
+    query: MapQuery,
+    name: &'static str,
+    /// The form with the same queue without packets.
+    single: usize,
+    /// The source's mean over nine scenes in media, % over type I without packets; the fourth as computed from its rows, which its own mean is not.
+    published: f64,
+}
+
+const fn form(queue: MapQueue, query: MapQuery, name: &'static str, single: usize, published: f64) -> Form {
+    Form {
+        queue,
+        query,
+        name,
+        single,
+        published,
+    }
+}
+
+const FORMS: [Form; 6] = [
+    form(MapQueue::Slots, MapQuery::Single, SLOTS, 0, 0.0),
+    form(MapQueue::Compacted, MapQuery::Single, COMPACTED, 1, 2.1),
+    form(MapQueue::Blocks, MapQuery::Single, BLOCKS, 2, 27.2),
+    form(MapQueue::Slots, MapQuery::Packet, "packets, I", 0, -71.9),
+    form(MapQueue::Compacted, MapQuery::Packet, "packets, II", 1, -69.3),
+    form(MapQueue::Blocks, MapQuery::Packet, "packets, III", 2, -66.8),
 ];
 
-/// The source's means over nine scenes in media, % over type I without packets; the fourth as computed from its rows, which its own mean is not.
-const PUBLISHED: [f64; 6] = [0.0, 2.1, 27.2, -71.9, -69.3, -66.8];
-
-/// One form of queries at work, and the milliseconds of its frames.
-struct Runner {
-    mapper: PhotonMapper,
-    gather: Vec<f64>,
-    /// The queue's share of it.
-    queue: Vec<f64>,
+rows! {
+    /// A scene.
+    struct Seen = "Scenes and their queries" by [scene] {
+        scene: String = "scene",
+        seen: String = "seen",
+        rays: f64 = "eye's rays per frame",
+        ask: f64 = "of them ask (%)",
+        contributions: f64 = "k, contributions per query",
+        different: u64 = "forms with other counts than the first",
+        subgroup: u64 = "lanes of a subgroup",
+    }
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let columns = [
-        "scene",
-        "seen",
-        "eye's rays",
-        "of them ask (%)",
-        "k, contributions a query",
-    ];
-    let mut times = Table::new(
-        "GPU milliseconds of queries with their queues",
-        &columns.into_iter().chain(FORMS.map(|form| form.2)).collect::<Vec<_>>(),
-    );
-    let mut shares = Table::new(
-        "The same over type I by itself, %",
-        &std::iter::once("scene")
-            .chain(FORMS.map(|form| form.2))
-            .collect::<Vec<_>>(),
-    );
-    let scenes = if context.smoke {
-        &SCENES[..SMOKE_SCENES]
-    } else {
-        &SCENES[..]
+rows! {
+    /// A form on a scene.
+    struct Row = "GPU milliseconds of queries with their queues" by [scene, form] {
+        scene: String = "scene",
+        form: String = "form",
+        gather: Repeats = "queries with their queue (ms)",
+        queue: Repeats = "the queue's stages alone (ms)",
+        over_first: Repeats = "over type I by itself (%)",
+        over_single: Option<Repeats> = "packets over the same queue by itself (%)",
+    }
+    beside "source: over type I by itself, rays through media (%)" = |row| {
+        FORMS.iter().find(|form| form.name == row.form).map(|form| form.published).into()
     };
-    for (done, (seen, address, photons, spread)) in scenes.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        let name = address.trim_start_matches("builtin:");
-        context.watch.begin(name, done, scenes.len());
-        let runners = runners(context, &gpu, address, &settings(*photons, *spread, context.smoke)?)?;
-        let Some(first) = runners.first() else { continue };
-        let (rays, counts) = (
-            first.mapper.eye_counters().extend_rays as f64,
-            first.mapper.counts().gather,
-        );
-        if runners.iter().any(|runner| runner.mapper.counts().gather != counts) {
-            return Err(Error::Internal {
-                what: "queries of one map by different queues".into(),
-                fault: "have different counts".into(),
-            });
-        }
-        let queries = counts.queries as f64;
-        let mut row: Vec<Cell> = vec![
-            name.into(),
-            (*seen).into(),
-            (rays / f64::from(frames(context) + 1)).into(),
-            (1e2 * queries / rays).into(),
-            (counts.photons as f64 / queries.max(1.0)).into(),
-        ];
-        let medians = runners.iter().map(|runner| median(runner.gather.clone()));
-        let medians: Vec<f64> = medians.collect();
-        for runner in &runners {
-            let spread = Spread::of(runner.gather.clone());
-            let [median, least, greatest] =
-                [spread.median, spread.least, spread.greatest].map(|value| Cell::Number(value).to_string());
-            let queue = Cell::Number(crate::timing::median(runner.queue.clone())).to_string();
-            row.push(format!("{median} ({least} … {greatest}), queue {queue}").into());
-        }
-        times.row(row);
-        let mut row: Vec<Cell> = vec![name.into()];
-        row.extend(medians.iter().map(|ms| Cell::from(1e2 * (ms / medians[0] - 1.0))));
-        shares.row(row);
-    }
-    let mut row: Vec<Cell> = vec!["source: rays through media, mean of nine scenes".into()];
-    row.extend(PUBLISHED.map(Cell::from));
-    shares.row(row);
-    let [width, height] = size(context);
-    times.note(format!(
-        "{width} × {height} pixels, a sample each; medians (least … greatest) of {} frames of the same map, one of each form in turn after one that \
-         compiles kernels; then what of it the queue's own stages take. Types II and III look at the surface once more to see who asks, which in the source the \
-         kernels do that trace rays. Subgroups of {}; counts of queries and contributions are equal in all forms.",
-        frames(context),
-        gpu.caps().subgroup_size,
-    ));
-    shares.note(
-        "Source: milliseconds of density estimation by rays through photons in media, 512 × 512 pixels, on a GPU of 2008; its printed mean for packets with \
-         type I is −74.7, its rows give −71.9.",
-    );
-    Ok(vec![times, shares])
 }
 
-fn size(context: &Context<'_>) -> [u32; 2] {
-    if context.smoke { SMOKE_SIZE } else { SIZE }
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    scenes: Vec<Seen>,
+    times: Vec<Row>,
 }
 
-fn frames(context: &Context<'_>) -> u32 {
-    if context.smoke { SMOKE_FRAMES } else { FRAMES }
-}
+const OF_SCENES: &[Criterion<Seen>] = &[Criterion::each(
+    "counts of queries and contributions are equal in all forms: forms with others",
+    Bound::AtMost(0.0),
+    |row: &Seen| row.different.into(),
+)
+.in_every_form()];
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "packets take less time than queries by themselves (%)",
+        Bound::AtMost(0.0),
+        |row: &Row| row.over_single.as_ref().map_or(f64::NAN.into(), Repeats::measured),
+    )
+    .among(|row| row.over_single.is_some()),
+    Criterion::each(
+        "a compacted queue costs little more than it gains (%)",
+        Bound::AtMost(5.0),
+        |row: &Row| (&row.over_first).into(),
+    )
+    .among(|row| row.form == COMPACTED)
+    .because("little is a few per cent; the source's mean is 2.1"),
+    Criterion::each(
+        "a queue in blocks costs little more than it gains (%)",
+        Bound::AtMost(27.0),
+        |row: &Row| (&row.over_first).into(),
+    )
+    .among(|row| row.form == BLOCKS)
+    .because("no more than in the source, whose mean is 27.2"),
+];
 
-/// All forms of one scene, with their frames taken in turns: samples of one pass, so that all have the same map.
-fn runners(context: &Context<'_>, gpu: &Gpu, address: &str, settings: &PhotonSettings) -> Result<Vec<Runner>> {
-    let scene = scene::load(address)?;
-    let frames = frames(context);
-    let mut runners = Vec::new();
-    for (queue, query, _) in FORMS {
-        let settings = PhotonSettings {
-            queue,
-            query,
-            samples_per_pass: frames + 1,
-            ..settings.clone()
-        };
-        runners.push(Runner {
-            mapper: mapper(gpu, &scene, size(context), settings)?,
-            gather: Vec::new(),
-            queue: Vec::new(),
-        });
-    }
-    for frame in 0..=frames {
-        for runner in &mut runners {
-            let mut milliseconds = [0.0; 2];
-            while let Some(step) = runner.mapper.step(frame + 1)? {
-                for pass in step.timings.iter().flat_map(|timings| &timings.passes) {
-                    for (sum, name) in milliseconds.iter_mut().zip([GATHER_PASSES, QUEUE_PASSES]) {
-                        if pass.name.starts_with(name) {
-                            *sum += pass.nanoseconds.unwrap_or(0) as f64 * 1e-6;
-                        }
-                    }
+/// GPU milliseconds of a frame's queries with their queues, and of the queues alone.
+fn frame(mapper: &mut PhotonMapper, samples: u32) -> Result<[f64; 2]> {
+    let mut milliseconds = [0.0; 2];
+    while let Some(step) = mapper.step(samples)? {
+        for pass in step.timings.iter().flat_map(|timings| &timings.passes) {
+            for (sum, name) in milliseconds.iter_mut().zip([GATHER_PASSES, QUEUE_PASSES]) {
+                if pass.name.starts_with(name) {
+                    *sum += pass.nanoseconds.unwrap_or(0) as f64 * 1e-6;
                 }
             }
-            if frame > 0 {
-                runner.gather.push(milliseconds[0]);
-                runner.queue.push(milliseconds[1]);
-            }
         }
     }
-    Ok(runners)
+    Ok(milliseconds)
+}
+
+/// All forms on one scene, with their frames taken in turns: samples of one pass, so that all have the same map.
+fn scene_of_forms(
+    context: &Context<'_>,
+    gpu: &Gpu,
+    (seen, address, photons, spread): (&str, &str, u32, f32),
+) -> Result<(Seen, Vec<Row>)> {
+    let scene = scene::load(address)?;
+    let settings = settings(photons, spread, context.smoke)?;
+    let with = |form: &Form| {
+        let settings = PhotonSettings {
+            queue: form.queue,
+            query: form.query,
+            samples_per_pass: TURNS + 1,
+            ..settings.clone()
+        };
+        mapper(gpu, &scene, context.pick(SIZE, SMOKE_SIZE), settings)
+    };
+    let mut mappers: Vec<PhotonMapper> = FORMS.iter().map(with).collect::<Result<_>>()?;
+    let mut frames = [0; FORMS.len()];
+    let turns = context.in_turns(TURNS as usize, mappers.len(), |i| {
+        frames[i] += 1;
+        frame(&mut mappers[i], frames[i])
+    })?;
+    let (rays, counts) = (mappers[0].eye_counters().extend_rays as f64, mappers[0].counts().gather);
+    let differs = |mapper: &&PhotonMapper| mapper.counts().gather != counts;
+    let queries = counts.queries as f64;
+    let name = short_name(address);
+    let row = Seen {
+        scene: name.into(),
+        seen: seen.into(),
+        rays: rays / f64::from(frames[0]),
+        ask: 1e2 * queries / rays,
+        contributions: counts.photons as f64 / queries.max(1.0),
+        different: mappers.iter().filter(differs).count() as u64,
+        subgroup: gpu.caps().subgroup_size.into(),
+    };
+    let parts: Vec<[Repeats; 2]> = turns.iter().map(|turns| Repeats::by_part(turns)).collect();
+    let times = FORMS.iter().zip(&parts).map(|(form, [gather, queue])| Row {
+        scene: name.into(),
+        form: form.name.into(),
+        gather: gather.clone(),
+        queue: queue.clone(),
+        over_first: changes(gather, &parts[0][0]),
+        over_single: (form.query == MapQuery::Packet).then(|| changes(gather, &parts[form.single][0])),
+    });
+    Ok((row, times.collect()))
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let mut times = Vec::new();
+        let name = |scene: &(&str, &str, u32, f32)| short_name(scene.1).to_owned();
+        let scenes = context.each(context.first(&SCENES, 1), name, |scene| {
+            let (row, of_forms) = scene_of_forms(context, &gpu, *scene)?;
+            times.extend(of_forms);
+            Ok(vec![row])
+        })?;
+        Ok(Self { scenes, times })
+    }
+
+    fn findings(&self) -> Findings {
+        let packets = self.times.iter().filter(|row| row.form == FORMS[3].name);
+        let ratio = |row: &Row| {
+            let Measured { value, low, high } = row.over_first.measured();
+            let [value, low, high] = [value, low, high].map(|change| 1.0 + change / 1e2);
+            Measured { value, low, high }
+        };
+        Findings::of(&self.times, CRITERIA)
+            .headline(
+                "time of queries by packets over that of queries by themselves, in slots, geometric mean",
+                geometric_mean(packets.map(ratio)),
+            )
+            .bars(
+                "times",
+                "GPU milliseconds of queries with their queues",
+                &self.times,
+                |row| [row.scene.clone(), row.form.clone()],
+                |row| row.gather.measured(),
+            )
+            .note(format!(
+                "{} × {} pixels, a sample each; frames of the same map, one of each form in turn. Types II and III look at the surface once \
+                 more to see who asks, which in the source the kernels do that trace rays.",
+                SIZE[0], SIZE[1],
+            ))
+            .note(
+                "Source: milliseconds of density estimation by rays through photons in media, 512 × 512 pixels, means of nine scenes, on a GPU \
+                 of 2008; its printed mean for packets with type I is −74.7, its rows give −71.9.",
+            )
+            .and(Findings::of(&self.scenes, OF_SCENES))
+    }
 }

@@ -7,20 +7,19 @@
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
 use clerestory::techniques::photon_mapping::PhotonSettings;
-use clerestory::techniques::photon_mapping::kernel::{KernelSettings, PhotonRecord};
 use clerestory::{Result, scene};
 use glam::Vec3;
 
-use super::cases::{CASES, Case, mapper, settings};
+use super::cases::{Case, cases, published, settings};
+use super::kernel_statistics::{Statistics, distribution_distance, middle, shares};
+use crate::experiments::findings::{Bound, Criterion, Findings, Study, change, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::table::{Cell, Table};
-use crate::timing::median;
 
 /// Pixels that ask the map.
 const SIZE: [u32; 2] = [128, 96];
 const SMOKE_SIZE: [u32; 2] = [16, 12];
-/// Scenes of the smoke form.
-const SMOKE_SCENES: [&str; 2] = ["Passage", "Ring"];
+/// Counterparts of the scenes of a smoke run.
+const SMOKE_CASES: &[&str] = &["Passage", "Ring"];
 
 /// An empty closed room of 144 m² with a lamp, as large as the source's first scene.
 const ROOM: &str = "builtin:box-room?contents=empty&mirror=no&source=point";
@@ -35,186 +34,223 @@ const ROOMS: [(f32, u32, f32, f64, Option<u64>); 4] = [
 /// Exponents of the dampening; the last is the source's.
 const EXPONENTS: [f32; 3] = [1.0, 0.5, 0.25];
 
-/// An axis counts as clamped that near to the greatest length: records are of f32.
-const CLAMPED_FROM: f64 = 1.0 - 1e-5;
-
-/// What one map comes to.
-struct Statistics {
-    emitted: u64,
-    deposits: u64,
-    stored: u64,
-    discarded: f64,
-    clamped: f64,
-    contributions: f64,
-    cover: f64,
-    /// Of the longer axes A and the shorter ones B, m.
-    axes: [Vec<f64>; 2],
+rows! {
+    /// A scene.
+    struct Row = "Photons, their kernels and the contributions to a query" by [scene] {
+        scene: String = "scene",
+        counterpart: String = "counterpart",
+        photons: u64 = "photons",
+        interactions: u64 = "interactions",
+        discarded: f64 = "discarded (%)",
+        spread: f64 = "spread",
+        clamped: f64 = "clamped (%)",
+        contributions: f64 = "k, contributions per query",
+        over_source: f64 = "k over the source's",
+        cover: f64 = "kernels about a point of the scene",
+    }
+    beside "source: interactions" = |row| published(&row.counterpart).map(|source| source.interactions).into();
+    beside "source: discarded (%)" = |row| published(&row.counterpart).map(|source| source.discarded).into();
+    beside "source: clamped (%)" = |row| published(&row.counterpart).map(|source| source.clamped).into();
+    beside "source: k" = |row| published(&row.counterpart).map(|source| source.contributions[0]).into();
+    beside "source: k of nearest neighbours" = |row| published(&row.counterpart).map(|source| source.contributions[1]).into();
 }
 
-impl Statistics {
-    fn of(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: PhotonSettings) -> Result<Self> {
-        let mut mapper = mapper(gpu, scene, size, settings)?;
-        let kernel = mapper.kernel(0);
-        while mapper.step(1)?.is_some() {}
-        // What the first pass was made of, traced again.
-        let counts = mapper.counts();
-        let photons: Vec<PhotonRecord> = mapper.photons(0)?.iter().map(|photon| photon.record).collect();
-        let share = |part: u64, whole: u64| 100.0 * part as f64 / whole.max(1) as f64;
-        let clamped = photons.iter().filter(|photon| is_clamped(&kernel, photon)).count();
-        let lengths = |axis: fn(&PhotonRecord) -> Vec3| photons.iter().map(|p| f64::from(axis(p).length())).collect();
-        Ok(Self {
-            emitted: counts.photons.emitted,
-            deposits: counts.photons.deposits,
-            stored: counts.records,
-            discarded: share(counts.photons.without_kernel, counts.photons.deposits),
-            clamped: share(clamped as u64, counts.records),
-            contributions: counts.gather.photons as f64 / counts.gather.queries.max(1) as f64,
-            cover: counts.cover,
-            axes: [lengths(|p| p.along), lengths(|p| p.across)],
-        })
+rows! {
+    /// The axes of a scene's kernels.
+    struct Axis = "Lengths of the kernels' axes" by [scene, axis] {
+        scene: String = "scene",
+        axis: String = "axis",
+        median: f64 = "median (m)",
+        distance: f64 = "distance of the distributions of A and B",
     }
 }
 
-fn is_clamped(kernel: &KernelSettings, photon: &PhotonRecord) -> bool {
-    let length = f64::from(photon.along.length().max(photon.across.length()));
-    length >= kernel.length_max * kernel.unit_length * CLAMPED_FROM
-}
-
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    let gpu = (context.gpu)()?;
-    let size = if context.smoke { SMOKE_SIZE } else { SIZE };
-    let mut table = photons_table();
-    let mut lengths = lengths_table();
-    let cases: Vec<&Case> = CASES
-        .iter()
-        .filter(|case| !context.smoke || SMOKE_SCENES.contains(&case.published.name))
-        .collect();
-    for (done, case) in cases.iter().enumerate() {
-        if context.watch.stopped() {
-            break;
-        }
-        context.watch.begin(case.name(), done, cases.len());
-        let statistics = Statistics::of(&gpu, &scene::load(case.scene)?, size, case.settings(context.smoke)?)?;
-        table.row(photons_row(case, &statistics));
-        for row in lengths_rows(case, &statistics) {
-            lengths.row(row);
-        }
+rows! {
+    /// Axes of some lengths.
+    struct Bin = "Shares of the axes by length" by [scene, axis, length] {
+        scene: String = "scene",
+        axis: String = "axis",
+        length: String = "length",
+        share: f64 = "share (%)",
     }
-    if context.smoke {
-        let fewer = "Smoke form: a 64th of the photons, with kernels of the same size, so that k is a 64th too.";
-        table.note(fewer);
-        lengths.note(fewer);
+}
+
+rows! {
+    /// The room with walls of a reflectance.
+    struct Room = "An empty room of 144 m²: kernels about a point, beside an evaluation by other means" by [reflectance, photons] {
+        reflectance: f64 = "reflectance",
+        photons: u64 = "photons",
+        spread: f64 = "spread",
+        cover: f64 = "kernels about a point",
+        expected: f64 = "kernels about a point, expected",
+        records: u64 = "records",
+        records_expected: Option<u64> = "records, expected",
+        discarded: f64 = "discarded (%)",
+        clamped: f64 = "clamped (%)",
+        contributions: f64 = "k, contributions per query",
     }
-    Ok(vec![
-        table,
-        lengths,
-        rooms(context, &gpu, size)?,
-        dampening(context, &gpu, size)?,
-    ])
 }
 
-fn photons_table() -> Table {
-    let mut table = Table::new(
-        "Photons, their kernels and the contributions to a query",
-        &[
-            "scene",
-            "counterpart",
-            "photons",
-            "interactions",
-            "source: interactions",
-            "discarded (%)",
-            "source: discarded (%)",
-            "spread",
-            "clamped (%)",
-            "source: clamped (%)",
-            "k, contributions a query",
-            "source: k",
-            "source: k of nearest neighbours",
-            "kernels about a point of the scene",
-        ],
-    );
-    table.note(
-        "Skewed kernels, uniform profile, dampening 1/4, unit and greatest axis 1 m, flatness 1/20; second and third hits are stored. k is \
-         counted where the camera looks, and only on surfaces that face as the photon's does.",
-    );
-    table
+rows! {
+    /// A scene with a dampening.
+    struct Dampened = "What the dampening changes" by [scene, exponent] {
+        scene: String = "scene",
+        exponent: f64 = "exponent",
+        cover: f64 = "kernels about a point",
+        contributions: f64 = "k, contributions per query",
+        discarded: f64 = "discarded (%)",
+        clamped: f64 = "clamped (%)",
+        median_a: f64 = "median of A (m)",
+        median_b: f64 = "median of B (m)",
+    }
 }
 
-fn photons_row(case: &Case, s: &Statistics) -> Vec<Cell> {
-    let of = &case.published;
-    vec![
-        case.name().into(),
-        of.name.into(),
-        s.emitted.into(),
-        s.deposits.into(),
-        of.interactions.into(),
-        s.discarded.into(),
-        of.discarded.into(),
-        f64::from(case.spread).into(),
-        s.clamped.into(),
-        of.clamped.into(),
-        s.contributions.into(),
-        of.contributions[0].into(),
-        of.contributions[1].into(),
-        s.cover.into(),
-    ]
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    photons: Vec<Row>,
+    axes: Vec<Axis>,
+    bins: Vec<Bin>,
+    rooms: Vec<Room>,
+    dampened: Vec<Dampened>,
 }
 
-/// Bounds between the bins of lengths, m.
-const BINS: [f64; 11] = [
-    0.015_625, 0.0221, 0.031_25, 0.0442, 0.0625, 0.0884, 0.125, 0.177, 0.25, 0.354, 0.5,
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each("less than 1 % discarded (%)", Bound::AtMost(1.0), |row: &Row| {
+        row.discarded.into()
+    }),
+    Criterion::each(
+        "contributions of the source's order: over its",
+        Bound::Between(0.32, 3.2),
+        |row: &Row| row.over_source.into(),
+    )
+    .because("half an order of magnitude to either side"),
+];
+const OF_ROOMS: &[Criterion<Room>] = &[
+    Criterion::each(
+        "the room's kernels about a point are within 2 % (%)",
+        Bound::Between(-2.0, 2.0),
+        |room: &Room| room.cover_off().into(),
+    ),
+    Criterion::each(
+        "the room's records are within 2 % (%)",
+        Bound::Between(-2.0, 2.0),
+        |room: &Room| room.records_off().unwrap_or(f64::NAN).into(),
+    )
+    .among(|room| room.records_expected.is_some()),
 ];
 
-fn lengths_table() -> Table {
-    let mut heads = vec!["scene".to_owned(), "axis".to_owned(), "median (m)".to_owned()];
-    heads.push(format!("below {} m (%)", BINS[0]));
-    heads.extend(BINS[1..].iter().map(|bound| format!("… {bound} (%)")));
-    heads.push("more (%)".to_owned());
-    heads.push("distance of the distributions of A and B".to_owned());
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-    let mut table = Table::new("Lengths of the kernels' axes", &heads);
-    table.note(
-        "A is the longer axis. The distance is Kolmogorov's and Smirnov's: the largest difference between the shares of lengths below any \
-         one; 0 were kernels round.",
-    );
-    table
-}
-
-fn lengths_rows(case: &Case, s: &Statistics) -> Vec<Vec<Cell>> {
-    let distance = distribution_distance(&s.axes[0], &s.axes[1]);
-    let of = |axis: &str, lengths: &[f64]| {
-        let mut shares = [0_u64; BINS.len() + 1];
-        for length in lengths {
-            shares[BINS.partition_point(|bound| bound <= length)] += 1;
+impl Row {
+    fn of(case: &Case, of: &Statistics) -> Self {
+        Self {
+            scene: case.name().into(),
+            counterpart: case.published.name.into(),
+            photons: of.emitted,
+            interactions: of.deposits,
+            discarded: of.discarded,
+            spread: case.spread.into(),
+            clamped: of.clamped,
+            contributions: of.contributions,
+            over_source: of.contributions / case.published.contributions[0],
+            cover: of.cover,
         }
-        let mut row: Vec<Cell> = vec![case.name().into(), axis.into(), middle(lengths).into()];
-        row.extend(shares.map(|count| (100.0 * count as f64 / lengths.len().max(1) as f64).into()));
-        row.push(distance.into());
-        row
-    };
-    vec![of("A", &s.axes[0]), of("B", &s.axes[1])]
-}
-
-fn middle(lengths: &[f64]) -> f64 {
-    if lengths.is_empty() {
-        0.0
-    } else {
-        median(lengths.to_vec())
     }
 }
 
-/// The largest difference between two empirical distributions.
-fn distribution_distance(a: &[f64], b: &[f64]) -> f64 {
-    let sorted = |values: &[f64]| {
-        let mut values = values.to_vec();
-        values.sort_by(f64::total_cmp);
-        values
-    };
-    let (a, b) = (sorted(a), sorted(b));
-    let below = |values: &[f64], x: f64| values.partition_point(|v| *v <= x) as f64 / values.len().max(1) as f64;
-    let all = a.iter().chain(&b);
-    all.map(|x| (below(&a, *x) - below(&b, *x)).abs()).fold(0.0, f64::max)
+impl Room {
+    /// From the expected kernels about a point, %.
+    fn cover_off(&self) -> f64 {
+        change(self.cover, self.expected)
+    }
+
+    /// From the expected records, %, where there are any.
+    fn records_off(&self) -> Option<f64> {
+        Some(change(self.records as f64, self.records_expected? as f64))
+    }
+
+    fn worst(&self) -> f64 {
+        self.cover_off().abs().max(self.records_off().unwrap_or(0.0).abs())
+    }
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let size = context.pick(SIZE, SMOKE_SIZE);
+        let mut found = Self::default();
+        let cases = cases(context, SMOKE_CASES);
+        let photons = context.each(
+            &cases,
+            |case| case.name().to_owned(),
+            |case| {
+                let of = Statistics::of(&gpu, &scene::load(case.scene)?, size, case.settings(context.smoke)?)?;
+                found.add_axes(case.name(), &of);
+                Ok(vec![Row::of(case, &of)])
+            },
+        )?;
+        Ok(Self {
+            photons,
+            rooms: rooms(context, &gpu, size)?,
+            dampened: dampened(context, &gpu, size)?,
+            ..found
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        Findings::of(&self.photons, CRITERIA)
+            .headline(
+                "the room's greatest deviation from what is expected (%)",
+                largest(&self.rooms, |_| true, Room::worst),
+            )
+            .note(
+                "Skewed kernels, uniform profile, dampening 1/4, unit and greatest axis 1 m, flatness 1/20; second and third hits are stored. k \
+                 is counted where the camera looks, and only on surfaces that face as the photon's does. A smoke run has a 64th of the photons, \
+                 with kernels of the same size, so that its k is a 64th too.",
+            )
+            .bars(
+                "contributions",
+                "Contributions to a query over the source's",
+                &self.photons,
+                |row| ["k over the source's".to_owned(), row.scene.clone()],
+                |row| row.over_source.into(),
+            )
+            .and(Findings::of(&self.axes, &[]))
+            .note(
+                "A is the longer axis. The distance is Kolmogorov's and Smirnov's: the largest difference between the shares of lengths below \
+                 any one; 0 were kernels round.",
+            )
+            .and(Findings::pivoted(&self.bins, "length", &[]))
+            .and(Findings::of(&self.rooms, OF_ROOMS))
+            .note(
+                "Expected are also 0.12 to 0.14 % discarded and less than 0.01 % clamped. The sum of the kernels' areas over the room's is that \
+                 of kernels about a point.",
+            )
+            .and(Findings::of(&self.dampened, &[]))
+            .note(
+                "Exponent 1 leaves footprints as they are, up to 1 m. Discarded photons are lost with their flux; all fluxes of a pass are about \
+                 equal, so that this is the energy that is lost.",
+            )
+    }
+}
+
+impl Found {
+    fn add_axes(&mut self, scene: &str, of: &Statistics) {
+        let distance = distribution_distance(&of.axes[0], &of.axes[1]);
+        for (axis, lengths) in ["A", "B"].into_iter().zip(&of.axes) {
+            self.axes.push(Axis {
+                scene: scene.into(),
+                axis: axis.into(),
+                median: middle(lengths),
+                distance,
+            });
+            self.bins.extend(shares(lengths).into_iter().map(|(length, share)| Bin {
+                scene: scene.into(),
+                axis: axis.into(),
+                length,
+                share,
+            }));
+        }
+    }
 }
 
 /// The room with walls of that reflectance.
@@ -226,97 +262,51 @@ fn room(reflectance: f32) -> Result<Scene> {
     Ok(scene)
 }
 
-fn rooms(context: &Context<'_>, gpu: &Gpu, size: [u32; 2]) -> Result<Table> {
-    let mut table = Table::new(
-        "An empty room of 144 m²: kernels about a point, beside an evaluation by other means",
-        &[
-            "reflectance",
-            "photons",
-            "spread",
-            "kernels about a point",
-            "expected",
-            "records",
-            "records expected",
-            "discarded (%)",
-            "clamped (%)",
-            "k, contributions a query",
-        ],
-    );
-    for (reflectance, photons, spread, expected, records) in ROOMS {
-        let settings = settings(photons, spread, context.smoke)?;
-        let s = Statistics::of(gpu, &room(reflectance)?, size, settings)?;
-        table.row([
-            f64::from(reflectance).into(),
-            s.emitted.into(),
-            f64::from(spread).into(),
-            s.cover.into(),
-            expected.into(),
-            s.stored.into(),
-            records.into(),
-            s.discarded.into(),
-            s.clamped.into(),
-            s.contributions.into(),
-        ]);
-    }
-    table.note("Expected are 0.12 to 0.14 % discarded and less than 0.01 % clamped. The sum of the kernels' areas over the room's is that of kernels about a point.");
-    Ok(table)
+fn rooms(context: &Context<'_>, gpu: &Gpu, size: [u32; 2]) -> Result<Vec<Room>> {
+    let name = |of: &(f32, u32, f32, f64, Option<u64>)| format!("empty room, reflectance {}", of.0);
+    context.each(&ROOMS, name, |(reflectance, photons, spread, expected, records)| {
+        let settings = settings(*photons, *spread, context.smoke)?;
+        let of = Statistics::of(gpu, &room(*reflectance)?, size, settings)?;
+        Ok(vec![Room {
+            reflectance: (*reflectance).into(),
+            photons: of.emitted,
+            spread: (*spread).into(),
+            cover: of.cover,
+            expected: *expected,
+            records: of.stored,
+            records_expected: *records,
+            discarded: of.discarded,
+            clamped: of.clamped,
+            contributions: of.contributions,
+        }])
+    })
 }
 
-fn dampening(context: &Context<'_>, gpu: &Gpu, size: [u32; 2]) -> Result<Table> {
-    let mut table = Table::new(
-        "What the dampening changes",
-        &[
-            "scene",
-            "exponent",
-            "kernels about a point",
-            "k, contributions a query",
-            "discarded (%)",
-            "clamped (%)",
-            "median of A (m)",
-            "median of B (m)",
-        ],
-    );
-    let room = room(0.7)?;
-    let ring = scene::load("builtin:ring")?;
-    let passage = scene::load("builtin:passage")?;
-    for (name, scene, spread) in [
-        ("empty room", &room, 20.0),
-        ("passage", &passage, 15.0),
-        ("ring", &ring, 10.0),
-    ] {
-        for dampening in EXPONENTS {
+fn dampened(context: &Context<'_>, gpu: &Gpu, size: [u32; 2]) -> Result<Vec<Dampened>> {
+    let scenes = [
+        ("empty room", room(0.7)?, 20.0),
+        ("passage", scene::load("builtin:passage")?, 15.0),
+        ("ring", scene::load("builtin:ring")?, 10.0),
+    ];
+    let name = |of: &(&str, Scene, f32)| format!("{}, dampened", of.0);
+    context.each(&scenes, name, |(name, scene, spread)| {
+        let row = |dampening: f32| -> Result<Dampened> {
             let settings = PhotonSettings {
                 dampening,
-                ..settings(1 << 17, spread, context.smoke)?
+                ..settings(1 << 17, *spread, context.smoke)?
             };
-            let s = Statistics::of(gpu, scene, size, settings)?;
-            table.row([
-                name.into(),
-                f64::from(dampening).into(),
-                s.cover.into(),
-                s.contributions.into(),
-                s.discarded.into(),
-                s.clamped.into(),
-                middle(&s.axes[0]).into(),
-                middle(&s.axes[1]).into(),
-            ]);
-        }
-    }
-    table.note(
-        "Exponent 1 leaves footprints as they are, up to 1 m. Discarded photons are lost with their flux; all fluxes of a pass are about \
-         equal, so that this is the energy that is lost.",
-    );
-    Ok(table)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn distributions_that_do_not_meet_have_distance_one() {
-        assert_eq!(distribution_distance(&[1.0, 2.0], &[3.0, 4.0]), 1.0);
-        assert_eq!(distribution_distance(&[1.0, 2.0], &[1.0, 2.0]), 0.0);
-        assert_eq!(distribution_distance(&[1.0, 3.0], &[2.0, 3.0]), 0.5);
-    }
+            let of = Statistics::of(gpu, scene, size, settings)?;
+            Ok(Dampened {
+                scene: (*name).into(),
+                exponent: dampening.into(),
+                cover: of.cover,
+                contributions: of.contributions,
+                discarded: of.discarded,
+                clamped: of.clamped,
+                median_a: middle(&of.axes[0]),
+                median_b: middle(&of.axes[1]),
+            })
+        };
+        EXPONENTS.map(row).into_iter().collect()
+    })
 }
