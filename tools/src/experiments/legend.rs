@@ -29,7 +29,7 @@ const GAP: i32 = 8;
 const LETTERS: i32 = 13;
 const ROW: i32 = 16;
 const BETWEEN: i32 = 6;
-/// Of these letters as many as fit on a line: seven pixels each is wider than the mean of any usual font of that size.
+/// Letters that fit on a line: seven pixels each is more than the mean of usual fonts of that size.
 const LETTERS_OF_A_LINE: usize = (WIDTH as usize - LEGEND_LINE as usize - GAP as usize) / 7;
 
 /// Lines of whole words, of which one is longer than a line only where a word is.
