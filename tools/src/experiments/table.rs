@@ -74,7 +74,7 @@ impl std::fmt::Display for Cell {
                 let [value, low, high] = [value, low, high].map(|number| Self::Number(*number));
                 write!(f, "{value} ({low} … {high})")
             }
-            Self::Interval(Measured { value, .. }) => Self::Number(*value).fmt(f),
+            Self::Interval(Measured { value, .. }) => write!(f, "{} (no interval)", Self::Number(*value)),
         }
     }
 }

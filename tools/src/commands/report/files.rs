@@ -26,11 +26,7 @@ fn make(folder: &Path) -> Outcome {
 /// Writes what a measure found: a page with the verdicts first, JSON, a CSV for each table, and its rows if it keeps any. Returns the page.
 pub fn measure(folder: &Path, experiment: &Experiment, run: &Run) -> Outcome<String> {
     make(folder)?;
-    let Findings {
-        verdicts,
-        tables,
-        headline,
-    } = &run.findings;
+    let Findings { tables, plots, .. } = &run.findings;
     let mut page = format!(
         "# {}: {}\n\n{}{}\n",
         experiment.name,
@@ -38,33 +34,19 @@ pub fn measure(folder: &Path, experiment: &Experiment, run: &Run) -> Outcome<Str
         verdicts_first(&run.findings),
         experiment.about
     );
+    for plot in plots {
+        if let Some(svg) = plot.svg()? {
+            write(&folder.join(&plot.file), &svg)?;
+        }
+    }
     for (index, table) in tables.iter().enumerate() {
         page += &format!("\n{}", table.markdown());
         write(&folder.join(format!("{}.csv", index + 1)), &table.csv())?;
     }
     write(&folder.join("report.md"), &page)?;
-    let verdicts: Vec<_> = verdicts
-        .iter()
-        .map(|judged| {
-            serde_json::json!({
-                "criterion": judged.name,
-                "wanted": judged.bound.to_string(),
-                "because": judged.because,
-                "verdict": judged.verdict,
-                "found": judged.found,
-                "rows": judged.rows,
-                "failing": judged.failing,
-                "worst": judged.worst,
-            })
-        })
-        .collect();
-    let headline = headline
-        .as_ref()
-        .map(|headline| serde_json::json!({ "words": headline.words, "found": headline.found }));
-    let document = serde_json::json!({ "verdicts": verdicts, "headline": headline, "tables": tables });
     write(
         &folder.join("report.json"),
-        &output::json_text("report.json", &document)?,
+        &output::json_text("report.json", &run.findings)?,
     )?;
     if let Some(rows) = &run.rows {
         write(&folder.join("rows.json"), rows)?;

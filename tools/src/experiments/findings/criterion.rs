@@ -1,6 +1,10 @@
 //! Criteria: what an experiment calls good, as statements about its rows that are true or false of them, made before it runs.
 
 use super::{Measured, Sheet};
+use crate::experiments::table::Cell;
+
+/// Below it, exact whole numbers are written with all digits.
+const LARGEST_COUNT: f64 = 1e12;
 
 /// What is wanted of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,12 +45,20 @@ impl Bound {
 
 impl std::fmt::Display for Bound {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let number = |value: f64| crate::experiments::table::Cell::Number(value);
         match *self {
             Self::AtMost(most) => write!(f, "at most {}", number(most)),
             Self::AtLeast(least) => write!(f, "at least {}", number(least)),
             Self::Between(least, most) => write!(f, "{} to {}", number(least), number(most)),
         }
+    }
+}
+
+/// An exact number: a whole one as counts are written.
+fn number(value: f64) -> Cell {
+    if value >= 0.0 && value.fract() == 0.0 && value < LARGEST_COUNT {
+        Cell::Count(value as u64)
+    } else {
+        Cell::Number(value)
     }
 }
 
@@ -56,18 +68,37 @@ pub struct Criterion<R: 'static> {
     bound: Bound,
     because: &'static str,
     in_every_form: bool,
+    needs: &'static str,
     among: fn(&R) -> bool,
-    of: fn(&R) -> Measured,
+    of: Of<R>,
+}
+
+/// What of rows is judged.
+enum Of<R: 'static> {
+    /// A number of each row.
+    Each(fn(&R) -> Measured),
+    /// One number of all rows; `None` where they have none.
+    All(fn(&[&R]) -> Option<Measured>),
 }
 
 impl<R: Sheet> Criterion<R> {
     /// Of a number of each row; the worst row speaks for all.
     pub const fn each(name: &'static str, bound: Bound, of: fn(&R) -> Measured) -> Self {
+        Self::new(name, bound, Of::Each(of))
+    }
+
+    /// Of one number of all rows, `None` where they have none.
+    pub const fn all(name: &'static str, bound: Bound, of: fn(&[&R]) -> Option<Measured>) -> Self {
+        Self::new(name, bound, Of::All(of))
+    }
+
+    const fn new(name: &'static str, bound: Bound, of: Of<R>) -> Self {
         Self {
             name,
             bound,
             because: "",
             in_every_form: false,
+            needs: "",
             among: |_| true,
             of,
         }
@@ -94,56 +125,76 @@ impl<R: Sheet> Criterion<R> {
         }
     }
 
-    /// The verdict on rows. Each holds where its whole interval is within the bound, fails where none of it is, and is undecided between; all hold
-    /// where each does, and fail where one fails.
+    /// Only where this is there; without rows, a verdict names it.
+    #[must_use]
+    pub const fn needs(self, what: &'static str) -> Self {
+        Self { needs: what, ..self }
+    }
+
+    /// The verdict on rows, as [`judge`].
     pub fn judge(&self, rows: &[R]) -> Judged {
-        let mut judged = Judged {
-            name: self.name,
-            bound: self.bound,
-            because: self.because,
-            in_every_form: self.in_every_form,
-            verdict: Verdict::NotRun,
-            found: None,
-            rows: 0,
-            failing: 0,
-            noisy: 0,
-            worst: String::new(),
+        let rows: Vec<&R> = rows.iter().filter(|row| (self.among)(row)).collect();
+        let found: Vec<(String, Measured)> = match self.of {
+            Of::Each(of) => rows.iter().map(|row| (row.label(), of(row))).collect(),
+            Of::All(of) => of(&rows).map(|found| (String::new(), found)).into_iter().collect(),
         };
-        // Rows that fail come before those that noise decides, and these before those that hold.
-        let mut most = (0, f64::NEG_INFINITY);
-        for row in rows.iter().filter(|row| (self.among)(row)) {
-            let found = (self.of)(row);
-            judged.rows += 1;
-            let rank = match self.bound.holds(&found) {
-                Some(true) => 0,
-                Some(false) => {
-                    judged.failing += 1;
-                    2
-                }
-                None => {
-                    judged.noisy += 1;
-                    1
-                }
-            };
-            let missed = (rank, self.bound.missed_by(found.value));
-            if missed > most || judged.found.is_none() {
-                most = missed;
-                judged.found = Some(found);
-                judged.worst = row.label();
-            }
+        let mut judged = judge(self.name, self.bound, self.because, found);
+        judged.in_every_form = self.in_every_form;
+        if judged.verdict == Verdict::NotRun && !self.needs.is_empty() {
+            judged.verdict = Verdict::Needs(self.needs.into());
         }
-        judged.verdict = match (judged.rows, judged.failing, judged.noisy) {
-            (0, ..) => Verdict::NotRun,
-            (_, 0, 0) => Verdict::Holds,
-            (_, 0, _) => Verdict::Noise,
-            _ => Verdict::Fails { by: most.1.max(0.0) },
-        };
         judged
     }
 }
 
+/// The verdict on numbers, each with the name of its row. Each holds where its whole interval is within the bound, fails where none of it is, and is
+/// undecided between; all hold where each does, and fail where one fails.
+pub fn judge(name: &str, bound: Bound, because: &str, found: impl IntoIterator<Item = (String, Measured)>) -> Judged {
+    let mut judged = Judged {
+        name: name.into(),
+        bound,
+        because: because.into(),
+        in_every_form: false,
+        verdict: Verdict::NotRun,
+        found: None,
+        rows: 0,
+        failing: 0,
+        noisy: 0,
+        worst: String::new(),
+    };
+    // Rows that fail come before those that noise decides, and these before those that hold.
+    let mut most = (0, f64::NEG_INFINITY);
+    for (label, found) in found {
+        judged.rows += 1;
+        let rank = match bound.holds(&found) {
+            Some(true) => 0,
+            Some(false) => {
+                judged.failing += 1;
+                2
+            }
+            None => {
+                judged.noisy += 1;
+                1
+            }
+        };
+        let missed = (rank, bound.missed_by(found.value));
+        if missed > most || judged.found.is_none() {
+            most = missed;
+            judged.found = Some(found);
+            judged.worst = label;
+        }
+    }
+    judged.verdict = match (judged.rows, judged.failing, judged.noisy) {
+        (0, ..) => Verdict::NotRun,
+        (_, 0, 0) => Verdict::Holds,
+        (_, 0, _) => Verdict::Noise,
+        _ => Verdict::Fails { by: most.1.max(0.0) },
+    };
+    judged
+}
+
 /// How a criterion came out.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// As it was wanted.
@@ -157,19 +208,22 @@ pub enum Verdict {
     Noise,
     /// Undecided: there are no rows.
     NotRun,
+    /// Undecided: there are no rows, for which this is needed.
+    Needs(String),
     /// Undecided: a smoke run has too few inputs.
     SmokeForm,
 }
 
 /// A criterion with what was found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Judged {
     /// The statement.
-    pub name: &'static str,
-    /// What is wanted.
+    pub name: String,
+    /// What is wanted, in words.
+    #[serde(serialize_with = "in_words")]
     pub bound: Bound,
     /// Where the bound is from; empty for the experiment's own sentence.
-    pub because: &'static str,
+    pub because: String,
     /// Whether it holds of smoke runs too.
     pub in_every_form: bool,
     /// The verdict.
@@ -186,13 +240,17 @@ pub struct Judged {
     pub worst: String,
 }
 
+fn in_words<S: serde::Serializer>(bound: &Bound, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(bound)
+}
+
 impl Judged {
     /// The same of a smoke run, which decides only what holds in every form.
     #[must_use]
     pub fn of_smoke_run(self) -> Self {
         let verdict = match self.verdict {
-            Verdict::NotRun => Verdict::NotRun,
-            verdict if self.in_every_form => verdict,
+            Verdict::NotRun | Verdict::Needs(_) => return self,
+            _ if self.in_every_form => return self,
             _ => Verdict::SmokeForm,
         };
         Self { verdict, ..self }
@@ -202,23 +260,25 @@ impl Judged {
 impl std::fmt::Display for Judged {
     /// A line of a page: "**fails by 0.12**: name: 1.12 where at most 1 is wanted, in 3 of 28 rows; worst: `conference`".
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        use crate::experiments::table::Cell;
-        match self.verdict {
+        match &self.verdict {
             Verdict::Holds => write!(f, "**holds**")?,
-            Verdict::Fails { by } if by.is_finite() => write!(f, "**fails** by {}", Cell::Number(by))?,
+            Verdict::Fails { by } if by.is_finite() => write!(f, "**fails** by {}", number(*by))?,
             Verdict::Fails { .. } => write!(f, "**fails**")?,
             Verdict::Noise => write!(f, "**undecided**, noise")?,
             Verdict::NotRun => write!(f, "**undecided**, not run")?,
+            Verdict::Needs(what) => write!(f, "**undecided**, needs {what}")?,
             Verdict::SmokeForm => write!(f, "**undecided**, a smoke run")?,
         }
         write!(f, ": {}", self.name)?;
         match self.found {
+            Some(found) if found.is_exact() => write!(f, ": {} where {} is wanted", number(found.value), self.bound)?,
             Some(found) => write!(f, ": {} where {} is wanted", Cell::from(found), self.bound)?,
             None => write!(f, ": {} is wanted", self.bound)?,
         }
         match (self.failing, self.noisy) {
-            (0, 0) if self.rows > 0 => write!(f, ", {} rows", self.rows)?,
+            (0, 0) if self.rows > 1 => write!(f, ", {} rows", self.rows)?,
             (0, 0) => {}
+            _ if self.rows == 1 => {}
             (0, noisy) => write!(f, ", noise decides {noisy} of {} rows", self.rows)?,
             (failing, _) => write!(f, ", in {failing} of {} rows", self.rows)?,
         }

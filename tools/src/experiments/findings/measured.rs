@@ -1,16 +1,27 @@
 //! Measured numbers with the intervals that they lie in.
 
+use clerestory::film::z_test::{sidak_threshold, two_sided_p};
+
+use super::field::{any_number, any_numbers};
+
+/// Share of runs in which chance alone exceeds [`z_most`].
+const ALARMS: f64 = 0.01;
+/// No p-value of f64 is left beyond it.
+const Z_WITHOUT_CHANCE: f64 = 40.0;
 /// Least probability with which an interval of order statistics holds the median.
 const COVERAGE: f64 = 0.93;
 
 /// A number and the interval that it lies in. An exact number is its own interval.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Measured {
     /// The number.
+    #[serde(with = "any_number")]
     pub value: f64,
     /// The interval's lower end.
+    #[serde(with = "any_number")]
     pub low: f64,
     /// The interval's upper end.
+    #[serde(with = "any_number")]
     pub high: f64,
 }
 
@@ -67,7 +78,7 @@ impl From<&Repeats> for Measured {
 /// Values of one quantity, one for each turn, in the order of turns.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(transparent)]
-pub struct Repeats(pub Vec<f64>);
+pub struct Repeats(#[serde(with = "any_numbers")] pub Vec<f64>);
 
 impl Repeats {
     /// The median, with the narrowest interval of order statistics that holds the quantity's median with a probability of 93 % at least, whatever
@@ -104,10 +115,53 @@ impl Repeats {
     }
 }
 
+impl Repeats {
+    /// Values of each part of a turn, from arrays of a turn.
+    pub fn by_part<const N: usize>(turns: &[[f64; N]]) -> [Self; N] {
+        std::array::from_fn(|part| turns.iter().map(|turn| turn[part]).collect())
+    }
+}
+
 impl FromIterator<f64> for Repeats {
     fn from_iter<I: IntoIterator<Item = f64>>(values: I) -> Self {
         Self(values.into_iter().collect())
     }
+}
+
+/// The geometric mean of ratios, in the interval of that of their ends; `None` of none.
+pub fn geometric_mean(all: impl IntoIterator<Item = Measured>) -> Option<Measured> {
+    let (mut sums, mut count) = ([0.0; 3], 0.0_f64);
+    for Measured { value, low, high } in all {
+        for (sum, ratio) in sums.iter_mut().zip([value, low, high]) {
+            // An end without bound goes below zero.
+            *sum += if ratio.is_nan() { ratio } else { ratio.max(0.0).ln() };
+        }
+        count += 1.0;
+    }
+    let [value, low, high] = sums.map(|sum| (sum / count).exp());
+    (count > 0.0).then_some(Measured { value, low, high })
+}
+
+/// The largest |z| of so many standard normal numbers that chance exceeds once in a hundred runs. Source: Šidák, *Rectangular Confidence Regions for
+/// the Means of Multivariate Normal Distributions*, 1967.
+pub fn z_most(count: usize) -> f64 {
+    let threshold = sidak_threshold(ALARMS, count.max(1));
+    // The p-value falls with z: bisection, to the last bit.
+    let (mut below, mut above) = (0.0, Z_WITHOUT_CHANCE);
+    for _ in 0..f64::MANTISSA_DIGITS {
+        let z = 0.5 * (below + above);
+        if two_sided_p(z) > threshold {
+            below = z;
+        } else {
+            above = z;
+        }
+    }
+    above
+}
+
+/// What a value changes in another, in %.
+pub fn change(value: f64, first: f64) -> f64 {
+    100.0 * (value / first - 1.0)
 }
 
 /// The rank, from 0, of the order statistic that begins the interval; `None` where even the least and the greatest hold the median too seldom.
@@ -148,6 +202,34 @@ mod tests {
         let (a, b) = (Repeats(vec![2.0, 8.0]), Repeats(vec![1.0, 2.0]));
         assert_eq!(a.over(&b).0, [2.0, 4.0]);
         assert_eq!(a.scaled(0.5).0, [1.0, 4.0]);
+    }
+
+    #[test]
+    fn chance_exceeds_the_largest_of_more_numbers_later() {
+        // Quantiles of the normal distribution: 2.576 at 1 % on both sides, 3.29 at 1 - 0.99^(1/10).
+        assert!((z_most(1) - 2.5758).abs() < 1e-3, "{}", z_most(1));
+        assert!((z_most(10) - 3.2892).abs() < 1e-3, "{}", z_most(10));
+    }
+
+    #[test]
+    fn geometric_means_have_the_intervals_of_their_ends() {
+        let of = |value, low, high| Measured { value, low, high };
+        let mean = geometric_mean([of(1.0, 0.5, 2.0), of(4.0, 2.0, 8.0)]).unwrap();
+        assert_eq!(
+            [mean.value, mean.low, mean.high].map(|x| (1e9 * x).round()),
+            [2e9, 1e9, 4e9]
+        );
+        assert_eq!(geometric_mean([]), None);
+        let open = geometric_mean([of(1.0, f64::NEG_INFINITY, f64::INFINITY), of(4.0, 2.0, 8.0)]).unwrap();
+        assert_eq!((open.low, open.high), (0.0, f64::INFINITY));
+        assert!(geometric_mean([f64::NAN.into()]).unwrap().value.is_nan());
+    }
+
+    #[test]
+    fn parts_of_turns_have_their_values_in_order() {
+        let [a, b] = Repeats::by_part(&[[1.0, 2.0], [3.0, 4.0]]);
+        assert_eq!((a.0, b.0), (vec![1.0, 3.0], vec![2.0, 4.0]));
+        assert_eq!(change(90.0, 100.0).round(), -10.0);
     }
 
     #[test]

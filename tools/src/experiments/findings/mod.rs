@@ -4,18 +4,22 @@
 //! (judged over no rows, they are "not run").
 
 mod criterion;
-pub(crate) mod json;
+mod field;
 mod measured;
+mod plots;
 mod sheet;
 
-pub use criterion::{Bound, Criterion, Judged, Verdict};
-pub use measured::{Measured, Repeats};
+pub use criterion::{Bound, Criterion, Judged, Verdict, judge};
+pub use field::Field;
+pub use measured::{Measured, Repeats, change, geometric_mean, z_most};
+pub use plots::{Axes, Part, Plot, curves};
 pub(crate) use sheet::rows;
-pub use sheet::{Column, Sheet, Shown};
+pub use sheet::{Column, Sheet};
 
 use clerestory::{Error, Result};
 
 use super::measures::Context;
+use super::plot::Curve;
 use super::table::Table;
 
 /// An experiment of rows.
@@ -31,21 +35,24 @@ pub trait Study: Default + serde::Serialize + serde::de::DeserializeOwned {
 }
 
 /// One number that a reader wants to know first.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Headline {
     /// What it is, with its unit.
-    pub words: &'static str,
+    pub words: String,
     /// The number.
     pub found: Measured,
 }
 
 /// All that a page says.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Findings {
     /// The number for a list of experiments; `None` where nothing was run.
     pub headline: Option<Headline>,
     /// Criteria with their verdicts.
     pub verdicts: Vec<Judged>,
+    /// Plots and pictures, the one for the page's top first.
+    #[serde(skip)]
+    pub plots: Vec<Plot>,
     /// Tables, in the order of the page.
     pub tables: Vec<Table>,
 }
@@ -64,6 +71,19 @@ impl Findings {
         .judged(rows, criteria)
     }
 
+    /// As [`Findings::of`], with the values of one field as heads: a line for each of the other keys, in the order in which they appear.
+    pub fn pivoted<R: Sheet>(rows: &[R], across: &str, criteria: &[Criterion<R>]) -> Self {
+        Self {
+            tables: if rows.is_empty() {
+                Vec::new()
+            } else {
+                vec![R::pivoted(rows, across)]
+            },
+            ..Self::default()
+        }
+        .judged(rows, criteria)
+    }
+
     /// The same with verdicts on rows that stand in no table of their own.
     #[must_use]
     pub fn judged<R: Sheet>(mut self, rows: &[R], criteria: &[Criterion<R>]) -> Self {
@@ -74,9 +94,12 @@ impl Findings {
 
     /// The same with the number that a reader wants to know first.
     #[must_use]
-    pub fn headline(self, words: &'static str, found: Option<Measured>) -> Self {
+    pub fn headline(self, words: impl Into<String>, found: Option<Measured>) -> Self {
         Self {
-            headline: found.map(|found| Headline { words, found }),
+            headline: found.map(|found| Headline {
+                words: words.into(),
+                found,
+            }),
             ..self
         }
     }
@@ -90,11 +113,70 @@ impl Findings {
         self
     }
 
-    /// Tables and verdicts one after the other; the first headline.
+    /// The same with the last table for a file alone.
+    #[must_use]
+    pub fn long(mut self) -> Self {
+        if let Some(table) = self.tables.last_mut() {
+            table.is_long = true;
+        }
+        self
+    }
+
+    /// The same with curves; `name` is that of the file, without its ending.
+    #[must_use]
+    pub fn curves(self, name: &str, title: &str, axes: Axes, curves: Vec<Curve>) -> Self {
+        self.plot(Plot::curves(name, title, axes, curves))
+    }
+
+    /// The same with a bar for each row: its group and its name, and its length.
+    #[must_use]
+    pub fn bars<R>(
+        self,
+        name: &str,
+        title: &str,
+        rows: &[R],
+        names: impl Fn(&R) -> [String; 2],
+        of: impl Fn(&R) -> Measured,
+    ) -> Self {
+        self.plot(Plot::bars(name, title, rows, names, of))
+    }
+
+    /// The same with a bar for each row, in parts.
+    #[must_use]
+    pub fn stacked_bars<R>(
+        self,
+        name: &str,
+        title: &str,
+        rows: &[R],
+        names: impl Fn(&R) -> String,
+        parts: &[Part<'_, R>],
+    ) -> Self {
+        self.plot(Plot::stacked_bars(name, title, rows, names, parts))
+    }
+
+    /// The same with an SVG that a study draws of its rows itself.
+    #[must_use]
+    pub fn drawing(self, file: &str, title: &str, svg: String) -> Self {
+        self.plot(Plot::drawing(file, title, svg))
+    }
+
+    /// The same with a picture that the run wrote to [`Context::file`]. Of no run, it has none: call it where there are rows.
+    #[must_use]
+    pub fn picture(self, file: &str, words: &str) -> Self {
+        self.plot(Plot::picture(file, words))
+    }
+
+    fn plot(mut self, plot: Plot) -> Self {
+        self.plots.push(plot);
+        self
+    }
+
+    /// Tables, plots and verdicts one after the other; the first headline.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
         self.headline = self.headline.or(other.headline);
         self.verdicts.extend(other.verdicts);
+        self.plots.extend(other.plots);
         self.tables.extend(other.tables);
         self
     }

@@ -39,6 +39,26 @@ impl Context<'_> {
         if self.smoke { smoke } else { full }
     }
 
+    /// All of them, or the first so many in a smoke run.
+    pub fn first<'t, T>(&self, all: &'t [T], smoke: usize) -> &'t [T] {
+        self.pick(all, &all[..smoke.min(all.len())])
+    }
+
+    /// A row for each variant of each case, until it is stopped; the watch is told of each case.
+    ///
+    /// # Errors
+    /// The first of a cell.
+    pub fn grid<C: ToString, V, R>(
+        &self,
+        cases: &[C],
+        variants: &[V],
+        mut cell: impl FnMut(&C, &V) -> Result<R>,
+    ) -> Result<Vec<R>> {
+        self.each(cases, C::to_string, |case| {
+            variants.iter().map(|variant| cell(case, variant)).collect()
+        })
+    }
+
     /// Rows of each case, until it is stopped; the watch is told of each by its name.
     ///
     /// # Errors
@@ -86,6 +106,11 @@ impl Context<'_> {
     }
 }
 
+/// An address without the word that all generated scenes begin with.
+pub fn short_name(address: &str) -> &str {
+    address.strip_prefix("builtin:").unwrap_or(address)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,5 +145,10 @@ mod tests {
     fn cases_have_their_rows_in_order() {
         let rows = context(false).each(&[1, 2], i32::to_string, |case| Ok(vec![*case; 2]));
         assert_eq!(rows.unwrap(), [1, 1, 2, 2]);
+        let products = context(true).grid(&[1, 2], &[10, 20], |a, b| Ok(a * b));
+        assert_eq!(products.unwrap(), [10, 20, 20, 40]);
+        assert_eq!(context(true).first(&[1, 2, 3], 2), [1, 2]);
+        assert_eq!(context(false).first(&[1, 2, 3], 2), [1, 2, 3]);
+        assert_eq!(short_name("builtin:ring?roughness=0.2"), "ring?roughness=0.2");
     }
 }
