@@ -25,6 +25,13 @@ impl std::fmt::Display for Cost {
 }
 
 impl Cost {
+    /// The number, bound or not.
+    pub fn number(self) -> f64 {
+        match self {
+            Self::Measured(cost) | Self::AtMost(cost) | Self::Above(cost) => cost,
+        }
+    }
+
     /// The number, when it is more than a bound.
     pub fn measured(self) -> Option<f64> {
         match self {
@@ -45,32 +52,75 @@ pub fn common_error<'a>(curves: impl IntoIterator<Item = &'a [(f64, f64)]>) -> O
     common
 }
 
+/// A cost with the budgets that it was read off between; of a bound, twice the one that it is the cost of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// What was read off.
+    pub cost: Cost,
+    between: [usize; 2],
+}
+
+impl Reading {
+    /// What the error costs on a curve of the same budgets from fewer repeats, by the straight line through the same two of them: how the cost
+    /// changes with the curve, for which that line goes on beyond both. Not a number where one of their errors has no logarithm.
+    pub fn on(&self, curve: &[(f64, f64)], error: f64) -> f64 {
+        let [(c0, e0), (c1, e1)] = self.between.map(|budget| curve[budget]);
+        if self.between[0] == self.between[1] {
+            return c0;
+        }
+        if e0 > 0.0 && e1 > 0.0 {
+            between((c0, e0), (c1, e1), error)
+        } else {
+            f64::NAN
+        }
+    }
+}
+
+/// Where the straight line in logarithms has that error.
+fn between((c0, e0): (f64, f64), (c1, e1): (f64, f64), error: f64) -> f64 {
+    c0 * (c1 / c0).powf((error / e0).ln() / (e1 / e0).ln())
+}
+
 /// What `error` costs on a curve of (cost, error) by rising budget: where it is first reached. `None` for a curve without points, and where
 /// work of this kind is none, as rays are to a technique that draws.
-pub fn cost_of(curve: &[(f64, f64)], error: f64) -> Option<Cost> {
+pub fn read(curve: &[(f64, f64)], error: f64) -> Option<Reading> {
     if curve.iter().any(|(cost, _)| *cost <= 0.0) {
         return None;
     }
+    let bound = |cost: Cost, budget: usize| {
+        Some(Reading {
+            cost,
+            between: [budget; 2],
+        })
+    };
     let first = curve.first()?;
-    if first.1 <= error {
-        return Some(if first.1 == error {
-            Cost::Measured(first.0)
-        } else {
-            Cost::AtMost(first.0)
+    if first.1 == error {
+        return Some(Reading {
+            cost: Cost::Measured(first.0),
+            between: [0, 1.min(curve.len() - 1)],
         });
     }
-    for pair in curve.windows(2) {
-        let ((c0, e0), (c1, e1)) = (pair[0], pair[1]);
-        if e1 <= error {
+    if first.1 < error {
+        return bound(Cost::AtMost(first.0), 0);
+    }
+    for (index, pair) in curve.windows(2).enumerate() {
+        if pair[1].1 <= error {
             // An error that is lost in the reference's noise has no logarithm: how early the curve crossed is not known.
-            if e1 <= 0.0 {
-                return Some(Cost::AtMost(c1));
+            if pair[1].1 <= 0.0 {
+                return bound(Cost::AtMost(pair[1].0), index + 1);
             }
-            let share = (error / e0).ln() / (e1 / e0).ln();
-            return Some(Cost::Measured(c0 * (c1 / c0).powf(share)));
+            return Some(Reading {
+                cost: Cost::Measured(between(pair[0], pair[1], error)),
+                between: [index, index + 1],
+            });
         }
     }
-    curve.last().map(|(cost, _)| Cost::Above(*cost))
+    bound(Cost::Above(curve.last()?.0), curve.len() - 1)
+}
+
+/// The cost alone of [`read`].
+pub fn cost_of(curve: &[(f64, f64)], error: f64) -> Option<Cost> {
+    read(curve, error).map(|reading| reading.cost)
 }
 
 #[cfg(test)]
@@ -112,5 +162,20 @@ mod tests {
                 .is_some_and(|cost| cost > 1.0 && cost < 4.0)
         );
         assert_eq!(common_error([]), None);
+    }
+
+    #[test]
+    fn a_reading_follows_the_curve_beyond_its_budgets() {
+        let curve = |scale: f64| [1.0, 4.0, 16.0].map(|n: f64| (n, scale * n.powf(-0.5)));
+        // The last budget has the error that is asked for; with errors of 1.1 times it costs 1.21 times as much.
+        let last = read(&curve(1.0), 0.25).unwrap();
+        assert_eq!(last.cost, Cost::Measured(16.0));
+        assert!((last.on(&curve(1.1), 0.25) / (1.21 * 16.0) - 1.0).abs() < 1e-12);
+        assert!((last.on(&curve(0.9), 0.25) / (0.81 * 16.0) - 1.0).abs() < 1e-12);
+        let bound = read(&curve(1.0), 0.1).unwrap();
+        assert_eq!((bound.cost, bound.on(&curve(1.1), 0.1)), (Cost::Above(16.0), 16.0));
+        let mut lost = curve(1.0);
+        lost[2].1 = f64::NAN;
+        assert!(last.on(&lost, 0.25).is_nan());
     }
 }

@@ -1,18 +1,15 @@
 //! Line charts on linear axes, as SVG: functions along a path, of which the parts above the frame are left out.
 //!
-//! Legible in black and white, by the dashes and colours of [`super::plot`].
+//! Legible in black and white, by the dashes and colours of [`super::plot`]; the legend stands beside the frame.
 
 use clerestory::{Error, Result};
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::legend::{self, Entry};
 use super::plot::{COLORS, DASHES, FONT, Words, line};
 
+/// Pixels across and, where the legend is no longer, down.
 const SIZE: (u32, u32) = (760, 400);
-const LEGEND: u32 = 200;
-const LEGEND_LINE: i32 = 28;
-const LEGEND_ROW: i32 = 22;
-const LEGEND_TOP: i32 = 50;
 
 /// A function by its points.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,9 +47,18 @@ fn onto(
     lines: &[Line],
 ) -> std::result::Result<(), String> {
     let failed = |cause: &dyn std::fmt::Display| cause.to_string();
-    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    let named = lines.iter().enumerate().map(|(index, function)| Entry {
+        name: &function.name,
+        color: COLORS[index % COLORS.len()],
+        dash: DASHES[index % DASHES.len()],
+        shape: None,
+    });
+    let entries: Vec<Entry<'_>> = named.collect();
+    let size = (SIZE.0, SIZE.1.max(legend::height(&entries)));
+    let root = SVGBackend::with_string(svg, size).into_drawing_area();
     root.fill(&WHITE).map_err(|e| failed(&e))?;
-    let (left, right) = root.split_horizontally(SIZE.0 - LEGEND);
+    let (left, right) = root.split_horizontally(SIZE.0 - legend::WIDTH);
+    legend::draw(&right, &entries)?;
     let mut chart = ChartBuilder::on(&left)
         .caption(words.title, (FONT, 15))
         .margin(10)
@@ -81,17 +87,6 @@ fn onto(
             .into_iter()
             .map(|piece| line(scaled(piece), dash, style));
         chart.draw_series(pieces).map_err(|e| failed(&e))?;
-        let y = LEGEND_TOP + LEGEND_ROW * index as i32;
-        right
-            .draw(&line(vec![(0, y), (LEGEND_LINE, y)], dash, style))
-            .map_err(|e| failed(&e))?;
-        let font = (FONT, 13)
-            .into_font()
-            .color(&BLACK)
-            .pos(Pos::new(HPos::Left, VPos::Center));
-        right
-            .draw(&Text::new(function.name.clone(), (LEGEND_LINE + 8, y), font))
-            .map_err(|e| failed(&e))?;
     }
     root.present().map_err(|e| failed(&e))
 }

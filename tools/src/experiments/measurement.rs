@@ -22,12 +22,14 @@ pub struct Measurement {
     /// Fingerprint of all that it depends on but the kernels.
     pub key: String,
     /// Fingerprints of the kernels, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub kernels: BTreeMap<String, String>,
     /// The scene's address.
     pub scene: String,
     /// The technique's id.
     pub technique: String,
     /// All of its settings.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
     pub settings: Value,
     /// What was allowed.
     pub budget: Budget,
@@ -57,6 +59,16 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// Without what is the same of all measurements of a variant, or large and of no use but to the store: settings and kernels.
+    #[must_use]
+    pub fn within_results(self) -> Self {
+        Self {
+            kernels: BTreeMap::new(),
+            settings: Value::Null,
+            ..self
+        }
+    }
+
     /// A counter, 0 where the technique has none of that name.
     pub fn count(&self, name: &str) -> f64 {
         self.counters.get(name).copied().unwrap_or(0) as f64

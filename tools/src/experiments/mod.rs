@@ -9,6 +9,8 @@ pub mod bars;
 pub mod equal_error;
 pub mod findings;
 pub mod fingerprint;
+pub mod jackknife;
+pub mod legend;
 pub mod lines;
 pub mod measurement;
 pub mod measures;
@@ -17,11 +19,13 @@ pub mod plot;
 pub mod reference;
 pub mod render_sweep;
 pub mod results;
+pub mod scene_numbers;
 pub mod series;
 pub mod slope;
 pub mod strip;
 pub mod summary;
 pub mod sweep;
+pub mod sweep_criteria;
 pub mod table;
 pub mod unbiased;
 pub mod watch;
@@ -32,6 +36,7 @@ use std::path::Path;
 use clerestory::{Error, Result};
 
 use self::sweep::Sweep;
+use self::sweep_criteria::{SweepCriterion, SweepHeadline};
 
 /// The files of `tools/experiments/`: name and text.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/experiments.rs"));
@@ -54,6 +59,12 @@ pub struct Experiment {
     pub aliases: Vec<String>,
     measure: Option<String>,
     sweep: Option<Sweep>,
+    /// What is good of a sweep. Measures have theirs in code.
+    #[serde(default, rename = "criterion")]
+    pub criteria: Vec<SweepCriterion>,
+    /// The number of a sweep that a list of experiments shows.
+    #[serde(default)]
+    pub headline: Option<SweepHeadline>,
 }
 
 /// What an experiment does.
@@ -140,11 +151,19 @@ fn parse(name: &str, text: &str) -> Result<Experiment> {
         name: name.to_owned(),
         ..experiment
     };
+    let (criteria, headline) = (&experiment.criteria, experiment.headline.as_ref());
     match experiment.kind()? {
         Kind::Measure(measure) => {
             measures::find(measure)?;
+            if !criteria.is_empty() || headline.is_some() {
+                let cause = "is a measure, whose criteria and headline stand in its code";
+                return Err(Error::setting("experiment", name, cause));
+            }
         }
-        Kind::Sweep(sweep) => sweep.check()?,
+        Kind::Sweep(sweep) => {
+            sweep.check()?;
+            sweep_criteria::check(criteria, headline, sweep)?;
+        }
     }
     Ok(experiment)
 }
@@ -191,6 +210,24 @@ mod tests {
     }
 
     #[test]
+    fn every_sweep_says_what_is_good_of_it() {
+        for experiment in names().map(|name| find(name).unwrap()) {
+            let name = &experiment.name;
+            if let Kind::Sweep(sweep) = experiment.kind().unwrap() {
+                assert!(
+                    !experiment.criteria.is_empty() && experiment.headline.is_some(),
+                    "{name}"
+                );
+                assert!(sweep.repeats >= 4, "{name}: intervals of fewer repeats decide nothing");
+                let declared = sweep_criteria::declared(&experiment);
+                assert_eq!(declared.verdicts.len(), experiment.criteria.len(), "{name}");
+                let not_run = |judged: &findings::Judged| judged.verdict == findings::Verdict::NotRun;
+                assert!(declared.verdicts.iter().all(not_run), "{name}");
+            }
+        }
+    }
+
+    #[test]
     fn an_experiment_is_of_exactly_one_kind() {
         let refused = |text: &str| parse("x", text).unwrap_err().to_string();
         assert!(refused("title = \"t\"\nabout = \"a\"\nsystems = []\n").contains("exactly one"));
@@ -198,6 +235,8 @@ mod tests {
             refused("title = \"t\"\nabout = \"a\"\nsystems = []\nmeasure = \"no such\"\n").contains("is not known")
         );
         assert!(refused("title = \"t\"\nsystems = []\nmeasure = \"alpha\"\n").contains("about"));
+        let with_headline = "title = \"t\"\nabout = \"a\"\nsystems = []\nmeasure = \"alpha\"\n[headline]\nwords = \"w\"\nis.bias.of = \"x\"\n";
+        assert!(refused(with_headline).contains("in its code"));
         assert!(refused("title = \"t\"\nabout = \"a\"\nsystems = []\ncolour = 1\n").contains("colour"));
     }
 

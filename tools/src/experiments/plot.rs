@@ -2,12 +2,14 @@
 //!
 //! Legible in black and white: every curve has a marker and a dash of its own besides its colour, which is one of the eight of Okabe and Ito (*Color
 //! Universal Design*, 2008) that people with any colour vision tell apart. Bars span the least and greatest repeat; rings mark the Pareto front; a
-//! guide shows the slope −½ of independent samples.
+//! guide shows the slope −½ of independent samples. The legend stands beside the frame.
 
 use clerestory::{Error, Result};
 use plotters::element::{DashedPathElement, Drawable, DynElement, IntoDynElement, PointCollection};
 use plotters::prelude::*;
 use plotters_backend::{BackendCoord, DrawingErrorKind};
+
+use super::legend::{self, Entry};
 
 /// A point of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +44,8 @@ pub struct Words<'a> {
     pub y: &'a str,
 }
 
-const SIZE: (u32, u32) = (560, 400);
+/// Pixels across and, where the legend is no longer, down.
+const SIZE: (u32, u32) = (760, 400);
 pub(super) const FONT: &str = "sans-serif";
 /// Okabe and Ito without yellow, which white paper swallows.
 pub(super) const COLORS: [RGBColor; 7] = [
@@ -62,12 +65,11 @@ const GUIDE_DASH: (u32, u32) = (3, 5);
 const GUIDE_SLOPE: f64 = -0.5;
 /// Room around the points, as a factor.
 const MARGIN: f64 = 1.35;
-/// Room for the legend below rates, as a factor.
-const LEGEND_ROOM: f64 = 4.0;
 const MARKER: i32 = 4;
 const SHAPES: usize = 6;
 const RING: i32 = 8;
-const LEGEND_LINE: i32 = 28;
+/// Pixels of a line in a legend.
+pub(super) const LEGEND_LINE: i32 = 28;
 
 /// Draws curves; `None` when there is no point to draw.
 ///
@@ -77,7 +79,7 @@ pub fn log_log(words: Words<'_>, curves: &[Curve]) -> Result<Option<String>> {
     of(words, curves, true)
 }
 
-/// As [`log_log`] of rates, which grow with their number: without the guide, and the legend at the bottom.
+/// As [`log_log`] of rates, which grow with their number: without the guide.
 ///
 /// # Errors
 /// As [`log_log`].
@@ -97,12 +99,9 @@ fn of(words: Words<'_>, curves: &[Curve], of_errors: bool) -> Result<Option<Stri
         .collect();
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let heights = || points().flat_map(|point| [point.y, point.y_range[0], point.y_range[1]]);
-    let (Some(x), Some(mut y)) = (span(points().map(|point| point.x)), span(heights())) else {
+    let (Some(x), Some(y)) = (span(points().map(|point| point.x)), span(heights())) else {
         return Ok(None);
     };
-    if !of_errors {
-        y.0 /= LEGEND_ROOM;
-    }
     let mut svg = String::new();
     draw(&mut svg, words, &curves, x, y, of_errors)
         .map_err(|cause| Error::io(words.title, std::io::Error::other(cause)))?;
@@ -234,9 +233,25 @@ fn draw(
     of_errors: bool,
 ) -> std::result::Result<(), String> {
     let failed = |cause: &dyn std::fmt::Display| cause.to_string();
-    let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    let guide = of_errors.then_some(Entry {
+        name: "slope −½",
+        color: GUIDE_GREY,
+        dash: GUIDE_DASH,
+        shape: None,
+    });
+    let named = curves.iter().enumerate().map(|(index, curve)| Entry {
+        name: &curve.name,
+        color: COLORS[index % COLORS.len()],
+        dash: DASHES[index % DASHES.len()],
+        shape: Some(index),
+    });
+    let entries: Vec<Entry<'_>> = guide.into_iter().chain(named).collect();
+    let size = (SIZE.0, SIZE.1.max(legend::height(&entries)));
+    let root = SVGBackend::with_string(svg, size).into_drawing_area();
     root.fill(&WHITE).map_err(|e| failed(&e))?;
-    let mut chart = ChartBuilder::on(&root)
+    let (left, right) = root.split_horizontally(SIZE.0 - legend::WIDTH);
+    legend::draw(&right, &entries)?;
+    let mut chart = ChartBuilder::on(&left)
         .caption(words.title, (FONT, 15))
         .margin(10)
         .x_label_area_size(42)
@@ -267,14 +282,7 @@ fn draw(
         let ends = vec![(start, height(start)), (end, height(end))];
         chart
             .draw_series(std::iter::once(line(ends, GUIDE_DASH, style)))
-            .map_err(|e| failed(&e))?
-            .label("slope −½")
-            .legend(|at| Glyph {
-                points: vec![at],
-                shape: None,
-                legend: Some(GUIDE_DASH),
-                color: GUIDE_GREY,
-            });
+            .map_err(|e| failed(&e))?;
     }
     for (index, curve) in curves.iter().enumerate() {
         let color = COLORS[index % COLORS.len()];
@@ -282,14 +290,7 @@ fn draw(
         let ends: Vec<(f64, f64)> = curve.points.iter().map(|point| (point.x, point.y)).collect();
         chart
             .draw_series(std::iter::once(line(ends, dash, style)))
-            .map_err(|e| failed(&e))?
-            .label(&curve.name)
-            .legend(move |at| Glyph {
-                points: vec![at],
-                shape: Some(index),
-                legend: Some(dash),
-                color,
-            });
+            .map_err(|e| failed(&e))?;
         let thin = color.stroke_width(1);
         let bars = curve.points.iter().map(|point| {
             let low = if point.y_range[0] > 0.0 { point.y_range[0] } else { y.0 };
@@ -307,19 +308,6 @@ fn draw(
         let rings = ringed.map(|point| Circle::new((point.x, point.y), RING, BLACK.stroke_width(1)));
         chart.draw_series(rings).map_err(|e| failed(&e))?;
     }
-    chart
-        .configure_series_labels()
-        .position(if of_errors {
-            SeriesLabelPosition::UpperRight
-        } else {
-            SeriesLabelPosition::LowerRight
-        })
-        .legend_area_size(LEGEND_LINE + 8)
-        .label_font((FONT, 13))
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(160, 160, 160))
-        .draw()
-        .map_err(|e| failed(&e))?;
     root.present().map_err(|e| failed(&e))
 }
 
@@ -369,6 +357,35 @@ mod tests {
                 .unwrap()
                 .unwrap()
         );
+    }
+
+    #[test]
+    fn the_legend_stands_beside_the_frame_whatever_its_length() {
+        let names: Vec<String> = (0..20)
+            .map(|index| format!("number {index}, a long name of a curve"))
+            .collect();
+        let curves: Vec<Curve> = names.iter().map(|name| curve(name, 1.0)).collect();
+        let svg = log_log(WORDS, &curves).unwrap().unwrap();
+        let number = |line: &str, key: &str| -> u32 {
+            let (_, rest) = line.split_once(&format!(" {key}=\"")).unwrap();
+            rest.split_once('"').unwrap().0.parse().unwrap()
+        };
+        let height = number(svg.lines().next().unwrap(), "height");
+        assert!(height > SIZE.1);
+        // The text of an element stands on the line below it.
+        let lines: Vec<&str> = svg.lines().collect();
+        let legend: Vec<&str> = lines
+            .windows(2)
+            .filter(|pair| pair[0].starts_with("<text") && pair[1].starts_with("number"))
+            .map(|pair| pair[0])
+            .collect();
+        assert_eq!(legend.len(), names.len());
+        for line in legend {
+            assert!(
+                number(line, "x") > SIZE.0 - legend::WIDTH && number(line, "y") < height,
+                "{line}"
+            );
+        }
     }
 
     #[test]

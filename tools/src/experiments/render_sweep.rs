@@ -189,7 +189,9 @@ impl Running<'_> {
                     Err(other) => return Err(other),
                 },
             };
-            variant.points[task.budget].measurements.push(measurement);
+            variant.points[task.budget]
+                .measurements
+                .push(measurement.within_results());
             if let Some(path) = &task.shown {
                 variant.picture = Some(exr::read(path)?);
             }
@@ -202,7 +204,8 @@ impl Running<'_> {
             triangles,
             reference: reference_path.display().to_string(),
             tone,
-            reference_picture: reference,
+            reference_error_of_mean: unbiased::error_of_mean(&reference)?,
+            reference_picture: Some(reference),
             variants,
         }))
     }
@@ -245,7 +248,6 @@ impl Running<'_> {
                 name: variant.name.clone(),
                 technique: variant.technique.clone(),
                 settings: self.sweep.settings(&variant.technique, &variant.settings)?,
-                expected_slope: variant.slope,
                 refused: None,
                 points: points.collect(),
                 picture: None,

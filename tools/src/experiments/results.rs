@@ -1,4 +1,5 @@
-//! What a sweep found: its facts, measurements and pictures, before any statistics.
+//! What a sweep found: its facts, measurements and pictures, before any statistics. Written as JSON and read back it is the same without the
+//! pictures.
 
 use clerestory::film::{Picture, ToneMap};
 use serde_json::Value;
@@ -7,7 +8,8 @@ use super::measurement::Measurement;
 use super::sweep::{Budget, Sweep};
 
 /// Everything about one run of a sweep.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Results {
     /// The experiment's name.
     pub experiment: String,
@@ -42,7 +44,8 @@ pub struct Results {
 }
 
 /// What was found of one scene.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SceneResults {
     /// Its address.
     pub address: String,
@@ -52,15 +55,18 @@ pub struct SceneResults {
     pub reference: String,
     /// Pixels for the reader: exposure and curve of shown pictures and of FLIP.
     pub tone: ToneMap,
-    /// The reference itself.
+    /// Standard error of the reference's mean, over that mean.
+    pub reference_error_of_mean: f64,
+    /// The reference itself; `None` of results that were read back.
     #[serde(skip)]
-    pub reference_picture: Picture,
+    pub reference_picture: Option<Picture>,
     /// By variant, in the sweep's order.
     pub variants: Vec<VariantResults>,
 }
 
 /// What was found of a variant in one scene.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct VariantResults {
     /// Its name.
     pub name: String,
@@ -68,8 +74,6 @@ pub struct VariantResults {
     pub technique: String,
     /// All of its settings.
     pub settings: Value,
-    /// The slope that is expected, if one is.
-    pub expected_slope: Option<f64>,
     /// Why it could not render the scene.
     pub refused: Option<String>,
     /// By budget, rising; those without any measurement are left out.
@@ -80,10 +84,11 @@ pub struct VariantResults {
 }
 
 /// All repeats of one budget.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Point {
     /// What was allowed.
     pub budget: Budget,
-    /// By seed, in order.
+    /// By seed, in order; without the kernels and settings, which [`Measurement::within_results`] leaves out.
     pub measurements: Vec<Measurement>,
 }

@@ -4,10 +4,11 @@
 //! Errors are relative RMSE, the root of the mean of the repeats' relative MSEs without the reference's noise ([`super::unbiased`]).
 
 use super::equal_error::{self, Cost};
+use super::jackknife::mean_without;
 use super::measurement::Measurement;
 use super::pareto;
 use super::results::{Point, Results, SceneResults, VariantResults};
-use super::slope::{self, Slope};
+use super::slope::{Fit, Slope};
 use super::sweep::Budget;
 use crate::timing::median;
 
@@ -112,8 +113,6 @@ pub struct Series {
     pub absolute_slope: Option<Slope>,
     /// Of relative RMSE against seconds.
     pub time_slope: Option<Slope>,
-    /// The slope that is expected.
-    pub expected_slope: Option<f64>,
     /// Seconds to the scene's common error.
     pub seconds_to_error: Option<Cost>,
     /// Rays to the scene's common error.
@@ -176,50 +175,79 @@ fn scene(results: &SceneResults) -> SceneSeries {
     }
 }
 
-fn variant(results: &VariantResults) -> Series {
-    let points: Vec<SeriesPoint> = results.points.iter().map(point).collect();
-    let fit = |work: Work, mse: fn(&Measurement) -> f64, reference_error: fn(&Measurement) -> f64| {
-        // A budget that an interruption has left with fewer repeats waits for them.
-        let most = results.points.iter().map(|point| point.measurements.len()).max()?;
-        let whole = || {
-            let pairs = results.points.iter().zip(&points);
-            pairs.filter(move |(point, _)| point.measurements.len() == most)
-        };
-        let works: Vec<f64> = whole().map(|(_, point)| point.work(work)).collect();
-        let errors = whole().map(|(point, _)| point.measurements.iter().map(mse).collect());
-        let by_reference = whole().flat_map(|(point, _)| &point.measurements).map(reference_error);
-        slope::fit(
-            &works,
-            &errors.collect::<Vec<Vec<f64>>>(),
-            by_reference.fold(0.0, f64::max),
-        )
+/// An MSE of a measurement and the standard error that the reference gives it.
+type Errors = [fn(&Measurement) -> f64; 2];
+const RELATIVE: Errors = [|one| one.error.relative_mse, |one| one.error.reference_relative_error];
+const ABSOLUTE: Errors = [|one| one.error.mse, |one| one.error.reference_error];
+
+fn fit(results: &VariantResults, work: Work, [mse, reference_error]: Errors, least: f64) -> Option<Fit> {
+    // A budget that an interruption has left with fewer repeats waits for them.
+    let most = results.points.iter().map(|point| point.measurements.len()).max()?;
+    let whole = || {
+        let points = results.points.iter();
+        points.filter(move |point| point.measurements.len() == most && point.budget.amount() >= least)
     };
-    let relative: [fn(&Measurement) -> f64; 2] =
-        [|one| one.error.relative_mse, |one| one.error.reference_relative_error];
+    let works: Vec<f64> = whole().map(|point| median_work(point, work, None)).collect();
+    let errors = whole().map(|point| point.measurements.iter().map(mse).collect());
+    let by_reference = whole().flat_map(|point| &point.measurements).map(reference_error);
+    Fit::of(
+        &works,
+        &errors.collect::<Vec<Vec<f64>>>(),
+        by_reference.fold(0.0, f64::max),
+    )
+}
+
+/// The slope of relative RMSE against samples, from budgets of `least` on.
+pub(super) fn fall(results: &VariantResults, least: f64) -> Option<Fit> {
+    fit(results, Work::Samples, RELATIVE, least)
+}
+
+fn kept(results: &Point, left_out: Option<usize>) -> impl Iterator<Item = &Measurement> {
+    let all = results.measurements.iter().enumerate();
+    all.filter(move |(repeat, _)| Some(*repeat) != left_out)
+        .map(|(_, one)| one)
+}
+
+fn median_work(results: &Point, work: Work, left_out: Option<usize>) -> f64 {
+    median(kept(results, left_out).map(|one| work.of(one)).collect())
+}
+
+/// Median seconds and relative RMSE of one budget without one of its repeats.
+pub(super) fn time_and_error(results: &Point, left_out: Option<usize>) -> (f64, f64) {
+    let relative: Vec<f64> = kept(results, left_out).map(RELATIVE[0]).collect();
+    (
+        median_work(results, Work::Seconds, left_out),
+        root(mean_without(&relative, None)),
+    )
+}
+
+/// A root of what is not above 0 is not a number, or 0, neither of which has a place on a logarithmic axis.
+fn root(mse: f64) -> f64 {
+    if mse > 0.0 { mse.sqrt() } else { f64::NAN }
+}
+
+fn variant(results: &VariantResults) -> Series {
+    let slope = |work: Work, errors: Errors| fit(results, work, errors, 0.0).map(|fit| fit.slope());
     Series {
         name: results.name.clone(),
         refused: results.refused.clone(),
-        slope: fit(Work::Samples, relative[0], relative[1]),
-        absolute_slope: fit(Work::Samples, |one| one.error.mse, |one| one.error.reference_error),
-        time_slope: fit(Work::Seconds, relative[0], relative[1]),
-        expected_slope: results.expected_slope,
+        slope: slope(Work::Samples, RELATIVE),
+        absolute_slope: slope(Work::Samples, ABSOLUTE),
+        time_slope: slope(Work::Seconds, RELATIVE),
         seconds_to_error: None,
         rays_to_error: None,
-        points,
+        points: results.points.iter().map(point).collect(),
     }
 }
 
 fn point(results: &Point) -> SeriesPoint {
     let all = |of: &dyn Fn(&Measurement) -> f64| results.measurements.iter().map(of).collect::<Vec<f64>>();
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let mean = |values: &[f64]| mean_without(values, None);
     let range = |values: &[f64]| {
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         [least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
     };
     let relative = all(&|one| one.error.relative_mse);
-    // A root of what is not above 0 is not a number, or 0, neither of which has a place on a logarithmic axis.
-    let root = |mse: f64| if mse > 0.0 { mse.sqrt() } else { f64::NAN };
-    let seconds = all(&|one| Work::Seconds.of(one));
     let biases: Vec<f64> = results
         .measurements
         .iter()
@@ -227,10 +255,10 @@ fn point(results: &Point) -> SeriesPoint {
         .collect();
     SeriesPoint {
         budget: results.budget,
-        samples: median(all(&|one| Work::Samples.of(one))),
-        rays: median(all(&|one| Work::Rays.of(one))),
-        seconds_range: range(&seconds),
-        seconds: median(seconds),
+        samples: median_work(results, Work::Samples, None),
+        rays: median_work(results, Work::Rays, None),
+        seconds: median_work(results, Work::Seconds, None),
+        seconds_range: range(&all(&|one| Work::Seconds.of(one))),
         rmse: root(mean(&all(&|one| one.error.mse))),
         relative_rmse: root(mean(&relative)),
         relative_rmse_range: range(&relative).map(|mse| mse.max(0.0).sqrt()),
@@ -254,7 +282,6 @@ pub(super) mod tests {
             name: name.into(),
             technique: "path".into(),
             settings: serde_json::Value::Null,
-            expected_slope: Some(-0.5),
             refused: None,
             points: [4, 16, 64]
                 .map(|spp| Point {
@@ -273,7 +300,8 @@ pub(super) mod tests {
             triangles: 138,
             reference: "r.exr".into(),
             tone: ToneMap::default(),
-            reference_picture,
+            reference_error_of_mean: 1e-4,
+            reference_picture: Some(reference_picture),
             variants: vec![variant("slow", 10.0), variant("<fast> & \"good\"", 20.0)],
         }
     }

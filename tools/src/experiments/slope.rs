@@ -1,14 +1,14 @@
 //! Convergence slopes: the exponent p of error ∝ work^p, fitted on logarithms, with its standard error from independent repeats.
 //!
 //! The fit is ordinary least squares through (ln work, ln RMSE), where RMSE is the root of the mean of the repeats' MSEs: those are unbiased,
-//! their logarithms and roots are not. The standard error is the delete-one jackknife over the repeats (Efron and Stein, *The Jackknife Estimate of
-//! Variance*, 1981): whatever the budgets of one repeat have in common (a seed, whose samples recur in its larger budgets) is left out
-//! together.
+//! their logarithms and roots are not. The standard error is the jackknife over the repeats ([`super::jackknife`]).
 //! Near the noise only fluctuations upwards have a logarithm, and a fit through those is too flat. A budget counts where its mean MSE is
 //! above [`SIGNIFICANT`] standard errors of it: those of the repeats and of the reference's noise, which all repeats share. The budgets that
 //! count are chosen once and serve every replicate of the jackknife.
 //! Guarantees: deterministic; budgets that do not count are left out and counted. A replicate's mean MSE is at least the full mean less one
 //! standard error, so that what counts has a logarithm in every replicate.
+
+use super::jackknife::{self, mean_without};
 
 /// How many standard errors above 0 a budget's mean MSE must lie.
 pub const SIGNIFICANT: f64 = 3.0;
@@ -38,46 +38,64 @@ pub fn least_squares(points: &[(f64, f64)]) -> Option<f64> {
     (points.len() >= 2 && xx > 0.0).then(|| xy / xx)
 }
 
-/// The exponent of RMSE against work. `work[i]` is that of budget i, `mse[i][r]` the unbiased MSE of its repeat r; every budget has the same
-/// repeats in the same order. `reference_error` is the standard error of any of them by the reference's noise; that by the repeats is added
-/// to it, with a single repeat as 0. `None` when fewer than two budgets can be fitted.
-pub fn fit(work: &[f64], mse: &[Vec<f64>], reference_error: f64) -> Option<Slope> {
-    let repeats = mse.iter().map(Vec::len).min().unwrap_or(0);
-    let mean_without = |mse: &[f64], left_out: Option<usize>| {
-        let kept = mse.iter().enumerate().filter(|(r, _)| Some(*r) != left_out);
-        let (sum, count) = kept.fold((0.0, 0), |(sum, count), (_, mse)| (sum + mse, count + 1));
-        sum / f64::from(count.max(1))
-    };
-    let stands_out = |mse: &[f64]| {
-        let (n, mean) = (mse.len() as f64, mean_without(mse, None));
-        let squares: f64 = mse.iter().map(|mse| (mse - mean).powi(2)).sum();
-        let by_repeats = squares / (n * (n - 1.0).max(1.0));
-        mean > 0.0 && mean > SIGNIFICANT * (by_repeats + reference_error * reference_error).sqrt()
-    };
-    let counting: Vec<(f64, &[f64])> = work
-        .iter()
-        .zip(mse)
-        .map(|(work, mse)| (*work, &mse[..repeats]))
-        .filter(|(work, mse)| *work > 0.0 && stands_out(mse))
-        .collect();
-    let slope_without = |left_out: Option<usize>| {
-        let point = |(work, mse): &(f64, &[f64])| (work.ln(), 0.5 * mean_without(mse, left_out).ln());
-        least_squares(&counting.iter().map(point).collect::<Vec<_>>())
-    };
-    let value = slope_without(None)?;
-    let without: Option<Vec<f64>> = (0..repeats).map(|r| slope_without(Some(r))).collect();
-    let standard_error = without.filter(|slopes| slopes.len() >= 2).map(|slopes| {
-        let n = slopes.len() as f64;
-        let mean = slopes.iter().sum::<f64>() / n;
-        ((n - 1.0) / n * slopes.iter().map(|slope| (slope - mean).powi(2)).sum::<f64>()).sqrt()
-    });
-    Some(Slope {
-        value,
-        standard_error,
-        budgets: counting.len(),
-        hidden: work.len() - counting.len(),
-        repeats,
-    })
+/// Whether the mean of repeats' MSEs is above [`SIGNIFICANT`] standard errors of it, of which the reference's noise has `reference_error`; that by a
+/// single repeat is not known and counts as 0.
+pub fn stands_out(mse: &[f64], reference_error: f64) -> bool {
+    let mean = mean_without(mse, None);
+    let without: Vec<f64> = (0..mse.len()).map(|repeat| mean_without(mse, Some(repeat))).collect();
+    let by_repeats = jackknife::standard_error(&without).unwrap_or(0.0);
+    mean > 0.0 && mean > SIGNIFICANT * by_repeats.hypot(reference_error)
+}
+
+/// A fitted exponent with those without each of the repeats.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Of all repeats.
+    pub value: f64,
+    /// Without each of them; what cannot be fitted is not a number.
+    pub without: Vec<f64>,
+    /// Budgets that were fitted.
+    pub budgets: usize,
+    /// Budgets left out since their error does not stand out from the noise.
+    pub hidden: usize,
+}
+
+impl Fit {
+    /// The exponent of RMSE against work. `work[i]` is that of budget i, `mse[i][r]` the unbiased MSE of its repeat r; every budget has the same
+    /// repeats in the same order. `reference_error` is the standard error of any of them by the reference's noise. `None` when fewer than two budgets
+    /// can be fitted.
+    pub fn of(work: &[f64], mse: &[Vec<f64>], reference_error: f64) -> Option<Self> {
+        let repeats = mse.iter().map(Vec::len).min().unwrap_or(0);
+        let counting: Vec<(f64, &[f64])> = work
+            .iter()
+            .zip(mse)
+            .map(|(work, mse)| (*work, &mse[..repeats]))
+            .filter(|(work, mse)| *work > 0.0 && stands_out(mse, reference_error))
+            .collect();
+        let slope_without = |left_out: Option<usize>| {
+            let point = |(work, mse): &(f64, &[f64])| (work.ln(), 0.5 * mean_without(mse, left_out).ln());
+            least_squares(&counting.iter().map(point).collect::<Vec<_>>())
+        };
+        Some(Self {
+            value: slope_without(None)?,
+            without: (0..repeats)
+                .map(|repeat| slope_without(Some(repeat)).unwrap_or(f64::NAN))
+                .collect(),
+            budgets: counting.len(),
+            hidden: work.len() - counting.len(),
+        })
+    }
+
+    /// With its standard error.
+    pub fn slope(&self) -> Slope {
+        Slope {
+            value: self.value,
+            standard_error: jackknife::standard_error(&self.without),
+            budgets: self.budgets,
+            hidden: self.hidden,
+            repeats: self.without.len(),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -85,6 +103,10 @@ mod tests {
     use clerestory_hard_cases::random::Random;
 
     use super::*;
+
+    fn fit(work: &[f64], mse: &[Vec<f64>], reference_error: f64) -> Option<Slope> {
+        Fit::of(work, mse, reference_error).map(|fit| fit.slope())
+    }
 
     const WORK: [f64; 5] = [4.0, 16.0, 64.0, 256.0, 1024.0];
 

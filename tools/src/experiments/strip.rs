@@ -39,12 +39,15 @@ pub struct Strip {
     pub columns: Vec<Column>,
 }
 
-/// The strip of a scene.
+/// The strip of a scene; `None` of results that were read back, which have no pictures.
 ///
 /// # Errors
 /// [`Error::Picture`] for pictures that do not fit each other.
-pub fn of(results: &SceneResults) -> Result<Strip> {
-    let (reference, tone) = (&results.reference_picture, results.tone);
+pub fn of(results: &SceneResults) -> Result<Option<Strip>> {
+    let Some(reference) = &results.reference_picture else {
+        return Ok(None);
+    };
+    let tone = results.tone;
     let options = CompareOptions {
         tone,
         ..CompareOptions::default()
@@ -76,11 +79,11 @@ pub fn of(results: &SceneResults) -> Result<Strip> {
             flip: png::false_color(&flip, picture.width(), FLIP_FULL_SCALE)?,
         })
     });
-    Ok(Strip {
+    Ok(Some(Strip {
         reference: shown(reference)?,
         full_scale,
         columns: columns.collect::<Result<_>>()?,
-    })
+    }))
 }
 
 impl Strip {
@@ -148,7 +151,7 @@ mod tests {
 
     #[test]
     fn every_variant_has_its_column() {
-        let strip = of(&made_up_scene()).unwrap();
+        let strip = of(&made_up_scene()).unwrap().unwrap();
         assert_eq!(strip.columns.len(), 2);
         assert_eq!(strip.full_scale, 0.25);
         assert_eq!(
@@ -173,6 +176,8 @@ mod tests {
     fn a_variant_without_a_picture_has_no_column() {
         let mut results = made_up_scene();
         results.variants[0].picture = None;
-        assert_eq!(of(&results).unwrap().columns.len(), 1);
+        assert_eq!(of(&results).unwrap().map(|strip| strip.columns.len()), Some(1));
+        results.reference_picture = None;
+        assert_eq!(of(&results).unwrap(), None);
     }
 }

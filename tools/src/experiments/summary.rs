@@ -3,42 +3,12 @@
 use std::fmt::Write as _;
 
 use super::results::Results;
-use super::series::{SceneSeries, Series};
+use super::series::SceneSeries;
 use super::slope::Slope;
 use super::sweep::Budget;
 use super::table::{Cell, Table};
 
-/// Student's t with 1, 2, … 30 degrees of freedom: within ± these it lies with probability 95 % (Abramowitz and Stegun, *Handbook of
-/// Mathematical Functions*, table 26.10).
-const STUDENT_95: [f64; 30] = [
-    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131, 2.120,
-    2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042,
-];
-/// How far a slope may lie off what is expected.
-pub const SLOPE_TOLERANCE: f64 = 0.05;
 const NONE: &str = "–";
-
-/// How many standard errors from so many repeats a number may lie off by chance; beyond the table its last entry, which is a little wide.
-fn student(repeats: usize) -> f64 {
-    STUDENT_95[repeats.saturating_sub(2).min(STUDENT_95.len() - 1)]
-}
-
-/// Whether a slope is what it should be: within [`SLOPE_TOLERANCE`], "within noise" where only its standard error does not exclude that.
-fn verdict(series: &Series) -> &'static str {
-    let (Some(slope), Some(expected)) = (series.slope, series.expected_slope) else {
-        return NONE;
-    };
-    let off = (slope.value - expected).abs();
-    let Some(standard_error) = slope.standard_error else {
-        return "not testable";
-    };
-    let margin = standard_error * student(slope.repeats);
-    match off {
-        off if off <= SLOPE_TOLERANCE => "yes",
-        off if off <= SLOPE_TOLERANCE + margin => "within noise",
-        _ => "no",
-    }
-}
 
 /// A slope with its standard error.
 pub fn slope_text(slope: Option<Slope>) -> String {
@@ -114,7 +84,6 @@ pub fn overview(scenes: &[SceneSeries]) -> Table {
             "scene",
             "variant",
             "slope against samples",
-            "as expected",
             "slope of absolute RMSE",
             "slope against time",
             "relative RMSE",
@@ -132,7 +101,7 @@ pub fn overview(scenes: &[SceneSeries]) -> Table {
             let text = |text: String| Cell::Text(text);
             if let Some(cause) = &series.refused {
                 let row = [scene.address.clone(), series.name.clone(), format!("refused: {cause}")];
-                table.row(row.map(Cell::Text).into_iter().chain((0..7).map(|_| NONE.into())));
+                table.row(row.map(Cell::Text).into_iter().chain((0..6).map(|_| NONE.into())));
                 continue;
             }
             let seconds = series.seconds_to_error.and_then(|cost| cost.measured());
@@ -140,7 +109,6 @@ pub fn overview(scenes: &[SceneSeries]) -> Table {
                 text(format!("`{}`", scene.address)),
                 text(series.name.clone()),
                 text(slope_text(series.slope)),
-                verdict(series).into(),
                 text(slope_text(series.absolute_slope)),
                 text(slope_text(series.time_slope)),
                 scene.common_error.map_or(NONE.into(), Cell::Number),
@@ -158,10 +126,8 @@ pub fn overview(scenes: &[SceneSeries]) -> Table {
         }
     }
     table.note(
-        "As expected: the slope against samples lies within 0.05 of the one that the experiment names; \"within noise\": only by its \
-         standard error times Student's t at 95 % for repeats − 1 degrees of freedom more; \"not testable\": one repeat has no standard \
-         error. Lost in noise: budgets whose mean MSE is not above 3 standard errors, by the repeats and the reference together. Equal error: the least that all variants of a scene reach, read off straight lines between budgets in logarithms. \
-         Speed-up: over the first variant.",
+        "Lost in noise: budgets whose mean MSE is not above 3 standard errors, by the repeats and the reference together. Equal error: the least that \
+         all variants of a scene reach, read off straight lines between budgets in logarithms. Speed-up: over the first variant.",
     );
     table
 }
@@ -336,7 +302,7 @@ pub(super) mod tests {
         let scenes = series::of(&results);
         let text = markdown(&results, &scenes);
         for word in [
-            "-0.500 ± 0.000 | yes",
+            "-0.500 ± 0.000 | -0.500 ± 0.000 |",
             "| 6.400 |",
             "| 2.00 |",
             "Smoke run",
@@ -361,54 +327,5 @@ pub(super) mod tests {
             text.contains("**8 pixels left out** of the errors of 2 pictures"),
             "{text}"
         );
-    }
-
-    #[test]
-    fn quantiles_of_student_hold_95_percent() {
-        // With t = √ν tan θ the density is proportional to cos^(ν − 1) θ. Integrals by the midpoint rule, which errs far below 1e-6 here; the
-        // table's rounding of 0.0005 moves the share by at most twice that times the density there, which is below 0.07.
-        let integral = |power: i32, end: f64| {
-            let steps = 10_000;
-            let width = end / f64::from(steps);
-            let heights = (0..steps).map(|step| (width * (f64::from(step) + 0.5)).cos().powi(power));
-            heights.sum::<f64>() * width
-        };
-        for (index, quantile) in STUDENT_95.iter().enumerate() {
-            let power = i32::try_from(index).unwrap();
-            let end = (quantile / f64::from(power + 1).sqrt()).atan();
-            let share = integral(power, end) / integral(power, std::f64::consts::FRAC_PI_2);
-            assert!((share - 0.95).abs() < 2.0 * 0.0005 * 0.07, "{}: {share}", power + 1);
-        }
-        assert_eq!((student(2), student(31), student(99)), (12.706, 2.042, 2.042));
-    }
-
-    #[test]
-    fn verdicts_weigh_the_noise() {
-        let results = made_up_results();
-        let mut series = series::of(&results)[0].series[0].clone();
-        assert_eq!(verdict(&series), "yes");
-        for (value, standard_error, repeats, expected) in [
-            (-0.54, Some(0.0), 5, "yes"),
-            (-0.6, Some(0.01), 5, "no"),
-            (-0.6, Some(0.03), 5, "within noise"),
-            // 0.05 beyond the tolerance are 2.5 standard errors, within 12.7 and 4.3 but not within 2.23 and 2.04.
-            (-0.6, Some(0.02), 2, "within noise"),
-            (-0.6, Some(0.02), 3, "within noise"),
-            (-0.6, Some(0.02), 11, "no"),
-            (-0.6, Some(0.02), 99, "no"),
-            (-0.6, None, 1, "not testable"),
-            (-0.5, None, 1, "not testable"),
-        ] {
-            series.slope = Some(Slope {
-                value,
-                standard_error,
-                budgets: 3,
-                hidden: 0,
-                repeats,
-            });
-            assert_eq!(verdict(&series), expected, "{value} ± {standard_error:?}, {repeats}");
-        }
-        series.expected_slope = None;
-        assert_eq!(verdict(&series), NONE);
     }
 }

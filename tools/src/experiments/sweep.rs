@@ -20,10 +20,12 @@
 //! settings = { roulette_cap = 0.9 }  # default: the technique's; of its samplers only the independent one, "pcg", is allowed
 //!
 //! [[sweep.variant]]
+//! name = "default"
+//!
+//! [[sweep.variant]]
 //! name = "from bounce 3"
 //! technique = "path"              # default
 //! settings = { roulette_start = 3 }
-//! slope = -0.5                    # optional: what log RMSE against log samples is expected to have
 //!
 //! [sweep.smoke]                   # optional: what `--smoke` takes instead
 //! size = [32, 32]
@@ -31,6 +33,14 @@
 //! repeats = 2
 //! reference_spp = 512
 //! scenes = ["builtin:cornell-box"]
+//!
+//! [[criterion]]                   # what is good, judged scene by scene: super::sweep_criteria has all kinds
+//! name = "the same mean"
+//! is.bias = { of = ["default", "from bounce 3"], within = 0.01 }
+//!
+//! [headline]                      # optional: one number for a list of experiments
+//! words = "time of the default over that from bounce 3, at equal error"
+//! is.speed_up = { of = "from bounce 3", over = "default" }
 //! ```
 //!
 //! Unknown keys are refused. Settings are the technique's (`clerestory list path`).
@@ -132,9 +142,6 @@ pub struct Variant {
     /// Its settings, where they differ from the defaults.
     #[serde(default)]
     pub settings: Map<String, Value>,
-    /// Expected slope of log RMSE against log samples, −½ for independent samples.
-    #[serde(default)]
-    pub slope: Option<f64>,
 }
 
 /// What the smoke form takes in place of the sweep's own.
@@ -163,6 +170,16 @@ pub enum Budget {
     Spp(u32),
     /// After about this many seconds of wall clock.
     Seconds(f64),
+}
+
+impl Budget {
+    /// Its number: samples a pixel or seconds.
+    pub fn amount(self) -> f64 {
+        match self {
+            Self::Spp(spp) => f64::from(spp),
+            Self::Seconds(seconds) => seconds,
+        }
+    }
 }
 
 impl std::fmt::Display for Budget {
@@ -339,7 +356,7 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "scenes = [\"builtin:ring\"]\nsize = [96, 64]\nspp = [4, 16]\nreference = { spp = 1024 }\n\
-                        [[variant]]\nname = \"a\"\nsettings = { sampler = \"pcg\" }\nslope = -0.5\n[[variant]]\nname = \"b\"\n";
+                        [[variant]]\nname = \"a\"\nsettings = { sampler = \"pcg\" }\n[[variant]]\nname = \"b\"\n";
 
     fn changed(from: &str, to: &str) -> std::result::Result<Sweep, String> {
         assert!(TEXT.contains(from), "{from}");

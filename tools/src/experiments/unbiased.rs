@@ -101,6 +101,32 @@ pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
     })
 }
 
+/// Standard error of a reference's mean by its variance layer, over that mean; 0 of a black one. Pixels are independent; channels of a pixel count as
+/// fully correlated, which bounds it from above.
+///
+/// # Errors
+/// [`Error::Picture`] when the reference has no variance layer.
+pub fn error_of_mean(reference: &Picture) -> Result<f64> {
+    let (b, variance) = (reference.main_layer()?, reference.require(VARIANCE)?);
+    let finite = b.pixels().zip(variance.pixels()).filter(|(b, variance)| {
+        let mut values = b.iter().chain(variance);
+        values.all(|value| value.is_finite())
+    });
+    let (levels, squares): (Vec<f64>, Vec<f64>) = finite
+        .map(|(b, variance)| {
+            let level: f64 = b.iter().map(|value| f64::from(*value)).sum();
+            let deviation: f64 = variance.iter().map(|value| f64::from(*value).max(0.0).sqrt()).sum();
+            (level, deviation * deviation)
+        })
+        .unzip();
+    let level = sum(&levels);
+    Ok(if level == 0.0 {
+        0.0
+    } else {
+        sum(&squares).sqrt() / level.abs()
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use clerestory_hard_cases::random::Random;
@@ -125,6 +151,19 @@ mod tests {
         assert!((error.reference_error - by_reference).abs() < 1e-15);
         assert!((error.reference_relative_error - by_reference / 1.01).abs() < 1e-15);
         assert_eq!(error.skipped, 1);
+    }
+
+    #[test]
+    fn the_error_of_a_mean_is_that_of_a_sum_of_pixels() {
+        let mut reference = Picture::from_radiance(2, 1, vec![1.0, 1.0, 1.0, 3.0, 3.0, 3.0]).unwrap();
+        assert!(error_of_mean(&reference).is_err(), "without variance");
+        let variance = vec![0.25, 0.25, 0.25, 1.0, 1.0, 1.0];
+        reference.add_layer(VARIANCE, 3, variance).unwrap();
+        // Sums of pixels 3 ± 1.5 and 9 ± 3.
+        assert!((error_of_mean(&reference).unwrap() - 11.25f64.sqrt() / 12.0).abs() < 1e-15);
+        let mut black = Picture::from_radiance(1, 1, vec![0.0; 3]).unwrap();
+        black.add_layer(VARIANCE, 3, vec![0.0; 3]).unwrap();
+        assert_eq!(error_of_mean(&black).unwrap(), 0.0);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The page of a sweep: one HTML file with everything in it, plots as inline SVG and pictures as base64, that loads nothing from anywhere.
+//! The page of a sweep: one HTML file with everything in it, verdicts first, plots as inline SVG and pictures as base64, that loads nothing from
+//! anywhere.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,9 +9,10 @@ use base64::engine::general_purpose::STANDARD;
 use clerestory::Result;
 use clerestory::film::png::Rgb8;
 
+use super::findings::{Findings, Headline};
 use super::plot::{self, Curve, PlotPoint, Words};
 use super::results::Results;
-use super::series::{SceneSeries, Work};
+use super::series::{SceneSeries, Series, SeriesPoint, Work};
 use super::strip::{self, Strip};
 use super::summary;
 use super::table::{Cell, Table};
@@ -95,34 +97,55 @@ fn table_html(table: &Table) -> String {
     html
 }
 
+/// What plots of sweeps show on the axis of errors.
+pub const ERROR: &str = "relative RMSE";
+
+/// A scene's errors against some work, a curve for each variant.
+pub fn curves_of(scene: &SceneSeries, work: Work) -> Vec<Curve> {
+    let point = |point: &SeriesPoint| PlotPoint {
+        x: point.work(work),
+        y: point.relative_rmse,
+        y_range: point.relative_rmse_range,
+        ringed: work == Work::Seconds && point.on_front,
+    };
+    let curve = |series: &Series| Curve {
+        name: series.name.clone(),
+        points: series.points.iter().map(point).collect(),
+    };
+    scene.series.iter().map(curve).collect()
+}
+
 /// The plot of a scene's errors against some work; `None` without points.
 ///
 /// # Errors
 /// As [`plot::log_log`].
 pub fn plot_of(scene: &SceneSeries, work: Work) -> Result<Option<String>> {
-    let curves: Vec<Curve> = scene
-        .series
-        .iter()
-        .map(|series| Curve {
-            name: series.name.clone(),
-            points: series
-                .points
-                .iter()
-                .map(|point| PlotPoint {
-                    x: point.work(work),
-                    y: point.relative_rmse,
-                    y_range: point.relative_rmse_range,
-                    ringed: work == Work::Seconds && point.on_front,
-                })
-                .collect(),
-        })
-        .collect();
     let words = Words {
         title: &scene.address,
         x: work.label(),
-        y: "relative RMSE",
+        y: ERROR,
     };
-    plot::log_log(words, &curves)
+    plot::log_log(words, &curves_of(scene, work))
+}
+
+/// Verdicts, then the one number.
+fn verdicts_html(findings: &Findings) -> String {
+    let mut html = String::new();
+    if !findings.verdicts.is_empty() {
+        let verdicts = findings.verdicts.iter();
+        let items: String = verdicts
+            .map(|judged| format!("<li>{}</li>\n", inline(&judged.to_string())))
+            .collect();
+        html += &format!("<ul class=\"verdicts\">\n{items}</ul>\n");
+    }
+    if let Some(Headline { words, found }) = &findings.headline {
+        html += &format!(
+            "<p>In one number: {}: <b>{}</b>.</p>\n",
+            inline(words),
+            Cell::from(*found)
+        );
+    }
+    html
 }
 
 fn picture(of: &Rgb8, alt: &str) -> Result<String> {
@@ -167,15 +190,21 @@ fn strip_html(strip: &Strip) -> Result<String> {
     Ok(format!("<table class=\"strip\">{rows}</table>\n"))
 }
 
-/// The whole page. `strips` are those of the scenes, in order.
+/// The whole page. `strips` are those of the scenes, in order, where pictures are there.
 ///
 /// # Errors
 /// [`clerestory::Error::Picture`] or [`clerestory::Error::Io`] for a picture or plot that cannot be made.
-pub fn html(results: &Results, scenes: &[SceneSeries], strips: &[Strip]) -> Result<String> {
+pub fn html(
+    results: &Results,
+    scenes: &[SceneSeries],
+    findings: &Findings,
+    strips: &[Option<Strip>],
+) -> Result<String> {
     let title = format!("{}: {}", results.experiment, results.title);
     let mut page = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n<p>{1}</p>\n<ul>\n",
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n{1}<p>{2}</p>\n<ul>\n",
         escaped(&title),
+        verdicts_html(findings),
         inline(&results.about)
     );
     for fact in summary::facts(results) {
@@ -196,7 +225,7 @@ pub fn html(results: &Results, scenes: &[SceneSeries], strips: &[Strip]) -> Resu
             page += &plot_of(scene, work)?.unwrap_or_default();
         }
         page += "</div>\n<p class=\"note\">Bars span the least and greatest of the repeats; rings mark the Pareto front of time and error.</p>\n";
-        if let Some(strip) = strips.get(index) {
+        if let Some(Some(strip)) = strips.get(index) {
             page += &strip_html(strip)?;
         }
         page += &table_html(&budgets);
@@ -207,6 +236,7 @@ pub fn html(results: &Results, scenes: &[SceneSeries], strips: &[Strip]) -> Resu
 
 #[cfg(test)]
 mod tests {
+    use super::super::findings::{self, Bound, Measured};
     use super::super::series;
     use super::super::summary::tests::made_up_results;
     use super::*;
@@ -215,8 +245,22 @@ mod tests {
     fn the_page_holds_everything_and_loads_nothing() {
         let results = made_up_results();
         let scenes = series::of(&results);
-        let strips: Vec<Strip> = results.scenes.iter().map(|scene| strip::of(scene).unwrap()).collect();
-        let page = html(&results, &scenes, &strips).unwrap();
+        let strips: Vec<Option<Strip>> = results.scenes.iter().map(|scene| strip::of(scene).unwrap()).collect();
+        let verdicts = vec![findings::judge(
+            "faster, <always>",
+            Bound::AtLeast(1.0),
+            "",
+            [("`ring`".to_owned(), Measured::exact(0.5))],
+        )];
+        let findings = Findings {
+            verdicts,
+            ..Findings::default()
+        }
+        .headline("a & b", Some(Measured::exact(2.0)));
+        let page = html(&results, &scenes, &findings, &strips).unwrap();
+        let verdict = page.find("<li><b>fails</b> by 0.5000: faster, &lt;always&gt;").unwrap();
+        assert!(verdict < page.find("<p>Compares").unwrap());
+        assert!(page.contains("In one number: a &amp; b: <b>2.000</b>."));
         assert_eq!(page.matches("<svg").count(), 3);
         assert_eq!(page.matches("data:image/png;base64,").count(), 1 + 2 * 3);
         assert!(

@@ -10,7 +10,7 @@ use clerestory_tools::experiments::reference::slug;
 use clerestory_tools::experiments::results::Results;
 use clerestory_tools::experiments::series::{self, Work};
 use clerestory_tools::experiments::strip::{self, Strip};
-use clerestory_tools::experiments::{Experiment, summary, web_page};
+use clerestory_tools::experiments::{Experiment, summary, sweep_criteria, web_page};
 
 use crate::failure::Outcome;
 use crate::output;
@@ -84,14 +84,15 @@ pub fn for_a_page(experiment: &Experiment, findings: &Findings) -> String {
     text
 }
 
-/// Writes everything of a sweep: page, Markdown, JSON, CSV, plots and picture strips. Returns the Markdown of facts and tables.
-pub fn sweep(folder: &Path, results: &Results) -> Outcome<String> {
+/// Writes everything of a sweep: page, Markdown, JSON, CSV, plots and picture strips. Returns the Markdown of verdicts, facts and tables.
+pub fn sweep(folder: &Path, experiment: &Experiment, results: &Results) -> Outcome<String> {
     let (plots, strips) = (folder.join("plots"), folder.join("strips"));
     for folder in [folder, &plots, &strips] {
         make(folder)?;
     }
     let scenes = series::of(results);
-    let made: clerestory::Result<Vec<Strip>> = results.scenes.iter().map(strip::of).collect();
+    let findings = sweep_criteria::findings(experiment, results, &scenes);
+    let made: clerestory::Result<Vec<Option<Strip>>> = results.scenes.iter().map(strip::of).collect();
     let made = made?;
     for (scene, strip) in scenes.iter().zip(&made) {
         let name = slug(&scene.address);
@@ -100,21 +101,32 @@ pub fn sweep(folder: &Path, results: &Results) -> Outcome<String> {
                 write(&plots.join(format!("{name}-{}.svg", work.word())), &svg)?;
             }
         }
-        png::write(strips.join(format!("{name}.png")), &strip.composed())?;
+        if let Some(strip) = strip {
+            png::write(strips.join(format!("{name}.png")), &strip.composed())?;
+        }
     }
+    let verdicts = verdicts_first(&findings);
     let text = summary::markdown(results, &scenes);
     let page = format!(
-        "# {}: {}\n\n{}\n\n{text}",
+        "# {}: {}\n\n{verdicts}{}\n\n{text}",
         results.experiment, results.title, results.about
     );
     write(&folder.join("report.md"), &page)?;
     write(&folder.join("measurements.csv"), &summary::measurements(results).csv())?;
-    let document = serde_json::json!({ "results": results, "statistics": scenes });
+    let document = serde_json::json!({
+        "verdicts": findings.verdicts,
+        "headline": findings.headline,
+        "results": results,
+        "statistics": scenes,
+    });
     write(
         &folder.join("report.json"),
         &output::json_text("report.json", &document)?,
     )?;
     // Last, so that a page that is there has all that stands beside it.
-    write(&folder.join("index.html"), &web_page::html(results, &scenes, &made)?)?;
-    Ok(text)
+    write(
+        &folder.join("index.html"),
+        &web_page::html(results, &scenes, &findings, &made)?,
+    )?;
+    Ok(verdicts + &text)
 }

@@ -301,7 +301,7 @@ fn render(
             error.into()
         }
     })?;
-    let text = files::sweep(&places.folder, &results)?;
+    let text = files::sweep(&places.folder, experiment, &results)?;
     match part.filter(|_| !results.interrupted) {
         Some((block, page)) => {
             block.write(&page, &text)?;
