@@ -3,6 +3,7 @@
 mod choice;
 mod files;
 mod progress;
+mod summary;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,6 +31,7 @@ use crate::{frame_report, output, pictures};
 use choice::ChoiceReport;
 use files::{Document, ErrorAgainst, Files};
 use progress::Interruptible;
+use summary::Why;
 
 /// Renders a scene to an EXR picture, a PNG to look at and a JSON report
 #[derive(Debug, Args)]
@@ -44,6 +46,7 @@ Examples:
   clerestory render --spp 4096 -o reference.exr
   clerestory render --spp 16 --seed 1 --reference reference.exr
   clerestory render --settings '{\"roulette_start\": 8}' --stats json | jq .steady_rates
+  clerestory render --stats table                            passes, work, memory and index in full
 
 Beside a model NAME.gltf, NAME.scene.toml may say what glTF cannot: environment map, measured metals, aperture, exposure, technique.
 
@@ -112,7 +115,7 @@ pub struct Arguments {
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time_budget: Option<Duration>,
     /// What to print about the run to standard output
-    #[arg(long, value_enum, default_value_t = Statistics::Table)]
+    #[arg(long, value_enum, default_value_t = Statistics::Summary)]
     stats: Statistics,
     /// A picture of the same view: prints and reports the error against it
     #[arg(long, value_name = "FILE")]
@@ -189,10 +192,12 @@ impl Aov {
 /// What is printed at the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Statistics {
-    /// The frame report as JSON.
-    Json,
-    /// The frame report as a table.
+    /// About ten lines that matter: files, technique, seconds, rates, memory, error.
+    Summary,
+    /// The whole frame report as tables.
     Table,
+    /// The whole frame report as JSON.
+    Json,
     /// Nothing.
     None,
 }
@@ -287,7 +292,13 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     };
     let layers: Vec<&str> = arguments.aov.iter().map(|aov| aov.layer()).collect();
     files.write(&rendered.picture, &layers, &document)?;
-    conclude(arguments, &document, &files)?;
+    let why = match (&plan, &arguments.technique, &scene.defaults.technique) {
+        (Some(plan), ..) => Why::Chosen(plan.goal),
+        (None, Some(_), _) => Why::Asked,
+        (None, None, Some(_)) => Why::Scene,
+        (None, None, None) => Why::Default,
+    };
+    conclude(arguments, &document, &rendered.picture, &files, why)?;
     check_validation(&validation)?;
     Ok(if interrupted {
         Code::Interrupted.into()
@@ -440,9 +451,10 @@ fn measure(arguments: &Arguments, rendered: &Rendered, reference: &Picture, tone
 }
 
 /// Says what came out.
-fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Outcome {
+fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, files: &Files, why: Why) -> Outcome {
     match arguments.stats {
         Statistics::None => {}
+        Statistics::Summary => output::print(&summary::text(document, picture, files, why))?,
         Statistics::Json => output::print_json(document)?,
         Statistics::Table => {
             let mut text = frame_report::text(document.report);
@@ -463,7 +475,8 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
         output::note(&choice.text());
     }
     let report = document.report;
-    if report.non_finite_samples.total() > 0 && arguments.stats != Statistics::Table {
+    let said = matches!(arguments.stats, Statistics::Summary | Statistics::Table);
+    if report.non_finite_samples.total() > 0 && !said {
         output::warn(&format!(
             "{} samples were NaN and {} infinite; they are left out",
             report.non_finite_samples.nan, report.non_finite_samples.infinite
@@ -483,7 +496,10 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
         };
         output::warn(&format!("{cause}: {samples} of {} samples a pixel", report.spp));
     }
-    output::note(&format!("wrote {}", files.names()));
+    // The summary begins with them.
+    if arguments.stats != Statistics::Summary {
+        output::note(&format!("wrote {}", files.names()));
+    }
     Ok(())
 }
 
