@@ -16,7 +16,7 @@
 //!
 //! The modules are floors, and each uses only those below it. From below:
 //!
-//! 1. [`gpu`]: Vulkan, thin.
+//! 1. [`gpu`]: a thin layer over Vulkan.
 //! 2. [`kernels`], sort, scan and the like; [`scene`] and [`film`].
 //! 3. [`accel`], spatial indexes, and [`maps`], maps of directions; above them [`raster`], rasterization.
 //! 4. [`transport`]: what light does.

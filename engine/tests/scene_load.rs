@@ -194,7 +194,7 @@ fn densities_are_generated_or_read_and_placed() {
         ("file = \"a.vol\", generate = \"smoke\"", "either file or generate"),
         ("file = \"none.vol\"", "none.vol"),
         ("file = \"a.nvdb\"", "mitsuba2-vdb-converter"),
-        ("file = \"a.raw\"", "wants size"),
+        ("file = \"a.raw\"", "needs size"),
         ("file = \"a.raw\", size = 2, type = \"int8\"", "known: uint8"),
         (
             "file = \"a.raw\", size = 2, endian = \"middle\"",

@@ -20,7 +20,7 @@ pub fn text(report: &FrameReport) -> String {
         report.scene, report.camera, report.technique, report.path_set
     ));
     text += &line(format!(
-        "{width} × {height} pixels, {samples} samples a pixel, seed {}",
+        "{width} × {height} pixels, {samples} samples per pixel, seed {}",
         report.seed
     ));
     text += &line(format!("{}, driver {}", report.device, report.driver));

@@ -398,7 +398,7 @@ fn an_interrupt_leaves_complete_files() -> Tested {
     let status = child.wait()?;
     assert_eq!(status.code(), Some(130), "{heard}");
     assert!(
-        heard.contains("interrupted") && heard.contains("samples a pixel"),
+        heard.contains("interrupted") && heard.contains("samples per pixel"),
         "{heard}"
     );
     let report = json_file(&path.with_extension("json"))?;

@@ -40,7 +40,7 @@ Examples:
   clerestory render                                          the Cornell box
   clerestory render 'builtin:cornell-box?sphere=glass' --spp 256 -o out/glass.exr
   clerestory render model.glb --camera front --size 1280x720 --time-budget 30s --tone neutral
-  clerestory render model.glb --error 0.02 --explain         as many samples as it takes, by the settings that suit the scene
+  clerestory render model.glb --error 0.02 --explain         as many samples as it takes, with the settings that suit the scene
   clerestory render model.glb --time 20s                     the best picture in that time
   clerestory render --path-set direct --aov normal,albedo,depth
   clerestory render --spp 4096 -o reference.exr
@@ -50,20 +50,20 @@ Examples:
 
 Beside a model NAME.gltf, NAME.scene.toml may say what glTF cannot: environment map, measured metals, aperture, exposure, technique.
 
-Ctrl-C stops after the step at hand and writes what is there, with exit code 130; a second one stops at once and writes nothing. \
+Ctrl-C stops after the current step and writes the picture so far, with exit code 130; a second one stops at once and writes nothing. \
 `clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
 pub struct Arguments {
     /// A scene file (gltf, glb, ply, obj, toml) or `builtin:` address
     #[arg(default_value = "builtin:cornell-box")]
     scene: String,
     /// The picture to write: NAME.exr with NAME.png and NAME.json beside it, or NAME.png with NAME.json; by default out/SCENE.exr.
-    /// A folder that is not there is made, which the error output says
+    /// Missing folders are created, which the error output says
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Technique; by default the scene's, else `path`
     #[arg(long, value_name = "ID")]
     technique: Option<String>,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
     /// Pixels: WIDTHxHEIGHT, or the height alone; by default the reference's size, else 512 high by the scene's aspect
@@ -77,15 +77,15 @@ pub struct Arguments {
     camera: Option<String>,
     /// Chooses technique, settings and samples for this error: the root of the relative MSE, 0.02 is 2 %
     ///
-    /// Small pilot pictures judge noise and bias of every technique; one whose bias exceeds the error is refused with that figure, and so is the
-    /// path tracer where it misses light that others find (what lights without area give by way of mirrors and smooth glass). --explain shows
+    /// Small pilot pictures measure the noise and bias of every technique. One whose bias exceeds the error is refused with that figure, and so is the
+    /// path tracer where it misses light that others find (light of sources without area by way of mirrors and smooth glass). --explain shows
     /// all figures.
     #[arg(long, value_name = "ERROR", value_parser = positive, conflicts_with_all = ["spp", "time_budget"])]
     error: Option<f64>,
-    /// Chooses technique, settings and samples for this time, pilots included; with --error, its limit: 10s, 500ms, 2min
+    /// Chooses technique, settings and samples for this time, pilots included (10s, 500ms, 2min); with --error, the most that it may take
     #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with_all = ["spp", "time_budget"])]
     time: Option<Duration>,
-    /// Shows what could have been chosen, and why it was not
+    /// Shows the alternatives, and why they were not chosen
     #[arg(long)]
     explain: bool,
     /// Which light paths: words or an expression from light to eye, e.g. direct, LS+DE; --help says more
@@ -96,13 +96,13 @@ pub struct Arguments {
     /// them are intersected. Put expressions in quotes: 'L(D|S)E', 'LD{1,3}E', '!L.*S.*E'. docs/path-sets.md shows pictures.
     #[arg(long, value_name = "SET", value_parser = parse_path_set)]
     path_set: Option<PathSet>,
-    /// Sequence of random numbers; by default as the settings say, else sobol
+    /// Sequence of random numbers; by default that of the settings, else sobol
     #[arg(long, value_enum)]
     sampler: Option<Sampler>,
-    /// Index of the rays: bvh2 by binned SAH, lbvh along the Morton curve (least build, slower rays), lbvh-high optimised, lbvh-device as lbvh but built by the device, kd a kd-tree (longest build). The picture is the same
+    /// Ray index: bvh2 by binned SAH, lbvh along the Morton curve (shortest build, slower rays), lbvh-high optimised, lbvh-device like lbvh but built by the device, kd a kd-tree (longest build). The picture is the same with each
     #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd", default_value_t, value_parser = parse_index)]
     index: IndexKind,
-    /// With --index kd: folder that keeps kd-trees; one of the same triangles is read from there, not built anew
+    /// With --index kd: folder that keeps kd-trees; a tree over the same triangles is read from there instead of being built again
     #[arg(long, value_name = "FOLDER")]
     index_cache: Option<PathBuf>,
     /// The technique's settings as JSON, or @FILE that holds them
@@ -111,7 +111,7 @@ pub struct Arguments {
     /// Layers of the EXR besides radiance
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,…")]
     aov: Vec<Aov>,
-    /// Stops after about this time with the samples there are: 10s, 500ms, 2min
+    /// Stops after about this time with the samples taken so far: 10s, 500ms, 2min
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time_budget: Option<Duration>,
     /// What to print about the run to standard output
@@ -205,7 +205,7 @@ enum Statistics {
 fn positive(text: &str) -> Result<f64, String> {
     match finite(text)? {
         number if number > 0.0 => Ok(number),
-        _ => Err("is not above 0".into()),
+        _ => Err("must be above 0".into()),
     }
 }
 
@@ -229,7 +229,7 @@ fn without_name(error: Error) -> String {
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if arguments.index_cache.is_some() && !matches!(arguments.index, IndexKind::Kd(_)) {
         return Err(Failure::usage(
-            "--index-cache keeps kd-trees alone; it goes with --index kd",
+            "--index-cache keeps only kd-trees; use it with --index kd",
         ));
     }
     let scene = scene::load(&arguments.scene).map_err(Failure::scene)?;
@@ -395,7 +395,7 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Settings> {
     Ok(settings.into())
 }
 
-/// The option of the command line for what is no technique's setting.
+/// The option of the command line for what is not a technique's setting.
 fn option_of(name: &str) -> Option<&'static str> {
     match name {
         "seed" => Some("--seed"),
@@ -421,7 +421,7 @@ fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
         None => (text.to_owned(), "the text"),
     };
     serde_json::from_str(&text).map_err(|cause| {
-        Failure::usage(format!("--settings: {from} is no JSON object: {cause}"))
+        Failure::usage(format!("--settings: {from} is not a JSON object: {cause}"))
             .hint("write for example --settings '{\"roulette_start\": 8}'; `clerestory list path` explains all settings of a technique")
     })
 }
@@ -494,7 +494,7 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, f
         } else {
             "time is up"
         };
-        output::warn(&format!("{cause}: {samples} of {} samples a pixel", report.spp));
+        output::warn(&format!("{cause}: {samples} of {} samples per pixel", report.spp));
     }
     // The summary begins with them.
     if arguments.stats != Statistics::Summary {
