@@ -44,7 +44,7 @@ pub struct Compiler {
 pub struct Shader {
     /// Path below the folder of shaders, with forward slashes: `accel/trace_rays.comp`.
     pub name: String,
-    /// First comment block of the file, one string a line.
+    /// First comment block of the file, one string per line.
     pub head: Vec<String>,
     /// The module that goes into the library.
     pub embedded: PathBuf,

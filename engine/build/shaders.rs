@@ -13,7 +13,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// Where the generated code finds what it refers to.
 pub struct Paths {
-    /// The engine's module `gpu`: `clerestory::gpu` outside of the engine.
+    /// The engine's module `gpu`: `clerestory::gpu` outside the engine.
     pub gpu: &'static str,
     /// The module that includes the generated file: `crate::shaders`.
     pub shaders: &'static str,

@@ -47,7 +47,7 @@ pub enum Error {
         cause: String,
     },
     /// Something is larger than a limit of the device or of the engine allows. Buffers are in bytes; else the limit's name says what counts.
-    #[error("{name:?} wants {value}, more than {limit_name} = {limit}")]
+    #[error("{name:?} needs {value}, more than {limit_name} = {limit}")]
     LimitExceeded {
         /// The buffer's or image's name.
         name: String,
@@ -59,7 +59,7 @@ pub enum Error {
         limit: u64,
     },
     /// The device was lost while it worked.
-    #[error("the device was lost in or after pass {last_pass:?}; the Gpu must be made anew")]
+    #[error("the device was lost in or after pass {last_pass:?}; the Gpu must be created again")]
     DeviceLost {
         /// The last pass that the crash markers saw begin.
         last_pass: String,

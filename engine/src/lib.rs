@@ -16,7 +16,7 @@
 //!
 //! The modules are floors, and each uses only those below it. From below:
 //!
-//! 1. [`gpu`]: Vulkan, thin.
+//! 1. [`gpu`]: a thin layer over Vulkan.
 //! 2. [`kernels`], sort, scan and the like; [`scene`] and [`film`].
 //! 3. [`accel`], spatial indexes, and [`maps`], maps of directions; above them [`raster`], rasterization.
 //! 4. [`transport`]: what light does.
@@ -57,3 +57,8 @@ pub use error::{Error, Result};
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 struct Readme;
+
+/// The examples of the reference, compiled as doc tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/reference.md")]
+struct Reference;

@@ -43,7 +43,7 @@ pub struct RenderOptions {
     pub camera: Option<String>,
     /// Pixels across and down.
     pub size: [u32; 2],
-    /// Samples a pixel to stop at.
+    /// Samples per pixel to stop at.
     pub spp: u32,
     /// Seed of the random numbers.
     pub seed: u32,
@@ -106,9 +106,9 @@ pub struct FrameReport {
     pub path_set: String,
     /// Pixels across and down.
     pub size: [u32; 2],
-    /// Samples a pixel that were asked for.
+    /// Samples per pixel that were asked for.
     pub spp: u32,
-    /// Least and greatest number of samples that a pixel has got.
+    /// Fewest and most samples that a pixel has received.
     pub samples: [u32; 2],
     /// Seed.
     pub seed: u32,
@@ -183,7 +183,7 @@ pub struct RendererDesc {
     /// Kind of the ray index.
     pub index: IndexKind,
     /// Folder where a kd-tree is read from if the same was kept there before, and kept otherwise. The report says which
-    /// ([`IndexReport::kept`]); what cannot be read or written there is no error.
+    /// ([`IndexReport::kept`]); failing to read or write there is not an error.
     pub index_folder: Option<PathBuf>,
 }
 
@@ -366,7 +366,7 @@ impl Rendering {
         }))
     }
 
-    /// Asks for another number of samples a pixel; those that are there stay.
+    /// Asks for another number of samples per pixel; those that are there stay.
     pub fn set_spp(&mut self, spp: u32) {
         self.options.spp = spp;
         self.finished = false;
@@ -382,7 +382,7 @@ impl Rendering {
         self.technique.path_set()
     }
 
-    /// Looks through another camera, from the first sample and second on.
+    /// Looks through another camera, starting again from the first sample and second.
     ///
     /// # Errors
     /// [`Error::Setting`], [`Error::DeviceLost`].

@@ -82,9 +82,9 @@ fn a_sidecar_adds_what_the_model_cannot_say() {
 }
 
 #[test]
-fn the_sidecar_of_the_readme_is_understood() {
-    let readme = include_str!("../../README.md");
-    let block = readme
+fn the_sidecar_of_the_reference_is_understood() {
+    let reference = include_str!("../../docs/reference.md");
+    let block = reference
         .split("```toml\n")
         .nth(1)
         .and_then(|rest| rest.split("```").next());
@@ -194,7 +194,7 @@ fn densities_are_generated_or_read_and_placed() {
         ("file = \"a.vol\", generate = \"smoke\"", "either file or generate"),
         ("file = \"none.vol\"", "none.vol"),
         ("file = \"a.nvdb\"", "mitsuba2-vdb-converter"),
-        ("file = \"a.raw\"", "wants size"),
+        ("file = \"a.raw\"", "needs size"),
         ("file = \"a.raw\", size = 2, type = \"int8\"", "known: uint8"),
         (
             "file = \"a.raw\", size = 2, endian = \"middle\"",

@@ -80,7 +80,7 @@ impl Sheet {
         lettering::write(text, dot, |x, y| self.put(left + x, top + y, color));
     }
 
-    /// Four bytes a pixel, rows from top to bottom.
+    /// Four bytes per pixel, rows from top to bottom.
     pub fn bytes(&self, format: PixelFormat) -> Vec<u8> {
         let of = |[r, g, b]: [u8; 3]| match format {
             PixelFormat::Rgba8 => [r, g, b, u8::MAX],

@@ -13,7 +13,7 @@ use crate::orbit::{Orbit, Pose};
 
 /// Time of work for one frame.
 const FRAME: Duration = Duration::from_millis(50);
-/// Samples a pixel after which a picture is left as it is.
+/// Samples per pixel after which a picture is left as it is.
 const SAMPLES: u32 = 1 << 20;
 
 /// A picture that follows a camera and a window's size.
@@ -43,7 +43,7 @@ struct State {
 pub struct Frame {
     /// Pixels of four bytes, rows from top to bottom; finished, and may be copied from.
     pub pixels: Buffer,
-    /// Samples a pixel so far, on average.
+    /// Samples per pixel so far, on average.
     pub samples: f64,
     /// Rays traced for this frame.
     pub rays: u64,

@@ -81,7 +81,7 @@ fn hello_triangle_offscreen_draws_its_corners() {
         let pixel = picture.get_pixel(x, y).0;
         (0..3).max_by_key(|channel| pixel[*channel]).unwrap()
     };
-    // Near the corners red (top), green (right) and blue (left); outside of the triangle the background.
+    // Near the corners red (top), green (right) and blue (left); outside the triangle the background.
     assert_eq!([dominant(256, 80), dominant(430, 395), dominant(80, 395)], [0, 1, 2]);
     assert_eq!(picture.get_pixel(10, 10), picture.get_pixel(500, 500));
     assert_ne!(picture.get_pixel(10, 10), picture.get_pixel(256, 256));
@@ -401,7 +401,7 @@ fn the_photon_viewer_converges_while_nothing_moves() {
 fn the_photon_viewers_camera_flies() {
     let arguments = ["--turn", "0", "--flight", "0.1", "--frames"];
     let [before, after] = ["1", "4"].map(|frames| photon_viewer(&[&arguments[..], &[frames]].concat()).0);
-    // By how many pixels the picture has gone to the left: the floor is seen from 2.3 m at 28 pixels a metre.
+    // By how many pixels the picture has gone to the left: the floor is seen from 2.3 m at 28 pixels per metre.
     let difference = |shift: u32| {
         let shared = (0..60).flat_map(|y| (20..60).map(move |x| (x, y)));
         let pairs = shared.map(|(x, y)| (before.get_pixel(x, y)[1], after.get_pixel(x - shift, y)[1]));

@@ -23,7 +23,7 @@ const uint BVH2_MAX_DEPTH = 32u;
 #define BVH2_UNFINISHED (word != INDEX_FINISHED && (iterations < INDEX_QUOTA || (word & BVH2_COUNT_MASK) != 0u))
 
 #ifdef CLERESTORY_CANDIDATE_FILTER
-// The filter is asked outside of the loop, where lanes wait for each other with their candidates: inside, where subgroups run both sides of
+// The filter is asked outside the loop, where lanes wait for each other with their candidates: inside, where subgroups run both sides of
 // branches, every iteration would pay for it.
 #define BVH2_BEGIN_CANDIDATES \
     bool awaiting; \

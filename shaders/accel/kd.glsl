@@ -227,7 +227,7 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     uint size = 0u;
     uint reference = 0u;
     uint reference_end = 0u;
-    // Of caches: the last entry; the last cached nodes, four bytes a word, the older word first; a leaf that waits, its references and their end.
+    // Of caches: the last entry; the last cached nodes, four bytes per word, the older word first; a leaf that waits, its references and their end.
     uvec2 head = uvec2(0u);
     uvec2 bytes = uvec2(0u);
     uvec2 postponed = uvec2(0u);

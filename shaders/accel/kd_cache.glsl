@@ -20,7 +20,7 @@ const uint KD_STACK_CACHE_BYTES = 2u;
 const uint KD_HEAP_LEVELS = 10u;
 const uint KD_BYTE_LEVELS = 8u;
 
-// The oldest of nodes that are four bytes a word, the older word first; 0 for none.
+// The oldest of nodes that are four bytes per word, the older word first; 0 for none.
 uint kd_oldest_byte(uvec2 bytes) {
     uint word = bytes.x != 0u ? bytes.x : bytes.y;
     return word >> (max(findMSB(word), 0) & ~7);

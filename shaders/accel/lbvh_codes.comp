@@ -12,7 +12,7 @@ layout(constant_id = 0) const uint LBVH_AXIS_BITS = 10u;
 
 layout(set = 0, binding = 0) uniform utextureBuffer lbvh_boxes;
 layout(set = 0, binding = 1, scalar) restrict readonly buffer LbvhStateBlock { LbvhState lbvh_state; };
-// One word a code of 30 bits, two of 63 with the low one first.
+// One word per code of 30 bits, two of 63 with the low one first.
 layout(set = 0, binding = 2, scalar) restrict writeonly buffer LbvhCodes { uint lbvh_codes[]; };
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer LbvhOrder { uint lbvh_order[]; };
 

@@ -1,5 +1,5 @@
 // Last stage of the linear hierarchy: nodes and triangles in the layout that rays traverse (accel/index_bindings.glsl), the root first and
-// the others in the order of their splits, without those inside of leaves.
+// the others in the order of their splits, without those inside leaves.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

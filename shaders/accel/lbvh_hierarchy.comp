@@ -18,7 +18,7 @@ layout(constant_id = 0) const uint LBVH_CODE_WORDS = 1u;
 layout(constant_id = 2) const uint LBVH_RUN = 1u;
 
 layout(set = 0, binding = 5) uniform utextureBuffer lbvh_boxes;
-// Sorted; four words a texel.
+// Sorted; four words per texel.
 layout(set = 0, binding = 6) uniform utextureBuffer lbvh_codes;
 layout(set = 0, binding = 7) uniform utextureBuffer lbvh_order;
 

@@ -1,7 +1,7 @@
 // Second stage of refitting: boxes of moved triangles from the leaves up; the tree stays what it is. Twin of
 // clerestory::accel::lbvh::refit.
 //
-// One invocation a child of a node: those of leaves climb, and the second to arrive at a node goes on. The host fills `lbvh_arrival_counters` with
+// One invocation per child of a node: those of leaves climb, and the second to arrive at a node goes on. The host fills `lbvh_arrival_counters` with
 // zero.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -31,7 +31,7 @@ struct LbvhSubtree {
 
 layout(set = 0, binding = 0, scalar) restrict coherent buffer LbvhNodes { int lbvh_nodes[]; };
 layout(set = 0, binding = 1, scalar) restrict coherent buffer LbvhSummaries { LbvhSummary lbvh_summaries[]; };
-// 1 for nodes that stay, 0 for those inside of leaves.
+// 1 for nodes that stay, 0 for those inside leaves.
 layout(set = 0, binding = 2, scalar) restrict coherent buffer LbvhRetained { uint lbvh_retained[]; };
 layout(set = 0, binding = 3, scalar) restrict buffer LbvhStateBlock { LbvhState lbvh_state; };
 // Nodes that wait for what is below another run: how many of each run, then the first of each run, the second of each run, and so on.

@@ -1,5 +1,5 @@
 #version 460
-// Boxes of blocks of four places, and of blocks of blocks, a level a dispatch. The first of them puts the places' own boxes into their order.
+// Boxes of blocks of four places, and of blocks of blocks, a level per dispatch. The first of them puts the places' own boxes into their order.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -11,7 +11,7 @@ layout(local_size_x = MAP_GROUP_SIZE) in;
 layout(constant_id = 0) const bool MAP_PLACES = false;
 
 layout(set = 0, binding = 0) uniform utextureBuffer map_boxes;
-// Sorted; four words a texel.
+// Sorted; four words per texel.
 layout(set = 0, binding = 1) uniform utextureBuffer map_order;
 layout(set = 0, binding = 2, scalar) restrict buffer MapBlocks { ivec4 map_blocks_out[]; };
 

@@ -23,7 +23,7 @@ const uint MAP_RANGE_STEPS = 112u;
 
 // Inner nodes of a level stand one behind the other.
 struct MapTreeLevel {
-    uint groups[3];  // indirect arguments: one invocation a node
+    uint groups[3];  // indirect arguments: one invocation per node
     uint count;
     uint begin;
 };
@@ -32,7 +32,7 @@ struct MapTreeLevel {
 // another kernel instead.
 struct MapTreeState {
     MapTreeLevel levels[MAP_LEVELS + 1u];
-    uint node_groups[3];  // indirect arguments: one invocation an inner node
+    uint node_groups[3];  // indirect arguments: one invocation per inner node
     uint nodes;           // inner nodes
     uint leaf_size;
 };
@@ -43,7 +43,7 @@ bool map_splits(uint first, uint last, uint first_code, uint last_code, uint lea
 }
 
 #ifdef MAP_CODES
-// Sorted; four words a texel.
+// Sorted; four words per texel.
 layout(set = 0, binding = 0) uniform utextureBuffer map_codes;
 
 uint map_code(uint place) { return texelFetch(map_codes, int(place >> 2))[place & 3u]; }

@@ -1,4 +1,4 @@
-// The trace kernel, a ray an invocation.
+// The trace kernel, a ray per invocation.
 #ifndef CLERESTORY_ACCEL_TRACE_GLSL
 #define CLERESTORY_ACCEL_TRACE_GLSL
 

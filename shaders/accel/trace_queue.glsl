@@ -4,7 +4,7 @@
 
 #include "accel/trace_ray.glsl"
 
-// Batches that a workgroup fetches in one dispatch; 0 sets no end. Software drivers end loops in silence after so many iterations of all
+// Batches that a workgroup fetches in one dispatch; 0 sets no end. Software drivers end loops silently after so many iterations of all
 // loops of an invocation together: the quotas of batches and of rays must stay below it, or rays are lost.
 layout(constant_id = 1) const uint TRACE_FETCHES = 64u;
 // Rays of a batch.

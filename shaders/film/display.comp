@@ -1,5 +1,5 @@
 #version 460
-// Film to the screen: mean radiance, exposed, clipped and sRGB-encoded, as four bytes a pixel. Pixels without samples are black.
+// Film to the screen: mean radiance, exposed, clipped and sRGB-encoded, as four bytes per pixel. Pixels without samples are black.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

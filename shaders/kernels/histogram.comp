@@ -15,7 +15,7 @@ layout(push_constant, scalar) uniform Push {
     uint mask;   // of a value, at bit 0
 } push;
 layout(set = 0, binding = 1, scalar) restrict readonly buffer HistogramWords { uint histogram_words[]; };
-// One word a bin, and one for all other values.
+// One word per bin, and one for all other values.
 layout(set = 0, binding = 2, scalar) restrict buffer HistogramCounts { uint histogram_counts[]; };
 
 shared uint counts[COUNTERS];

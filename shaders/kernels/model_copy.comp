@@ -1,4 +1,4 @@
-// Copies a buffer, sixteen bytes an invocation.
+// Copies a buffer, sixteen bytes per invocation.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 

@@ -1,4 +1,4 @@
-// A stream of elements cut into blocks, one a team: what every reduce-then-scan kernel shares.
+// A stream of elements cut into blocks, one per team: what every reduce-then-scan kernel shares.
 //
 // A team is one workgroup, or one invocation where barriers cost more than they bring (software drivers). Teams own contiguous blocks in
 // order, so what they find is combined in order, and results do not depend on how many there are. The number of teams is bounded, so a

@@ -1,5 +1,5 @@
 #version 460
-// Look-ups in a map of directions, one a query.
+// Look-ups in a map of directions, one per query.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

@@ -40,7 +40,7 @@ ivec2 directional_wrap(ivec2 p, ivec2 size) {
     return DIRECTIONAL_KIND == DIRECTIONAL_LAT_LONG ? lat_long_wrap(p, size) : octahedron_wrap(p, size);
 }
 
-// Whether there is a texel at a place up to one outside of a layer of a map without borders; layer and place become those of the texel.
+// Whether there is a texel at a place up to one outside a layer of a map without borders; layer and place become those of the texel.
 bool directional_find(inout uint layer, inout ivec2 p, ivec2 size) {
     bvec2 outside = bvec2(p.x < 0 || p.x >= size.x, p.y < 0 || p.y >= size.y);
     if (DIRECTIONAL_KIND == DIRECTIONAL_CUBE) {

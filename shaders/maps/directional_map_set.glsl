@@ -11,7 +11,7 @@ layout(set = 1, binding = 1, scalar) restrict readonly buffer MapTexels { vec3 m
 // Of texels, sr.
 layout(set = 1, binding = 2, scalar) restrict readonly buffer MapAngles { float map_angles[]; };
 
-// A texel up to one outside of the level.
+// A texel up to one outside the level.
 vec3 directional_fetch(MapLevel level, ivec2 p) {
     if (DIRECTIONAL_BORDER == 0 && (min(p.x, p.y) < 0 || any(greaterThanEqual(p, level.size)))) {
         p = directional_wrap(p, level.size);

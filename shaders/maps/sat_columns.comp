@@ -1,5 +1,5 @@
 #version 460
-// Second half of a summed-area table: sums down its columns, an invocation a column.
+// Second half of a summed-area table: sums down its columns, an invocation per column.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

@@ -1,5 +1,5 @@
 #version 460
-// Lobes about directions by weighted boxes of a summed-area table, one a query. Sources and guarantees: maps/box_lobe.rs.
+// Lobes about directions by weighted boxes of a summed-area table, one per query. Sources and guarantees: maps/box_lobe.rs.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

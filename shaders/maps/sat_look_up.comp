@@ -1,5 +1,5 @@
 #version 460
-// Means over boxes about directions by a summed-area table, one a query.
+// Means over boxes about directions by a summed-area table, one per query.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

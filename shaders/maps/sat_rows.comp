@@ -1,5 +1,5 @@
 #version 460
-// First half of a summed-area table: sums along the rows of a bordered map, an invocation a row.
+// First half of a summed-area table: sums along the rows of a bordered map, an invocation per row.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

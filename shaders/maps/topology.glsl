@@ -1,4 +1,4 @@
-// Which texel a border texel repeats, up to one size outside of the map. Sources and guarantees: maps/topology.rs.
+// Which texel a border texel repeats, up to one size outside the map. Sources and guarantees: maps/topology.rs.
 #ifndef CLERESTORY_MAPS_TOPOLOGY_GLSL
 #define CLERESTORY_MAPS_TOPOLOGY_GLSL
 
@@ -32,7 +32,7 @@ ivec2 lat_long_wrap(ivec2 p, ivec2 size) {
     return p.y < 0 || p.y >= size.y ? ivec2(repeated_texel(p.x + size.x / 2, size.x), mirrored_texel(p.y, size.y)) : p;
 }
 
-// The cube, whose faces are n x n texels: the face on which a texel lies, which comes to lie inside of that. Not beyond corners, where no
+// The cube, whose faces are n x n texels: the face on which a texel lies, which comes to lie inside that. Not beyond corners, where no
 // texel repeats.
 uint cube_wrap(uint face, inout ivec2 p, int n) {
     // In halves of texels from the middle; what sticks out is folded down the cube's side.

@@ -32,7 +32,7 @@ struct ShadowTexel {
     ivec2 at;
 };
 
-// Half the diagonal of a square as large as the texel about a direction, radians, in a map of side x side texels a layer.
+// Half the diagonal of a square as large as the texel about a direction, radians, in a map of side x side texels per layer.
 float shadow_texel_radius(uint kind, vec3 d, int side) {
     uint face;
     float density = kind == SHADOW_CUBE ? cube_density(cube_encode(d, face)) : octahedron_density(octahedron_encode(d));

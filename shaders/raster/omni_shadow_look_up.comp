@@ -1,5 +1,5 @@
 #version 460
-// Look-ups in an omnidirectional shadow map, one a query.
+// Look-ups in an omnidirectional shadow map, one per query.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

@@ -1,4 +1,4 @@
-// The vertex stage where triangles are drawn as pieces: three vertices a piece, level² pieces a triangle.
+// The vertex stage where triangles are drawn as pieces: three vertices per piece, level² pieces per triangle.
 #ifndef CLERESTORY_RASTER_PIECE_MAIN_GLSL
 #define CLERESTORY_RASTER_PIECE_MAIN_GLSL
 

@@ -1,4 +1,4 @@
-// The vertex stage where the view is known in it: three vertices a triangle, by number.
+// The vertex stage where the view is known in it: three vertices per triangle, by number.
 #ifndef CLERESTORY_RASTER_VERTEX_MAIN_GLSL
 #define CLERESTORY_RASTER_VERTEX_MAIN_GLSL
 

@@ -38,7 +38,7 @@ float fetch_density(SceneMedium m, uvec3 cell) {
     return texelFetch(media_densities, int(m.first_density + (cell.z * m.cells.y + cell.y) * m.cells.x + cell.x)).x;
 }
 
-// Density at a point in cells that lies in the grid: between centres by trilinear interpolation, constant outside of them.
+// Density at a point in cells that lies in the grid: between centres by trilinear interpolation, constant outside them.
 float density_in_cells(SceneMedium m, vec3 point) {
     vec3 last = vec3(m.cells - 1u);
     vec3 at = clamp(point - 0.5, vec3(0.0), last);

@@ -42,13 +42,13 @@ Arrival arrival_at(Hit hit, vec3 direction, vec3 scene_lower, vec3 scene_upper) 
 
 bool arrival_is_unlit(Arrival a) { return HAS_UNLIT && (a.material.flags & MATERIAL_UNLIT) != 0u; }
 
-// Photons are stored, and looked for, where a diffuse base is seen from outside of the body.
+// Photons are stored, and looked for, where a diffuse base is seen from outside the body.
 bool arrival_has_diffuse_base(Arrival a) { return bsdf_has_diffuse_base(a.bsdf, a.solid && !a.front); }
 
 // Material of the body that the way was in, or OUTSIDE; `known` is what the path knew: one that begins inside a solid learns it here.
 uint arrival_interior(Arrival a, uint known) { return known == OUTSIDE && a.solid && !a.front ? a.surface.material : known; }
 
-// What is left of light after a way inside of a body.
+// What is left of light after a way inside a body.
 vec3 absorbed(vec3 light, uint interior, float way) {
     if (HAS_ABSORPTION && interior != OUTSIDE) {
         light *= exp(-load_material(interior).absorption * way);

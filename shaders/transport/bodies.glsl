@@ -14,7 +14,7 @@ struct Crossing {
     bool boundary;  // the surface is there for media alone
 };
 
-// The way in `direction` to a triangle, believed to be inside of `interior`.
+// The way in `direction` to a triangle, believed to be inside `interior`.
 Crossing cross_surface(uint triangle_index, vec3 direction, uint interior) {
     SceneTriangle triangle = load_triangle(triangle_index);
     uvec4 q7 = material_quarter(triangle.material, 7u);
@@ -29,7 +29,7 @@ Crossing cross_surface(uint triangle_index, vec3 direction, uint interior) {
     return entering ? Crossing(around, triangle.material, boundary) : Crossing(triangle.material, around, boundary);
 }
 
-// Index of the medium inside of a body, or NO_MEDIUM; `surrounding` is the one outside of all.
+// Index of the medium inside a body, or NO_MEDIUM; `surrounding` is the one outside all.
 uint medium_inside(uint interior, uint surrounding) {
     return interior == OUTSIDE ? surrounding : material_quarter(interior, 9u).z - 1u;
 }

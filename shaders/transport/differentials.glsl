@@ -10,7 +10,7 @@
 
 #include "transport/warp.glsl"
 
-// Least |cos| of incidence in a transfer: beyond it the footprint stops to grow.
+// Least |cos| of incidence in a transfer: beyond it the footprint stops growing.
 const float DIFFERENTIAL_COS_MIN = 1e-3;
 // Least |cos| of the refracted direction in its derivative, which is infinite at the critical angle.
 const float DIFFERENTIAL_REFRACTED_COS_MIN = 1e-3;

@@ -3,7 +3,7 @@
 // Sources: Woodcock et al., "Techniques Used in the GEM Code for Monte Carlo Neutronics Calculations" (1965); ratio tracking of Novak,
 // Selle and Jarosz, "Residual Ratio Tracking for Estimating Attenuation in Participating Media" (2014); stepping through blocks of
 // Amanatides and Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing" (1987); bands as in transport/medium.glsl.
-// Guarantees: unbiased wherever majorants bound the density; at most GRID_WALK_QUOTA iterations a call, after which the walk can go on from where
+// Guarantees: unbiased wherever majorants bound the density; at most GRID_WALK_QUOTA iterations per call, after which the walk can go on from where
 // it stands, since free flight has no memory; where f32 does not tell one stop from the next, a rounding unit of the way is left out. Random
 // numbers are hashes of a key and the number of the draw.
 #ifndef CLERESTORY_TRANSPORT_MEDIA_TRACKING_GLSL
@@ -13,7 +13,7 @@
 #include "transport/medium.glsl"
 #include "transport/random.glsl"
 
-// Iterations of a grid walk in one dispatch: blocks left and tentative collisions. Software drivers end loops in silence after 65,535 of all lanes.
+// Iterations of a grid walk in one dispatch: blocks left and tentative collisions. Software drivers end loops silently after 65,535 of all lanes.
 const uint GRID_WALK_QUOTA = 2048u;
 // Transmittances below this are decided by roulette, with this chance to go on.
 const float RATIO_ROULETTE_BELOW = 0.1;

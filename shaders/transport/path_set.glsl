@@ -1,7 +1,7 @@
 // Which light paths a picture contains: a range of bounces, and an automaton that reads a path's lobes from the eye to the light.
 //
 // Layout and meaning: transport/path_set. One packed word holds bits 0-6 lobes, 7-18 least and 19-30 greatest number of bounces; a
-// greatest number of PATH_SET_UNBOUNDED is no bound. A word a state holds seven successors of four bits, in the order of the LOBE_...
+// greatest number of PATH_SET_UNBOUNDED is no bound. A word per state holds seven successors of four bits, in the order of the LOBE_...
 // bits; accepting states are the bits of one more word. A path carries its state beside its number of bounces.
 #ifndef CLERESTORY_TRANSPORT_PATH_SET_GLSL
 #define CLERESTORY_TRANSPORT_PATH_SET_GLSL

@@ -17,7 +17,7 @@ layout(constant_id = 18) const bool RESUMES = false;
 
 layout(push_constant, scalar) uniform Push {
     WalkKey key;
-    uint surrounding;  // index of the medium outside of all bodies, or NO_MEDIUM
+    uint surrounding;  // index of the medium outside all bodies, or NO_MEDIUM
 } push;
 
 #include "transport/attribute_features.glsl"

@@ -6,7 +6,7 @@
 #include "transport/features.glsl"
 #include "walk/wave.glsl"
 
-// Lets a shadow ray wait at a place. It begins inside of the body of material `interior`, or OUTSIDE; the way through what is there begins at `start`,
+// Lets a shadow ray wait at a place. It begins inside the body of material `interior`, or OUTSIDE; the way through what is there begins at `start`,
 // in lengths of the ray's direction: 0, or negative by what the offset of its origin left out.
 uint store_shadow_ray(uint place, ShadowRay ray, uint interior, float start) {
     store_waiting(place, uvec4(floatBitsToUint(ray.origin), floatBitsToUint(ray.t_max)), uvec4(floatBitsToUint(ray.direction), ray.slot),

@@ -1,6 +1,6 @@
 // How walks pass the surfaces that bound media; what they keep of media is in walk/wave.glsl.
 //
-// A body is a solid that refracts or an invisible boundary. Walks carry the material of the innermost body they are in; what is outside of a
+// A body is a solid that refracts or an invisible boundary. Walks carry the material of the innermost body they are in; what is outside a
 // body is known for each of its triangles, so bodies may lie in bodies, as long as their surfaces do not cross. A surface of a body tells
 // by its side which body the way to it was in, whatever the walk believed: rounding cannot leave a walk in the wrong medium for good.
 // Boundaries leave the ray as it is: the search for the next surface begins one rounding unit behind them. A surface at the same distance is

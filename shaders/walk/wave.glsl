@@ -101,10 +101,10 @@ struct ShadowState {
 };
 
 layout(set = 0, binding = 0, scalar) restrict buffer WaveStatusBlock {
-    uint item_groups[3];     // indirect arguments: one invocation a place
-    uint chunk_groups[3];    // one a chunk
+    uint item_groups[3];     // indirect arguments: one invocation per place
+    uint chunk_groups[3];    // one per chunk
     uint scatter_groups[3];  // chunk_groups as they were before the last scan
-    uint waiting_groups[3];  // one a waiting place
+    uint waiting_groups[3];  // one per waiting place
     uint active_count;       // places in the queue
     uint previous_count;     // as it was before the last scan
     uint waiting_count;      // waiting places of the bounce that the last scan ended
@@ -125,7 +125,7 @@ layout(set = 0, binding = 8) uniform utextureBuffer walk_waiting_in;  // by plac
 layout(set = 0, binding = 9, scalar) restrict writeonly buffer WalkWaitingOut { uvec4 walk_waiting_out[]; };
 layout(set = 0, binding = 10) uniform utextureBuffer walk_waiting_queue_in;  // places
 layout(set = 0, binding = 11, scalar) restrict writeonly buffer WalkWaitingQueueOut { uint walk_waiting_queue_out[]; };
-layout(set = 0, binding = 12) uniform utextureBuffer walk_flags_in;  // four places a texel
+layout(set = 0, binding = 12) uniform utextureBuffer walk_flags_in;  // four places per texel
 layout(set = 0, binding = 13, scalar) restrict writeonly buffer WalkFlagsOut { uint walk_flags_out[]; };
 // Where stopped rays go on, by place in the queue of the stage that stalled.
 layout(set = 0, binding = 14, scalar) restrict buffer WalkResume { uint walk_resume[]; };

@@ -33,7 +33,7 @@ pub struct Rendered {
     pub radiance: Vec<f32>,
     /// Variance of the means.
     pub variance: Vec<f32>,
-    /// Finite samples a pixel.
+    /// Finite samples per pixel.
     pub samples: Vec<f32>,
     /// Samples left out.
     pub non_finite: u64,
@@ -183,7 +183,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, size: [u32; 2], samples: u32, settings: 
     picture
 }
 
-/// As [`scenes::pixel_averages`](clerestory_hard_cases::scenes::pixel_averages), with 16 × 16 points a pixel.
+/// As [`scenes::pixel_averages`](clerestory_hard_cases::scenes::pixel_averages), with 16 × 16 points per pixel.
 pub fn pixel_averages(size: u32, half: f64, function: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     clerestory_hard_cases::scenes::pixel_averages(size, half, 16, function)
 }

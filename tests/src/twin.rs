@@ -118,7 +118,7 @@ pub fn compare(
     worst
 }
 
-/// Dispatches one invocation a case of a kernel with the three buffers cases, results, table.
+/// Dispatches one invocation per case of a kernel with the three buffers cases, results, table.
 pub fn dispatch<K: ComputeShader<Spec = ()>>(
     gpu: &Gpu,
     cases: &[Case],

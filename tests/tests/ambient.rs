@@ -180,7 +180,7 @@ fn what_else_shines_is_refused() {
     });
 }
 
-/// One picture a frame into a recorder of whoever calls, without the engine's film: the sample that the technique adds.
+/// One picture per frame into a recorder of whoever calls, without the engine's film: the sample that the technique adds.
 #[test]
 fn frames_are_recorded_by_themselves() {
     with_gpu(|gpu| {

@@ -128,7 +128,7 @@ fn what_cannot_be_chosen_says_why() {
 /// A technique of a host's own that errs: the path tracer's pictures, too bright by a twentieth.
 struct Bright {
     path: Box<dyn Technique>,
-    /// Samples a pixel beyond which it has no room.
+    /// Samples per pixel beyond which it has no room.
     most: u32,
 }
 
@@ -226,7 +226,7 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
             ..options()
         };
         let among = |cards: &[&Card], error| plan_among(&renderer, cards, &options, goal(error), &mut || true).unwrap();
-        // Alone it is taken, and what it lacks is said; it is judged by pilots of the path tracer that is no candidate.
+        // Alone it is taken, and what it lacks is said; it is judged by pilots of the path tracer that is not a candidate.
         let strict = among(&[&BRIGHT], 0.02);
         let choice = strict.choice();
         let bias = choice.bias.unwrap();

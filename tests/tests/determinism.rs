@@ -32,7 +32,7 @@ fn how_the_work_is_cut_up_never_shows() {
         let truth = picture(gpu, &settings);
         assert!(truth.mean()[0].0 > 0.01);
         assert_eq!(picture(gpu, &settings).bits(), truth.bits(), "two runs");
-        // Fewer paths than pixels, an odd number, several samples a wave.
+        // Fewer paths than pixels, an odd number, several samples per wave.
         for paths_in_flight in [64, 200, 1000, 4096] {
             let split = picture(
                 gpu,

@@ -142,7 +142,7 @@ fn look_ups_are_seamless() {
                 let (fine, part) = (query.w.floor() as usize, f64::from(query.w.fract()));
                 let at = |level: usize| levels[level.min(2)].look_up(d).unwrap();
                 let expected = at(fine).lerp(at(fine + 1), part);
-                // Places are off by 10⁻⁶ of the map's 16 or 32 texels, and radiance changes by up to 1 a texel along each axis.
+                // Places are off by 10⁻⁶ of the map's 16 or 32 texels, and radiance changes by up to 1 per texel along each axis.
                 let off = (found.as_dvec3() - expected).abs().max_element();
                 assert!(off < 64e-6, "{map} {query}: {found} {expected}");
             }
@@ -211,7 +211,7 @@ fn look_ups_in_cubes_and_discs_are_their_twins() {
                 worst = worst.max((found.as_dvec3() - expected).abs().max_element());
             }
             println!("{map}: off by {worst:.2e}; {left_out} near jumps");
-            // Places are off by 10⁻⁶ of 16 texels, near the rim of discs with roots by 10⁻⁵; radiance changes by up to 1 a texel along each
+            // Places are off by 10⁻⁶ of 16 texels, near the rim of discs with roots by 10⁻⁵; radiance changes by up to 1 per texel along each
             // axis, and where few texels share a weight by as much more as that is small.
             assert!(worst < 2e-3, "{map}: {worst}");
             assert!(left_out < 60, "{map}: {left_out}");

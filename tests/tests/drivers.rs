@@ -13,7 +13,7 @@ use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::{assert_no_messages, with_gpu};
 use serde_json::{Value, json};
 
-/// Pixels a side.
+/// Pixels per side.
 const SIDE: usize = 16;
 /// Renderings of each picture.
 const SEEDS: u32 = 12;

@@ -242,7 +242,7 @@ fn exhausted_descriptors_fail_the_pass_and_not_the_program() {
 #[test]
 #[expect(
     unsafe_code,
-    reason = "an event that the host sets, to hold the device inside of a pass"
+    reason = "an event that the host sets, to hold the device inside a pass"
 )]
 fn the_marker_of_a_pass_is_written_when_all_before_has_ended_and_none_after() {
     let (_guard, gpu) = faulty(FaultCall::WaitSemaphores, 1, vk::Result::ERROR_DEVICE_LOST);

@@ -278,7 +278,9 @@ fn pages_name_files_that_exist() {
                 faults.push(format!("{}: `{name}`", page.display()));
             }
         }
-        for link in prose.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        let links = prose.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        let pictures = prose.split("src=\"").skip(1).filter_map(|rest| rest.split('"').next());
+        for link in links.chain(pictures) {
             let file = link.split('#').next().unwrap_or_default();
             if !link.contains("://") && !file.is_empty() && !beside.join(file).exists() {
                 faults.push(format!("{}: link to {link}", page.display()));

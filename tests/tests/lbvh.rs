@@ -220,7 +220,7 @@ fn an_index_that_stays_on_the_device_knows_its_size_and_cost() {
             assert_eq!(resident.is_some(), count >= 2);
             let Some(resident) = resident else { continue };
             let (device, host_size) = (resident.statistics, host.statistics());
-            // Sums of positive terms, one a level, each within three units of roundoff.
+            // Sums of positive terms, one per level, each within three units of roundoff.
             let bound = 3.0 * f64::from(host_size.max_depth + 1) / f64::from(1 << 24);
             let error = device.sah_cost / host_size.sah_cost - 1.0;
             assert!(error.abs() <= bound, "{count}: {error:e} of {bound:e}");

@@ -1,4 +1,4 @@
-//! Samples that are no finite numbers: the film counts them by kind and keeps them out of its sums.
+//! Samples that are not finite numbers: the film counts them by kind and keeps them out of its sums.
 
 use clerestory::film::{GpuFilm, NonFiniteSamples};
 use clerestory::gpu::ash::vk;

@@ -1,5 +1,5 @@
-//! Both models of execution, a thread a ray and persistent threads on a queue, against the Rust twin of the traversal: every hit, all
-//! counters, no ray lost and none traced twice. And what becomes of a queue without a quota on a driver that ends loops in silence.
+//! Both models of execution, a thread per ray and persistent threads on a queue, against the Rust twin of the traversal: every hit, all
+//! counters, no ray lost and none traced twice. And what becomes of a queue without a quota on a driver that silently ends loops.
 //!
 //! Equality of bits with the twin is asked of software devices: Vulkan lets others divide with an error of 2.5 ULP, so there the hits are
 //! held to the f64 test.

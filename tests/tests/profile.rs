@@ -153,7 +153,7 @@ fn what_is_absent_costs_no_byte() {
         let bare_bytes = bytes(gpu, &bare());
         // 2 triangles of 48 bytes; a lone black surface has no light.
         assert_eq!((bare_bytes[0], bare_bytes[3]), (2 * 48, 0), "{bare_bytes:?}");
-        // Attributes are 16 bytes a vertex, and with any of them each triangle has 16 bytes that say which vertices are its own.
+        // Attributes are 16 bytes per vertex, and with any of them each triangle has 16 bytes that say which vertices are its own.
         let attribute = 4 * 16 + 2 * 16;
         let more = |change: Change| {
             let mut scene = bare();

@@ -2,7 +2,7 @@
 //!
 //! Seeds are fixed. Each check has a false-alarm rate of 10⁻⁶ (`clerestory_tests::statistics`), some forty of them: below 5·10⁻⁵
 //! for a driver that was never seen before. Draws of one Sobol' pixel are stratified, so their counts are too even for the test; those are
-//! drawn one sample a pixel.
+//! drawn one sample per pixel.
 
 #[path = "samplers/scattering.rs"]
 mod scattering;
@@ -26,7 +26,7 @@ const DRAWS: usize = 1 << 17;
 /// Cells along each side of the square.
 const SIDE: usize = 32;
 
-/// Pairs of numbers from the device: of slot `dimension`, one a pixel, or many of one pixel.
+/// Pairs of numbers from the device: of slot `dimension`, one per pixel, or many of one pixel.
 fn pairs(gpu: &Gpu, kind: SamplerKind, dimension: u32, one_pixel: bool) -> Vec<[f32; 2]> {
     let cases: Vec<RandomCase> = (0..DRAWS as u32)
         .map(|i| RandomCase {
@@ -223,7 +223,7 @@ fn environments_are_sampled_by_their_texels_and_evenly_within() {
         let cases: Vec<Case> = (texel.iter().zip(&within))
             .map(|(t, w)| Case::new(&[f32::from_bits(16), f32::from_bits(8), t[0], t[1], w[0], w[1]]))
             .collect();
-        // Four cells a texel: halves in azimuth, and in height, which is even over a texel's solid angle.
+        // Four cells per texel: halves in azimuth, and in height, which is even over a texel's solid angle.
         let mut counts = vec![0.0; 512];
         for result in twin_tables(gpu, 2, &cases, &cdf) {
             let w = result.vector(0);

@@ -31,7 +31,7 @@ def parse_arguments():
     parser.add_argument("prefix", help="output files without their suffix")
     parser.add_argument("--variant", default="auto", choices=["auto", "scalar_rgb", "llvm_ad_rgb"], help="auto: LLVM when it is there")
     parser.add_argument("--passes", type=int, default=64, help="independent passes, at least 2 (default %(default)s)")
-    parser.add_argument("--spp", type=int, default=16, help="samples a pixel in each pass (default %(default)s)")
+    parser.add_argument("--spp", type=int, default=16, help="samples per pixel in each pass (default %(default)s)")
     parser.add_argument("--sampler", default="independent", choices=["independent", "stratified", "multijitter", "orthogonal", "ldsampler"])
     parser.add_argument("--seed", type=int, default=0, help="seed of the first pass; pass i takes seed + i, modulo 2^32")
     parser.add_argument("--integrator", choices=["path", "volpath", "volpathmis"], help="in place of the scene's")

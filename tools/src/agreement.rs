@@ -48,15 +48,15 @@ pub struct AgreementOptions {
     pub size: u32,
     /// Independent passes of Mitsuba: 100 or more, so that their variance is known well enough.
     pub passes: u32,
-    /// Samples a pixel in each pass; this engine takes `passes` times as many.
+    /// Samples per pixel in each pass; this engine takes `passes` times as many.
     pub samples_per_pass: u32,
     /// Seed of both renderers.
     pub seed: u32,
     /// Rounds of the timed pictures, in each of which every renderer has its turn with each of its samplers; 0 times nothing.
     pub timing_rounds: u32,
-    /// Independent timed pictures a turn, 2 or more; with the rounds 3 or more.
+    /// Independent timed pictures per turn, 2 or more; with the rounds 3 or more.
     pub timing_pictures: u32,
-    /// Samples a pixel of a timed picture, a square number for Mitsuba's multijittered sampler; a power of four suits Sobol' points too.
+    /// Samples per pixel of a timed picture, a square number for Mitsuba's multijittered sampler; a power of four suits Sobol' points too.
     pub timing_samples: u32,
     /// The Python that has Mitsuba.
     #[serde(skip)]
@@ -139,7 +139,7 @@ impl Fault {
 ///
 /// # Errors
 /// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the
-/// exporter and the files. A picture that disagrees and one that is not finite are no errors: see [`AgreementReport::passes`]; nor is what
+/// exporter and the files. A picture that disagrees and one that is not finite are not errors: see [`AgreementReport::passes`]; nor is what
 /// fails after a wish to stop.
 pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Result<AgreementReport> {
     let wanted = selected(options)?;
@@ -247,7 +247,7 @@ fn selected(options: &AgreementOptions) -> Result<Vec<ComparedScene>> {
         return refuse("--timing-rounds", options.timing_rounds.to_string(), cause);
     }
     if options.passes.checked_mul(options.samples_per_pass).is_none() {
-        let cause = format!("times {} samples a pixel are too many", options.samples_per_pass);
+        let cause = format!("times {} samples per pixel are too many", options.samples_per_pass);
         return refuse("--passes", options.passes.to_string(), cause);
     }
     // Every picture has a seed of its own, and so has the one that warms up before each turn.

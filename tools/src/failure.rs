@@ -1,4 +1,4 @@
-//! How the program fails: an exit code that scripts can use, one line that says what is wrong, and where there is one a line that helps.
+//! How the program fails: an exit code that scripts can use, one line that says what is wrong, and a second line that helps where there is one.
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use crate::output;
 pub enum Code {
     /// The run failed: device lost, out of memory, a file that cannot be read or written.
     Run = 1,
-    /// The command line asks for what cannot be, pictures of different sizes to compare included.
+    /// The command line asks for the impossible, pictures of different sizes to compare included.
     Usage = 2,
     /// The scene cannot be read, or the technique cannot render it.
     Scene = 3,
@@ -45,7 +45,7 @@ pub struct Failure {
 pub type Outcome<T = ()> = Result<T, Failure>;
 
 impl Failure {
-    /// A command line that asks for what cannot be.
+    /// A command line that asks for the impossible.
     pub fn usage(message: impl Into<String>) -> Self {
         Self {
             code: Code::Usage,

@@ -20,7 +20,7 @@ pub fn text(report: &FrameReport) -> String {
         report.scene, report.camera, report.technique, report.path_set
     ));
     text += &line(format!(
-        "{width} × {height} pixels, {samples} samples a pixel, seed {}",
+        "{width} × {height} pixels, {samples} samples per pixel, seed {}",
         report.seed
     ));
     text += &line(format!("{}, driver {}", report.device, report.driver));
@@ -79,18 +79,31 @@ fn work(report: &FrameReport) -> String {
     };
     let mut table = Table::new(&["work", "count", head], &[]);
     for (name, count) in &report.counters {
-        let rate = if steady {
-            report.steady_rates.get(name).copied()
-        } else {
-            Some(*count as f64 / report.render_seconds).filter(|rate| *rate > 0.0 && rate.is_finite())
-        };
         table.row([
             name.replace('_', " "),
             count.to_string(),
-            rate.map_or_else(|| "-".into(), output::metric),
+            rate(report, name).map_or_else(|| "-".into(), output::metric),
         ]);
     }
     table.text()
+}
+
+/// Work per second of steady time by a counter's name, or with compilation where a picture took one step.
+pub fn rate(report: &FrameReport, name: &str) -> Option<f64> {
+    if !report.steady_rates.is_empty() {
+        return report.steady_rates.get(name).copied();
+    }
+    let rate = *report.counters.get(name)? as f64 / report.render_seconds;
+    Some(rate).filter(|rate| *rate > 0.0 && rate.is_finite())
+}
+
+/// What became of an index that a folder keeps.
+pub fn kept(kept: IndexKept) -> &'static str {
+    match kept {
+        IndexKept::Read => "read, not built: the folder had it",
+        IndexKept::Written => "kept for the next time",
+        IndexKept::NotWritten => "could not be kept",
+    }
 }
 
 fn memory(report: &FrameReport) -> String {
@@ -123,12 +136,7 @@ fn rest(report: &FrameReport) -> String {
     if !stages.is_empty() {
         let _ = writeln!(text, "       ms of it: {}", stages.join(", "));
     }
-    let kept = report.index.kept.map(|kept| match kept {
-        IndexKept::Read => "read, not built: the folder had it",
-        IndexKept::Written => "kept for the next time",
-        IndexKept::NotWritten => "could not be kept",
-    });
-    if let Some(kept) = kept {
+    if let Some(kept) = report.index.kept.map(kept) {
         let _ = writeln!(text, "       {kept}");
     }
     if let Some(cause) = report.index.host_because {

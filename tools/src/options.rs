@@ -22,7 +22,7 @@ pub enum ValidationMode {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Says more to the error output; twice for all of it
+    /// Prints more to the error output; give it twice for everything
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
 }
@@ -31,11 +31,11 @@ pub struct Global {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Device")]
 pub struct DeviceOptions {
-    /// Device by its index or a part of its name (`lavapipe` is Mesa's software device); the fastest kind by default. `clerestory
+    /// Device, by its index or a part of its name (`lavapipe` is Mesa's software device); by default the fastest kind. `clerestory
     /// info` lists them
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
-    /// Vulkan validation layers, whose errors fail the run; by default as CLERESTORY_VALIDATION says, else off
+    /// Vulkan validation layers, whose errors fail the run; by default the value of CLERESTORY_VALIDATION, else off
     #[arg(long, value_name = "MODE")]
     pub validation: Option<ValidationMode>,
 }

@@ -1,4 +1,4 @@
-//! What the program prints: plain text in a pipe, colour on a terminal only, and no complaint when nobody listens any more.
+//! What the program prints: plain text in a pipe, colour on a terminal only, and no complaint when nobody is listening any more.
 //!
 //! Guarantees: no control character but the line feed reaches a pipe, whatever a scene file calls its parts.
 
@@ -30,7 +30,7 @@ impl Stream {
     }
 }
 
-/// Prints to standard output. A reader that has gone (`| head`) is no error.
+/// Prints to standard output. A reader that has gone (`| head`) is not an error.
 pub fn print(text: &str) -> Outcome {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {

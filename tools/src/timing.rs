@@ -9,7 +9,7 @@ pub fn timed<T>(function: impl FnOnce() -> T) -> (T, f64) {
     (result, start.elapsed().as_secs_f64())
 }
 
-/// Runs something that says its seconds so often, after once to warm up: what the last run gave, which is dropped outside of the next
+/// Runs something that says its seconds so often, after once to warm up: what the last run gave, which is dropped outside the next
 /// one's time, and the seconds of all but the first. Without repeats the first counts.
 ///
 /// # Errors

@@ -79,6 +79,8 @@ fn a_rendering_leaves_picture_preview_and_report() -> Tested {
         "2",
         "--aov",
         "normal,depth,samples",
+        "--stats",
+        "table",
         "-o",
         text(&path),
     ])?;
@@ -118,6 +120,43 @@ fn a_rendering_leaves_picture_preview_and_report() -> Tested {
         String::from_utf8_lossy(&output.stderr).contains("made folder"),
         "{}",
         said(&output)
+    );
+    Ok(())
+}
+
+#[test]
+fn a_rendering_is_summed_up_in_lines_that_matter() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let (reference, picture) = (folder.path().join("r.exr"), folder.path().join("a.exr"));
+    let lines = |more: &[&str]| -> Result<Vec<String>, Box<dyn std::error::Error>> {
+        let small = ["render", "--size", "16", "--spp", "2"];
+        let said = String::from_utf8(succeed(&[&small[..], more].concat())?.stdout)?;
+        Ok(said.lines().map(str::to_owned).collect())
+    };
+    let said = |lines: &[String], name: &str| {
+        let found = lines.iter().find(|line| line.starts_with(name));
+        found.cloned().unwrap_or_else(|| panic!("{name}: {lines:?}"))
+    };
+    let first = lines(&["-o", text(&reference)])?;
+    assert!((8..13).contains(&first.len()), "{first:?}");
+    assert!(first[0].starts_with("picture") && first[0].contains("r.exr") && first[0].contains("r.json"));
+    for (name, word) in [
+        ("technique", "path, the default; unbiased"),
+        ("seconds", "after the first step"),
+        ("samples", "2 per pixel"),
+        ("rates", "rays/s"),
+        ("memory", "on the device"),
+        ("error", "not measured"),
+        ("more", "--stats table"),
+    ] {
+        assert!(said(&first, name).contains(word), "{name}: {first:?}");
+    }
+    let again = ["--seed", "1", "--technique", "path", "-o", text(&picture)];
+    let second = lines(&[&again[..], &["--reference", text(&reference)]].concat())?;
+    assert!(said(&second, "technique").contains("as asked for"), "{second:?}");
+    assert!(
+        said(&second, "error").contains("root of the relative MSE"),
+        "{second:?}"
     );
     Ok(())
 }
@@ -359,7 +398,7 @@ fn an_interrupt_leaves_complete_files() -> Tested {
     let status = child.wait()?;
     assert_eq!(status.code(), Some(130), "{heard}");
     assert!(
-        heard.contains("interrupted") && heard.contains("samples a pixel"),
+        heard.contains("interrupted") && heard.contains("samples per pixel"),
         "{heard}"
     );
     let report = json_file(&path.with_extension("json"))?;

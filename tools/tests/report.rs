@@ -89,7 +89,7 @@ fn a_second_run_measures_nothing_and_a_change_only_what_it_must() -> Tested {
         "kept to the last digit"
     );
 
-    // Words are no part of a measurement, nor is a default that is spelled out.
+    // Words are not part of a measurement, nor is a default that is spelled out.
     bench.measured(&TEXT.replace("independent", "pcg"), 0, 4)?;
     let spelled = format!("roulette_start = {}, sampler =", default_start()?);
     bench.measured(&TEXT.replace("sampler =", &spelled), 0, 4)?;

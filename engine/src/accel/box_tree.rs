@@ -68,7 +68,7 @@ pub struct TreeShape {
 pub enum TreeFault {
     /// A node is reached twice or does not exist.
     Node(u32),
-    /// A leaf lies outside of the order or is empty.
+    /// A leaf lies outside the order or is empty.
     Leaf {
         /// First place.
         first: u32,

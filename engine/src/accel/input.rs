@@ -108,7 +108,7 @@ pub(super) fn check_count(triangles: usize) -> Result<()> {
     })
 }
 
-/// Refuses a setting outside of its range, both ends of which it may take.
+/// Refuses a setting outside its range, both ends of which it may take.
 pub(super) fn check_range(name: &str, value: u32, least: u32, most: u32) -> Result<()> {
     if (least..=most).contains(&value) {
         return Ok(());

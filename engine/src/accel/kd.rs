@@ -1,7 +1,7 @@
 //! kd-trees: space itself is cut by planes, so leaves come in the order of the ray and a triangle may lie in several.
 //!
 //! Sources: I. Wald and V. Havran, "On building fast kd-Trees for Ray Tracing, and on doing that in O(N log N)", IEEE RT 2006;
-//! "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, chapters 3 and 4 (heuristics for origins inside the
+//! B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, chapters 3 and 4 (heuristics for origins inside the
 //! scene, traversal without a stack by a word of flags, push-down and short stack).
 //!
 //! Guarantees: the same tree whatever the number of threads; at most [`MAX_DEPTH`] inner nodes on a way from the root; hits are those of

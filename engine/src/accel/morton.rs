@@ -47,7 +47,7 @@ pub fn cells_per_length(extent: f32, axis_bits: u32) -> f32 {
     f32::from_bits(scale_exponent << FRACTION_BITS | (quotient >> carry) & (hidden - 1))
 }
 
-/// A grid of 2ᵏ cells an axis over a box.
+/// A grid of 2ᵏ cells per axis over a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MortonGrid {
     lower: Vec3,

@@ -70,7 +70,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-TREELETS",
     name: "optimisation of trees by treelets, mini trees and reinsertion",
     role: Role::PartOf("CL-LBVH"),
-    limits: "On the host only; guards the expected cost, which overlap of boxes hardly shows in.",
+    limits: "On the host only; minds only the expected cost, in which overlap of boxes hardly shows.",
     sources: &[
         sources::DOMINGUES_PEDRINI_2015.whole(),
         sources::GANESTAM_2015.whole(),

@@ -1,4 +1,4 @@
-//! Closest hits of a buffer of rays on the device, or whether they meet anything, in either model of execution: one invocation a ray, or persistent threads that fetch
+//! Closest hits of a buffer of rays on the device, or whether they meet anything, in either model of execution: one invocation per ray, or persistent threads that fetch
 //! rays from a queue.
 //!
 //! Sources: T. Aila and S. Laine, "Understanding the Efficiency of Ray Traversal on GPUs", HPG 2009 (persistent threads); "Interactive
@@ -498,7 +498,7 @@ impl RayTracer {
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "PM-X-1",
-        name: "closest hits of a buffer of rays: one thread a ray",
+        name: "closest hits of a buffer of rays: one thread per ray",
         role: Role::Kernel,
         limits: "A subgroup takes as long as its slowest ray.",
         sources: &[sources::AILA_LAINE_2009.whole()],
@@ -516,7 +516,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-X-2",
         name: "closest hits of a buffer of rays: persistent threads on a queue with quotas",
         role: Role::Kernel,
-        limits: "Which workgroup traces which ray differs from run to run, and shows in the time alone.",
+        limits: "Which workgroup traces which ray differs from run to run, and shows only in the time.",
         sources: &[
             sources::AILA_LAINE_2009.whole(),
             sources::FABIANOWSKI_2011.at("§2.2.3.4"),

@@ -1,4 +1,4 @@
-//! The modules that have rows, but for those of techniques, which come with their cards: one line a module.
+//! The modules that have rows, but for those of techniques, which come with their cards: one line per module.
 
 use crate::catalogue::Row;
 

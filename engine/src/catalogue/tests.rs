@@ -41,7 +41,7 @@ fn ids_are_unique_and_have_a_known_prefix() {
 fn fault_of_limits(limits: &str) -> Option<&'static str> {
     let sentence = limits.strip_suffix('.').unwrap_or_default();
     if sentence.split_whitespace().count() < 3 {
-        return Some("is no sentence that ends with a period");
+        return Some("is not a sentence that ends with a period");
     }
     let capital = sentence.starts_with(char::is_uppercase);
     let cells = sentence.contains(['|', '\n']);

@@ -1,6 +1,6 @@
 //! OpenEXR files: multi-layer pictures with their metadata, lossless and reproducible.
 //!
-//! Written are single-part scan-line files, f32, ZIP (16 lines a block). The `radiance` layer takes the plain channels R, G, B (Y when it has one
+//! Written are single-part scan-line files, f32, ZIP (16 lines per block). The `radiance` layer takes the plain channels R, G, B (Y when it has one
 //! channel), which every reader shows; other layers are named as in the OpenEXR technical introduction ("layers"): `albedo.R`, `normal.X`,
 //! `depth.Z`, `samples.Y`. Metadata are string attributes, UTF-8.
 //! Guarantees: equal pictures give equal bytes (attributes stand in the order of their names); values round-trip to the bit; files appear as a whole.
@@ -20,7 +20,7 @@ use crate::catalogue::{Role, Row, sources};
 /// Samples (values, not pixels) that a file may hold in all; a header asking for more is refused before anything is allocated.
 const MAX_SAMPLES: usize = 1 << 29;
 
-/// Attributes that the writing library sets and that are no metadata of a picture's making.
+/// Attributes that the writing library sets and that are not metadata of a picture's making.
 const LIBRARY_ATTRIBUTES: [&str; 1] = ["software"];
 
 /// Writes all layers and the metadata, as a whole or not at all.

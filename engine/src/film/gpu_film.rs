@@ -174,7 +174,7 @@ impl GpuFilm {
         Ok((picture, left_out))
     }
 
-    /// Records the addition of a picture: to each pixel one sample, `radiance` of which holds three f32 a pixel, rows from the top. What compute
+    /// Records the addition of a picture: to each pixel one sample, `radiance` of which holds three f32 per pixel, rows from the top. What compute
     /// shaders have written there is waited for; afterwards they may write there again, and what was added is visible to them and to copies. Samples with NaNs or infinities are counted by kind and left out.
     ///
     /// # Errors
@@ -220,7 +220,7 @@ impl GpuFilm {
         self.add_frame.get().map(ComputePipeline::info).into_iter().collect()
     }
 
-    /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
+    /// Writes what there is so far to a buffer of four bytes per pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
     /// and sRGB-encoded.
     ///
     /// # Errors

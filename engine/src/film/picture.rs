@@ -81,7 +81,7 @@ pub struct NonFinite {
     pub infinite: u64,
 }
 
-/// Samples that were left out of a picture since a channel of theirs was no finite number.
+/// Samples that were left out of a picture since a channel of theirs was not a finite number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct NonFiniteSamples {
     /// Samples with a NaN.
@@ -110,7 +110,7 @@ pub struct Metadata {
     pub settings: Option<String>,
     /// Seed of the random numbers.
     pub seed: Option<u64>,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub spp: Option<u64>,
     /// The device's name.
     pub device: Option<String>,

@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-/// Four bytes a pixel, as screens take them: sRGB-encoded colours, and an alpha of 255.
+/// Four bytes per pixel, as screens take them: sRGB-encoded colours, and an alpha of 255.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum PixelFormat {
     /// Red, green, blue, alpha: picture files, `VK_FORMAT_R8G8B8A8_*`.

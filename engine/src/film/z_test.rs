@@ -170,7 +170,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-ZTEST",
     name: "agreement of two pictures by z-test with Šidák's correction",
     role: Role::Service,
-    limits: "Takes means as normally distributed, which fireflies keep them from being.",
+    limits: "Assumes normally distributed means, which fireflies prevent.",
     sources: &[sources::SUBR_ARVO_2007.whole(), sources::SIDAK_1967.whole()],
     tests: &[
         "engine/src/film/z_test.rs::false_alarms_come_at_the_stated_rate",

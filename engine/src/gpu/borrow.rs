@@ -103,7 +103,7 @@ impl Recorder {
     ///
     /// # Safety
     /// - The command buffer is primary or secondary, of the device of `gpu` and of a pool of [`Gpu::queue_family`]; it is in the recording
-    ///   state and outside of a rendering, and stays so while the recorder is used. No other thread uses it or its pool in that time.
+    ///   state and outside a rendering, and stays so while the recorder is used. No other thread uses it or its pool in that time.
     /// - No query of pipeline statistics is active in it where [`Recorder::count_invocations`] is used.
     /// - It is executed by a queue of that family, in an order with the engine's own submissions that the host sees to: the engine's queue,
     ///   held by [`Gpu::lock_queue`], gives the order of submissions.
@@ -124,7 +124,7 @@ impl Recorder {
             tracker: cfg!(debug_assertions).then(Tracker::default),
         };
         if desc.opening_barrier {
-            // SAFETY: the caller's command buffer is recording, outside of a rendering.
+            // SAFETY: the caller's command buffer is recording, outside a rendering.
             unsafe { recorder.barrier_over_everything() };
         }
         Ok(BorrowedRecorder(recorder))
@@ -180,7 +180,7 @@ impl Gpu {
     pub unsafe fn borrow_buffer(&self, lent: &HostBuffer<'_>) -> Result<Buffer> {
         for (part, value) in [("offset", lent.offset), ("bytes", lent.bytes)] {
             if !value.is_multiple_of(4) || (part == "bytes" && value == 0) {
-                let cause = format!("is no {part} of whole words in buffer {:?}", lent.name);
+                let cause = format!("is not a {part} of whole words in buffer {:?}", lent.name);
                 return Err(Error::setting(part, value, cause));
             }
         }

@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::options::Lesser;
 
-/// Iterations of all loops of an invocation together after which software drivers end loops in silence; the test that ends a loop counts
+/// Iterations of all loops of an invocation together after which software drivers end loops silently; the test that ends a loop counts
 /// too.
 pub const SOFTWARE_LOOP_CAP: u32 = 65_535;
 

@@ -1,4 +1,4 @@
-//! Crash markers: one word a pass, written as the pass begins, that the host can read after the device is lost.
+//! Crash markers: one word per pass, written as the pass begins, that the host can read after the device is lost.
 
 use std::collections::BTreeMap;
 

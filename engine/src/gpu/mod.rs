@@ -1,4 +1,4 @@
-//! Floor 1: Vulkan, thin. Everything a kernel needs and nothing that decides for it.
+//! Floor 1: a thin layer over Vulkan, with everything that a kernel needs and nothing that decides for it.
 //!
 //! A [`Gpu`] is a device with one queue. Work is recorded by hand into a [`Recorder`], pass by pass, with explicit barriers, and submitted
 //! on a timeline, or into a host's command buffer, which the host submits ([`Recorder::borrow`]). All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].

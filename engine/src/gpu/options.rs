@@ -85,7 +85,7 @@ impl Validation {
             other => Err(Error::setting(
                 VALIDATION_VARIABLE,
                 other,
-                "is none of off, core and gpu",
+                "is not one of off, core and gpu",
             )),
         }
     }

@@ -218,7 +218,7 @@ impl PipelineInner {
         let module = ShaderModule::new(gpu, info.name, spirv)?;
         let (entries, data) = specialization_data(&spec);
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
-        // Widths that are no multiple of a subgroup cannot be asked for.
+        // Widths that are not multiples of a subgroup cannot be asked for.
         let is_full =
             info.subgroups && gpu.caps.full_subgroups && local_size[0].is_multiple_of(gpu.caps.subgroup_size.max(1));
         let flags = if is_full {

@@ -8,7 +8,7 @@ use ash::vk;
 /// Tells apart the temporary files of several devices in one process.
 static SAVES: AtomicU32 = AtomicU32::new(0);
 
-/// A `VkPipelineCache` and where it is kept. A cache that cannot be read or written is no error: pipelines are then made anew.
+/// A `VkPipelineCache` and where it is kept. A cache that cannot be read or written is not an error: pipelines are then compiled again.
 pub(super) struct PipelineCache {
     pub raw: vk::PipelineCache,
     file: Option<PathBuf>,

@@ -160,7 +160,7 @@ impl Recorder {
     /// A barrier that nothing waits at makes it take the timestamp now; validation sees no dependency in it.
     ///
     /// # Safety
-    /// The command buffer is recording, outside of a rendering, and the index is one of the pool's, reset and not written yet.
+    /// The command buffer is recording, outside a rendering, and the index is one of the pool's, reset and not written yet.
     unsafe fn write_timestamp(&self, index: u32) {
         let command_buffer = self.command_buffer;
         let timestamps = self.recorded.resources.timestamps;
@@ -260,7 +260,7 @@ impl Recorder {
     /// All commands before, of earlier submissions, too, then all that follow.
     ///
     /// # Safety
-    /// The command buffer is recording, outside of a rendering.
+    /// The command buffer is recording, outside a rendering.
     pub(super) unsafe fn barrier_over_everything(&self) {
         let all = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
@@ -302,7 +302,7 @@ impl Recorder {
 /// device really was in. Written where the host can see it at once, since a lost device flushes nothing more.
 ///
 /// # Safety
-/// The command buffer must be recording outside of rendering, and the buffer must live until it has been executed.
+/// The command buffer must be recording outside rendering, and the buffer must live until it has been executed.
 unsafe fn record_marker(device: &ash::Device, command_buffer: vk::CommandBuffer, markers: &Buffer, index: usize) {
     let (all, transfer) = (
         vk::PipelineStageFlags2::ALL_COMMANDS,
@@ -482,7 +482,7 @@ impl Pass<'_> {
         if let Some(count) = self.recorder.recorded.barriers.last_mut() {
             *count += 1;
         }
-        // SAFETY: the command buffer is recording, outside of rendering.
+        // SAFETY: the command buffer is recording, outside rendering.
         unsafe {
             self.recorder
                 .gpu

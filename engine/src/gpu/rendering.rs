@@ -97,7 +97,7 @@ pub struct Targets<'a> {
     pub colors: &'a [Option<ColorTarget<'a>>],
     /// Depth attachment.
     pub depth: Option<DepthTarget<'a>>,
-    /// The part that is filled and drawn into; `None` for all. What is outside of it stays as it is.
+    /// The part that is filled and drawn into; `None` for all. What is outside it stays as it is.
     pub area: Option<Area>,
     /// Layers that every primitive is rendered into, one bit a view; 0 for rendering without views.
     pub view_mask: u32,
@@ -147,7 +147,7 @@ impl<'a> Pass<'a> {
         }
         let inner = Arc::clone(&self.recorder.gpu.inner);
         let command_buffer = self.command_buffer;
-        // SAFETY: the command buffer is recording, outside of rendering; the images are kept alive.
+        // SAFETY: the command buffer is recording, outside rendering; the images are kept alive.
         unsafe { inner.device.cmd_begin_rendering(command_buffer, &info) };
         let format = |target: &Option<ColorTarget<'_>>| target.map_or(vk::Format::UNDEFINED, |t| t.image.format());
         let mut render = Render {
@@ -223,7 +223,7 @@ impl Render<'_, '_> {
         Ok(())
     }
 
-    /// Nothing is drawn outside of this part of the targets from here on; what clip space spans stays as it is. It must lie in the part that is
+    /// Nothing is drawn outside this part of the targets from here on; what clip space spans stays as it is. It must lie in the part that is
     /// rendered into.
     ///
     /// # Errors

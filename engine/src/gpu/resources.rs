@@ -57,7 +57,7 @@ impl Drop for Lease {
 pub(super) struct FrameResources {
     pub command_pool: vk::CommandPool,
     pub command_buffer: vk::CommandBuffer,
-    /// Two timestamps a pass; null without timestamp support.
+    /// Two timestamps per pass; null without timestamp support.
     pub timestamps: vk::QueryPool,
     /// The counts of [`counted`] of each pass; null without support.
     pub statistics: vk::QueryPool,

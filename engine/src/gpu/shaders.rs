@@ -4,7 +4,7 @@
 //!
 //! 1. **Write the entry file** `shaders/<floor>/<name>.comp`. It begins with `#version 460` and a comment block, which becomes the
 //!    documentation of the generated module. Mathematics goes to `shaders/<floor>/`, with include guards, as functions of
-//!    the same names as their Rust twins. Keep the file short: software drivers compile about a hundred lines a second.
+//!    the same names as their Rust twins. Keep the file short: software drivers compile about a hundred lines per second.
 //!
 //!    ```glsl
 //!    #version 460
@@ -49,7 +49,7 @@
 //!    ```
 //!
 //! 4. **Mind the limits** of small devices: a pipeline has [`Caps::descriptors`](super::Caps) to live with (Vulkan promises
-//!    no more than 4 descriptor sets, so that theirs are 0 to 3, and 4 storage buffers a stage), where the bindings count that the optimized module uses; loops end in silence after 65,535 iterations on the software driver; a
+//!    no more than 4 descriptor sets, so that theirs are 0 to 3, and 4 storage buffers per stage), where the bindings count that the optimized module uses; loops end in silence after 65,535 iterations on the software driver; a
 //!    submission must be over within seconds, so split work by the [`Timings`](super::Timings) of the last.
 //!
 //! 5. **Test it** against its twin, like `tests/tests/twins/`; every module is also read by

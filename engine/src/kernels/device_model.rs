@@ -1,11 +1,11 @@
-//! The cost model of a device, measured: latency of dependent loads by the size of what they lie in, bandwidth of copies, tickets a second
+//! The cost model of a device, measured: latency of dependent loads by the size of what they lie in, bandwidth of copies, tickets per second
 //! from one counter, and what a boundary between dispatches costs.
 //!
-//! Sources: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §2.2.2 to §2.2.4, whose figures for a GPU of
+//! Sources: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §2.2.2 to §2.2.4, whose figures for a GPU of
 //! 2008 explain its choices; H. Wong et al., "Demystifying GPU Microarchitecture through Microbenchmarking", ISPASS 2010 (pointer
 //! chasing). The kernels are `shaders/kernels/model_*.comp`.
 //!
-//! Guarantees: what is done is exact (each place of a chain is visited once a round, each ticket is given once, copies are equal, which
+//! Guarantees: what is done is exact (each place of a chain is visited once per round, each ticket is given once, copies are equal, which
 //! the tests check); the seconds are measured.
 
 use std::time::Instant;

@@ -14,7 +14,7 @@ pub(super) const BLOCK_ITERATIONS: u32 = SOFTWARE_LOOP_CAP.div_ceil(2);
 /// Loops of a scan that take each element: one combines a lane's items, one writes them.
 const SCAN_LOOPS: u32 = 2;
 
-/// Tiles of a block whose team is a workgroup, at most. A lane takes about 20 iterations a tile: [`SCAN_LOOPS`] times the items, and the
+/// Tiles of a block whose team is a workgroup, at most. A lane takes about 20 iterations per tile: [`SCAN_LOOPS`] times the items, and the
 /// steps of the scan over the lanes.
 const WORKGROUP_TILES: u32 = 1 << 11;
 
@@ -30,7 +30,7 @@ pub(super) const SERIAL_LANES: u32 = 64;
 /// Teams that are invocations, on devices with lanes of their own: enough to fill them, few enough to be scanned by a workgroup.
 pub(super) const SERIAL_TEAMS: u32 = 1 << 14;
 
-/// Elements that blocks of single invocations are a multiple of, so that short streams do not go to a team an element; on software
+/// Elements that blocks of single invocations are a multiple of, so that short streams do not go to a team per element; on software
 /// devices, which have few threads, more.
 pub(super) const SERIAL_TILE: u32 = 64;
 const SERIAL_TILE_ON_SOFTWARE: u32 = 256;
@@ -170,7 +170,7 @@ impl Teams {
         })
     }
 
-    /// Teams that are workgroups in any case, of kernels without barriers in their loops, with so many loop iterations an element.
+    /// Teams that are workgroups in any case, of kernels without barriers in their loops, with so many loop iterations per element.
     pub fn workgroups(caps: &Caps, iterations: u32) -> Self {
         let lanes = if caps.kind == DeviceKind::Cpu {
             SOFTWARE_WORKGROUP_LANES

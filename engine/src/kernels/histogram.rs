@@ -58,7 +58,7 @@ impl Histogram {
         stream::scratch_bytes(1)
     }
 
-    /// Words of the counts: one a bin, and one for all other values.
+    /// Words of the counts: one per bin, and one for all other values.
     pub fn count_words(&self) -> u32 {
         self.bins + 1
     }

@@ -33,7 +33,7 @@ pub struct PartitionOptions {
     pub form: Form,
 }
 
-/// Ranges that a partition reads and writes, of one word an element. They must be aligned as storage bindings are, and be apart.
+/// Ranges that a partition reads and writes, of one word per element. They must be aligned as storage bindings are, and be apart.
 #[derive(Debug, Clone, Copy)]
 pub struct PartitionBuffers<'a> {
     /// Flags: words that are not 0.

@@ -21,7 +21,7 @@ pub enum Direction {
 /// Ranges that a permutation reads and writes. They must be aligned as storage bindings are, and be apart.
 #[derive(Debug, Clone, Copy)]
 pub struct PermuteBuffers<'a> {
-    /// One word an element.
+    /// One word per element.
     pub indices: BufferView<'a>,
     /// The elements.
     pub input: BufferView<'a>,

@@ -345,7 +345,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "PM-B-4",
     name: "radix sort of 32- and 64-bit keys, with or without values",
     role: Role::Kernel,
-    limits: "Keys are unsigned: others want an order-preserving map first; the device bounds how many there may be.",
+    limits: "Keys are unsigned: others need an order-preserving map first; the device bounds how many there may be.",
     sources: &[sources::SATISH_2009.whole(), sources::ASHKIANI_2016.whole()],
     shaders: &[
         "shaders/kernels/radix_count_serial.comp",

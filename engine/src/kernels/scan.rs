@@ -32,7 +32,7 @@ pub struct ScanOptions {
     pub form: Form,
 }
 
-/// Ranges that a scan reads and writes, of one word an element. They must be aligned as storage bindings are; output and input may be one
+/// Ranges that a scan reads and writes, of one word per element. They must be aligned as storage bindings are; output and input may be one
 /// range.
 #[derive(Debug, Clone, Copy)]
 pub struct ScanBuffers<'a> {

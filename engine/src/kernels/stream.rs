@@ -1,4 +1,4 @@
-//! Streams of elements cut into blocks, one a team: how the host plans and begins every reduce-then-scan kernel.
+//! Streams of elements cut into blocks, one per team: how the host plans and begins every reduce-then-scan kernel.
 //!
 //! The arithmetic of blocks is that of `shaders/kernels/stream.glsl`. Guarantees: every element is in exactly one block, no team's
 //! block is longer than the quota that its form allows, and no more workgroups are dispatched than every device takes.
@@ -108,7 +108,7 @@ pub(super) struct Prepare {
     pipeline: ComputePipeline<stream_prepare::Kernel>,
 }
 
-/// Arguments of indirect dispatches of an invocation an element, for as many elements as a buffer says.
+/// Arguments of indirect dispatches of an invocation per element, for as many elements as a buffer says.
 #[derive(Debug)]
 pub(crate) struct IndirectCount {
     prepare: Prepare,
@@ -212,7 +212,7 @@ impl Prepare {
 }
 
 impl Stream<'_> {
-    /// Dispatches one team a block.
+    /// Dispatches one team per block.
     pub fn dispatch<K: ComputeShader>(
         &self,
         pass: &mut Pass<'_>,

@@ -431,7 +431,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "OEM-5",
     name: "look-ups in octahedron maps: unfiltered, repaired levels of detail, borders at each level",
     role: Role::Kernel,
-    limits: "Bilinear in the map, not on the sphere; cubes and discs have no borders, so that texels there share the weight of missing ones.",
+    limits: "Bilinear in the map, not on the sphere; cubes and discs have no borders, so texels there share the weight of missing ones.",
     sources: &[
         sources::ENGELHARDT_DACHSBACHER_2008.whole(),
         sources::ENGELHARDT_2013.at("7.2.2"),

@@ -11,11 +11,11 @@ pub(super) fn integrate(corner: impl Fn(f64, f64) -> f64, lower: DVec2, upper: D
         corner(a, b).copysign(u * v)
     };
     let sum = at(upper.x, upper.y) - at(lower.x, upper.y) - at(upper.x, lower.y) + at(lower.x, lower.y);
-    // What is outside of the disc is the difference of equal numbers.
+    // What is outside the disc is the difference of equal numbers.
     if outside(lower, upper) { 0.0 } else { sum.max(0.0) }
 }
 
-/// Whether a rectangle lies outside of the disc.
+/// Whether a rectangle lies outside the disc.
 fn outside(lower: DVec2, upper: DVec2) -> bool {
     DVec2::ZERO.clamp(lower, upper).length_squared() >= 1.0
 }

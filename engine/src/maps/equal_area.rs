@@ -60,7 +60,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-EQUAL-AREA",
     name: "equal-area octahedron map",
     role: Role::Kernel,
-    limits: "No projection: triangles cannot be drawn into it; shapes of texels are sheared off the axes.",
+    limits: "Not a projection: triangles cannot be drawn into it; shapes of texels are sheared off the axes.",
     sources: &[sources::CLARBERG_2008.whole()],
     shaders: &["shaders/maps/equal_area.glsl"],
     tests: &[

@@ -162,7 +162,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-IRRADIANCE",
     name: "irradiance under a map, and maps of it over normals",
     role: Role::Kernel,
-    limits: "Texels are constant each; at the rims of the sphere map and of Nusselt's off by up to 3·10⁻⁴ and 3·10⁻³.",
+    limits: "Each texel counts as constant; at the rims of the sphere map and of Nusselt's off by up to 3·10⁻⁴ and 3·10⁻³.",
     sources: &[
         sources::LAMBERT_1760.whole(),
         sources::RAMAMOORTHI_HANRAHAN_2001.whole(),

@@ -201,7 +201,7 @@ impl Parametrization {
         inside && at.layer < self.layers() && (!self.is_disc() || self.natural(at.uv).length_squared() <= 1.0)
     }
 
-    /// The unit direction at a place; `None` outside of the map.
+    /// The unit direction at a place; `None` outside the map.
     pub fn decode(self, at: MapPoint) -> Option<DVec3> {
         let p = self.natural(at.uv);
         self.holds(at).then(|| match self {
@@ -253,7 +253,7 @@ impl Parametrization {
         [along * extent.x, down * extent.y]
     }
 
-    /// Solid angle of a rectangle of a layer, sr: exact, what lies outside of a disc left out.
+    /// Solid angle of a rectangle of a layer, sr: exact, what lies outside a disc left out.
     pub fn rectangle_solid_angle(self, lower: DVec2, upper: DVec2) -> f64 {
         let (low, high) = (self.natural(lower), self.natural(upper));
         match self {
@@ -278,7 +278,7 @@ impl Parametrization {
         disc::area(low, high) / (high - low).element_product()
     }
 
-    /// Solid angle of a texel of a map of that many texels a layer, sr.
+    /// Solid angle of a texel of a map of that many texels per layer, sr.
     pub fn texel_solid_angle(self, size: UVec2, texel: Texel) -> f64 {
         let [lower, upper] = texel.bounds(size);
         self.rectangle_solid_angle(lower, upper)
@@ -290,7 +290,7 @@ impl Parametrization {
         rows.flat_map(move |(layer, y)| (0..size.x).map(move |x| Texel { layer, x, y }))
     }
 
-    /// The unit direction of a texel's centre; `None` where that lies outside of a disc.
+    /// The unit direction of a texel's centre; `None` where that lies outside a disc.
     pub fn texel_direction(self, size: UVec2, texel: Texel) -> Option<DVec3> {
         self.decode(texel.centre(size))
     }

@@ -12,7 +12,7 @@ pub fn nusselt_encode(d: DVec3) -> DVec2 {
     DVec2::new(d.x, d.y)
 }
 
-/// The unit direction; outside of the disc it lies on the horizon.
+/// The unit direction; outside the disc it lies on the horizon.
 pub fn nusselt_decode(uv: DVec2) -> DVec3 {
     let squared = uv.length_squared();
     uv.extend((1.0 - squared).max(0.0).sqrt()) / squared.max(1.0).sqrt()
@@ -39,7 +39,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "DP-5",
     name: "Nusselt's map of the hemisphere",
     role: Role::Kernel,
-    limits: "Half of the sphere only; solid angles of texels are without bound at the horizon.",
+    limits: "Half of the sphere only; solid angles of texels grow without bound towards the horizon.",
     sources: &[sources::NUSSELT_1928.whole()],
     shaders: &["shaders/maps/nusselt.glsl"],
     tests: &[

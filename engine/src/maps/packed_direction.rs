@@ -1,7 +1,7 @@
 //! Directions in a word: the octahedron map's two coordinates as signed normalized integers.
 //!
 //! Sources: Meyer et al., "On Floating-Point Normal Vectors" (2010), as surveyed by Cigolle et al. (JCGT 3(2), 2014), which also has the
-//! rounding that tries all four neighbours. Guarantees, for 2 × `bits` with s = 2^(bits − 1) − 1 steps a side: directions are off by at most
+//! rounding that tries all four neighbours. Guarantees, for 2 × `bits` with s = 2^(bits − 1) − 1 steps per side: directions are off by at most
 //! [`packed_error`] = 3/(√2 s) radians and 2·10⁻⁷ for the roundings of f32, those along axes by nothing: 1.7·10⁻² for 8 bits, 1.04·10⁻³ for 12,
 //! 5.2·10⁻⁴ for 13, 1.3·10⁻⁴ for 15, 6.5·10⁻⁵ for 16. Packing is in f32 as on the device. Twin of `maps/packed_direction.glsl`.
 
@@ -64,7 +64,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-PACKED",
     name: "directions in a word",
     role: Role::Kernel,
-    limits: "Directions are off by up to 3/(√2 s) radians for s steps a side; those along axes are exact.",
+    limits: "Directions are off by up to 3/(√2 s) radians for s steps per side; those along axes are exact.",
     sources: &[sources::MEYER_2010.whole(), sources::CIGOLLE_2014.whole()],
     shaders: &["shaders/maps/packed_direction.glsl"],
     tests: &[

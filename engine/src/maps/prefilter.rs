@@ -81,7 +81,7 @@ pub fn ggx_mean(texels: &[(DVec3, DVec4)], r: DVec3, alpha: f64) -> DVec3 {
 /// Twin of [`PrefilterGgx`]: a map of the same kind, of `size`.
 ///
 /// # Errors
-/// [`Error::Setting`] for α outside of (0, 1], or for a size that the map cannot have.
+/// [`Error::Setting`] for α outside (0, 1], or for a size that the map cannot have.
 pub fn prefilter_ggx(source: &MapImage, size: UVec2, alpha: f64) -> Result<MapImage> {
     check(alpha)?;
     let map = source.map();
@@ -129,7 +129,7 @@ impl PrefilterGgx {
     /// the target must have ended. After it the target has been written by a compute shader.
     ///
     /// # Errors
-    /// [`Error::Setting`] for α outside of (0, 1], levels that are not there or maps of other kinds or borders; [`Error::LimitExceeded`] for a
+    /// [`Error::Setting`] for α outside (0, 1], levels that are not there or maps of other kinds or borders; [`Error::LimitExceeded`] for a
     /// source of more than 2¹⁵ texels, of which a coarser level serves; and as [`Pass::dispatch`].
     pub fn record(
         &self,

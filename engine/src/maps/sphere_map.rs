@@ -20,7 +20,7 @@ pub fn sphere_map_encode(d: DVec3) -> DVec2 {
     along * (0.5 * (1.0 - d.z)).sqrt()
 }
 
-/// The unit direction; outside of the disc as at its rim.
+/// The unit direction; outside the disc as at its rim.
 pub fn sphere_map_decode(uv: DVec2) -> DVec3 {
     let z = (1.0 - uv.length_squared()).max(0.0).sqrt();
     DVec3::new(2.0 * z * uv.x, 2.0 * z * uv.y, 2.0 * z * z - 1.0)
@@ -51,7 +51,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "DP-2",
     name: "sphere map (mirror ball)",
     role: Role::Kernel,
-    limits: "Texels degrade in shape without bound at the rim, which is one direction all round.",
+    limits: "Texels degrade in shape without bound at the rim, which is a single direction all the way round.",
     sources: &[sources::MILLER_HOFFMAN_1984.whole()],
     shaders: &["shaders/maps/sphere_map.glsl"],
     tests: &[

@@ -15,7 +15,7 @@
 //!   that there could be.
 //!
 //! Bias: exact for piecewise constant texels (twins: [`SatImage::sat_mean`] in f64, [`box_mean`] without a table). GLSL:
-//! `maps/spherical_sat.glsl`. Table: four channels of eight bytes a texel of the bordered map.
+//! `maps/spherical_sat.glsl`. Table: four channels of eight bytes per texel of the bordered map.
 
 use super::directional_map::{DirectionalMap, answer};
 use super::lat_long::lat_long_pole_density;
@@ -98,7 +98,7 @@ pub(super) fn half_width_at(map: Parametrization, size: UVec2, uv: DVec2, solid_
 const FIXED_BITS: f64 = 62.0;
 /// Largest scale of integers as a power of two: it and what it multiplies stay within f32.
 const MAX_SCALE: f64 = 120.0;
-/// Longest line of a table: a line is a loop of some steps a texel, and software drivers end loops after 65,535.
+/// Longest line of a table: a line is a loop of some steps per texel, and software drivers end loops after 65,535.
 const MAX_LINE: u32 = 4096;
 
 /// A table on the device.

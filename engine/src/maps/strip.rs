@@ -46,7 +46,7 @@ impl MapImage {
         Ok((extent, texels))
     }
 
-    /// The texel at a place inside of a layer or beyond its edges.
+    /// The texel at a place inside a layer or beyond its edges.
     fn beyond(&self, layer: u32, x: i32, y: i32) -> Option<Vec3> {
         let (map, size) = (self.map(), self.size());
         let held = |x: i32, y: i32| map.wrap(size, layer, x, y).map(|texel| self.at(texel));

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3, UVec2};
 /// A texel and its share of a look-up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tap {
-    /// The texel, inside of the map.
+    /// The texel, inside the map.
     pub texel: Texel,
     /// Its weight.
     pub weight: f64,
@@ -14,7 +14,7 @@ pub struct Tap {
 
 impl Parametrization {
     /// The bilinear taps of a direction; weights sum to 1. Where a texel does not exist (see [`Parametrization::wrap`]) or its centre lies
-    /// outside of a disc, its weight is 0 and the others share it. `None` for a direction that the map does not hold.
+    /// outside a disc, its weight is 0 and the others share it. `None` for a direction that the map does not hold.
     pub fn taps(self, size: UVec2, direction: DVec3) -> Option<[Tap; 4]> {
         let at = self.encode(direction)?;
         let place = at.uv * size.as_dvec2() - 0.5;

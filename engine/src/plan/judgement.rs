@@ -132,7 +132,7 @@ fn judgement_of(
                 Ok(Judgement {
                     bias: found.last().map(|(_, found)| BiasModel::constant(*found)),
                     by: format!(
-                        "{}, of {} samples a pixel: it misses {}",
+                        "{}, of {} samples per pixel: it misses {}",
                         consistent.card.id, consistent.spp, trial.misses
                     ),
                     ..Judgement::default()
@@ -152,7 +152,7 @@ fn judgement_of(
             let last = found.last().map(|(_, found)| *found).unwrap_or_default();
             Ok(Judgement {
                 bias: found.last().map(|(_, found)| BiasModel::constant(*found)),
-                by: format!("{}, of {} samples a pixel", other.card.id, other.spp),
+                by: format!("{}, of {} samples per pixel", other.card.id, other.spp),
                 // Neither within the goal nor beyond it.
                 may_be_seen: error.is_some_and(|e| last.square < e * e && last.upper() > e * e),
                 unseen: 0.0,
@@ -184,7 +184,7 @@ fn judgement_of_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> 
         let law = bias.map_or_else(String::new, |bias| law(&bias));
         return Ok(Judgement {
             bias,
-            by: format!("{}, of {} samples a pixel; {law}", reference.card.id, reference.spp),
+            by: format!("{}, of {} samples per pixel; {law}", reference.card.id, reference.spp),
             may_be_seen,
             unseen: 0.0,
         });
@@ -193,12 +193,12 @@ fn judgement_of_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> 
         Some(reference) if !reference.misses.is_empty() => format!("{} misses {}", reference.card.id, reference.misses),
         Some(reference) if has_unseen => {
             format!(
-                "{} has not met all light in {} samples a pixel",
+                "{} has not met all light in {} samples per pixel",
                 reference.card.id, reference.spp
             )
         }
         Some(reference) => format!(
-            "{} is too noisy in {} samples a pixel",
+            "{} is too noisy in {} samples per pixel",
             reference.card.id, reference.spp
         ),
         None => "nothing else can".into(),
@@ -207,7 +207,7 @@ fn judgement_of_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> 
     Ok(match own {
         Some(own) => Judgement {
             by: format!(
-                "its own pictures of {} samples a pixel, since {why}; {}",
+                "its own pictures of {} samples per pixel, since {why}; {}",
                 stages.join(", "),
                 law(&own)
             ),
@@ -221,7 +221,7 @@ fn judgement_of_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> 
         ),
         None if trial.spp <= trial.law.samples_a_pass => Judgement::unknown(
             &format!(
-                "its own pictures of up to {} samples a pixel are of one pass, and {why}",
+                "its own pictures of up to {} samples per pixel are of one pass, and {why}",
                 trial.spp
             ),
             may_be_seen,
@@ -229,7 +229,7 @@ fn judgement_of_consistent(trial: &Trial<'_>, reference: Option<&Trial<'_>>) -> 
         None if moved.is_empty() => Judgement::unknown("there was no time for pictures of two budgets", may_be_seen),
         None => Judgement::unknown(
             &format!(
-                "its own pictures of {} samples a pixel do not settle, and {why}",
+                "its own pictures of {} samples per pixel do not settle, and {why}",
                 stages.join(", ")
             ),
             may_be_seen,

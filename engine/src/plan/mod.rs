@@ -73,7 +73,7 @@ pub struct Candidate {
     pub reason: String,
     /// What of the light paths asked for it does not find, in words; empty where it finds all.
     pub misses: String,
-    /// Samples a pixel of its last pilots, 0 without.
+    /// Samples per pixel of its last pilots, 0 without.
     pub pilot_spp: u32,
     /// Root of the relative MSE of those by noise alone.
     pub pilot_noise: f64,
@@ -81,9 +81,9 @@ pub struct Candidate {
     pub lit: bool,
     /// The noise falls as samples^(−slope/2).
     pub slope: f64,
-    /// Predicted seconds for each sample a pixel of the whole picture.
+    /// Predicted seconds for each sample per pixel of the whole picture.
     pub seconds_a_sample: f64,
-    /// Samples a pixel that it would take.
+    /// Samples per pixel that it would take.
     pub spp: u32,
     /// Predicted root of the relative MSE by noise alone.
     pub noise: f64,
@@ -106,7 +106,7 @@ pub struct Candidate {
 pub struct Reference {
     /// Technique id.
     pub technique: &'static str,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub pilot_spp: u32,
     /// Root of the relative MSE of each by noise.
     pub pilot_noise: f64,
@@ -226,7 +226,7 @@ pub fn plan_among(
     }
     run_rounds(&mut trials, &asked, start, proceed)?;
     let pilot_seconds = start.elapsed().as_secs_f64();
-    // A reference that is no candidate stands at the end, beyond all of them.
+    // A reference that is not a candidate stands at the end, beyond all of them.
     for (candidate, trial) in candidates.iter_mut().zip(&trials) {
         if let Some(trial) = trial {
             trial.predict(candidate, goal, pilot_seconds);
@@ -341,7 +341,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-PLAN",
     name: "automatic choice of technique, settings and samples by pilot pictures",
     role: Role::Service,
-    limits: "A pilot does not see what is rarer than its samples, and times are those of a machine that does nothing else.",
+    limits: "Pilots do not see what is rarer than their samples, and times assume a machine that does nothing else.",
     tests: &[
         "engine/src/plan/noise.rs::pairs_know_their_error",
         "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",

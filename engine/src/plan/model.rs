@@ -1,4 +1,4 @@
-//! Models of error, bias and cost over samples a pixel, fitted to pilot renderings.
+//! Models of error, bias and cost over samples per pixel, fitted to pilot renderings.
 
 use super::bias::BiasEstimate;
 use crate::techniques::Law;
@@ -12,12 +12,12 @@ const BELIEF: f64 = 0.5;
 /// What a number may exceed a whole one by and still count as that.
 const HAIR: f64 = 1e-6;
 
-/// Relative MSE over samples a pixel.
+/// Relative MSE over samples per pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorModel {
     /// Least slope.
     least_slope: f64,
-    /// Samples a pixel and relative MSE, with rising samples.
+    /// Samples per pixel and relative MSE, with rising samples.
     points: Vec<(f64, f64)>,
     /// What the last measurement has not seen, for all that is known.
     unseen: f64,
@@ -66,7 +66,7 @@ impl ErrorModel {
         measured - (1.0 - BELIEF) * surplus
     }
 
-    /// Relative MSE expected of `samples` samples a pixel: between measurements by the power law through both, beyond the last by the
+    /// Relative MSE expected of `samples` samples per pixel: between measurements by the power law through both, beyond the last by the
     /// slope; 0 without a measurement.
     pub fn relative_mse(&self, samples: f64) -> f64 {
         let last = self.points.last().map_or(0.0, |(n, _)| *n);
@@ -84,7 +84,7 @@ impl ErrorModel {
         e * (samples / n).powf(-self.slope())
     }
 
-    /// Least number of samples a pixel for that relative MSE, at least 1 and at most `u32::MAX`.
+    /// Least number of samples per pixel for that relative MSE, at least 1 and at most `u32::MAX`.
     pub fn samples(&self, relative_mse: f64) -> u32 {
         if self.unseen > 0.0 {
             return least(|samples| self.relative_mse(samples) <= relative_mse).unwrap_or(u32::MAX);
@@ -112,12 +112,12 @@ const EXPONENTS: std::ops::RangeInclusive<f64> = 0.0..=2.0;
 /// Least exponent by which where a picture is going can be told from how it moves.
 const SETTLING_EXPONENT: f64 = 0.1;
 
-/// Relative squared bias over samples a pixel: a power law through the last measurement.
+/// Relative squared bias over samples per pixel: a power law through the last measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BiasModel {
     /// Passes of the last measurement.
     at: f64,
-    /// Samples a pixel of a pass.
+    /// Samples per pixel of a pass.
     samples_a_pass: f64,
     /// What it found, and what may be by its noise.
     square: f64,
@@ -135,7 +135,7 @@ impl Default for BiasModel {
     }
 }
 
-/// Passes of so many samples a pixel. Pictures of less than a pass are as biased as that of one.
+/// Passes of so many samples per pixel. Pictures of less than a pass are as biased as that of one.
 fn passes(samples: f64, samples_a_pass: f64) -> f64 {
     (samples / samples_a_pass).max(1.0)
 }
@@ -224,7 +224,7 @@ impl BiasModel {
         self.exponent
     }
 
-    /// Relative squared bias expected of that many samples a pixel.
+    /// Relative squared bias expected of that many samples per pixel.
     pub fn square(&self, samples: f64) -> f64 {
         self.square * self.decay(samples)
     }
@@ -242,7 +242,7 @@ impl BiasModel {
         }
     }
 
-    /// Least number of samples a pixel from which noise and bias together stay within a relative MSE, and the bias does so with what it may be
+    /// Least number of samples per pixel from which noise and bias together stay within a relative MSE, and the bias does so with what it may be
     /// by its noise; `None` where no number does.
     pub fn samples(&self, noise: &ErrorModel, relative_mse: f64) -> Option<u32> {
         if self.upper == 0.0 {
@@ -271,22 +271,22 @@ fn least(holds: impl Fn(f64) -> bool) -> Option<u32> {
     Some(enough)
 }
 
-/// Seconds over samples a pixel.
+/// Seconds over samples per pixel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CostModel {
     /// Before and with the first sample.
     pub start: f64,
-    /// For each sample a pixel.
+    /// For each sample per pixel.
     pub sample: f64,
 }
 
 impl CostModel {
-    /// Seconds for `samples` samples a pixel.
+    /// Seconds for `samples` samples per pixel.
     pub fn seconds(&self, samples: f64) -> f64 {
         self.start + self.sample * samples
     }
 
-    /// Most samples a pixel in that time; 0 when not even one fits.
+    /// Most samples per pixel in that time; 0 when not even one fits.
     pub fn samples(&self, seconds: f64) -> u32 {
         ((seconds - self.start) / self.sample.max(1e-12)).clamp(0.0, f64::from(u32::MAX)) as u32
     }

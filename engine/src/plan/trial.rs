@@ -21,7 +21,7 @@ use crate::{Error, Result};
 const PILOT_PIXELS: f64 = 16_384.0;
 /// Shortest side of a pilot picture, pixels, where the picture itself has as many.
 const PILOT_SIDE: u32 = 8;
-/// Samples a pixel of the pilots, one round after the other.
+/// Samples per pixel of the pilots, one round after the other.
 pub const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 /// Relative MSE of a black picture, which is all that pilots without light know.
 const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
@@ -97,7 +97,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Of an unbiased technique that is no candidate, for others to be held against.
+    /// Of an unbiased technique that is not a candidate, for others to be held against.
     pub fn start_reference(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate) -> Result<Option<Self>> {
         let trial = Self::start(asked, card, candidate, 0)?;
         Ok(trial.map(|trial| Self {
@@ -191,7 +191,7 @@ impl<'a> Trial<'a> {
         Ok(Some(trial))
     }
 
-    /// Refines both pilots to `spp` samples a pixel; what keeps them from it is [`failure`](Self::failure) from then on. `pixels` are those of the picture itself.
+    /// Refines both pilots to `spp` samples per pixel; what keeps them from it is [`failure`](Self::failure) from then on. `pixels` are those of the picture itself.
     pub fn go_on(&mut self, spp: u32, pixels: f64) -> Result<()> {
         if let Err(error) = self.round(spp, pixels) {
             self.failure = reason_of(error)?;
@@ -199,7 +199,7 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// A round of both pilots to `spp` samples a pixel; `pixels` are those of the picture itself.
+    /// A round of both pilots to `spp` samples per pixel; `pixels` are those of the picture itself.
     fn round(&mut self, spp: u32, pixels: f64) -> Result<()> {
         let from = Instant::now();
         for pilot in &mut self.pilots {
@@ -232,14 +232,14 @@ impl<'a> Trial<'a> {
         Ok([a.picture()?, b.picture()?])
     }
 
-    /// Seconds for each sample a pixel of a picture of so many pixels, by a round of so many samples.
+    /// Seconds for each sample per pixel of a picture of so many pixels, by a round of so many samples.
     fn seconds_a_sample(&self, samples: u32, pixels: f64) -> f64 {
         let [width, height] = self.pilots[0].size();
         let larger = pixels / (f64::from(width) * f64::from(height));
         self.round_seconds / f64::from(2 * samples.max(1)) * (self.fixed + (1.0 - self.fixed) * larger)
     }
 
-    /// Samples a pixel for the goal, when the pilots have taken `spent` seconds.
+    /// Samples per pixel for the goal, when the pilots have taken `spent` seconds.
     pub fn samples(&self, goal: Goal, spent: f64) -> u32 {
         let for_error = goal.error.map(|error| match self.lit {
             // What cannot reach it is shown with as many as noise alone would take.
@@ -254,7 +254,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Samples a pixel for an error, noise and bias together.
+    /// Samples per pixel for an error, noise and bias together.
     fn reach(&self, error: f64) -> Option<u32> {
         self.judgement.bias?.samples(&self.error, error * error)
     }
@@ -264,7 +264,7 @@ impl<'a> Trial<'a> {
         self.error.relative_mse(f64::from(self.spp))
     }
 
-    /// Relative MSE expected of that many samples a pixel, by noise alone.
+    /// Relative MSE expected of that many samples per pixel, by noise alone.
     pub fn relative_mse(&self, samples: u32) -> f64 {
         if self.lit {
             self.error.relative_mse(f64::from(samples))
@@ -311,7 +311,7 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// What others are held against: technique, samples a pixel, noise.
+    /// What others are held against: technique, samples per pixel, noise.
     pub fn as_reference(&self) -> Reference {
         Reference {
             technique: self.card.id,

@@ -40,7 +40,7 @@ pub fn shortfall(choice: &Candidate, goal: Goal, pilot_seconds: f64) -> String {
     if let Some(time) = goal.time.map(|time| time.as_secs_f64())
         && all > time * (1.0 + TOLERANCE)
     {
-        return format!("{time:.3} s are too short: one sample a pixel and the pilots take about {all:.3} s");
+        return format!("{time:.3} s are too short: one sample per pixel and the pilots take about {all:.3} s");
     }
     if choice.bias.is_none() && !choice.misses.is_empty() {
         return format!(

@@ -1,7 +1,7 @@
 //! Polygons cut along the planes x = 0, y = 0 and z = 0, and the ways to render an octahedron map that rest on it.
 //!
 //! Source: T. Engelhardt, "Efficient From-Point Visibility for Global Illumination in Virtual Scenes with Participating
-//! Media", PhD thesis, KIT, 2013, §7.2.1 and §7.3.2, of which these cuts differ: clip coordinates are homogeneous, with the norm |x| + |y| + |z| as the divisor, so that what is interpolated inside of an octant is
+//! Media", PhD thesis, KIT, 2013, §7.2.1 and §7.3.2, of which these cuts differ: clip coordinates are homogeneous, with the norm |x| + |y| + |z| as the divisor, so that what is interpolated inside an octant is
 //! right (the source's are divided already, and depth and attributes bend), and no more is emitted than there is.
 //!
 //! Guarantees. A cut is the same from both ends of an edge, and every octant's piece has the same corners on a plane as its neighbour's:
@@ -247,7 +247,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "OEM-4b",
-        name: "octahedron maps rendered live: split along the equator alone",
+        name: "octahedron maps rendered live: split only along the equator",
         role: Role::Kernel,
         limits: "Edges stay straight over x = 0 and y = 0, where their images bend; rectangular layout only.",
         sources: &[sources::ENGELHARDT_2013.at("7.2.1 and 7.3.2")],
@@ -267,10 +267,10 @@ pub(crate) const ROWS: &[Row] = &[
         id: "OEM-4c",
         name: "octahedron maps rendered live: split outlines",
         role: Role::Kernel,
-        limits: "Silhouettes are exact, depth and attributes inside of them are not; rectangular layout only.",
+        limits: "Silhouettes are exact, depth and attributes inside them are not; rectangular layout only.",
         sources: &[sources::ENGELHARDT_2013.at("7.2.1 and 7.3.2")],
         shaders: &["shaders/raster/surface_outlines.geom"],
-        bias: Some(Bias::Biased("what is interpolated inside of outlines")),
+        bias: Some(Bias::Biased("what is interpolated inside outlines")),
         needs: &["geometryShader"],
         tests: &[
             "tests/tests/raster/cuts.rs::halves_and_outlines_are_wrong_as_stated",

@@ -401,7 +401,7 @@ pub struct ShadowReceiver {
     pub height: f64,
 }
 
-/// Half the diagonal of a square as large as the texel about a direction, radians, in a map of `side` × `side` texels a layer.
+/// Half the diagonal of a square as large as the texel about a direction, radians, in a map of `side` × `side` texels per layer.
 pub fn shadow_texel_radius(layout: ShadowLayout, d: DVec3, side: u32) -> f64 {
     let map = layout.map();
     let density = map.encode(d).map_or(0.0, |at| map.solid_angle_density(at.uv));

@@ -65,7 +65,7 @@ impl Output {
         }
     }
 
-    /// Bytes a pixel.
+    /// Bytes per pixel.
     pub const fn bytes(self) -> u64 {
         match self {
             Self::Triangle | Self::Object | Self::Material | Self::Distance => 4,

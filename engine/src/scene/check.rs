@@ -56,7 +56,7 @@ impl Scene {
                 return fail(
                     format!("images[{i}]"),
                     format!(
-                        "is {} × {}; at most {MAX_IMAGE_SIDE} a side are allowed",
+                        "is {} × {}; at most {MAX_IMAGE_SIDE} per side are allowed",
                         image.width, image.height
                     ),
                 );
@@ -312,7 +312,7 @@ mod tests {
                 s.images[0].height = 1;
                 s.images[0].texels = vec![[0; 4]; 65_536];
             })
-            .contains("at most 65535 a side")
+            .contains("at most 65535 per side")
         );
         assert!(refusal(|s| s.materials[0].roughness = 2.0).contains("roughness"));
         assert!(refusal(|s| s.materials[0].roughness = f32::NAN).contains("roughness"));

@@ -69,7 +69,7 @@ fn model(path: &Path) -> Result<Scene> {
         other => {
             let cause = match other {
                 "" => "has no ending that tells its kind".into(),
-                _ => format!("{other:?} is no known kind of scene file"),
+                _ => format!("{other:?} is not a known kind of scene file"),
             };
             let known = "known: gltf, glb, ply, obj, toml, and builtin: addresses";
             let text = path.display().to_string();
@@ -94,7 +94,7 @@ fn complete(scene: &mut Scene) {
         scene.notes.push(Note {
             feature: "no geometry".into(),
             at: "meshes".into(),
-            instead: "the picture shows the background alone".into(),
+            instead: "the picture shows only the background".into(),
         });
     }
     if scene.cameras.is_empty() {

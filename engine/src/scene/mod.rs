@@ -48,7 +48,7 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Participating media that [`Material::interior`] and [`Scene::surrounding`] refer to.
     pub media: Vec<Medium>,
-    /// Index into [`Scene::media`] of the one that fills the space outside of all bodies.
+    /// Index into [`Scene::media`] of the one that fills the space outside all bodies.
     pub surrounding: Option<u32>,
     /// Cameras in world space; the first is the default.
     pub cameras: Vec<Camera>,
@@ -121,7 +121,7 @@ impl Scene {
     }
 }
 
-/// Something a reader met and did not model: always reported, never dropped in silence.
+/// Something a reader met and did not model: always reported, never dropped silently.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Note {
     /// The extension or feature by its name.
@@ -149,7 +149,7 @@ pub struct Mesh {
     pub uv1: Vec<Vec2>,
     /// Linear vertex colours, multiplied onto base colour and alpha.
     pub colors: Vec<Vec4>,
-    /// Three vertex indices a triangle, counter-clockwise seen from the front.
+    /// Three vertex indices per triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`].
     pub material: Option<u32>,
@@ -233,7 +233,7 @@ pub struct Material {
     pub attenuation_color: Vec3,
     /// Metres; infinite means clear.
     pub attenuation_distance: f32,
-    /// Index into [`Scene::media`] of the medium inside of a closed mesh, behind its faces. Only for a [`Material::boundary`] or a solid that
+    /// Index into [`Scene::media`] of the medium inside a closed mesh, behind its faces. Only for a [`Material::boundary`] or a solid that
     /// transmits, and instead of its attenuation: both are an error.
     pub interior: Option<u32>,
     /// Bounds [`Material::interior`], which it must have, and is otherwise not there: light goes through unchanged, and no bounce is counted.

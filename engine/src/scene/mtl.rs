@@ -48,7 +48,7 @@ pub(super) fn parse(text: &str) -> Result<Vec<LibraryMaterial>, String> {
         let Some(material) = materials.last_mut() else {
             return Err(fault("stands before the first newmtl"));
         };
-        let color = || color(value).ok_or_else(|| fault(&format!("{key} wants one number or three")));
+        let color = || color(value).ok_or_else(|| fault(&format!("{key} needs one number or three")));
         match key {
             "Kd" => material.diffuse = Some(color()?),
             "Ke" => material.emission = Some(color()?),

@@ -175,7 +175,7 @@ fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
         if let Some(slot) = ["v", "vt", "vn"].iter().position(|k| *k == key) {
             counts[slot] += 1;
             if key == "v" && !words.take(3).all(|w| w.parse::<f32>().is_ok_and(f32::is_finite)) {
-                return Err((i + 1, "a position is no finite number".into()));
+                return Err((i + 1, "a position is not a finite number".into()));
             }
         } else if key == "usemtl" && words.next().is_none() {
             return Err((i + 1, "usemtl without a name".into()));
@@ -191,7 +191,7 @@ fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
                     }
                     let index = part
                         .parse::<i64>()
-                        .map_err(|_| (i + 1, format!("{part:?} is no index")))?;
+                        .map_err(|_| (i + 1, format!("{part:?} is not an index")))?;
                     if index == 0 || index > count || index < -count {
                         return Err((
                             i + 1,

@@ -198,7 +198,7 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, &[u8]), Fault> {
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         match (number, words.as_slice()) {
             (1, ["ply"]) => {}
-            (1, _) => return fault(at, "this is no PLY file"),
+            (1, _) => return fault(at, "this is not a PLY file"),
             (_, ["format", name, "1.0"]) => {
                 encoding = match *name {
                     "ascii" => Some(Encoding::Ascii),
@@ -209,7 +209,7 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, &[u8]), Fault> {
             }
             (_, ["element", name, count]) => {
                 let Ok(count) = count.parse() else {
-                    return fault(at, format!("{count:?} is no count"));
+                    return fault(at, format!("{count:?} is not a count"));
                 };
                 elements.push(Element {
                     name: name.to_string(),
@@ -226,7 +226,7 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, &[u8]), Fault> {
                     _ => None,
                 };
                 let (Some(((list, kind), name)), Some(element)) = (kinds, elements.last_mut()) else {
-                    return fault(at, format!("{line:?} is no property"));
+                    return fault(at, format!("{line:?} is not a property"));
                 };
                 element.properties.push(Property {
                     name: name.to_string(),
@@ -372,7 +372,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-MESH",
     name: "readers of PLY and OBJ",
     role: Role::Service,
-    limits: "Triangles and polygons cut into fans; of .mtl files Kd and Ke alone.",
+    limits: "Triangles and polygons cut into fans; of .mtl files only Kd and Ke.",
     sources: &[sources::TURK_1994.whole(), sources::WAVEFRONT_OBJ.whole()],
     tests: &[
         "engine/src/scene/ply.rs::all_encodings_are_read",

@@ -64,7 +64,7 @@ pub struct PhaseUse {
     pub rayleigh: bool,
 }
 
-/// What the participating media need: of the surrounding one and those inside of placed materials. A medium that does nothing
+/// What the participating media need: of the surrounding one and those inside placed materials. A medium that does nothing
 /// ([`Medium::is_empty`]) is counted by `boundaries` and `in_solids` alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct MediaUse {
@@ -84,7 +84,7 @@ pub struct MediaUse {
     pub chromatic: bool,
     /// Phase functions of those that scatter.
     pub phases: PhaseUse,
-    /// The space outside of all bodies holds a medium.
+    /// The space outside all bodies holds a medium.
     pub surrounding: bool,
     /// Some placed material is an invisible boundary.
     pub boundaries: bool,
@@ -453,8 +453,8 @@ impl fmt::Display for MediaUse {
             ("Schlick", self.phases.schlick),
             ("Rayleigh", self.phases.rayleigh),
             ("around everything", self.surrounding),
-            ("inside of boundaries", self.boundaries),
-            ("inside of solids", self.in_solids),
+            ("inside boundaries", self.boundaries),
+            ("inside solids", self.in_solids),
         ];
         write!(f, "{}", self.count)?;
         facts

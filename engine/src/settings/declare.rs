@@ -56,7 +56,7 @@ pub trait TypedSettings: std::fmt::Debug + Clone + Default + PartialEq + Send + 
         let object = match json {
             Value::Null => return Ok(settings),
             Value::Object(object) => object,
-            other => return Err(Error::setting("settings", shown(other), "is no JSON object")),
+            other => return Err(Error::setting("settings", shown(other), "is not a JSON object")),
         };
         for (name, value) in object {
             if !settings.set(name, value)? {

@@ -287,7 +287,7 @@ mod tests {
                 "setting seed: 1 is for no setting of that name; there is: count, share, order",
             ),
             (json!({"count": 0, "share": 1.0}), "setting share: 1 needs a count"),
-            (json!([]), "setting settings: array is no JSON object"),
+            (json!([]), "setting settings: array is not a JSON object"),
         ] {
             let text = Declared::from_json(&json).unwrap_err().to_string();
             assert!(text.contains(words), "{json}: {text}");

@@ -101,7 +101,7 @@ pub(super) fn check(caps: &Caps, technique: &Card) -> Result<()> {
             None => {
                 let known: Vec<_> = FEATURES.iter().map(|(name, _)| *name).collect();
                 let cause = format!(
-                    "is needed by technique {} but is none of {}",
+                    "is needed by technique {} but is not one of {}",
                     technique.id,
                     known.join(", ")
                 );

@@ -27,9 +27,9 @@ pub struct Law {
     pub slope: f64,
     /// Its squared bias falls as samples^(−exponent), where pilots do not show how; 0 where it stays, or where nothing is known. Only consistent techniques are asked.
     pub bias_exponent: f64,
-    /// Samples a pixel, 1 or more, that are taken before anything shrinks: pictures with no more than these have the same bias.
+    /// Samples per pixel, 1 or more, that are taken before anything shrinks: pictures with no more than these have the same bias.
     pub samples_a_pass: u32,
-    /// Neighbouring pixels share their noise, as under a kernel, so that what is bright in one picture alone is no rare light that pixels around may
+    /// Neighbouring pixels share their noise, as under a kernel, so that what is bright in one picture alone is not rare light that pixels around may
     /// get, too.
     pub shares_noise: bool,
 }

@@ -1,4 +1,4 @@
-//! Techniques that draw one picture a frame, and what makes progressive techniques of them.
+//! Techniques that draw one picture per frame, and what turns them into progressive techniques.
 //!
 //! A [`FrameMethod`] records into a command buffer of the engine or of a host: it submits nothing and waits for nothing. [`Accumulated`] owns
 //! what a [`Technique`] needs beside that: film, camera, and how many frames a step takes.
@@ -42,10 +42,10 @@ pub struct Frame<'a> {
     pub number: u32,
 }
 
-/// Where a picture goes: three f32 a pixel, linear RGB radiance, row by row from the top without gaps.
+/// Where a picture goes: three f32 per pixel, linear RGB radiance, row by row from the top without gaps.
 #[derive(Debug, Clone, Copy)]
 pub struct FrameTarget<'a> {
-    /// A storage buffer of twelve bytes a pixel or more. Compute shaders write it.
+    /// A storage buffer of twelve bytes per pixel or more. Compute shaders write it.
     pub radiance: &'a Buffer,
     /// Pixels across and down.
     pub size: [u32; 2],
@@ -88,7 +88,7 @@ impl FrameTarget<'_> {
     }
 }
 
-/// Draws one picture a frame. [`Accumulated`] makes a [`Technique`] of it.
+/// Draws one picture per frame. [`Accumulated`] makes a [`Technique`] of it.
 ///
 /// What `begin` and one `record` take together must be less than the 1024 passes of a [`Recorder`], since [`Accumulated`] adds one of its own.
 pub trait FrameMethod: Send {
@@ -301,7 +301,7 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
         skipped.push(Skipped {
             what: "albedo, normal and depth",
             why: if self.wants_aovs {
-                "frames hold radiance alone"
+                "frames hold only radiance"
             } else {
                 "they were not asked for"
             },

@@ -4,7 +4,7 @@
 //! reason), which light paths its picture contains, and whether and how it is biased.
 //!
 //! There are two kinds with one face, [`Technique`]. *Progressive* ones implement it: bounded steps add whole samples to a film. A [`FrameMethod`] draws one
-//! picture a frame, into a command buffer of the engine or of a host; [`Accumulated`] makes a technique of it. Whatever takes a technique takes both.
+//! picture per frame, into a command buffer of the engine or of a host; [`Accumulated`] makes a technique of it. Whatever takes a technique takes both.
 //!
 //! # How to add one
 //!
@@ -63,14 +63,14 @@ pub struct Card {
     pub id: &'static str,
     /// One sentence.
     pub summary: &'static str,
-    /// Its rows of the [`catalogue`](crate::catalogue), of it and of its parts, a list a file. The first is the technique's own
+    /// Its rows of the [`catalogue`](crate::catalogue), of it and of its parts, a list per file. The first is the technique's own
     /// ([`Role::Technique`](crate::catalogue::Role::Technique)); a host's card may have none.
     pub rows: &'static [&'static [Row]],
     /// Bias.
     pub bias: Bias,
     /// Device features beyond the baseline, by the Vulkan names that [`offers`] knows.
     pub needs: &'static [&'static str],
-    /// Kernels that a picture may take, of whatever scene, with default settings, beside those of the film, a list a file; [`lacks`] tells from their interfaces which limits of a device are too
+    /// Kernels that a picture may take, of whatever scene, with default settings, beside those of the film, a list per file; [`lacks`] tells from their interfaces which limits of a device are too
     /// low. The list may be empty: what is missing is then found when a pipeline is made.
     pub kernels: &'static [&'static [&'static ShaderInfo]],
     /// The light paths of its picture with default settings; a setting `path_set` may restrict them to a part.
@@ -129,7 +129,7 @@ pub struct View<'a> {
 
 /// A technique at work on one view. It refines its picture step by step.
 pub trait Technique: Send {
-    /// Does a bounded piece of work towards `samples` samples a pixel; `None` when there is nothing left to do.
+    /// Does a bounded piece of work towards `samples` samples per pixel; `None` when there is nothing left to do.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`].
@@ -141,7 +141,7 @@ pub trait Technique: Send {
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)>;
 
-    /// Writes the picture so far to a buffer of four bytes a pixel on the device: `exposure` in stops, clipped, sRGB-encoded.
+    /// Writes the picture so far to a buffer of four bytes per pixel on the device: `exposure` in stops, clipped, sRGB-encoded.
     ///
     /// # Errors
     /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
@@ -257,7 +257,7 @@ impl Card {
         settings.clone()
     }
 
-    /// Why the path set in settings cannot be rendered, if it can be read and is no part of the technique's own, or a part to which it cannot be
+    /// Why the path set in settings cannot be rendered, if it can be read and is not part of the technique's own, or a part to which it cannot be
     /// restricted.
     fn path_set_refusal(&self, settings: &Settings) -> Option<String> {
         let wanted: PathSet = settings.to_json().get(PATH_SET)?.as_str()?.parse().ok()?;

@@ -27,7 +27,7 @@ pub fn build_distribution(name: &str, weights: &[f64]) -> Result<Vec<f32>> {
         ));
     }
     if let Some((i, w)) = weights.iter().enumerate().find(|(_, w)| !(w.is_finite() && **w >= 0.0)) {
-        let cause = "is no weight: weights are finite and not negative";
+        let cause = "is not a weight: weights are finite and not negative";
         return Err(Error::setting(format!("{name}[{i}]"), w, cause));
     }
     let largest = weights.iter().copied().fold(0.0, f64::max);

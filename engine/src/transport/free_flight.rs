@@ -42,7 +42,7 @@ pub fn ratio_tracked_transmittance(
     0.0
 }
 
-/// Delta tracking: the distance of a collision before `t_max`, by about `majorant` look-ups a metre. Unbiased, however loose the majorant.
+/// Delta tracking: the distance of a collision before `t_max`, by about `majorant` look-ups per metre. Unbiased, however loose the majorant.
 pub fn tracked_free_flight(
     extinction: impl Fn(f64) -> f64,
     majorant: f64,

@@ -79,7 +79,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-F-1",
         name: "radiometry of point and spot lights, split into direct and indirect light",
         role: Role::PartOf("BG-3"),
-        limits: "Points and spots have no extent: no ray meets them, so that mirrors do not show them.",
+        limits: "Points and spots have no extent: no ray meets them, so mirrors do not show them.",
         sources: &[
             sources::VEACH_1997.at("chapter 3"),
             sources::KHRONOS_LIGHTS_PUNCTUAL.whole(),

@@ -47,7 +47,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "PM-F-2",
     name: "surface models: Lambert, mirror, refraction (path tracer); modified Phong (function)",
     role: Role::PartOf("BG-3"),
-    limits: "The modified Phong lobe is a function alone: no material of a scene has it.",
+    limits: "The modified Phong lobe is only a function: no material of a scene has it.",
     sources: &[sources::LAFORTUNE_WILLEMS_1994.whole(), sources::WALTER_2007.whole()],
     shaders: &["shaders/transport/phong.glsl"],
     bias: Some(Bias::Unbiased),

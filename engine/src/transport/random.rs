@@ -149,7 +149,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-SOBOL",
         name: "Owen-scrambled Sobol' points by hashing",
         role: Role::PartOf("BG-3"),
-        limits: "Even in pairs of dimensions only, so that the gain fades with the bounces.",
+        limits: "Even in pairs of dimensions only, so the gain fades with the bounces.",
         sources: &[sources::BURLEY_2020.whole(), sources::LAINE_KARRAS_2011.whole()],
         shaders: &["shaders/transport/random.glsl"],
         bias: Some(Bias::Unbiased),

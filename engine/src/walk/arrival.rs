@@ -54,11 +54,11 @@ pub trait ArrivalStage {
 /// The places of a wave's queue: indirect arguments of dispatches over them.
 #[derive(Debug, Clone, Copy)]
 pub struct Places<'a> {
-    /// One invocation a place.
+    /// One invocation per place.
     pub items: BufferView<'a>,
     /// One invocation for each [`COMPACT_CHUNK`](crate::gpu::shaders::constants::COMPACT_CHUNK) places.
     pub chunks: BufferView<'a>,
-    /// One invocation a place where something waits, once the queues are compacted.
+    /// One invocation per place where something waits, once the queues are compacted.
     pub waiting: BufferView<'a>,
 }
 

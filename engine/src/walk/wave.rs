@@ -116,7 +116,7 @@ pub fn slots_of_device(gpu: &Gpu) -> u32 {
     slots - slots % WALK_GROUP
 }
 
-/// Indirect arguments of stages with one invocation a place, and a chunk, of a queue.
+/// Indirect arguments of stages with one invocation per place, and a chunk, of a queue.
 pub(super) fn group_counts(places: u32) -> [[u32; 3]; 2] {
     [places, places.div_ceil(COMPACT_CHUNK)].map(|count| [count.div_ceil(WALK_GROUP), 1, 1])
 }

@@ -5,11 +5,11 @@
 //!
 //! Each frame the light goes around the middle of the scene by `--turn`, its photons are traced and their map is built, and rays from the eye
 //! find direct light, specular chains and, in the map, everything else. Space holds the light, and the picture converges. `--flight` moves
-//! the camera to its right each frame as far as that, and turns it by 2.5 degrees a metre. Photons, shape, spread and radius are the settings
+//! the camera to its right each frame as far as that, and turns it by 2.5 degrees per metre. Photons, shape, spread and radius are the settings
 //! of these names of the technique `photon`. Otherwise as the viewer.
 //!
-//! Source of the program's form: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.3, with flights of 10 cm
-//! and 0.25 degrees a frame (appendix A).
+//! Source of the program's form: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.3, with flights of 10 cm
+//! and 0.25 degrees per frame (appendix A).
 
 use std::collections::VecDeque;
 use std::process::ExitCode;
@@ -29,7 +29,7 @@ use clerestory_samples::orbit::{Orbit, Pose};
 use clerestory_samples::window::{self, Canvas, Show, Shown};
 use winit::keyboard::{Key, NamedKey};
 
-/// Photons a frame, unless told otherwise.
+/// Photons per frame, unless told otherwise.
 const PHOTONS: u32 = 1 << 15;
 /// Size of kernels in footprints, unless told otherwise: less than finished pictures want, for the sake of speed.
 const SPREAD: f32 = 8.0;
@@ -86,7 +86,7 @@ struct View {
     pixels: Buffer,
     size: [u32; 2],
     pose: Pose,
-    /// Samples a pixel.
+    /// Samples per pixel.
     samples: u32,
     /// When its last frame was done.
     done: Instant,

@@ -5,7 +5,7 @@
 //! [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--screenshot FILE]`
 //!
 //! Each frame the body goes on by `--turn` degrees of its way. Lights without area cast shadows by omnidirectional shadow maps (`--shadow` texels
-//! along a side); the scene without the body is drawn in all directions from the body's middle, into an octahedron map of `--map` texels a side, and
+//! along a side); the scene without the body is drawn in all directions from the body's middle, into an octahedron map of `--map` texels per side, and
 //! the body shows that map, filtered by how rough it is. What walls throw on one another is a second such map, drawn three times at the start, each lit by the one before.
 //! `--samples` squared samples make a pixel. Metals are gold, silver, copper, aluminium, iron, chromium, titanium, nickel and cobalt. Space holds the
 //! body. With `--output` there is no window: the last of `--frames` frames is written, and how long its parts took. Without a scene it is a room with two
@@ -35,7 +35,7 @@ use winit::keyboard::{Key, NamedKey};
 const RADIUS: f64 = 0.2;
 /// Radius of its way, as a share of the scene's lesser side on the ground.
 const WAY: f64 = 0.13;
-/// Degrees of its way a frame, unless told otherwise.
+/// Degrees of its way per frame, unless told otherwise.
 const TURN: f64 = 4.0;
 /// Turns about itself for each round.
 const SPIN: f64 = 3.0;
@@ -127,13 +127,13 @@ impl Settings {
                 return Err(Error::setting(
                     "--shadows",
                     other,
-                    "is none of cube, octahedron and none",
+                    "is not one of cube, octahedron and none",
                 ));
             }
         };
         let radius = given.value("--radius")?;
         if let Some(wrong) = radius.filter(|radius: &f64| !(*radius > 0.0 && radius.is_finite())) {
-            return Err(Error::setting("--radius", wrong, "is no length above 0"));
+            return Err(Error::setting("--radius", wrong, "is not a length above 0"));
         }
         Ok(Self {
             shape: given.text("--shape").unwrap_or("knot").into(),
@@ -157,7 +157,7 @@ impl Settings {
             "sphere" => Ok(solids::sphere(1.0, 96)),
             "ring" => Ok(solids::knot([1, 0], 0.72, 0.0, 0.28, [160, 64])),
             "knot" => Ok(solids::knot([2, 3], 0.56, 0.26, 0.18, [384, 40])),
-            other => Err(Error::setting("--shape", other, "is none of sphere, ring and knot")),
+            other => Err(Error::setting("--shape", other, "is not one of sphere, ring and knot")),
         }
     }
 
@@ -406,7 +406,7 @@ impl Show for Stage {
     fn title(&mut self) -> String {
         let whole: f64 = self.times.values().sum();
         if whole > 0.0 {
-            format!("GPU {whole:.1} ms a frame")
+            format!("GPU {whole:.1} ms per frame")
         } else {
             "no timestamps".into()
         }

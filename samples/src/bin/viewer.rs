@@ -33,7 +33,7 @@ struct Viewer {
     picture: Progressive,
     /// Rays and seconds since the last title.
     work: (u64, f64),
-    /// Samples a pixel.
+    /// Samples per pixel.
     samples: f64,
 }
 

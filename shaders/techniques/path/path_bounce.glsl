@@ -11,7 +11,7 @@ layout(push_constant, scalar) uniform Push {
     float roulette_cap;     // largest probability to go on
     WalkKey key;            // sequences are pixels, places in them samples
     uint roulette_start;    // first bounce at which Russian roulette may end a path
-    uint surrounding;       // index of the medium outside of all bodies, or NO_MEDIUM
+    uint surrounding;       // index of the medium outside all bodies, or NO_MEDIUM
     uint accepting;         // states of the automaton in which light counts, a bit each
     uint successors[15];    // of each state
 } push;

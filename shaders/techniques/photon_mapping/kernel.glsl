@@ -1,6 +1,6 @@
 // Kernels of density estimation on surfaces: ellipsoids as large as a photon's footprint, and the record of a photon in the map.
 //
-// Source: Interactive Manycore Photon Mapping (2011), 3.4.2, 5.2.1 and 5.2.2. An ellipsoid with the axes A (longer) and B in the tangent
+// Source: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.2, 5.2.1 and 5.2.2. An ellipsoid with the axes A (longer) and B in the tangent
 // plane and C across it, |C| = |B|, is kept as A ("along") and P ("across"), which is B turned by a right angle in the plane, P.A > 0.
 // Guarantees: a kernel integrates to one over the tangent plane; the box is tight; no length is compared with a constant, only with the
 // unit length.

@@ -3,7 +3,7 @@
 // photons of one light carry about the same flux. Directional lights and the environment send theirs through a disk as large as the
 // scene's bounding sphere.
 //
-// PM-PH-1, PM-PD-1: "Interactive Manycore Photon Mapping", 2011, §3.4.1 and §5.1.1; area lights and the environment as in Jensen 2001, §5.1.
+// PM-PH-1, PM-PD-1: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §3.4.1 and §5.1.1; area lights and the environment as in Jensen 2001, §5.1.
 // Deterministic in (seed, pass, photon).
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

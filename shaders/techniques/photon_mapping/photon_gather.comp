@@ -1,5 +1,5 @@
 #version 460
-// Radiance from the photon map where eye paths have arrived, a query an invocation.
+// Radiance from the photon map where eye paths have arrived, a query per invocation.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

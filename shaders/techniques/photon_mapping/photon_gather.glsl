@@ -6,7 +6,7 @@
 // leaves nothing, marks its place and stalls the wave: such places go through all records instead (LINEAR), so many a dispatch, whatever queue they
 // came from.
 //
-// PM-DE-1, PM-DE-3 to PM-DE-5, PM-ST-5, PM-ST-6: "Interactive Manycore Photon Mapping", 2011, §3.4.2, §5.2, §6.2.3 and §7.4.2. Deterministic: a
+// PM-DE-1, PM-DE-3 to PM-DE-5, PM-ST-5, PM-ST-6: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §3.4.2, §5.2, §6.2.3 and §7.4.2. Deterministic: a
 // path's sum has the order of the map's leaves, or of its records.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_GATHER_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_GATHER_GLSL

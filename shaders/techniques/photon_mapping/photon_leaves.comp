@@ -8,7 +8,7 @@
 layout(local_size_x = 64) in;
 
 layout(set = 0, binding = 0) uniform utextureBuffer photon_records_in;
-// Four words a texel.
+// Four words per texel.
 layout(set = 0, binding = 1) uniform utextureBuffer map_order;
 // Not 0 for places at which a node is split: a leaf ends there.
 layout(set = 0, binding = 2) uniform utextureBuffer map_retained;

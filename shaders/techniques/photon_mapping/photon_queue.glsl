@@ -1,10 +1,10 @@
 // The queue of eye paths that ask the photon map (descriptor set 3), of one of three types.
 //
-// QUEUE_SLOTS: an invocation a place of the wave; those that ask nothing idle. QUEUE_COMPACTED: flags by place and a stable compaction.
+// QUEUE_SLOTS: an invocation per place of the wave; those that ask nothing idle. QUEUE_COMPACTED: flags by place and a stable compaction.
 // QUEUE_BLOCKS: subgroups collect places in shared memory and append whole blocks, as wide as they are, to a list. A block number is all that
 // a consumer needs, so that consumers take the blocks of their own numbers instead of drawing tickets.
 //
-// PM-ST-2 to PM-ST-4: "Interactive Manycore Photon Mapping", 2011, §7.4.1. The order of blocks may differ from run to run, what is in a block
+// PM-ST-2 to PM-ST-4: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §7.4.1. The order of blocks may differ from run to run, what is in a block
 // does not; each place's sum is its own.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_QUEUE_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_QUEUE_GLSL

@@ -1,5 +1,5 @@
 #version 460
-// The queue of queries in blocks: each subgroup walks COMPACT_CHUNK places a lane, collects those that ask the photon map in shared memory and
+// The queue of queries in blocks: each subgroup walks COMPACT_CHUNK places per lane, collects those that ask the photon map in shared memory and
 // appends them to the list of blocks whenever less than a block of room is left; at its end the last block may be partial. No workgroup waits
 // for another. What is in a block follows from the places alone, its number from who came first.
 #extension GL_GOOGLE_include_directive : require

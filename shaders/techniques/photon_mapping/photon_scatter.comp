@@ -5,7 +5,7 @@
 // leaves its largest band as it is. Scattering functions are those of power (BSDF_IMPORTANCE), and where normals are interpolated the ratio
 // of cosines makes up for it (Veach 1997, 5.3.2), except for what adapt_shading_normal bends.
 //
-// PM-PH-1, PM-PD-2 to PM-PD-7: "Interactive Manycore Photon Mapping", 2011, §3.4.1 and §5.1. Deterministic in (seed, pass, photon).
+// PM-PH-1, PM-PD-2 to PM-PD-7: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §3.4.1 and §5.1. Deterministic in (seed, pass, photon).
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

@@ -1,5 +1,5 @@
 #version 460
-// Radiance to the screen: the mean of a pixel's samples, exposed, clipped and sRGB-encoded, as four bytes a pixel.
+// Radiance to the screen: the mean of a pixel's samples, exposed, clipped and sRGB-encoded, as four bytes per pixel.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

@@ -35,11 +35,11 @@ pub struct Painted {
     pub radiance: Vec<f32>,
     /// Variance of the means.
     pub variance: Vec<f32>,
-    /// Finite samples a pixel.
+    /// Finite samples per pixel.
     pub samples: Vec<f32>,
     /// Samples left out.
     pub non_finite: u64,
-    /// Samples a pixel that were asked for.
+    /// Samples per pixel that were asked for.
     pub spp: u32,
     /// Exact counts of work.
     pub counters: BTreeMap<&'static str, u64>,

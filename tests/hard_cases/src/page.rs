@@ -1,5 +1,6 @@
 //! The registry as a page of Markdown: every case with its picture, and the table of verdicts.
 
+use crate::run::WAY_ROUND;
 use crate::{HardCase, Outcome, Verdict};
 
 /// The page, from the repository's root.
@@ -40,10 +41,8 @@ pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: i
         subjects.join(" | "),
         "---|".repeat(subjects.len()),
     );
-    // Each with the cases that it is said of.
-    let mut reasons: Vec<(&String, &String, Vec<&str>)> = Vec::new();
     for (case, outcomes) in rows {
-        page += &format!("| [{name}](#{name}) |", name = case.name);
+        page += &format!("| {} |", link(case));
         for outcome in outcomes {
             page += &match outcome {
                 None => " – |".to_owned(),
@@ -51,22 +50,11 @@ pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: i
             };
         }
         page.push('\n');
-        for outcome in outcomes.iter().flatten() {
-            let Some(reason) = &outcome.reason else { continue };
-            let said = reasons
-                .iter_mut()
-                .find(|(subject, known, _)| (*subject, *known) == (&outcome.subject, reason));
-            match said {
-                Some((_, _, cases)) => cases.push(case.name),
-                None => reasons.push((&outcome.subject, reason, vec![case.name])),
-            }
-        }
     }
-    if !reasons.is_empty() {
-        page += "\n## What does not pass, and what to do\n\n";
-        for (subject, reason, cases) in reasons {
-            page += &format!("- {subject}, {}: {reason}\n", cases.join(", "));
-        }
+    let remarks = remarks(rows);
+    if !remarks.is_empty() {
+        page += "\n## What does not pass, and what to do\n";
+        page += &remarks;
     }
     page += "\n## The cases\n";
     for (case, _) in rows {
@@ -74,6 +62,64 @@ pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: i
         page += &case_section(case, pictured(case));
     }
     page
+}
+
+/// A link to a case's section.
+fn link(case: &HardCase) -> String {
+    format!("[{name}](#{name})", name = case.name)
+}
+
+/// A text with what it is said of.
+type Remark = (String, Vec<String>);
+
+/// Adds what a text is said of; each text stands once.
+fn add(remarks: &mut Vec<Remark>, text: String, said_of: String) {
+    match remarks.iter_mut().find(|(known, _)| *known == text) {
+        Some((_, all)) => all.push(said_of),
+        None => remarks.push((text, vec![said_of])),
+    }
+}
+
+/// What is said of outcomes that do not pass. What is documented stands in the sections of the cases, which are only named.
+fn remarks(rows: &[Row<'_>]) -> String {
+    let (mut degraded, mut refused, mut others) = (Vec::new(), Vec::new(), Vec::new());
+    for (case, outcomes) in rows {
+        for outcome in outcomes.iter().flatten() {
+            let Some(reason) = outcome.reason.as_deref() else {
+                continue;
+            };
+            let documented = [case.documented, case.documented_bias].contains(&Some(reason));
+            if outcome.verdict == Verdict::Refused {
+                for reason in reason.trim_end_matches(WAY_ROUND).split("; ") {
+                    add(&mut refused, format!("{}: {reason}", outcome.subject), link(case));
+                }
+            } else if documented {
+                add(&mut degraded, link(case), outcome.subject.clone());
+            } else {
+                add(&mut others, format!("{}: {reason}", outcome.subject), link(case));
+            }
+        }
+    }
+    let mut text = String::new();
+    for (text_of, cases) in others {
+        text += &format!("\n- {text_of} ({})", cases.join(", "));
+    }
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    if !degraded.is_empty() {
+        text += "\nThese degrade; the section of each case below says how, and what to do:\n\n";
+        for (case, subjects) in degraded {
+            text += &format!("- {case}: {}\n", subjects.join(", "));
+        }
+    }
+    if !refused.is_empty() {
+        text += "\nThese are refused; choose another technique or change the scene:\n\n";
+        for (reason, cases) in refused {
+            text += &format!("- {reason} ({})\n", cases.join(", "));
+        }
+    }
+    text
 }
 
 fn cell(outcome: &Outcome) -> String {

@@ -17,6 +17,9 @@ const SAMPLES_PER_PASS: u32 = 1024;
 const PROBE_SIDE: u32 = 64;
 const PROBE_FINEST: u32 = 32;
 
+/// What helps where a technique refuses a case.
+pub(crate) const WAY_ROUND: &str = "; choose another technique or change the scene";
+
 /// What a case is run against.
 #[derive(Debug, Clone, Copy)]
 pub enum Subject {
@@ -78,7 +81,7 @@ impl Subject {
             Bias::Consistent(cause) | Bias::Biased(cause) => format!("; {cause}"),
         };
         let of_parts = info.path_set != PathSet::ALL;
-        of_parts.then(|| format!("its pictures hold the light paths {} alone{bias}", info.path_set))
+        of_parts.then(|| format!("its pictures hold only the light paths {}{bias}", info.path_set))
     }
 
     /// Whether a case concerns it.
@@ -205,10 +208,7 @@ fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Out
         }
         Err(Error::Unsupported { reasons, .. }) => {
             outcome.verdict = Verdict::Refused;
-            outcome.reason = Some(format!(
-                "{}; choose another technique or change the scene",
-                reasons.join("; ")
-            ));
+            outcome.reason = Some(reasons.join("; ") + WAY_ROUND);
         }
         Err(error) => {
             outcome.measured = "error".into();

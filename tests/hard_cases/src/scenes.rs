@@ -158,7 +158,7 @@ fn add_palette(scene: &mut Scene) {
 }
 
 /// Averages of a function of (x, z) over each pixel of a square picture of [−half, half]² seen by [`camera_down`], by a midpoint rule of
-/// `steps` × `steps` points a pixel.
+/// `steps` × `steps` points per pixel.
 pub fn pixel_averages(size: u32, half: f64, steps: u32, function: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     let at = |i: u32, sub: u32| {
         half * (2.0 * (f64::from(i) + (f64::from(sub) + 0.5) / f64::from(steps)) / f64::from(size) - 1.0)

@@ -125,7 +125,7 @@ fn judgements_find_what_is_wrong() {
     assert!(!passes(|j| j.sound("", &Painted { spp: 5, ..painted(1.0) })));
     assert!(!passes(|j| j.exactly("", &painted(1.0 + f32::EPSILON), [1.0; 3])));
     assert!(!passes(|j| j.at_most("", f64::NAN, 1.0)));
-    // A deviation of 0.01 a channel and pixel.
+    // A deviation of 0.01 per channel and pixel.
     assert!(passes(|j| j.uniform("", &painted(1.02), [1.0; 3]).expect("picture")));
     assert!(!passes(|j| j.uniform("", &painted(1.06), [1.0; 3]).expect("picture")));
     // Of a technique with a bias, the mean over the picture alone.

@@ -118,7 +118,7 @@ fn scene_with_fog() -> Scene {
     scene
 }
 
-/// What the walks of the host's technique gather, whose numbers were counted, with so many bounces a submission.
+/// What the walks of the host's technique gather, whose numbers were counted, with so many bounces per submission.
 fn gather(gpu: &Gpu, scene: &Arc<GpuScene>, bounces: usize) -> Vec<[f32; 3]> {
     let start = gpu.compute_pipeline::<walk_start::Kernel>(&()).unwrap();
     let has_media = scene.profile().media.any();

@@ -60,7 +60,7 @@ fn beers_law_is_exact() {
             &render(gpu, &inside, [4, 4], 4, &independent()),
             beer(2.0),
         );
-        // A box in the box, of twice the extinction, seen from outside and from inside of both.
+        // A box in the box, of twice the extinction, seen from outside and from inside both.
         let mut nested = outside.clone();
         add_box(
             &mut nested,
@@ -75,7 +75,7 @@ fn beers_law_is_exact() {
         );
         nested.cameras[0] = ray_camera(DVec3::new(0.21, 0.25, 0.13), DVec3::NEG_Y);
         expect_exact(
-            "from inside of both",
+            "from inside both",
             &render(gpu, &nested, [4, 4], 4, &independent()),
             beer(2.5),
         );
@@ -286,7 +286,7 @@ fn a_medium_that_does_nothing_changes_no_expectation() {
 #[test]
 fn alpha_and_media_act_together() {
     with_gpu(|gpu| {
-        // A black surface that is half there, inside of an absorbing box: seen against the sky, and in the way of the sun.
+        // A black surface that is half there, inside an absorbing box: seen against the sky, and in the way of the sun.
         let sigma = [0.0f32, 0.7, 1.5];
         let mut scene = bright(DVec3::new(0.21, 5.0, 0.13));
         let mut half = Material::lambert("half", Vec3::ZERO);

@@ -1,7 +1,7 @@
 //! Photon mapping against closed forms, exact counts, and the path tracer on equal path sets.
 //!
 //! Photons are shared by all pixels of a pass, so pixels are correlated and the film's variance says nothing of a mean over the picture.
-//! Means are judged from passes instead, which are independent of each other (PCG, one eye path a pixel and pass) and, with kernels that do not
+//! Means are judged from passes instead, which are independent of each other (PCG, one eye path per pixel and pass) and, with kernels that do not
 //! shrink, alike: the picture is read after each pass, and means over parts of it are tested by Student's t over the passes, at a false-alarm
 //! rate of 10⁻⁶ a channel and part. Where a difference is allowed besides, its reason stands with it. Each test prints what it found, for
 //! `--nocapture`.
@@ -30,7 +30,7 @@ use clerestory_tests::render::{Rendered, camera_down, floor, paths, render, uplo
 use clerestory_tests::statistics::{expect_mean, normal_of_t};
 use glam::Vec3;
 
-/// Pixels a side.
+/// Pixels per side.
 const SIDE: u32 = 16;
 const SIZE: [u32; 2] = [SIDE; 2];
 
@@ -61,7 +61,7 @@ fn mapper(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings) -> PhotonMapper {
     }
 }
 
-/// Goes on to that many samples a pixel, and reads radiance.
+/// Goes on to that many samples per pixel, and reads radiance.
 fn advance(mapper: &mut PhotonMapper, samples: u32) -> Vec<f32> {
     while mapper.step(samples).unwrap_or_else(|error| panic!("{error}")).is_some() {}
     let (picture, non_finite) = mapper.picture().unwrap_or_else(|error| panic!("{error}"));

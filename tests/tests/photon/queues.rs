@@ -29,7 +29,7 @@ struct Made {
     stalls: u64,
 }
 
-/// Sixteen samples a pixel, so that a wave has as many places as two workgroups of the queue in blocks walk.
+/// Sixteen samples per pixel, so that a wave has as many places as two workgroups of the queue in blocks walk.
 fn made(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, (queue, query): (MapQueue, MapQuery)) -> Made {
     let settings = PhotonSettings {
         queue,

@@ -81,7 +81,7 @@ fn nearest_neighbours_agree_with_the_path_tracer() {
         let found = means(gpu, &scene, &settings, 16);
         let asked = found.counts.gather;
         let each = asked.photons as f64 / asked.queries as f64;
-        println!("{each:.1} photons a query");
+        println!("{each:.1} photons per query");
         assert!(each > 0.9 * f64::from(neighbors) && each < 1.1 * f64::from(neighbors));
         found.expect_same_as("nearest", &reference, [BIAS + NEAREST_BIAS; 3]);
     });
@@ -192,7 +192,7 @@ fn parts_of_the_light_sum_to_the_whole() {
         let parts = ["emitted", "direct", "indirect"].map(part);
         assert!(parts.iter().all(|part| sums(part)[0].iter().all(|sum| *sum > 0.1)));
         for (i, value) in whole.iter().enumerate() {
-            // The same random numbers: equal up to rounding, of four samples a pixel each.
+            // The same random numbers: equal up to rounding, of four samples per pixel each.
             let sum: f32 = parts.iter().map(|part| part[i]).sum();
             assert!((sum - value).abs() <= 1e-5 * value, "{i}: {sum}, not {value}");
         }

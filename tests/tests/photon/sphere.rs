@@ -117,9 +117,9 @@ fn lossless_rooms_end() {
         let found = means(gpu, &scene, &settings, 2);
         let photons = found.counts.photons;
         assert_eq!((photons.emitted, photons.absorbed), (2 << 12, 2 << 12));
-        // Nine hits are certain, then each follows the one before with probability 0.95: 8 + 1 / 0.05 rays a photon, ± 19 / √n, five of them.
+        // Nine hits are certain, then each follows the one before with probability 0.95: 8 + 1 / 0.05 rays per photon, ± 19 / √n, five of them.
         let rays = photons.rays as f64 / photons.emitted as f64;
-        println!("{rays} rays a photon");
+        println!("{rays} rays per photon");
         assert!(
             (rays - 28.0).abs() < 5.0 * 19.5 / (photons.emitted as f64).sqrt(),
             "{rays}"

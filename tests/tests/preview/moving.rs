@@ -134,7 +134,7 @@ fn moved_objects_are_as_if_made_there() {
     });
 }
 
-/// From inside of the object its own map would show nothing but itself.
+/// From inside the object its own map would show nothing but itself.
 #[test]
 fn objects_are_left_out_of_their_own_maps() {
     with_gpu(|gpu| {

@@ -1,4 +1,4 @@
-//! Where filters lie: the edge of an occluder along rows of texels, whose filtered shadow is known in closed form, inside of layers and across seams.
+//! Where filters lie: the edge of an occluder along rows of texels, whose filtered shadow is known in closed form, inside layers and across seams.
 
 use clerestory::gpu::Gpu;
 use clerestory::maps::cube::cube_decode;
@@ -106,7 +106,7 @@ fn shares(gpu: &Gpu, layout: ShadowLayout, edge: f64, width: u32, v: f64) -> Vec
 fn filtered_edges_are_ramps_about_the_edge() {
     with_gpu(|gpu| {
         for layout in ShadowLayout::ALL {
-            // Far inside of the layer, and with the filter across the seam: its edge before, in and beyond it.
+            // Far inside the layer, and with the filter across the seam: its edge before, in and beyond it.
             for edge in [-20.0, -1.0, 0.0, 1.0] {
                 for width in 1..=3 {
                     for v in ROWS {

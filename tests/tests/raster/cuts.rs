@@ -137,7 +137,7 @@ fn exact_cuts_interpolate_what_rays_meet() {
     });
 }
 
-/// Errata 20 and 21 of the cuts' source, and what it says of them: outlines are right where halves are not, and attributes inside of both are
+/// Errata 20 and 21 of the cuts' source, and what it says of them: outlines are right where halves are not, and attributes inside both are
 /// wrong.
 #[test]
 fn halves_and_outlines_are_wrong_as_stated() {

@@ -1,7 +1,7 @@
 //! Which triangles may be seen at a pixel, in f64: all that rounding leaves open, and nothing more.
 //!
 //! The rule. The rasterizer rounds the places of vertices to 2⁻ᵇ pixels (`subPixelPrecisionBits`, b), by an amount of less than one such
-//! step an axis, after their coordinates were computed in f32. So what it covers lies within δ of the exact projection and leaves out no
+//! step per axis, after their coordinates were computed in f32. So what it covers lies within δ of the exact projection and leaves out no
 //! more than a rim of that width: δ = √2·2⁻ᵇ + the rounding of coordinates, [`COORDINATE_ROUNDINGS`] half ulps of the sums that they come from,
 //! over w, in pixels, at the point of the outline near the picture ([`GUARD`]) where that is largest: clipping moves an edge by as much. A triangle *may* cover a pixel whose centre is within δ of its projection, and *surely* covers one whose centre is deeper inside than
 //! that. Depth there is known within the change over δ and τ: [`DEPTH_ROUNDINGS`] half ulps of what the plane equation sums up over the

@@ -136,7 +136,7 @@ pub(super) struct Request<'a> {
     pub(super) integrator: Integrator,
     /// Independent pictures.
     pub(super) passes: u32,
-    /// Samples a pixel in each.
+    /// Samples per pixel in each.
     pub(super) samples: u32,
     /// Of the first pass; the others count on from it, and so does one more pass that is not counted.
     pub(super) seed: u32,
@@ -158,7 +158,7 @@ pub(super) struct Rendered {
     pub(super) variant: String,
     /// Of each pass.
     pub(super) seconds_each: Vec<f64>,
-    /// Processor seconds a pass, mean.
+    /// Processor seconds per pass, mean.
     pub(super) cpu_seconds_each: f64,
     /// RGB values of each pass, where they were asked for.
     pub(super) pictures: Vec<Vec<f32>>,

@@ -46,9 +46,9 @@ pub struct Contender {
     /// versions.
     #[serde(default)]
     pub seconds_error: Option<f64>,
-    /// Processor seconds of all threads a picture, median of the rounds; `None` where the system does not say.
+    /// Processor seconds of all threads per picture, median of the rounds; `None` where the system does not say.
     pub cpu_seconds: Option<f64>,
-    /// Camera paths a second of wall clock.
+    /// Camera paths per second of wall clock.
     pub paths_per_second: f64,
     /// Relative MSE of one picture.
     pub relative_mse: f64,
@@ -389,7 +389,7 @@ pub(super) fn run(setup: &RaceSetup<'_>, options: &AgreementOptions, watch: &dyn
 
 /// Processor seconds of this process so far, all threads; `None` where the system does not say.
 fn cpu_seconds() -> Option<f64> {
-    /// Clock ticks a second that Linux reports to programs.
+    /// Clock ticks per second that Linux reports to programs.
     const TICKS: f64 = 100.0;
     /// User and system time, counted behind the program's name.
     const FIELDS: std::ops::RangeInclusive<usize> = 11..=12;

@@ -126,7 +126,7 @@ pub struct AgreementReport {
     pub machine: Machine,
     /// What was asked for.
     pub options: AgreementOptions,
-    /// One entry a scene.
+    /// One entry per scene.
     pub scenes: Vec<SceneAgreement>,
     /// The scenes of which Mitsuba made a picture that is not finite.
     #[serde(default)]
@@ -180,7 +180,7 @@ impl AgreementReport {
         Ok(())
     }
 
-    /// Agreement and time to equal error, one row a scene, as a part of a page of results.
+    /// Agreement and time to equal error, one row per scene, as a part of a page of results.
     pub fn to_results_block(&self) -> String {
         let (m, o) = (&self.machine, &self.options);
         let agreeing = self.scenes.iter().filter(|scene| scene.passes()).count();
@@ -191,7 +191,7 @@ impl AgreementReport {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "- {agreeing} of {} scenes agree with Mitsuba in a z-test of every value: {1} × {1} pixels, {2} samples a pixel on both sides; bias is \
+            "- {agreeing} of {} scenes agree with Mitsuba in a z-test of every value: {1} × {1} pixels, {2} samples per pixel on both sides; bias is \
              between these pictures.",
             self.scenes.len(),
             o.size,
@@ -254,7 +254,7 @@ impl AgreementReport {
         );
         let _ = writeln!(
             page,
-            "- Pictures of {0} × {0} pixels, {1} samples a pixel on both sides, Mitsuba's in {2} independent passes; independent (PCG) samples, single \
+            "- Pictures of {0} × {0} pixels, {1} samples per pixel on both sides, Mitsuba's in {2} independent passes; independent (PCG) samples, single \
              scattering and separable masking here.",
             o.size,
             o.passes * o.samples_per_pass,
@@ -275,7 +275,7 @@ impl AgreementReport {
         let _ = writeln!(
             page,
             "- mean z² is 1 for pictures that differ by noise alone. Bias is that of the whole picture, with its z; values of one pixel are \
-             not independent, so |z| up to about {BIAS_Z_MAX} is no evidence.\n\n## Agreement\n"
+             not independent, so |z| up to about {BIAS_Z_MAX} is not evidence.\n\n## Agreement\n"
         );
         page.push_str(
             "| scene | what it tests | values accepted | worst z | blocks accepted | worst z | mean z² | of blocks | bias | bias z | relative MSE | |\n\
@@ -311,7 +311,7 @@ impl AgreementReport {
         page
     }
 
-    /// Tables of all contenders, a row a scene: seconds to the error of our best, and what they come of.
+    /// Tables of all contenders, a row per scene: seconds to the error of our best, and what they come of.
     fn write_races(&self, page: &mut String) {
         let races = || self.scenes.iter().filter_map(|s| s.race.as_ref().map(|race| (s, race)));
         page.push_str(
@@ -354,7 +354,7 @@ impl AgreementReport {
             ("Relative MSE of one picture with its standard error", |one, _| {
                 format!("{:.2e} ± {:.0e}", one.relative_mse, one.relative_mse_error)
             }),
-            ("Millions of camera paths a second", |one, _| millions(one)),
+            ("Millions of camera paths per second", |one, _| millions(one)),
         ];
         for (title, shown) in tables {
             let _ = write!(page, "\n{title}:\n");
@@ -371,7 +371,7 @@ impl AgreementReport {
     }
 }
 
-/// Millions of camera paths a second.
+/// Millions of camera paths per second.
 fn millions(one: &Contender) -> String {
     format!("{:.3}", one.paths_per_second * 1e-6)
 }

@@ -18,7 +18,7 @@ use crate::output;
 /// Compares converged pictures with those of Mitsuba 3, within their noise, and measures both renderers' time to equal error
 #[derive(Debug, Args)]
 #[command(after_help = "\
-It needs a Python that has the package `mitsuba`: tools/mitsuba/README.md says how to get it.
+It needs a Python with the package `mitsuba`: tools/mitsuba/README.md says how to install it.
 
 Examples:
   clerestory agreement --list
@@ -37,19 +37,19 @@ pub struct Arguments {
     /// Independent passes of Mitsuba
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().passes)]
     passes: u32,
-    /// Samples a pixel in each pass
+    /// Samples per pixel in each pass
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().samples_per_pass)]
     spp: u32,
     /// Seed of both renderers
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().seed)]
     seed: u32,
-    /// Rounds of timed pictures, in each of which both renderers have their turns; 0 times nothing
+    /// Rounds of timed pictures, in which both renderers take turns; with 0 nothing is timed
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_rounds)]
     timing_rounds: u32,
-    /// Timed pictures a turn
+    /// Timed pictures per turn
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_pictures)]
     timing_pictures: u32,
-    /// Samples a pixel of a timed picture, a square number
+    /// Samples per pixel of a timed picture, a square number
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_samples)]
     timing_spp: u32,
     /// The Python that has Mitsuba; by default CLERESTORY_MITSUBA_PYTHON, else python3
@@ -61,14 +61,14 @@ pub struct Arguments {
     /// Writes the report to NAME.md and NAME.json
     #[arg(long, value_name = "NAME")]
     results: Option<PathBuf>,
-    /// Keeps the scenes that the report at --results holds, if it is of this machine and these options; without --scene only the others
+    /// Keeps the scenes that the report at --results holds, if it was made on this machine with these options; without --scene only the others
     /// are compared
     #[arg(long, requires = "results")]
     keep: bool,
     /// Writes errors and times to equal error beside Mitsuba's into a marked part of this page; the rest of it stays
     #[arg(long, value_name = "FILE.md")]
     page: Option<PathBuf>,
-    /// Prints the report as JSON, else as Markdown
+    /// Prints the report as JSON instead of Markdown
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     }
     if arguments.page.is_some() && arguments.timing_rounds == 0 {
         return Err(Failure::usage(
-            "--page wants times, and --timing-rounds 0 measures none",
+            "--page needs times, and --timing-rounds 0 measures none",
         ));
     }
     let defaults = AgreementOptions::default();

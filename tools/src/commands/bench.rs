@@ -23,9 +23,9 @@ Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
   clerestory bench --sort --peers --folder out/sort --page RESULTS.md
-  clerestory bench --peers                       sorts, then builds of indexes and rays a second, beside other libraries
+  clerestory bench --peers                       sorts, then index builds and rays per second, beside other libraries
 
-One run before the measured ones compiles the kernels. Rates are by wall clock from the first step to the last; figures move with \
+A first run, which is not measured, compiles the kernels. Rates are by wall clock from the first step to the last; figures vary with \
 the load of the machine, so compare ratios of runs made together. `clerestory report` measures errors too.")]
 pub struct Arguments {
     /// A scene; may be given several times; by default the Cornell box and the materials, with --peers those of `clerestory index`
@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Measured runs of each scene
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=999))]
     repeat: u32,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
     /// Pixels: WIDTHxHEIGHT, or the height alone
@@ -43,11 +43,11 @@ pub struct Arguments {
     /// Measures keys per second of the radix sort beside the standard library's instead
     #[arg(long)]
     sort: bool,
-    /// Measures the kernels beside other libraries instead: with --sort the sort alone, beside rdst and radsort too; else also what
-    /// `clerestory index --peers` measures, builds of indexes and rays a second
+    /// Measures the kernels beside other libraries instead: with --sort only the sort, also beside rdst and radsort; otherwise also what
+    /// `clerestory index --peers` measures: index builds and rays per second
     #[arg(long)]
     peers: bool,
-    /// Writes the rates of --sort and --peers as JSON, CSV and plots (SVG) into this folder too
+    /// Writes the rates of --sort and --peers as JSON, CSV and plots (SVG) to this folder too
     #[arg(long, value_name = "FOLDER")]
     folder: Option<PathBuf>,
     /// Writes the rates of --sort into a marked part of this page too; the rest of it stays
@@ -81,7 +81,7 @@ struct Measured {
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let of_kernels = arguments.sort || arguments.peers;
     if arguments.folder.is_some() && !of_kernels {
-        return Err(Failure::usage("--folder wants --sort or --peers"));
+        return Err(Failure::usage("--folder needs --sort or --peers"));
     }
     let scenes = |defaults: &[&str]| match &arguments.scenes[..] {
         [] => defaults.iter().map(|scene| (*scene).to_owned()).collect(),
@@ -175,7 +175,7 @@ fn run_kernels(gpu: Gpu, arguments: &Arguments, scenes: &[String]) -> Outcome<Ex
         sort_rates::write(folder, &rates, &document)?;
     }
     let head = output::one_line(&format!(
-        "{}, driver {}; {}, {} threads; random 32-bit keys a second, medians of {} runs in turns (least … greatest), load average \
+        "{}, driver {}; {}, {} threads; random 32-bit keys per second, medians of {} runs in turns (least … greatest), load average \
          {load_before} before and {load_after} after",
         caps.device,
         caps.driver,

@@ -18,11 +18,11 @@ use crate::{output, pictures};
 Examples:
   clerestory compare picture.exr reference.exr
   clerestory compare picture.exr reference.exr --diff difference.png
-  clerestory compare a.exr b.exr --threshold rmse=1e-3,flip=0.05     exit code 4 beyond either
+  clerestory compare a.exr b.exr --threshold rmse=1e-3,flip=0.05     exit code 4 if either is exceeded
 
-Metrics are of linear radiance, FLIP of tone-mapped pictures. A metric that is not a number is beyond every threshold; so are pixels \
+Metrics are of linear radiance, FLIP of tone-mapped pictures. A metric that is not a number exceeds every threshold; so do pixels \
 that are not finite, unless non_finite=COUNT allows them. Where both pictures have variance (render with --aov variance,samples) and \
-more than one sample a pixel, a z-test says whether they differ by more than noise.")]
+more than one sample per pixel, a z-test says whether they differ by more than noise.")]
 pub struct Arguments {
     /// The picture: EXR, Radiance HDR or PNG (taken as sRGB)
     picture: PathBuf,
@@ -90,7 +90,7 @@ fn parse_threshold(text: &str) -> Result<Threshold, String> {
     let (name, limit) = text.split_once('=').ok_or("write METRIC=LIMIT, such as rmse=1e-3")?;
     let known: Vec<&str> = METRICS.iter().map(|(name, _)| *name).collect();
     let metric = known.iter().find(|metric| **metric == name.trim());
-    let metric = metric.ok_or_else(|| format!("{name:?} is no metric; there are: {}", known.join(", ")))?;
+    let metric = metric.ok_or_else(|| format!("{name:?} is not a metric; there are: {}", known.join(", ")))?;
     let limit = finite(limit)?;
     if limit < 0.0 {
         return Err("a limit is at least 0".into());

@@ -30,9 +30,9 @@ Examples:
   clerestory index --peers --rays 262144
   clerestory index --peers --rays 262144 --repeat 9 --folder out/index --page RESULTS.md
 
-Build times are medians by wall clock from triangles on the host to an index where it was built, by stage those of the build in the middle; on \
-the device with the copies to it. Steps are nodes and triangles that a ray visits, exact counts of the same \
-rays for every index, though a node of a kd-tree is one plane, not two boxes: half of them leave the camera, half leave surfaces in random directions.")]
+Build times are medians of wall-clock time, from triangles on the host to an index where it is built; times by stage are those of the \
+median build. Builds on the device include the copies to it. Steps are the nodes and triangles that a ray visits, exact counts over the same \
+rays for every index; a node of a kd-tree is one plane, though, not two boxes. Half of the rays leave the camera, half leave surfaces in random directions.")]
 pub struct Arguments {
     /// A scene; may be given several times
     #[arg(long = "scene", value_name = "SCENE", default_values = SCENES)]
@@ -43,10 +43,10 @@ pub struct Arguments {
     /// Rays
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(2..))]
     rays: u32,
-    /// Folder that keeps kd-trees: one of the same triangles is read from there, not built anew, and so are repeats
+    /// Folder that keeps kd-trees: a tree over the same triangles is read from there instead of being built again, in repeats too
     #[arg(long, value_name = "FOLDER", conflicts_with = "peers")]
     index_cache: Option<PathBuf>,
-    /// Instead: builds, and rays a second of the device's kernels, beside obvhs, bvh and, where it is installed, Embree on the processor
+    /// Measures builds, and rays per second of the device's kernels, beside obvhs, bvh and, where it is installed, Embree on the processor, instead
     #[arg(long)]
     peers: bool,
     /// Writes what --peers finds as JSON, CSV, Markdown and charts (SVG) into this folder too
@@ -83,7 +83,7 @@ struct Measured {
     /// Surface area cost, and its ratio to that of the first index.
     sah_cost: f64,
     sah_ratio: f64,
-    /// Nodes and triangles a ray, and the ratio to those of the first index.
+    /// Nodes and triangles per ray, and the ratio to those of the first index.
     steps: f64,
     steps_ratio: f64,
     /// Milliseconds by stage.

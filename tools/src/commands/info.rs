@@ -19,7 +19,7 @@ use crate::output::{self, Stream};
 #[command(after_help = "\
 Examples:
   clerestory info                          devices, limits, and what each technique needs of them
-  clerestory info builtin:cornell-box      profile, cameras, notes of the reader, techniques
+  clerestory info builtin:cornell-box      profile, cameras, the reader's notes, techniques
   clerestory info --device lavapipe        one device
   clerestory info --json | jq '.devices[].name'")]
 pub struct Arguments {
@@ -211,14 +211,14 @@ impl DeviceInfo {
         let features = FEATURES.map(|name| (name, techniques::offers(caps, name) == Some(true)));
         lines.push(format!("  features     {}", names(&features)));
         lines.push(format!(
-            "  memory       {} heap, {} an allocation, {} a storage buffer, {} texels a texel buffer",
+            "  memory       {} heap, {} per allocation, {} per storage buffer, {} texels per texel buffer",
             output::bytes(caps.device_heap),
             output::bytes(caps.max_allocation_size),
             output::bytes(caps.max_storage_buffer_range),
             caps.max_texel_buffer_elements
         ));
         lines.push(format!(
-            "  compute      {} invocations a workgroup, {} shared, {} workgroups, {} of push constants",
+            "  compute      {} invocations per workgroup, {} shared, {} workgroups, {} of push constants",
             caps.max_workgroup_invocations,
             output::bytes(u64::from(caps.max_shared_memory)),
             caps.max_workgroups[0],

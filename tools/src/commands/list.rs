@@ -20,7 +20,7 @@ use results::Part;
 #[derive(Debug, Args)]
 #[command(after_help = after_help())]
 pub struct Arguments {
-    /// Only this technique or system, by its id, or those with all of these words: in their sentences, files, kernels and public paths
+    /// Only this technique or system, by its id, or those with all of these words in their descriptions, files, kernels and public paths
     #[arg(value_name = "ID OR WORDS")]
     words: Vec<String>,
     /// Prints JSON
@@ -44,7 +44,7 @@ Examples:
   clerestory list
   clerestory list BG-3                 one system, with its sources, code, shaders, tests and results
   clerestory list path                 one technique, with the meaning, range, unit and default of each setting
-  clerestory list photon mapping       systems by words
+  clerestory list photon mapping       systems found by words
   clerestory list --markdown > docs/catalogue.md
   clerestory list --sources > third_party_notes/sources.md
   clerestory list --json | jq '.techniques[].default_settings'

@@ -24,15 +24,15 @@ Examples:
   clerestory maps sky.hdr faces.exr --to cube --size 256 --border 1
 
 Maps: lat-long, cube, paraboloid, octahedron, octahedron-rectangular, octahedron-c=NUMBER, equal-area, sphere, nusselt (the upper \
-hemisphere alone). Layers lie side by side from left to right: the cube's +x −x +y −y +z −z with the axes of Vulkan's cube images, the \
-paraboloid's upper and lower disc. Latitude–longitude files are those that [environment] in a scene reads: +y is up, −z in the middle, +x to \
+hemisphere only). Layers lie side by side from left to right: the cube's +x −x +y −y +z −z with the axes of Vulkan's cube images, the \
+paraboloid's upper and lower disc. Latitude–longitude files follow the convention of [environment] in a scene: +y is up, −z in the middle, +x to \
 the right of it. All other maps but the cube have the world's up as their pole, and the map's x and y are the world's +x and −z. Texels \
-outside of discs are black.
+outside discs are black.
 
-It prints the integral of radiance over the sphere before and after. They differ by what texels share: 4 samples a side of the finer map's texels \
-are off by less than 1e-3 for most maps, maps of which one refines the other by much less; more --samples bring them closer.
+It prints the integral of radiance over the sphere before and after. The two differ where texels of one map straddle those of the other: with 4 samples per side of the finer \
+map's texels by less than 1e-3 for most maps, by much less where one map refines the other; more --samples bring them closer.
 
-Ctrl-C ends the conversion before anything is written: an older output stays as it was.")]
+Ctrl-C ends the conversion before anything is written: an older output is left untouched.")]
 pub struct Arguments {
     /// The map to read: EXR or Radiance HDR
     input: PathBuf,
@@ -44,19 +44,19 @@ pub struct Arguments {
     /// Parametrization of the output
     #[arg(long, value_name = "MAP", value_parser = map)]
     to: Parametrization,
-    /// Rows of a layer of the output; maps of two squares are twice as wide. By default as many as give about the input's number of texels
+    /// Rows of a layer of the output; maps of two squares are twice as wide. By default about as many texels as the input has
     #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
     size: Option<u32>,
-    /// Texels of border about each layer of the output, repeated from where the map goes on
+    /// Width in texels of the border around each layer of the output, which repeats the texels where the map continues
     #[arg(long, value_name = "TEXELS", default_value_t = 0)]
     border: u32,
-    /// Texels of border about each layer of the input
+    /// Width in texels of the border around each layer of the input
     #[arg(long, value_name = "TEXELS", default_value_t = 0)]
     from_border: u32,
     /// Samples along the side of the finer map's texels
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     samples: u32,
-    /// What the input is between the centres of its texels
+    /// How the input is interpolated between the centres of its texels
     #[arg(long, value_enum, default_value_t = Filter::Box)]
     filter: Filter,
     /// Prints JSON
@@ -254,7 +254,7 @@ fn report(arguments: &Arguments, source: &MapImage, converted: &MapImage) -> Out
     );
     let mut text = table.text();
     if arguments.to == Parametrization::Nusselt && arguments.from != Parametrization::Nusselt {
-        text += "the output holds the upper hemisphere alone\n";
+        text += "the output holds only the upper hemisphere\n";
     }
     output::print(&text)
 }

@@ -1,4 +1,4 @@
-//! The command line: one file a command.
+//! The command line: one file per command.
 
 mod agreement;
 mod bench;
@@ -50,7 +50,7 @@ Each command explains itself: clerestory render --help
 Exit codes:
   0    done
   1    the run failed: device lost, out of memory, a picture that cannot be read, a file that cannot be written
-  2    the command line or a setting asks for what cannot be; pictures to compare have different sizes
+  2    the command line or a setting asks for the impossible; pictures to compare have different sizes
   3    the scene is missing or cannot be read, or the technique cannot render it
   4    pictures differ beyond a --threshold, or renderers beyond their noise; a hard case fails
   5    no Vulkan device, or none that can do it
@@ -82,7 +82,7 @@ pub fn main() -> ExitCode {
         Failure {
             code: Code::Run,
             message: format!("fault in the program{place}: {cause}"),
-            hint: Some("this is a defect; please report it with the command line".into()),
+            hint: Some("this is a bug; please report it with the command line".into()),
         }
         .report();
     }));
@@ -93,7 +93,7 @@ fn start() -> ExitCode {
     let program = match Program::try_parse() {
         Ok(program) => program,
         Err(error) => {
-            // Help and version are no failures, and a reader that has gone is none either.
+            // Neither help and version nor a reader that has gone are failures.
             let _ = error.print();
             return ExitCode::from(error.exit_code() as u8);
         }
@@ -140,7 +140,7 @@ fn listen(verbose: u8) {
         .init();
 }
 
-/// Errors of the validation layers, which the log has shown, fail the run. At best called after the device has gone.
+/// Errors of the validation layers, which the log has shown, fail the run. Best called after the device is gone.
 fn check_validation(log: &ValidationLog) -> Outcome {
     match log.take().iter().filter(|message| message.error).count() {
         0 => Ok(()),

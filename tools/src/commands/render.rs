@@ -3,6 +3,7 @@
 mod choice;
 mod files;
 mod progress;
+mod summary;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,6 +31,7 @@ use crate::{frame_report, output, pictures};
 use choice::ChoiceReport;
 use files::{Document, ErrorAgainst, Files};
 use progress::Interruptible;
+use summary::Why;
 
 /// Renders a scene to an EXR picture, a PNG to look at and a JSON report
 #[derive(Debug, Args)]
@@ -38,29 +40,30 @@ Examples:
   clerestory render                                          the Cornell box
   clerestory render 'builtin:cornell-box?sphere=glass' --spp 256 -o out/glass.exr
   clerestory render model.glb --camera front --size 1280x720 --time-budget 30s --tone neutral
-  clerestory render model.glb --error 0.02 --explain         as many samples as it takes, by the settings that suit the scene
+  clerestory render model.glb --error 0.02 --explain         as many samples as it takes, with the settings that suit the scene
   clerestory render model.glb --time 20s                     the best picture in that time
   clerestory render --path-set direct --aov normal,albedo,depth
   clerestory render --spp 4096 -o reference.exr
   clerestory render --spp 16 --seed 1 --reference reference.exr
   clerestory render --settings '{\"roulette_start\": 8}' --stats json | jq .steady_rates
+  clerestory render --stats table                            passes, work, memory and index in full
 
 Beside a model NAME.gltf, NAME.scene.toml may say what glTF cannot: environment map, measured metals, aperture, exposure, technique.
 
-Ctrl-C stops after the step at hand and writes what is there, with exit code 130; a second one stops at once and writes nothing. \
+Ctrl-C stops after the current step and writes the picture so far, with exit code 130; a second one stops at once and writes nothing. \
 `clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
 pub struct Arguments {
     /// A scene file (gltf, glb, ply, obj, toml) or `builtin:` address
     #[arg(default_value = "builtin:cornell-box")]
     scene: String,
     /// The picture to write: NAME.exr with NAME.png and NAME.json beside it, or NAME.png with NAME.json; by default out/SCENE.exr.
-    /// A folder that is not there is made, which the error output says
+    /// Missing folders are created, which the error output says
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Technique; by default the scene's, else `path`
     #[arg(long, value_name = "ID")]
     technique: Option<String>,
-    /// Samples a pixel
+    /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
     spp: u32,
     /// Pixels: WIDTHxHEIGHT, or the height alone; by default the reference's size, else 512 high by the scene's aspect
@@ -74,15 +77,15 @@ pub struct Arguments {
     camera: Option<String>,
     /// Chooses technique, settings and samples for this error: the root of the relative MSE, 0.02 is 2 %
     ///
-    /// Small pilot pictures judge noise and bias of every technique; one whose bias exceeds the error is refused with that figure, and so is the
-    /// path tracer where it misses light that others find (what lights without area give by way of mirrors and smooth glass). --explain shows
+    /// Small pilot pictures measure the noise and bias of every technique. One whose bias exceeds the error is refused with that figure, and so is the
+    /// path tracer where it misses light that others find (light of sources without area by way of mirrors and smooth glass). --explain shows
     /// all figures.
     #[arg(long, value_name = "ERROR", value_parser = positive, conflicts_with_all = ["spp", "time_budget"])]
     error: Option<f64>,
-    /// Chooses technique, settings and samples for this time, pilots included; with --error, its limit: 10s, 500ms, 2min
+    /// Chooses technique, settings and samples for this time, pilots included (10s, 500ms, 2min); with --error, the most that it may take
     #[arg(long, value_name = "TIME", value_parser = parse_duration, conflicts_with_all = ["spp", "time_budget"])]
     time: Option<Duration>,
-    /// Shows what could have been chosen, and why it was not
+    /// Shows the alternatives, and why they were not chosen
     #[arg(long)]
     explain: bool,
     /// Which light paths: words or an expression from light to eye, e.g. direct, LS+DE; --help says more
@@ -93,13 +96,13 @@ pub struct Arguments {
     /// them are intersected. Put expressions in quotes: 'L(D|S)E', 'LD{1,3}E', '!L.*S.*E'. docs/path-sets.md shows pictures.
     #[arg(long, value_name = "SET", value_parser = parse_path_set)]
     path_set: Option<PathSet>,
-    /// Sequence of random numbers; by default as the settings say, else sobol
+    /// Sequence of random numbers; by default that of the settings, else sobol
     #[arg(long, value_enum)]
     sampler: Option<Sampler>,
-    /// Index of the rays: bvh2 by binned SAH, lbvh along the Morton curve (least build, slower rays), lbvh-high optimised, lbvh-device as lbvh but built by the device, kd a kd-tree (longest build). The picture is the same
+    /// Ray index: bvh2 by binned SAH, lbvh along the Morton curve (shortest build, slower rays), lbvh-high optimised, lbvh-device like lbvh but built by the device, kd a kd-tree (longest build). The picture is the same with each
     #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd", default_value_t, value_parser = parse_index)]
     index: IndexKind,
-    /// With --index kd: folder that keeps kd-trees; one of the same triangles is read from there, not built anew
+    /// With --index kd: folder that keeps kd-trees; a tree over the same triangles is read from there instead of being built again
     #[arg(long, value_name = "FOLDER")]
     index_cache: Option<PathBuf>,
     /// The technique's settings as JSON, or @FILE that holds them
@@ -108,11 +111,11 @@ pub struct Arguments {
     /// Layers of the EXR besides radiance
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,…")]
     aov: Vec<Aov>,
-    /// Stops after about this time with the samples there are: 10s, 500ms, 2min
+    /// Stops after about this time with the samples taken so far: 10s, 500ms, 2min
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time_budget: Option<Duration>,
     /// What to print about the run to standard output
-    #[arg(long, value_enum, default_value_t = Statistics::Table)]
+    #[arg(long, value_enum, default_value_t = Statistics::Summary)]
     stats: Statistics,
     /// A picture of the same view: prints and reports the error against it
     #[arg(long, value_name = "FILE")]
@@ -189,10 +192,12 @@ impl Aov {
 /// What is printed at the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Statistics {
-    /// The frame report as JSON.
-    Json,
-    /// The frame report as a table.
+    /// About ten lines that matter: files, technique, seconds, rates, memory, error.
+    Summary,
+    /// The whole frame report as tables.
     Table,
+    /// The whole frame report as JSON.
+    Json,
     /// Nothing.
     None,
 }
@@ -200,7 +205,7 @@ enum Statistics {
 fn positive(text: &str) -> Result<f64, String> {
     match finite(text)? {
         number if number > 0.0 => Ok(number),
-        _ => Err("is not above 0".into()),
+        _ => Err("must be above 0".into()),
     }
 }
 
@@ -224,7 +229,7 @@ fn without_name(error: Error) -> String {
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if arguments.index_cache.is_some() && !matches!(arguments.index, IndexKind::Kd(_)) {
         return Err(Failure::usage(
-            "--index-cache keeps kd-trees alone; it goes with --index kd",
+            "--index-cache keeps only kd-trees; use it with --index kd",
         ));
     }
     let scene = scene::load(&arguments.scene).map_err(Failure::scene)?;
@@ -287,7 +292,13 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     };
     let layers: Vec<&str> = arguments.aov.iter().map(|aov| aov.layer()).collect();
     files.write(&rendered.picture, &layers, &document)?;
-    conclude(arguments, &document, &files)?;
+    let why = match (&plan, &arguments.technique, &scene.defaults.technique) {
+        (Some(plan), ..) => Why::Chosen(plan.goal),
+        (None, Some(_), _) => Why::Asked,
+        (None, None, Some(_)) => Why::Scene,
+        (None, None, None) => Why::Default,
+    };
+    conclude(arguments, &document, &rendered.picture, &files, why)?;
     check_validation(&validation)?;
     Ok(if interrupted {
         Code::Interrupted.into()
@@ -384,7 +395,7 @@ fn settings(arguments: &Arguments, scene: &Scene) -> Outcome<Settings> {
     Ok(settings.into())
 }
 
-/// The option of the command line for what is no technique's setting.
+/// The option of the command line for what is not a technique's setting.
 fn option_of(name: &str) -> Option<&'static str> {
     match name {
         "seed" => Some("--seed"),
@@ -410,7 +421,7 @@ fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
         None => (text.to_owned(), "the text"),
     };
     serde_json::from_str(&text).map_err(|cause| {
-        Failure::usage(format!("--settings: {from} is no JSON object: {cause}"))
+        Failure::usage(format!("--settings: {from} is not a JSON object: {cause}"))
             .hint("write for example --settings '{\"roulette_start\": 8}'; `clerestory list path` explains all settings of a technique")
     })
 }
@@ -440,9 +451,10 @@ fn measure(arguments: &Arguments, rendered: &Rendered, reference: &Picture, tone
 }
 
 /// Says what came out.
-fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Outcome {
+fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, files: &Files, why: Why) -> Outcome {
     match arguments.stats {
         Statistics::None => {}
+        Statistics::Summary => output::print(&summary::text(document, picture, files, why))?,
         Statistics::Json => output::print_json(document)?,
         Statistics::Table => {
             let mut text = frame_report::text(document.report);
@@ -463,7 +475,8 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
         output::note(&choice.text());
     }
     let report = document.report;
-    if report.non_finite_samples.total() > 0 && arguments.stats != Statistics::Table {
+    let said = matches!(arguments.stats, Statistics::Summary | Statistics::Table);
+    if report.non_finite_samples.total() > 0 && !said {
         output::warn(&format!(
             "{} samples were NaN and {} infinite; they are left out",
             report.non_finite_samples.nan, report.non_finite_samples.infinite
@@ -481,9 +494,12 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, files: &Files) -> Ou
         } else {
             "time is up"
         };
-        output::warn(&format!("{cause}: {samples} of {} samples a pixel", report.spp));
+        output::warn(&format!("{cause}: {samples} of {} samples per pixel", report.spp));
     }
-    output::note(&format!("wrote {}", files.names()));
+    // The summary begins with them.
+    if arguments.stats != Statistics::Summary {
+        output::note(&format!("wrote {}", files.names()));
+    }
     Ok(())
 }
 

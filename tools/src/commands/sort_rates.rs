@@ -313,7 +313,7 @@ pub fn tables(rates: &[Rate]) -> String {
     text
 }
 
-/// The rates with their spread as Markdown tables, in millions a second.
+/// The rates with their spread as Markdown tables, in millions per second.
 pub fn markdown(rates: &[Rate]) -> String {
     let millions = |rate: f64| {
         let digits = usize::from(rate < 99.95e6);
@@ -326,7 +326,7 @@ pub fn markdown(rates: &[Rate]) -> String {
             format!("{} ({least} … {greatest})", millions(rate.keys_per_second))
         });
         rows.insert(1, vec!["---:".into(); rows[0].len()]);
-        text += &format!("Millions of 32-bit {} a second:\n\n", load.word());
+        text += &format!("Millions of 32-bit {} per second:\n\n", load.word());
         for row in rows {
             text += &format!("| {} |\n", row.join(" | "));
         }

@@ -22,13 +22,13 @@ use crate::output::{self, Table};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A case passes, degrades as documented, is refused with the reason, or fails; the figure beside the verdict is the one that came \
-nearest to its bound. Exit code 4 when a case fails.
+closest to its bound. The exit code is 4 when a case fails.
 
 Examples:
   clerestory stability
   clerestory stability scales far-from-origin
   clerestory stability --technique path
-  clerestory stability --list                        what each case breaks, and what has to come out
+  clerestory stability --list                        what each case breaks, and the expected result
   clerestory stability --pictures docs/hard-cases    a small picture of each case
   clerestory stability --markdown > docs/stability.md")]
 pub struct Arguments {

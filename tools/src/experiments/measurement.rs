@@ -2,8 +2,8 @@
 //!
 //! A measurement is known by its key, a fingerprint of all that it depends on: scene, picture, technique and settings, budget, seed,
 //! reference, engine version, machine, device and driver. It holds the fingerprints of the kernels that made it and counts only while the build
-//! still has them. Titles and the names of variants are no part of the key.
-//! Guarantees: a line that was cut off in writing is passed over; later lines replace earlier ones of the same key.
+//! still has them. Titles and the names of variants are not part of the key.
+//! Guarantees: a line that was cut off while it was written is skipped; later lines replace earlier ones of the same key.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -35,7 +35,7 @@ pub struct Measurement {
     pub budget: Budget,
     /// Seed.
     pub seed: u32,
-    /// Mean number of samples a pixel.
+    /// Mean number of samples per pixel.
     pub samples: f64,
     /// Seconds of wall clock, after a picture that warms the driver's cache.
     pub seconds: f64,

@@ -2,7 +2,7 @@
 //!
 //! A reference is known by a fingerprint of all that it depends on (scene content, camera, size, technique with its settings and path set, seed,
 //! samples, engine version), which is part of its file's name, and by the fingerprints of its kernels, which stand in its metadata. The
-//! device is no part of it: pictures by different devices differ by rounding, far below the noise.
+//! device is not part of it: pictures by different devices differ by rounding, far below the noise.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub struct Identity<'a> {
     pub technique: &'a str,
     /// All of its settings, path set included.
     pub settings: &'a serde_json::Value,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub spp: u32,
     /// Seed.
     pub seed: u32,

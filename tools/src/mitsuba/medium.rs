@@ -141,7 +141,7 @@ impl<'a> Surroundings<'a> {
         if both.is_empty() { both } else { format!("    {both}\n") }
     }
 
-    /// The medium inside of the one of these bodies that all others hold; that of the scene without any.
+    /// The medium inside the one of these bodies that all others hold; that of the scene without any.
     fn innermost(&self, around: &[&WorldMesh]) -> Option<u32> {
         let depth = |body: &WorldMesh| {
             let vertex = body

@@ -1,7 +1,7 @@
 //! Greedy construction of kd-trees in O(n log n): events sorted once, planes weighed in one sweep an axis, order kept when nodes are split.
 //!
 //! Sources: I. Wald and V. Havran, "On building fast kd-Trees for Ray Tracing, and on doing that in O(N log N)", IEEE RT 2006 (events,
-//! classification, planar triangles to the cheaper side); "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin,
+//! classification, planar triangles to the cheaper side); B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin,
 //! 2011, §3.2.3.1 and §4.1.4 (constants, bonus for empty space).
 //!
 //! Guarantees: the same tree whatever the number of threads; of planes of one cost the lowest axis and then the lowest coordinate wins; a
@@ -365,7 +365,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "PM-KD-1",
     name: "kd-trees by the surface area heuristic, O(n log n), with perfect splits",
     role: Role::Kernel,
-    limits: "Built on the host, the slowest of the builds; what moves is built anew.",
+    limits: "Built on the host, the slowest of the builds; what moves is rebuilt.",
     sources: &[sources::WALD_HAVRAN_2006.whole()],
     tests: &[
         "engine/src/accel/kd/tests.rs::every_point_of_a_triangle_lies_in_a_leaf_that_holds_it",

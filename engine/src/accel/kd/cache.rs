@@ -1,6 +1,6 @@
 //! Caches of kd-trees that kernels manage themselves: nodes in shared memory, entries of the stack in registers, a leaf that waits.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §4.3. They change where nodes and entries come from,
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §4.3. They change where nodes and entries come from,
 //! and, with a leaf that waits, how much is visited; never a hit.
 
 use crate::accel::input::check_range;
@@ -147,7 +147,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-CA-2",
         name: "kd node cache II: the top of the tree in shared memory, with boxes",
         role: Role::PartOf("PM-X-2"),
-        limits: "Exists with stack cache II alone, whose entries it gives their ends, and for the top 8 levels at most (8 KiB).",
+        limits: "Exists only with stack cache II, whose entries it gives their ends, and for the top 8 levels at most (8 KiB).",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
@@ -171,7 +171,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-CA-4",
         name: "kd stack cache II: entries as bytes in registers",
         role: Role::PartOf("PM-X-2"),
-        limits: "Eight entries at most, which name cached nodes alone: wants node cache II.",
+        limits: "Eight entries at most, which name cached nodes only: needs node cache II.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],

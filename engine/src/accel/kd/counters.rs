@@ -1,6 +1,6 @@
 //! Exact work of traversals of kd-trees.
 //!
-//! The traffic model is that of "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §4.2.4 and §4.3.3.
+//! The traffic model is that of B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §4.2.4 and §4.3.3.
 
 use crate::accel::TraversalCounters;
 

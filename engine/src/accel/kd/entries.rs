@@ -26,7 +26,7 @@ pub struct Entries {
     size: usize,
     caches: KdCaches,
     head: Option<Entry>,
-    /// Nodes, four a word, the older word first.
+    /// Nodes, four per word, the older word first.
     bytes: [u32; 2],
 }
 

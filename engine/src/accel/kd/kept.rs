@@ -101,7 +101,7 @@ impl KdTree {
     /// As [`KdTree::build`], but read from `folder` where the same tree was kept before, and kept there otherwise; the folder is made.
     ///
     /// # Errors
-    /// As [`KdTree::build`]. A file that cannot be read, or that is damaged, is no error: the tree is built; nor is one that cannot be
+    /// As [`KdTree::build`]. A file that cannot be read, or that is damaged, is not an error: the tree is built; nor is one that cannot be
     /// written, see [`KeptTree::not_kept`].
     pub fn kept(triangles: &[[Vec3; 3]], settings: &KdSettings, folder: &Path) -> Result<KeptTree> {
         settings.check()?;

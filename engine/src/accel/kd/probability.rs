@@ -1,7 +1,7 @@
 //! How probable it is that a ray visits a node of a kd-tree: what the greedy construction weighs its children by.
 //!
 //! Sources: J. MacDonald and K. Booth, "Heuristics for Ray Tracing Using Space Subdivision", The Visual Computer 6(3), 1990 (surface
-//! area); "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §4.1 (origins inside the scene: the integral,
+//! area); B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §4.1 (origins inside the scene: the integral,
 //! its 26 regions, and the overlapping slabs of SIROH); A. Van Oosterom and J. Strackee, "The Solid Angle of a Plane Triangle", IEEE
 //! TBME 30(2), 1983; C. Hoer and C. Love, "Exact Inductance Equations for Rectangular Conductors", J. Res. NBS 69C, 1965 (the integral of
 //! 1/r over two parallel rectangles).
@@ -276,7 +276,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-KD-2",
         name: "exact probability of a visit from inside the scene, in closed form",
         role: Role::PartOf("PM-KD-1"),
-        limits: "Origins are even in the scene's box and nothing hides a node; some hundred times slower a candidate than the surface area.",
+        limits: "Assumes origins spread evenly over the scene's box, and that nothing hides a node; some hundred times slower per candidate than the surface area.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.1.1"), sources::HOER_LOVE_1965.whole()],
         tests: &[
             "engine/src/accel/kd/probability/tests.rs::the_closed_form_is_the_integral_of_solid_angles",

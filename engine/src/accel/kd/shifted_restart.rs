@@ -1,6 +1,6 @@
 //! Traversal without a stack that restarts at the root behind the leaf it has left: three forms, each of which fails.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.4.4 and §4.2.1, on T. Foley, J. Sugerman,
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.4.4 and §4.2.1, on T. Foley, J. Sugerman,
 //! "KD-Tree Acceleration Structures for a GPU Raytracer", Graphics Hardware 2005. Planes are met where their distance says, as there, without the
 //! slack of the other traversals; rays' hits play no part. Kept for comparison: where a ray goes on is not told by a distance alone, since
 //! several leaves may begin at one.

@@ -107,7 +107,7 @@ fn restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not() {
         "{rays} rays, {met} meet several leaves: {endless} endless, {without_volume} miss leaves without volume, {skipped} skip"
     );
     println!("{small_steps} endless with a step lost in rounding");
-    // Closed intervals never leave a plane between two leaves. That which ends with the cube is no such plane.
+    // Closed intervals never leave a plane between two leaves. That which ends with the cube is not one.
     assert!(endless <= met && endless > met - met / 10);
     assert!(without_volume > rays / 4 && skipped > rays / 4 && small_steps > rays / 4);
 }

@@ -1,6 +1,6 @@
 //! Traversal of kd-trees with a stack, and without one by a word of flags: leaves come in the same order, hits are the same.
 //!
-//! Sources: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.4.1 and §4.2.2 to §4.2.3; the carry is that
+//! Sources: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.4.1 and §4.2.2 to §4.2.3; the carry is that
 //! of the leaf's parent kept in a register of its own, so that ways of 32 inner nodes work.
 //!
 //! One bit a level of the way from the root: 0 where the near subtree of a node with both children met is in progress, 1 where nothing is
@@ -153,7 +153,7 @@ impl KdTraversal {
     pub fn with_caches(mut self, caches: KdCaches) -> crate::Result<Self> {
         caches.check()?;
         if self.scheme != Scheme::Stack {
-            caches.check_absent("go with a stack alone")?;
+            caches.check_absent("go only with a stack")?;
         }
         self.caches = caches;
         Ok(self)
@@ -477,7 +477,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-TR-4",
         name: "traversal of kd-trees by a word of flags with push-down",
         role: Role::PartOf("PM-KD-1"),
-        limits: "Restarts at the lowest node that holds all that is left of the ray, which a ray that leaves something near the root gains nothing by.",
+        limits: "Restarts at the lowest node that holds all that is left of the ray; a ray that leaves something near the root gains nothing.",
         sources: &[sources::HORN_2007.whole()],
         shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[

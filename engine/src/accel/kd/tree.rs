@@ -1,7 +1,7 @@
 //! The layout of a kd-tree: nodes of 8 bytes in pairs of siblings; references of leaves on the host, triangles in the order of leaves on the
-//! device, where a reference would be one more dependent load for each test. That costs 48 bytes a reference and saves its 4.
+//! device, where a reference would be one more dependent load for each test. That costs 48 bytes per reference and saves its 4.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.3.1; the packed form of a node goes back
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.3.1; the packed form of a node goes back
 //! to I. Wald, "Realtime Ray Tracing and Interactive Global Illumination", PhD thesis, Saarland University, 2004, §7.1.
 
 use super::bounds::Bounds;
@@ -214,7 +214,7 @@ impl KdTree {
         let once = nodes.iter().all(&mut is_named_once);
         if nodes.len() < 2 || !nodes.len().is_multiple_of(2) || !places || !once || !nodes.iter().enumerate().all(sound)
         {
-            return Err(Error::setting("kd.nodes", nodes.len(), "are no tree"));
+            return Err(Error::setting("kd.nodes", nodes.len(), "are not a tree"));
         }
         let bounds = bounds_of_all(&positions);
         let tree = Self::complete(bounds, nodes, references, positions, indices, met.statistics);
@@ -253,7 +253,7 @@ impl KdTree {
         tree
     }
 
-    /// Box and where triangles begin, then a pair of nodes a texel, and three texels for the triangle of each reference.
+    /// Box and where triangles begin, then a pair of nodes per texel, and three texels for the triangle of each reference.
     fn pack(&self) -> Vec<[u32; 4]> {
         const HEADER: usize = constants::KD_HEADER_TEXELS as usize;
         let triangles = HEADER + self.nodes.len() / 2;

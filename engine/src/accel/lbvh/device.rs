@@ -133,7 +133,7 @@ impl LbvhBuilder {
         LbvhBuffers::new(&self.gpu, &self.sort, &self.ranks, self.run, count)
     }
 
-    /// As [`LbvhBuilder::buffers`], over triangles of the caller's, such as a host's ([`Gpu::borrow_buffer`]): 36 bytes a triangle in
+    /// As [`LbvhBuilder::buffers`], over triangles of the caller's, such as a host's ([`Gpu::borrow_buffer`]): 36 bytes per triangle in
     /// `corners`, 4 in `indices`, storage buffers both.
     ///
     /// # Errors

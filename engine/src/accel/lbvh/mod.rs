@@ -25,7 +25,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-LBVH",
     name: "LBVH (linear BVH) as ray index: built on the host or on the device, and refitted",
     role: Role::Kernel,
-    limits: "Rays visit more than in trees by the surface area unless it is optimised; refitting keeps the tree's shape, however things move.",
+    limits: "Unless it is optimised, rays visit more nodes than in trees built by surface area; refitting keeps the tree's shape, however things move.",
     sources: &[sources::APETREI_2014.whole(), sources::KARRAS_2012.whole()],
     shaders: &[
         "shaders/accel/lbvh_grid.comp",

@@ -102,17 +102,17 @@ pub fn hierarchy(boxes: &[Aabb], sorted: &SortedCodes, rule: LeafRule, max_depth
 pub(super) struct Splits {
     /// Slots, by words.
     words: Vec<[u32; SLOT_WORDS]>,
-    /// Of each slot 1 + the index of its node, 0 where it lies inside of a leaf.
+    /// Of each slot 1 + the index of its node, 0 where it lies inside a leaf.
     node_numbers: Vec<u32>,
     root: Built,
-    /// Nodes outside of leaves, by chunks of slots.
+    /// Nodes outside leaves, by chunks of slots.
     chunk_nodes: Vec<usize>,
 }
 
 /// A range of slots that a task fills.
 struct Slots<'a> {
     slots: &'a mut [Slot],
-    /// 1 for slots whose nodes stay, 0 for those inside of leaves and those that are not filled yet.
+    /// 1 for slots whose nodes stay, 0 for those inside leaves and those that are not filled yet.
     retained: &'a mut [u32],
 }
 
@@ -165,7 +165,7 @@ impl Splits {
         bytemuck::cast_slice(&self.words)
     }
 
-    /// Nodes outside of leaves.
+    /// Nodes outside leaves.
     pub(super) fn nodes(&self) -> usize {
         self.chunk_nodes.iter().sum()
     }

@@ -299,7 +299,7 @@ mod tests {
     use crate::accel::bvh2::MAX_DEPTH;
     use crate::accel::test_support::Random;
 
-    /// The change of the sum of areas when a node is moved, or none where that is no move.
+    /// The change of the sum of areas when a node is moved, or none where that is not a move.
     fn change(tree: &BoxTree, node: u32, beside: u32) -> Option<f64> {
         let mut links = Links::new(tree);
         let mut ancestor = beside;

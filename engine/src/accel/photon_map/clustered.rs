@@ -1,5 +1,5 @@
 //! The hierarchy by clusters: neighbours in the input that share the upper bits of their codes are sorted as one, and the tree is made
-//! several levels a pass.
+//! several levels per pass.
 //!
 //! Source: J. Pantaleoni and D. Luebke, "HLBVH: Hierarchical LBVH Construction for Real-Time Ray Tracing of Dynamic Geometry", HPG 2010.
 //! What it saves depends on the input's coherence, which [`ClusterCounts`] shows.

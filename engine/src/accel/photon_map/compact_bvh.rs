@@ -1,6 +1,6 @@
 //! Sibling pairs in half the bytes: of the twelve planes of two siblings six at most differ from their parent's, and only these are kept.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.2. Boxes are tight, so each plane of the
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.2. Boxes are tight, so each plane of the
 //! parent is a plane of one child at least; the other child may have a plane of its own. A pair stores one plane for each of the parent's
 //! six, and whose it is; the other child inherits. A point that a traversal has in the parent's box is thus tested against both children
 //! by six comparisons, and a ray by what it carries of the parent's span.
@@ -265,7 +265,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-MAP-8",
         name: "compact sibling pairs",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Boxes must be tight: trees without, such as refitted ones, are refused until they are encoded anew.",
+        limits: "Boxes must be tight: other trees, such as refitted ones, are refused until they are encoded again.",
         sources: &[sources::FABIANOWSKI_2011.at("§6.2.1")],
         shaders: &["shaders/accel/compact_bvh.glsl"],
         tests: &[

@@ -1,6 +1,6 @@
 //! A tree whose nodes hold their whole boxes, for queries by points and by rays: the baseline that compact nodes are measured against.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.2 and §6.2.4: nodes of 32 bytes for point
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.2.2 and §6.2.4: nodes of 32 bytes for point
 //! queries, sibling pairs of 56 bytes for rays. Slabs test: T. Kay and J. Kajiya, SIGGRAPH 1986.
 //!
 //! Guarantee: twins of the kernels' traversals with exact counters of what these read; every leaf whose box holds a point in its interior,
@@ -69,7 +69,7 @@ pub struct RootDescriptor {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct QueryCounters {
-    /// Nodes fetched, two a pair.
+    /// Nodes fetched, two per pair.
     pub nodes: u64,
     /// Leaves visited.
     pub leaves: u64,
@@ -86,7 +86,7 @@ pub struct CompleteBvh {
     pub root: RootDescriptor,
     /// Sibling pairs, for ray queries.
     pub pairs: Vec<RayPair>,
-    /// The same nodes for point queries, two a pair.
+    /// The same nodes for point queries, two per pair.
     pub nodes: Vec<CompleteNode>,
     /// Primitive of each record.
     pub order: Vec<u32>,
@@ -322,7 +322,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-MAP-7",
         name: "complete nodes and sibling pairs",
         role: Role::Yardstick,
-        limits: "Twice the bytes of compact pairs, which it is the baseline of.",
+        limits: "Twice the bytes of compact pairs, for which it is the baseline.",
         sources: &[sources::FABIANOWSKI_2011.at("§6.2.4")],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::pairs_are_recovered_to_the_bit_from_half_the_bytes",
@@ -334,7 +334,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-I-4",
         name: "slabs test of boxes",
         role: Role::PartOf("PM-MAP-7"),
-        limits: "Says that a leaf's box is met, not what in it is.",
+        limits: "Tells that a leaf's box is hit, not what inside it is.",
         sources: &[sources::KAY_KAJIYA_1986.whole()],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",

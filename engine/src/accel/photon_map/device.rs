@@ -145,7 +145,7 @@ impl MapBuilder {
     pub fn max_boxes(&self) -> u32 {
         let caps = self.gpu.caps();
         let dispatched = u64::from(caps.max_workgroups[0]) * u64::from(MAP_GROUP_SIZE);
-        // Boxes of places and blocks are the most texels: two a box, and a third of it besides.
+        // Boxes of places and blocks are the most texels: two per box, and a third of it besides.
         let texels = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
         let indexed = 1 << INDEX_BITS;
         let most = dispatched.min((texels / 3).saturating_sub(16)).min(indexed);
@@ -426,7 +426,7 @@ mod tests {
     #[test]
     fn there_is_room_for_every_block() {
         assert_eq!([0, 1, 2, 4, 5, 16, 17].map(blocks_of), [2, 2, 3, 5, 8, 21, 25]);
-        // What `max_boxes` counts on: less than three quarters of texels a box, beside the least.
+        // What `max_boxes` counts on: less than three quarters of texels per box, beside the least.
         for places in [1, 5, 100, 1 << 20, (1 << 20) + 1] {
             assert!(2 * blocks_of(places) <= 3 * (u64::from(places) + 16), "{places}");
         }

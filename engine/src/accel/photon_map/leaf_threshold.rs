@@ -1,6 +1,6 @@
 //! How many photon kernels a leaf of a map should hold, found from the kernels themselves.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.3. A point of a surface lies in as many
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.3. A point of a surface lies in as many
 //! kernels as their areas cover the scene's; leaves of a fixed share of that number cost about the least. The constant of
 //! proportionality is printed there as 8; the leaf sizes and counts of its own table need 1/16 to 1/8.
 

@@ -1,6 +1,6 @@
 //! The hierarchy by merging from the bottom up: boxes, sizes and links in one ascent, without nodes of one child.
 //!
-//! Source: the improved construction of linear hierarchies for photon maps in "Interactive Manycore Photon Mapping", PhD thesis, Trinity
+//! Source: the improved construction of linear hierarchies for photon maps in B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity
 //! College Dublin, 2011, §6.1.2. Neighbours whose codes differ are a merge point at the level of their highest differing bit; points of
 //! one level merge disjoint ranges, so a level is one parallel step, and all state lives at the two ends of a range.
 //!

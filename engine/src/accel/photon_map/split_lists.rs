@@ -93,7 +93,7 @@ fn link(parents: &mut [Range], children: &[Range]) {
     }
 }
 
-/// Takes out nodes of one child and those inside of leaves, from the lowest level up, with the boxes.
+/// Takes out nodes of one child and those inside leaves, from the lowest level up, with the boxes.
 fn collapse(boxes: &[Aabb], sorted: &SortedCodes, levels: &[Vec<Range>], leaf_size: u32) -> BoxTree {
     let mut nodes = Vec::new();
     let mut below: Vec<(Aabb, Child)> = Vec::new();

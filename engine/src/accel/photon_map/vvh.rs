@@ -1,6 +1,6 @@
 //! A tree by full sweeps of the voxel volume heuristic or the surface area heuristic: the yardstick of quality, built at leisure.
 //!
-//! Sources: the voxel volume heuristic for bounding volume hierarchies of photon maps, "Interactive Manycore Photon Mapping", PhD thesis,
+//! Sources: the voxel volume heuristic for bounding volume hierarchies of photon maps, B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis,
 //! Trinity College Dublin, 2011, §6.1.1: a point query visits the nodes that contain it, so a node's share is that of its volume; for
 //! rays, D. MacDonald and K. Booth, "Heuristics for Ray Tracing Using Space Subdivision", The Visual Computer 6, 1990. Primitives are sorted
 //! by their centres on each axis, and every border is tried.
@@ -127,7 +127,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "PM-MAP-3",
     name: "tree by the voxel volume heuristic",
     role: Role::Yardstick,
-    limits: "Built at leisure by full sweeps: too slow for a map that is made anew each pass.",
+    limits: "Built by full sweeps: too slow for a map that is rebuilt for each pass.",
     sources: &[sources::FABIANOWSKI_2011.at("§6.1.1")],
     tests: &["engine/src/accel/photon_map/tests.rs::sweeps_are_valid_and_beat_the_linear_tree"],
     api: &["clerestory::accel::photon_map::vvh::sweep_tree"],

@@ -89,7 +89,7 @@ pub struct TraceSettings {
 }
 
 impl TraceSettings {
-    /// One invocation a ray.
+    /// One invocation per ray.
     pub fn ray_per_thread() -> Self {
         Self {
             query: Query::Closest,

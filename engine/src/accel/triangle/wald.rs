@@ -79,7 +79,7 @@ impl WaldTriangle {
 /// Rows of the catalogue.
 pub(crate) const ROWS: &[Row] = &[Row {
     id: "PM-I-3",
-    name: "projected triangle test, made ready beforehand (measured, not in the kernels)",
+    name: "projected triangle test, precomputed (measured, not in the kernels)",
     role: Role::Yardstick,
     limits: "Not watertight, and weights lose digits where a triangle is far smaller than its distance from the origin of coordinates.",
     sources: &[sources::WALD_2004.at("7.1")],

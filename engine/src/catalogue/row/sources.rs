@@ -1,4 +1,4 @@
-//! The table of sources that rows cite: one line a publication, its constant named as its key is.
+//! The table of sources that rows cite: one line per publication, its constant named as its key is.
 
 use super::Source;
 

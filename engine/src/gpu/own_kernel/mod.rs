@@ -28,7 +28,7 @@
 //!
 //! What holds of WGSL: an index beyond an array, a buffer's end included, reads zero and writes nothing, and division by zero is defined, so
 //! no source breaks memory of others. What does not: loops have no bound that helps. A loop without an end hangs a device, or loses it where
-//! the system has a watchdog, and the software driver ends loops in silence after 65,535 iterations. GLSL has what the device's robust
+//! the system has a watchdog, and the software driver silently ends loops after 65,535 iterations. GLSL has what the device's robust
 //! buffer access gives it. Bindings are storage and uniform buffers, in GLSL texel buffers, too; images and samplers are refused.
 
 #[cfg(feature = "hot-reload")]

@@ -16,7 +16,7 @@ fn whole() -> impl Iterator<Item = Parametrization> {
 fn image(map: Parametrization, rows: u32, radiance: impl Fn(DVec3) -> f64 + Sync) -> MapImage {
     let size = UVec2::new(rows * map.aspect(), rows);
     MapImage::from_fn(map, size, |texel| {
-        // Of a texel whose centre is outside of its disc, the point next to the disc's middle.
+        // Of a texel whose centre is outside its disc, the point next to the disc's middle.
         let [lower, upper] = texel.bounds(size);
         let uv = DVec2::splat(0.5).clamp(lower, upper);
         let layer = texel.layer;
@@ -106,7 +106,7 @@ fn a_sun_of_one_texel_is_lamberts_polygon() {
                 let found = sun.irradiance(normal).unwrap();
                 let expected = normal.dot(exact);
                 // A twelfth of the solid angle of a 256th of the texel, or of 1.2·10⁻⁴ sr, times half of the shear and its inverse; and some
-                // times as much for normals at a slant, since where the density changes middles are no centroids.
+                // times as much for normals at a slant, since where the density changes middles are not centroids.
                 let bound = 8.0 * (map.texel_solid_angle(size, texel) / 256.0).max(1.2e-4) / 12.0;
                 assert!(
                     (found.x / (1e3 * expected) - 1.0).abs() < bound,

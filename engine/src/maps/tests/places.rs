@@ -15,7 +15,7 @@ fn directions_come_back_from_their_places() {
             };
             held += 1;
             assert!(map.holds(at) || map.is_disc(), "{map}: {d} {at:?}");
-            // On the rim of a disc rounding may lead outside of it, and roots lose half of the digits.
+            // On the rim of a disc rounding may lead outside it, and roots lose half of the digits.
             let at = MapPoint {
                 uv: if map.is_disc() {
                     0.5 + (at.uv - 0.5) * (1.0 - 1e-16)

@@ -78,7 +78,7 @@ fn rectangles_have_the_integral_of_the_density() {
             let (a, b) = (corner(&mut random), corner(&mut random));
             let (mut lower, mut upper) = (a.min(b), a.max(b));
             if map.is_disc() && map == Parametrization::Nusselt {
-                // The density is not bounded at the rim: inside of it.
+                // The density is not bounded at the rim: inside it.
                 (lower, upper) = (0.5 + 0.6 * (lower - 0.5), 0.5 + 0.6 * (upper - 0.5));
             }
             let (exact, found) = (map.rectangle_solid_angle(lower, upper), integral(map, lower, upper, 6));

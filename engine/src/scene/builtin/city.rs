@@ -20,7 +20,7 @@ pub const BOX_CITY: Entry = Entry {
             "instanced",
             "yes",
             &["yes", "no"],
-            "boxes as instances of one mesh a colour",
+            "boxes as instances of one mesh per colour",
         ),
         Parameter::real("sky", "1", 0.0, 1000.0, "strength of the sky"),
         Parameter::real("sun", "0", 0.0, 1000.0, "irradiance of an extra directional sun, W/m²"),

@@ -63,7 +63,7 @@ fn fog_box(values: &Values) -> Result<Scene> {
     if values.word("fill")? == "everywhere" {
         scene.surrounding = Some(fog);
     } else {
-        // Around the walls and not inside of them, so that everything in the box lies in the fog.
+        // Around the walls and not inside them, so that everything in the box lies in the fog.
         let boundary = add_boundary(&mut scene, fog);
         let (low, high) = (Vec3::splat(-0.02), Vec3::splat(0.58));
         scene.place(MeshBuilder::new("fog", boundary).cuboid(low, high).build());

@@ -78,7 +78,7 @@ fn build(values: &Values) -> Result<Scene> {
             let long = 0.25 * height * (0.6 + 0.4 * random(3));
             trunks.append(&twig, |p| at + turn * (p * Vec3::new(0.04, long, 0.04)));
         }
-        // Two triangles a leaf, in a crown of about the tree's upper half.
+        // Two triangles per leaf, in a crown of about the tree's upper half.
         let crown = foot + Vec3::Y * (0.72 * height);
         for i in 0..LEAVES {
             let random = |dimension| unit(seed ^ 0x91e1, tree * LEAVES + i, dimension);

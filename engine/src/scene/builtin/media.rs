@@ -161,13 +161,13 @@ pub const FURNACE_MEDIUM: Entry = Entry {
             "shape",
             "sphere",
             &["sphere", "box"],
-            "a sphere of radius 1 m, or a box of 2 m a side",
+            "a sphere of radius 1 m, or a box of 2 m per side",
         ),
         Parameter::choice(
             "density",
             "constant",
             &["constant", "gradient", "ball", "smoke", "cloud"],
-            "even, or a grid of 24 cells a side over the box around the body",
+            "even, or a grid of 24 cells per side over the box around the body",
         ),
         Parameter::real("ior", "1", 1.0, 4.0, "index of refraction; 1 is an invisible boundary"),
         Parameter::real(

@@ -137,7 +137,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-CORNELL",
     name: "Cornell box and the other generated scenes",
     role: Role::Service,
-    limits: "The same bits only with the same mathematics library; the Cornell box has colours in common use, not its measured spectra.",
+    limits: "Gives the same bits only with the same mathematics library; the Cornell box has colours in common use, not its measured spectra.",
     sources: &[
         sources::GORAL_1984.whole(),
         sources::CORNELL_BOX_DATA.whole(),

@@ -13,7 +13,7 @@ use crate::{Error, Result};
 
 pub const SPHERE_FLAKE: Entry = Entry {
     name: "sphere-flake",
-    summary: "A fractal of spheres on a floor: 9 children a sphere, up to a million triangles and more.",
+    summary: "A fractal of spheres on a floor: 9 children per sphere, up to a million triangles and more.",
     parameters: &[
         Parameter::integer(
             "depth",
@@ -27,7 +27,7 @@ pub const SPHERE_FLAKE: Entry = Entry {
             "4",
             1,
             32,
-            "cuts of each icosahedron edge: 20·frequency² triangles a sphere",
+            "cuts of each icosahedron edge: 20·frequency² triangles per sphere",
         ),
         Parameter::choice("instanced", "no", &["yes", "no"], "spheres as instances of one mesh"),
         Parameter::choice(

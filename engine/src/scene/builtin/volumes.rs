@@ -25,7 +25,7 @@ pub const SMOKE: Entry = Entry {
             "0",
             0.0,
             1e6,
-            "emitted radiance a metre at density 1, W·m⁻³·sr⁻¹",
+            "emitted radiance per metre at density 1, W·m⁻³·sr⁻¹",
         ),
         PHASE,
         G,

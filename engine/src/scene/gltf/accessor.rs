@@ -11,7 +11,7 @@ use crate::Result;
 pub struct Floats {
     /// Components an element.
     pub width: usize,
-    /// `width` values an element.
+    /// `width` values per element.
     pub values: Vec<f32>,
 }
 
@@ -82,10 +82,10 @@ impl<'a> Reader<'a> {
         let accessor = self.get(&self.root.accessors, "accessor", i, at)?;
         let place = format!("accessors[{i}]");
         let Checked::Valid(kind) = accessor.component_type else {
-            return self.fail(format!("{place}.componentType"), "is none of the allowed types");
+            return self.fail(format!("{place}.componentType"), "is not one of the allowed types");
         };
         let Checked::Valid(shape) = accessor.type_ else {
-            return self.fail(format!("{place}.type"), "is none of the allowed types");
+            return self.fail(format!("{place}.type"), "is not one of the allowed types");
         };
         let width = match shape {
             Type::Scalar => 1,
@@ -235,7 +235,10 @@ impl<'a> Reader<'a> {
             );
         }
         let Checked::Valid(index_kind) = sparse.indices.component_type else {
-            return self.fail(format!("{place}.indices.componentType"), "is none of the allowed types");
+            return self.fail(
+                format!("{place}.indices.componentType"),
+                "is not one of the allowed types",
+            );
         };
         let index_component = Component {
             kind: index_kind.0,

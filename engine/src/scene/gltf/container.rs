@@ -73,7 +73,7 @@ fn check_version(value: &Value, source: &str) -> Result<()> {
         _ => Err(Error::scene(
             source,
             "asset.version",
-            "is missing; this is no glTF 2.0 file",
+            "is missing; this is not a glTF 2.0 file",
         )),
     }
 }

@@ -92,14 +92,14 @@ impl Reader<'_> {
             Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
             Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::MirroredRepeat),
             Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::ClampToEdge),
-            Checked::Invalid => self.fail(format!("samplers[{i}]"), "has a wrap mode that is none of the allowed"),
+            Checked::Invalid => self.fail(format!("samplers[{i}]"), "has a wrap mode that is not allowed"),
         };
         let wraps = [wrap(&sampler.wrap_s)?, wrap(&sampler.wrap_t)?];
         let filter = match sampler.mag_filter {
             Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
             None | Some(Checked::Valid(MagFilter::Linear)) => Filter::Linear,
             Some(Checked::Invalid) => {
-                return self.fail(format!("samplers[{i}].magFilter"), "is none of the allowed filters");
+                return self.fail(format!("samplers[{i}].magFilter"), "is not one of the allowed filters");
             }
         };
         Ok((wraps, filter))

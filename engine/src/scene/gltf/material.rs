@@ -36,7 +36,7 @@ impl Reader<'_> {
                 cutoff: source.alpha_cutoff.map_or(0.5, |c| c.0),
             },
             Checked::Valid(json::material::AlphaMode::Blend) => AlphaMode::Blend,
-            Checked::Invalid => return self.fail(format!("{at}.alphaMode"), "is none of OPAQUE, MASK, BLEND"),
+            Checked::Invalid => return self.fail(format!("{at}.alphaMode"), "is not one of OPAQUE, MASK, BLEND"),
         };
         let mut material = Material {
             name: source.name.clone().unwrap_or_else(|| at.into()),

@@ -39,7 +39,7 @@ impl Reader<'_> {
                 self.note(format!("{mode:?} primitives"), at, "left out; they have no surface");
                 return Ok(None);
             }
-            Checked::Invalid => return self.fail(format!("{at}.mode"), "is none of the primitive types"),
+            Checked::Invalid => return self.fail(format!("{at}.mode"), "is not one of the primitive types"),
         };
         if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
             self.note("morph targets", format!("{at}.targets"), "the base shape is used");
@@ -229,7 +229,7 @@ fn assemble(mode: json::mesh::Mode, indices: &[u32]) -> Option<Vec<[u32; 3]>> {
         Mode::TriangleStrip => Some(
             (0..n - 2)
                 .map(|i| [indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]])
-                // Strips are stitched by repeated indices, which are no surface.
+                // Strips are stitched by repeated indices, which are not a surface.
                 .filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0])
                 .collect(),
         ),

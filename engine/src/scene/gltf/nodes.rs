@@ -268,7 +268,9 @@ impl Reader<'_> {
                 outer: spot.outer_cone_angle,
             },
             (Checked::Valid(Type::Spot), None) => return self.fail(place, "is a spot light without \"spot\""),
-            (Checked::Invalid, _) => return self.fail(format!("{place}.type"), "is none of directional, point, spot"),
+            (Checked::Invalid, _) => {
+                return self.fail(format!("{place}.type"), "is not one of directional, point, spot");
+            }
         };
         self.scene.lights.push(Light {
             name: light.name.clone().unwrap_or_else(|| node.into()),

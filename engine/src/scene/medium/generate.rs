@@ -4,7 +4,7 @@
 //! sums of octaves (fractional Brownian motion) and the shaping of clouds by noise in the falloff of simple bodies: Ebert, Musgrave, Peachey,
 //! Perlin and Worley, "Texturing and Modeling: A Procedural Approach", 3rd edition (2003), chapters 2 and 9. The shapes are the engine's own.
 //! Guarantees: pure functions of their parameters, made of additions, multiplications and square roots alone, so that they give the same bits
-//! on every machine; densities lie in [0, 1]; smoke, clouds and balls are zero in the outermost cells of grids of at least 8 a side.
+//! on every machine; densities lie in [0, 1]; smoke, clouds and balls are zero in the outermost cells of grids of at least 8 per side.
 
 use glam::{DAffine3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::DensityGrid;
 use crate::scene::builtin::noise::hash;
 
-/// Greatest number of cells a side.
+/// Greatest number of cells per side.
 pub const MAX_SIDE: u32 = 512;
 
 /// A procedural density over the unit cube, y upwards.
@@ -48,7 +48,7 @@ impl Generator {
             .map(|(_, generator)| *generator)
     }
 
-    /// A grid of `size` cells a side, each held to 1 … [`MAX_SIDE`], at the unit cube. Only smoke and clouds look at the seed.
+    /// A grid of `size` cells per side, each held to 1 … [`MAX_SIDE`], at the unit cube. Only smoke and clouds look at the seed.
     pub fn grid(self, size: [u32; 3], seed: u32) -> DensityGrid {
         let size = size.map(|s| s.clamp(1, MAX_SIDE));
         let centre = |i: usize, n: u32| (i as f64 + 0.5) / f64::from(n);

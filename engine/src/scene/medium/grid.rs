@@ -1,13 +1,13 @@
 //! Grids of densities and the look-up in them.
 //!
 //! The convention is that of textures and of Mitsuba's `gridvolume` with its filter `trilinear` and wrap mode `clamp`: cell (i, j, k) of a grid
-//! of n cells a side has its value at ((i, j, k) + ½) / n of the unit cube. Mitsuba's grid goes on outside of the cube with its outermost
+//! of n cells per side has its value at ((i, j, k) + ½) / n of the unit cube. Mitsuba's grid goes on outside the cube with its outermost
 //! values, but its media end there, as ours do.
 
 use glam::{DAffine3, DVec3};
 
 /// Densities at the centres of a grid's cells, interpolated linearly between them, constant from the outermost centres to the faces
-/// of the grid, and zero outside of it.
+/// of the grid, and zero outside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DensityGrid {
     /// Cells along x, y and z; each at least 1.

@@ -3,7 +3,7 @@
 //! Source: Yue, Iwasaki, Chen, Dobashi and Nishita, "Unbiased, adaptive stochastic sampling for rendering inhomogeneous participating media"
 //! (SIGGRAPH Asia 2010), with uniform blocks; Novák, Georgiev, Hanika and Jarosz, "Monte Carlo methods for volumetric light transport
 //! simulation" (2018), 4.2.
-//! Guarantees: bounds hold for interpolated densities up to half a cell outside of a block, so that a walk that is off by less stays
+//! Guarantees: bounds hold for interpolated densities up to half a cell outside a block, so that a walk that is off by less stays
 //! unbiased. Interpolation in floating point may pass them by the rounding of its three mixes.
 
 use glam::DVec3;
@@ -27,7 +27,7 @@ pub struct MajorantGrid {
 }
 
 impl MajorantGrid {
-    /// Bounds of a grid over blocks of `block` cells a side (at least 1). Looks at each value once an axis.
+    /// Bounds of a grid over blocks of `block` cells per side (at least 1). Looks at each value once per axis.
     pub fn new(grid: &DensityGrid, block: u32) -> Self {
         let block = block.max(1);
         let (mut minima, mut maxima) = (grid.values.clone(), grid.values.clone());

@@ -3,7 +3,7 @@
 //! Source: Chandrasekhar, "Radiative Transfer" (1960), chapter 1. Coefficients are those at density 1; a grid of densities scales all
 //! of them alike.
 //!
-//! Where media are: [`Scene::surrounding`](super::Scene::surrounding) fills the space outside of all bodies. A placed mesh whose material has
+//! Where media are: [`Scene::surrounding`](super::Scene::surrounding) fills the space outside all bodies. A placed mesh whose material has
 //! an [`interior`](super::Material::interior) holds that medium on the side its faces (counter-clockwise) turn their back to, in place of
 //! whatever is around it; so does a solid of glass without one hold nothing. Such meshes are closed, and nested or apart, never crossing.
 
@@ -41,7 +41,7 @@ pub enum Phase {
     Rayleigh,
 }
 
-/// A medium inside of closed surfaces ([`Material::interior`](super::Material::interior)) or around them
+/// A medium inside closed surfaces ([`Material::interior`](super::Material::interior)) or around them
 /// ([`Scene::surrounding`](super::Scene::surrounding)).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Medium {

@@ -96,7 +96,7 @@ pub fn parse(bytes: &[u8], layout: &RawLayout) -> Result<DensityGrid, Fault> {
         .collect();
     if let Some(i) = values.iter().position(|v| !v.is_finite() || *v < 0.0) {
         let place = layout.offset + i as u64 * layout.number.bytes() as u64;
-        let cause = format!("{} is no density: negative or not finite in f32", values[i]);
+        let cause = format!("{} is not a density: negative or not finite in f32", values[i]);
         return Err((format!("byte {place} (number {i})"), cause));
     }
     Ok(DensityGrid {

@@ -3,7 +3,7 @@
 //! A channel's n and k are the means of the measured n and k (`spectra.rs`, interpolated linearly) over the channel's sensitivity
 //! (`observer.rs`): CIE 1931 matching functions under D65, taken to linear Rec. 709. Guarantees, by the tests below: the normal
 //! reflectance of three of the nine spectra (chromium, iron, copper) is within 0.0035 of what others published for the same measurements;
-//! that of the three channels differs from that of its spectrum by at most 0.012, where the colour lies inside of Rec. 709. Gold's red lies beyond it (1.04): no index of refraction reflects more than
+//! that of the three channels differs from that of its spectrum by at most 0.012, where the colour lies inside Rec. 709. Gold's red lies beyond it (1.04): no index of refraction reflects more than
 //! comes in, and the channel has 0.98.
 
 mod observer;

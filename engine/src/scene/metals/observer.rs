@@ -64,7 +64,7 @@ const TO_RGB: [DVec3; 3] = [
 
 /// Means of a spectrum over the red, green and blue channels' sensitivities, which are scaled so that a constant stays what it is.
 ///
-/// The sensitivities have negative parts: a mean can lie outside of the spectrum's range. `spectrum` takes nanometres.
+/// The sensitivities have negative parts: a mean can lie outside the spectrum's range. `spectrum` takes nanometres.
 pub fn project(spectrum: impl Fn(f64) -> f64) -> DVec3 {
     let (mut sum, mut total) = (DVec3::ZERO, DVec3::ZERO);
     for (i, [x, y, z, power]) in TABLE.into_iter().enumerate() {

@@ -65,7 +65,7 @@ impl Sidecar {
         let mut grid = match (&table.file, &table.generate) {
             (Some(file), None) => self.density_file(key, table, file)?,
             (None, Some(name)) => self.generated_density(key, table, name)?,
-            _ => return Err(self.fault(key, "wants either file or generate")),
+            _ => return Err(self.fault(key, "needs either file or generate")),
         };
         let factor = table.factor.unwrap_or(1.0);
         let sound = factor.is_finite() && factor >= 0.0;
@@ -83,7 +83,7 @@ impl Sidecar {
                 grid.in_box(low, high)
             }
             (None, None) => grid,
-            _ => return Err(self.fault(key, "wants both low and high, or neither")),
+            _ => return Err(self.fault(key, "needs both low and high, or neither")),
         };
         let scale = DVec3::from_array(table.scale.map_or([1.0; 3], OneOrThree::all));
         let [x, y, z] = table.rotate.unwrap_or_default().map(f64::to_radians);
@@ -126,7 +126,7 @@ impl Sidecar {
             }
             _ => {
                 let Some(size) = table.size else {
-                    return Err(self.fault(key, "a file of nothing but numbers wants size = [x, y, z]"));
+                    return Err(self.fault(key, "a file of nothing but numbers needs size = [x, y, z]"));
                 };
                 let layout = RawLayout {
                     size: size.all(),

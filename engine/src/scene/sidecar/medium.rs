@@ -8,7 +8,7 @@
 //!
 //! [[medium]]
 //! name = "smoke"
-//! material = "bounds"           # inside of the meshes with this material …
+//! material = "bounds"           # inside the meshes with this material …
 //! boundary = true               # … which are not seen themselves; without it they must be solids that transmit
 //! sigma_t = 20.0                # instead of sigma_a and sigma_s: extinction, 1/m,
 //! albedo = [0.9, 0.9, 0.9]      # and the share of it that is scattering
@@ -134,7 +134,7 @@ impl Sidecar {
             self.require(
                 !table.boundary,
                 &format!("{key}.boundary"),
-                "wants material, whose meshes are the boundary",
+                "needs a material, whose meshes are the boundary",
             )?;
             self.require(
                 scene.surrounding.is_none(),
@@ -185,7 +185,7 @@ impl Sidecar {
             }
             _ => Err(self.fault(
                 key,
-                "wants sigma_a and sigma_s, or sigma_t with albedo, not a mixture of them",
+                "needs sigma_a and sigma_s, or sigma_t with albedo, not a mixture of them",
             )),
         }
     }

@@ -227,7 +227,7 @@ impl Sidecar {
                 self.require(sound, "environment.color", "must be finite and at least 0")?;
                 (Environment::uniform(Vec3::from_array(color)), None)
             }
-            _ => return Err(self.fault("environment", "wants either file or color")),
+            _ => return Err(self.fault("environment", "needs either file or color")),
         };
         let rotation = table.rotation.unwrap_or(0.0);
         let strength = table.strength.unwrap_or(1.0);
@@ -255,7 +255,7 @@ impl Sidecar {
             Metal::Measured(MeasuredMetal { eta, k }) => {
                 let sound =
                     eta.iter().all(|e| e.is_finite() && *e > 0.0) && k.iter().all(|k| k.is_finite() && *k >= 0.0);
-                self.require(sound, &key, "wants eta above 0 and k at least 0")?;
+                self.require(sound, &key, "needs eta above 0 and k at least 0")?;
                 ConductorIor {
                     eta: Vec3::from_array(*eta),
                     k: Vec3::from_array(*k),
@@ -302,7 +302,7 @@ impl Sidecar {
                 camera.focus_distance = eye.distance(target) as f32;
                 camera
             }
-            _ => return Err(self.fault(&key, "no camera has that name, and a new one wants eye and target")),
+            _ => return Err(self.fault(&key, "no camera has that name, and a new one needs eye and target")),
         };
         if let Some(fov) = table.fov {
             self.require(

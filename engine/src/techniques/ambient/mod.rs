@@ -1,5 +1,5 @@
 //! Ambient occlusion, the smallest frame method: light of a uniform sky, scattered once and diffusely.
-//! One ray a pixel and frame, distributed by the cosine. Unbiased on `LE|LDE`. A ray that its quota stops makes its sample NaN, which the film counts and leaves out.
+//! One ray per pixel and frame, distributed by the cosine. Unbiased on `LE|LDE`. A ray that its quota stops makes its sample NaN, which the film counts and leaves out.
 
 use std::sync::Arc;
 

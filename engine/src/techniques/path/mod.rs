@@ -8,8 +8,8 @@
 //! may lie in bodies as long as their surfaces neither cross nor coincide; the camera may be in any of them, where its position counts for
 //! the whole lens and for all of an orthographic picture. Nothing from infinity is seen through an endless medium that extinguishes it.
 //!
-//! Unbiased: paths end by Russian roulette or by the [`PathSet`](crate::transport::PathSet) alone. Deterministic: a pixel's sum depends on (seed, pixel, sample
-//! numbers) only, never on wave size, queue order or threads. Nothing is lost in silence: rays that an iteration quota stops go on in a
+//! Unbiased: paths end only by Russian roulette or by the [`PathSet`](crate::transport::PathSet). Deterministic: a pixel's sum depends on (seed, pixel, sample
+//! numbers) only, never on wave size, queue order or threads. Nothing is lost silently: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
 
 pub(super) mod card;
@@ -168,7 +168,7 @@ impl PathTracer {
         Ok(())
     }
 
-    /// Renders one more wave towards `samples` samples a pixel; `None` when all are there. The first wave also compiles the kernels.
+    /// Renders one more wave towards `samples` samples per pixel; `None` when all are there. The first wave also compiles the kernels.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end.
@@ -212,7 +212,7 @@ impl PathTracer {
         self.walker.buffers().slots()
     }
 
-    /// Samples that every pixel has got.
+    /// Samples that every pixel has received.
     pub(crate) fn samples_done(&self) -> u32 {
         self.cursor.sample
     }
@@ -249,7 +249,7 @@ impl PathTracer {
         self.film.picture()
     }
 
-    /// Writes what there is so far to a buffer of four bytes a pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
+    /// Writes what there is so far to a buffer of four bytes per pixel, rows from the top, on the device: exposed by `exposure` stops, clipped
     /// and sRGB-encoded.
     ///
     /// # Errors
@@ -309,7 +309,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-B8",
         name: "path estimation: light sampling, BRDF sampling, Russian roulette",
         role: Role::PartOf("BG-3"),
-        limits: "Paths begin at the eye alone: caustics of small lights are noise, and those of points are not found.",
+        limits: "Paths begin only at the eye: caustics of small lights are noise, and those of points are not found.",
         sources: &[
             sources::KAJIYA_1986.whole(),
             sources::VEACH_1997.at("chapters 9 and 10"),
@@ -344,7 +344,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "CL-ABSORPTION",
-        name: "absorption inside of solids",
+        name: "absorption inside solids",
         role: Role::PartOf("BG-3"),
         limits: "Solids of one absorption whose surfaces neither cross nor coincide.",
         sources: &[sources::KHRONOS_MATERIALS_VOLUME.at("law of Beer and Lambert")],

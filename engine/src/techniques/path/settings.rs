@@ -15,9 +15,9 @@ crate::settings! {
         pub sampler: SamplerKind = SamplerKind::Sobol;
         /// First bounce at which Russian roulette may end a path; changes the noise only.
         pub roulette_start: u32 = 4, in 0..=4096, unit "bounces";
-        /// Most likely survival of a round of roulette; changes the noise only.
+        /// Greatest probability of surviving a round of roulette; changes the noise only.
         ///
-        /// With 1, paths in lossless scenes would never end: they end by roulette alone.
+        /// With 1, paths in lossless scenes would never end: they end only by roulette.
         pub roulette_cap: f32 = 0.95, in AboveTo(0.0, 0.999), unit "probability";
         /// Compensates rough metals for scattering among microfacets; changes the picture.
         ///
@@ -25,11 +25,11 @@ crate::settings! {
         pub multiple_scattering: bool = true;
         /// Uncorrelated instead of height-correlated Smith masking of microfacets; changes the picture.
         pub separable_masking: bool = false;
-        /// Samples light of points and spots in homogeneous media also by the angle under which they see the ray; changes the noise only.
+        /// Also samples light of points and spots in homogeneous media by the angle under which they see the ray; changes the noise only.
         pub equiangular: bool = true;
         /// 0 chooses by the kind of device; never changes the picture.
         pub paths_in_flight: u32 = 0, in 0..=SLOTS_MAX, unit "paths";
-        /// After so many a ray goes on in a later dispatch; never changes the picture.
+        /// Iterations after which a ray is continued in a later dispatch; never changes the picture.
         ///
         /// A traversal makes progress only with a quota above twice the depth of the deepest tree, and must stay below
         /// [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).

@@ -54,7 +54,7 @@ impl Wave {
 }
 
 impl Cursor {
-    /// The next wave of at most `slots` paths towards `samples` samples a pixel, and where the one after it begins.
+    /// The next wave of at most `slots` paths towards `samples` samples per pixel, and where the one after it begins.
     pub fn next_wave(&self, film: &GpuFilm, slots: u32, samples: u32) -> Option<(Wave, Self)> {
         let mut c = *self;
         if c.sample >= samples {

@@ -26,7 +26,7 @@ use crate::transport::{PathSet, SURFACE_FEATURES};
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "photon",
-    summary: "progressive photon mapping: what diffuse surfaces get indirectly from a map of photons, anew for each pass, with kernels that shrink",
+    summary: "progressive photon mapping: indirect light on diffuse surfaces from a map of photons, rebuilt for each pass, with kernels that shrink",
     rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS],
     bias: BIAS,
     needs: &[],
@@ -189,7 +189,7 @@ impl Technique for PhotonMapper {
         if self.profile().has_unlit {
             skipped.push(Skipped {
                 what: "light from unlit surfaces beyond the first diffuse reflection",
-                why: "photons are sent by lights alone",
+                why: "only lights send photons",
             });
         }
         skipped
@@ -201,7 +201,7 @@ const BIAS: Bias = Bias::Consistent("kernels blur what they gather, and lose lig
 /// Rows of the catalogue.
 const ROWS: &[Row] = &[Row {
     id: "PM-SYS-1",
-    name: "technique `photon`: direct light and specular chains by rays, all else from a photon map, anew for each pass (stochastic progressive photon mapping)",
+    name: "technique `photon`: direct light and specular chains by rays, all else from a photon map, rebuilt for each pass (stochastic progressive photon mapping)",
     role: Role::Technique,
     limits: "Refuses scenes with media; light of unlit surfaces beyond the first diffuse reflection is missing, and glossy lobes never use the map.",
     sources: &[
@@ -264,7 +264,7 @@ mod tests {
         ] {
             for (name, ..) in features {
                 let known = shader.spec_constants.iter().any(|constant| constant.name == *name);
-                assert!(known, "{name} is no constant of {}", shader.name);
+                assert!(known, "{name} is not a constant of {}", shader.name);
             }
         }
         // What photons need of surfaces, eye paths need too, and say.

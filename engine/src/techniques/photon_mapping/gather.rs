@@ -280,7 +280,7 @@ impl ArrivalStage for GatherStage<'_> {
                 what: "steps of a query for neighbours".into(),
                 needed: u64::from(NEAREST_QUOTA) + 1,
                 capacity: u64::from(NEAREST_QUOTA),
-                instead: "look for neighbours within a smaller radius, trace fewer photons a pass, or ask point by point (\"query\": \"single\")"
+                instead: "look for neighbours within a smaller radius, trace fewer photons per pass, or ask point by point (\"query\": \"single\")"
                     .into(),
             });
         };
@@ -433,7 +433,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-ST-5",
-        name: "queries of the photon map, one a thread",
+        name: "queries of the photon map, one per thread",
         role: Role::PartOf("PM-SYS-1"),
         limits: "Neighbouring threads walk different parts of the tree.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],

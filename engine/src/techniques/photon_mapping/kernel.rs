@@ -1,6 +1,6 @@
 //! Kernels of density estimation on surfaces: ellipsoids as large as a photon's footprint, and the record of a photon in the map.
 //!
-//! Source: Interactive Manycore Photon Mapping (2011), §3.4.2, §5.2.1 and §5.2.2. An ellipsoid with the axes A (longer) and B in the
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §3.4.2, §5.2.1 and §5.2.2. An ellipsoid with the axes A (longer) and B in the
 //! tangent plane and C across it, |C| = |B|, is kept as A ([`along`](PhotonKernel::along)) and P ([`across`](PhotonKernel::across)),
 //! which is B turned by a right angle in the plane, P·A > 0. Two things follow that the source does without: the Jacobian |A × B| is P·A,
 //! and the record may keep fluxes undivided by it, in the narrow range that nine bits serve well. The normal cannot be had from P and A
@@ -285,7 +285,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-DE-5",
         name: "kernels as skewed ellipsoids of footprints, in nine numbers and a normal",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Flat in the tangent plane, so that curved surfaces are misjudged; the printed way to recover the normal does not hold and is not used.",
+        limits: "Flat in the tangent plane, so curved surfaces are misjudged; the printed way to recover the normal does not hold and is not used.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.2.1")],
         shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
         tests: &[

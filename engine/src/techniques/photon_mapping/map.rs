@@ -1,6 +1,6 @@
 //! The photon map: a compact hierarchy over the kernels of a pass, and the records in the order of its leaves.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2, §6.1.3 and §6.2: a linear hierarchy by
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2, §6.1.3 and §6.2: a linear hierarchy by
 //! merging, leaves as large as a share of the kernels about a point, sibling pairs of half the size. Built by the host here, or by the device
 //! ([`device_map`](super::device_map)).
 //!

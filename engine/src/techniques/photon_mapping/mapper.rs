@@ -2,7 +2,7 @@
 //!
 //! Sources: H. W. Jensen, "Realistic Image Synthesis Using Photon Mapping", 2001; T. Hachisuka and H. W. Jensen, "Stochastic Progressive Photon
 //! Mapping", ACM TOG 28(5), 2009; C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011, whose
-//! passes are independent of each other and need nothing kept of a pixel but its mean; "Interactive Manycore Photon Mapping", PhD thesis,
+//! passes are independent of each other and need nothing kept of a pixel but its mean; B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis,
 //! Trinity College Dublin, 2011, §6.3.
 //!
 //! Light paths are parted without overlap: what the eye sees through specular and glossy scattering alone, and the light that arrives
@@ -219,7 +219,7 @@ impl PhotonMapper {
         }
     }
 
-    /// Does a pass, or a part of its eye paths, towards `samples` samples a pixel; `None` when all are there.
+    /// Does a pass, or a part of its eye paths, towards `samples` samples per pixel; `None` when all are there.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory),

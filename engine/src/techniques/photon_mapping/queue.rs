@@ -1,6 +1,6 @@
 //! Queues of the eye paths that ask the photon map: which places of a wave a query's invocations are for.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1. Each place's sum is its own, so that the
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1. Each place's sum is its own, so that the
 //! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
 
 use super::settings::MapQueue;
@@ -237,7 +237,7 @@ impl Queue {
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "PM-ST-2",
-        name: "queue of queries, type I: an invocation a place of the wave",
+        name: "queue of queries, type I: an invocation per place of the wave",
         role: Role::PartOf("PM-SYS-1"),
         limits: "Places that ask nothing idle.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],

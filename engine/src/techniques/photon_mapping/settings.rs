@@ -39,11 +39,11 @@ pub enum MapQuery {
 
 /// Which places of a wave the invocations of queries are for.
 ///
-/// Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1.
+/// Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapQueue {
-    /// An invocation a place of the wave's paths under way; those that ask nothing idle (type I).
+    /// An invocation per place of the wave's paths under way; those that ask nothing idle (type I).
     Slots,
     /// Places that ask, listed in order by stream compaction (type II).
     Compacted,
@@ -68,14 +68,14 @@ crate::settings! {
     pub struct PhotonSettings {
         /// Which light paths the picture contains.
         pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63";
-        /// More have less noise, and less bias with kernels that follow footprints.
-        pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons a pass";
+        /// More give less noise, and less bias with kernels that follow footprints.
+        pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons per pass";
         /// Kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials.
         pub shape: KernelShape = KernelShape::Fixed;
-        /// Takes the nearest so many photons of each point under one kernel, as wide as the last is away, fewer as passes go on, down to 2;
-        /// 0: photons have kernels of their own.
+        /// Gathers so many of the photons nearest to each point under one kernel that reaches to the last of them, fewer as passes go on, down
+        /// to 2; with 0 photons have kernels of their own.
         pub neighbors: u32 = 0, in OrZero(NEIGHBORS_MIN..=1000), unit "photons";
-        /// How kernels fall off: noise against visible rims.
+        /// How kernels fall off: a choice between noise and visible rims.
         pub profile: KernelProfile = KernelProfile::Epanechnikov;
         /// Radius of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 chooses by the size of the scene, for
         /// neighbours by its area and the photons.
@@ -89,9 +89,9 @@ crate::settings! {
         pub dampening: f32 = 0.25, in AboveTo(0.0, 1.0), unit "exponent";
         /// Size that the dampening leaves as it is; 0 for a ninth of the scene's diagonal.
         pub unit_length: f32 = 0.0, in 0.0.., unit "m";
-        /// Of kernels that follow footprints: least area over the square of the longer axis of a footprint that is not flat.
+        /// For kernels that follow footprints: a footprint is flat if its area over the square of its longer axis is less.
         pub flatness: f32 = 0.05, in 0.0..1.0;
-        /// Widens flat footprints to the least flatness; else photons that have them are left out, with their light, in every pass.
+        /// Widens flat footprints to that flatness; otherwise photons that have them are left out, with their light, in every pass.
         ///
         /// The source leaves them without a kernel.
         pub widen_flat: bool = true;
@@ -100,22 +100,22 @@ crate::settings! {
         ///
         /// Sources: Hachisuka and Jensen 2009; Knaus and Zwicker 2011.
         pub reduction: f32 = 2.0 / 3.0, in AboveTo(0.0, 1.0);
-        /// Eye paths of a pixel that ask the same map.
+        /// Eye paths per pixel that query the same map.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
-        /// Takes direct light from the map too, not by shadow rays; not with final_gather.
+        /// Takes direct light from the map, too, instead of by shadow rays; cannot be combined with final_gather.
         pub direct_photons: bool = false;
-        /// Sees the map after one more diffuse reflection, caustics directly; not with direct_photons.
+        /// Sees the map after one more diffuse reflection, caustics directly; cannot be combined with direct_photons.
         pub final_gather: bool = false;
-        /// Points ask the map by themselves, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, last
+        /// Points query the map one by one, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, the last
         /// bits may differ.
         ///
         /// With neighbours, where a quota is an error, points that ask together meet it sooner.
         pub query: MapQuery = MapQuery::Single;
-        /// Invocations of queries are for every path under way, for those that ask the map by stream compaction, or in blocks that subgroups
-        /// collect; changes no picture but as query does.
+        /// Invocations of queries serve every path under way, or only those that query the map, found by stream compaction or in blocks that
+        /// subgroups collect; changes pictures only as query does.
         pub queue: MapQueue = MapQueue::Slots;
-        /// Who builds the map: the device, which needs shaderFloat64, so that photons are never read back, or the host; auto is the device where
-        /// it can. Changes no picture.
+        /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
+        /// it can. Never changes the picture.
         pub map_build: MapBuild = MapBuild::Auto;
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
         pub sampler: SamplerKind = SamplerKind::Sobol;
@@ -135,7 +135,7 @@ crate::settings! {
 impl PhotonSettings {
     fn sees_direct_light_once(&self) -> Result<()> {
         if self.direct_photons && self.final_gather {
-            let cause = "cannot be had with direct_photons: direct light would be seen twice";
+            let cause = "cannot be combined with direct_photons: direct light would be seen twice";
             return Err(Error::setting("final_gather", true, cause));
         }
         Ok(())

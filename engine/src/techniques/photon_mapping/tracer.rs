@@ -1,11 +1,11 @@
 //! Photons from the lights through the scene, in waves like those of paths, to the records that a map is made of.
 //!
-//! Sources: H. W. Jensen, "Realistic Image Synthesis Using Photon Mapping", 2001, chapter 5; "Interactive Manycore Photon Mapping", PhD
+//! Sources: H. W. Jensen, "Realistic Image Synthesis Using Photon Mapping", 2001, chapter 5; B. Fabianowski, "Interactive Manycore Photon Mapping", PhD
 //! thesis, Trinity College Dublin, 2011, §3.4.1 and §5.1. Stages: `photon_emit`, a walker's closest hits, `photon_scatter`, its compaction,
 //! `photon_append`.
 //!
 //! Guarantees: records depend on (seed, pass, number of photons) alone, and their order on the slots of a wave besides, never on the number of threads; photons that were
-//! emitted have escaped or were absorbed, to the count; records that do not fit are never lost in silence, since the pass is traced again
+//! emitted have escaped or were absorbed, to the count; records that do not fit are never lost silently, since the pass is traced again
 //! with room for them.
 
 use std::sync::Arc;
@@ -211,7 +211,7 @@ impl PhotonTracer {
                     what: "photon records".into(),
                     needed,
                     capacity: most,
-                    instead: "trace fewer photons a pass".into(),
+                    instead: "trace fewer photons per pass".into(),
                 });
             }
             let capacity = (needed + needed / 4).min(most) as u32;
@@ -410,7 +410,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PH-2",
         name: "random numbers of photons: Owen-scrambled Sobol' points, or independent",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Sobol' points are even in pairs of dimensions, so that their gain fades with the bounces.",
+        limits: "Sobol' points are even in pairs of dimensions, so their gain fades with the bounces.",
         sources: &[sources::OWEN_1995.whole(), sources::FABIANOWSKI_2011.at("§3.3.3")],
         shaders: &["shaders/transport/random.glsl"],
         tests: &[

@@ -39,7 +39,7 @@ pub(super) const NO_MEDIA: &str = "participating media are not shown";
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "preview",
-    summary: "raster preview: surfaces from a G-buffer, lights with shadow maps, the environment as a filtered probe; a picture a frame",
+    summary: "raster preview: surfaces from a G-buffer, lights with shadow maps, the environment as a filtered probe; a picture per frame",
     rows: &[ROWS, live::ROWS],
     bias: BIAS,
     needs: NEEDS,
@@ -90,7 +90,7 @@ const ROWS: &[Row] = &[Row {
     id: "CL-PREVIEW",
     name: "technique `preview`: deferred shading with shadow maps and light probes, frame by frame, and the same for hosts' own frames",
     role: Role::Technique,
-    limits: "Light of surfaces on others is left out but for what a host's probe holds; directional lights cast no shadows, and nothing is seen through glass.",
+    limits: "Light of surfaces on others is left out, except for what a host's probe holds; directional lights cast no shadows, and nothing is seen through glass.",
     sources: &[
         sources::DEERING_1988.whole(),
         sources::SAITO_TAKAHASHI_1990.whole(),

@@ -22,11 +22,11 @@ use crate::transport::{GpuScene, PathSet};
 crate::settings! {
     /// Settings of [`PreviewMethod`].
     pub struct PreviewSettings {
-        /// How directions lie in shadow maps; changes the borders of shadows.
+        /// How shadow maps store directions; changes the borders of shadows.
         pub shadow_layout: ShadowLayout = ShadowLayout::Octahedron;
-        /// Along a side of an octahedron, or of each face of a cube: more have less bias at borders of shadows.
+        /// Along a side of an octahedron, or of each face of a cube: more give less bias at borders of shadows.
         pub shadow_side: u32 = 1024, in 1..=16_384, unit "texels";
-        /// That the filter of shadows is wide: softer borders instead of stairs.
+        /// Width of the shadows' filter: softer borders instead of stairs.
         pub shadow_width: u32 = 2, in 0..=SHADOW_WIDTH_MAX, unit "texels";
         /// Along a side of the environment's map, a power of two: how sharp mirrors are.
         pub probe_side: u32 = 256, in 64..=4096, unit "texels";
@@ -56,7 +56,7 @@ impl PreviewSettings {
     }
 }
 
-/// Raster preview of a scene, a sample of every pixel a frame.
+/// Raster preview of a scene, a sample of every pixel per frame.
 #[derive(Debug)]
 pub struct PreviewMethod {
     scene: Arc<GpuScene>,

@@ -1,4 +1,4 @@
-//! Raster preview: a picture a frame, of surfaces from a G-buffer, lights with shadow maps, and light probes.
+//! Raster preview: a picture per frame, of surfaces from a G-buffer, lights with shadow maps, and light probes.
 //!
 //! Sources: M. Deering et al., "The Triangle Processor and Normal Vector Shader", SIGGRAPH 1988 (deferred shading); T. Saito and T. Takahashi,
 //! "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); those of [`OmniShadowMaps`](crate::raster::OmniShadowMaps) and of
@@ -12,16 +12,16 @@
 //!
 //! - Emitting surfaces light others only through a live map.
 //! - Directional lights cast no shadows; shadows of the others have the bias of [`OmniShadowMaps`](crate::raster::OmniShadowMaps).
-//! - A probe's light is neither occluded nor nearer than infinity, and interreflection is as much as a probe holds.
+//! - A probe's light is neither occluded nor nearer than infinity, and interreflection is limited to what a probe holds.
 //! - Microfacet reflections are filtered by a round lobe, mixed of two for roughnesses between those of a probe's levels ([`probe`]), without what the lobe's own Fresnel factors and masking do to its shape.
 //! - Nothing is seen through materials that transmit, and glass casts full shadows.
 //! - Partial alpha is drawn opaque, in the picture, in shadow maps and in live maps.
 //!
 //! Deterministic: the same bits for the same frame.
 //!
-//! Two ways to it: [`Preview`], for hosts that move lights and surfaces, light parts by probes of their own and show one frame each time; and [`PreviewMethod`],
+//! There are two ways to use it: [`Preview`], for hosts that move lights and surfaces, light parts by probes of their own and show one frame each time; and [`PreviewMethod`],
 //! a [`FrameMethod`](super::FrameMethod), which is the technique `preview`. That one sees each frame through another place of its pixels, and of the lens,
-//! so that edges and what is out of focus come right as frames add up; the environment is its probe. It refuses scenes whose light it would leave out:
+//! so that edges and what is out of focus converge as frames add up; the environment is its probe. It refuses scenes whose light it would leave out:
 //! those where surfaces shine, those with media, and those where light passes through surfaces.
 
 mod card;
@@ -165,7 +165,7 @@ impl Preview {
         self.drawing.record(recorder, scene, surfaces, &frame, target, parts)
     }
 
-    /// Records the way to the screen: four bytes a pixel, rows from the top, exposed by `exposure` stops, clipped and sRGB-encoded.
+    /// Records the way to the screen: four bytes per pixel, rows from the top, exposed by `exposure` stops, clipped and sRGB-encoded.
     /// Earlier uses of the target by compute shaders and copies must have ended.
     ///
     /// # Errors

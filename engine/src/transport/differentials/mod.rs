@@ -1,8 +1,8 @@
 //! Photon differentials: how position and direction of a photon change with the two parameters of its emission.
 //!
 //! They are carried along a photon's path, so that the distance to its neighbours is known wherever it lands. Sources: Igehy, "Tracing
-//! Ray Differentials" (1999); Schjøth, Frisvad, Erleben and Sporring, "Photon Differentials" (2007); Interactive Manycore Photon
-//! Mapping (2011), §3.1.2 and §5.1. Conventions: vectors are derivatives, unscaled by the step √(4π/n) that n photons are apart in
+//! Ray Differentials" (1999); Schjøth, Frisvad, Erleben and Sporring, "Photon Differentials" (2007); B. Fabianowski,
+//! "Interactive Manycore Photon Mapping" (2011), §3.1.2 and §5.1. Conventions: vectors are derivatives, unscaled by the step √(4π/n) that n photons are apart in
 //! either parameter ([`global_step`]). A direction of density p per solid angle has derivatives of length 1/√(4πp): one rule for
 //! emission, diffuse reflection and every sampled lobe. The density counts every choice up to the class of paths: one of two lights that
 //! are chosen evenly emits with half of its own density. Likewise the exact account of an earlier roulette with survival Q is to hand p·Q
@@ -23,7 +23,7 @@ use crate::gpu::shaders::constants;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
-/// Least |cos| of incidence in a transfer: beyond it the footprint stops to grow.
+/// Least |cos| of incidence in a transfer: beyond it the footprint stops growing.
 pub const DIFFERENTIAL_COS_MIN: f64 = constants::DIFFERENTIAL_COS_MIN as f64;
 /// Least |cos| of the refracted direction in its derivative, which is infinite at the critical angle.
 pub const DIFFERENTIAL_REFRACTED_COS_MIN: f64 = constants::DIFFERENTIAL_REFRACTED_COS_MIN as f64;
@@ -263,7 +263,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PD-2",
         name: "differentials of propagation to a surface",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Takes the surface as a plane, and the cosine of incidence as 10⁻³ at least: beyond that grazing footprints stop to grow.",
+        limits: "Takes the surface as a plane, and the cosine of incidence as at least 10⁻³: below that, grazing footprints stop growing.",
         sources: &[sources::IGEHY_1999.whole(), sources::FABIANOWSKI_2011.at("§3.1.2.3")],
         shaders: &["shaders/transport/differentials.glsl"],
         tests: &[
@@ -278,7 +278,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PD-3",
         name: "differentials of mirror reflection",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Sees curvature in interpolated normals alone; the printed form is corrected.",
+        limits: "Sees curvature only in interpolated normals; the printed form is corrected.",
         sources: &[sources::IGEHY_1999.whole(), sources::FABIANOWSKI_2011.at("§3.1.2.4")],
         shaders: &["shaders/transport/differentials.glsl"],
         tests: &[
@@ -320,7 +320,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-PD-6",
-        name: "differentials of diffuse reflection: absorbed and emitted anew",
+        name: "differentials of diffuse reflection: absorbed and re-emitted",
         role: Role::PartOf("PM-SYS-1"),
         limits: "Keeps the expected area of a footprint and forgets its shape; footprints are then too large, 2.58 times the share of each photon in the median of a closed room.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.1.3")],
@@ -340,7 +340,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PD-7",
         name: "differentials of Russian roulette",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Right for many photons and not for each; the next diffuse reflection keeps of it the area of the footprint alone, and makes directions anew from its density.",
+        limits: "Right for many photons and not for each; the next diffuse reflection keeps only the area of the footprint, and derives new directions from its density.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.1.4")],
         shaders: &["shaders/transport/differentials.glsl"],
         tests: &["engine/src/transport/differentials/footprint_tests.rs::roulette_makes_up_for_those_that_it_ends"],

@@ -24,7 +24,7 @@ pub(super) struct GpuMedia {
     densities: TexelView,
     majorants: TexelView,
     pub(super) bodies: Bodies,
-    /// The medium outside of all bodies.
+    /// The medium outside all bodies.
     pub(super) surrounding: Option<u32>,
 }
 

@@ -210,7 +210,7 @@ impl GpuScene {
     /// Moves or turns a point, spot or directional light, by its index in [`Scene::lights`]: as if the scene had been made with the light like
     /// this. The probabilities by which light sampling chooses stay, so its kind and its power must.
     ///
-    /// Pictures under way must begin anew ([`PathTracer::restart`](crate::techniques::PathTracer::restart),
+    /// Pictures under way must be restarted ([`PathTracer::restart`](crate::techniques::PathTracer::restart),
     /// [`PhotonMapper::restart`](crate::techniques::photon_mapping::PhotonMapper::restart) or
     /// [`Technique::set_camera`](crate::techniques::Technique::set_camera)), or they mix both; none of the scene's may be in the middle of a step.
     ///
@@ -254,7 +254,7 @@ impl GpuScene {
         )
     }
 
-    /// Index of the medium outside of all bodies, if there is one that does something.
+    /// Index of the medium outside all bodies, if there is one that does something.
     pub fn surrounding(&self) -> Option<u32> {
         self.media.as_ref()?.surrounding
     }

@@ -79,7 +79,7 @@ impl PunctualLights {
             return refused(format!("does not exist: the scene has {}", self.lights.len()));
         };
         let Some(index) = placed.record else {
-            return refused("has no power, so that it is none of the lights to choose among".into());
+            return refused("has no power, so it is not one of the lights to choose among".into());
         };
         if !light_is_sound(kind) {
             return refused(
@@ -89,12 +89,12 @@ impl PunctualLights {
         }
         let record = light_record(kind);
         if record.kind != placed.kind {
-            return refused("would be of another kind: the scene must be made anew".into());
+            return refused("would be of another kind: the scene must be uploaded again".into());
         }
         let power = luminance(light_power(kind, self.radius));
         if power.to_bits() != placed.power.to_bits() {
             return refused(format!(
-                "would have {power} W instead of {} W, but lights are chosen by power: the scene must be made anew",
+                "would have {power} W instead of {} W, but lights are chosen by power: the scene must be uploaded again",
                 placed.power
             ));
         }

@@ -61,7 +61,7 @@ impl Reader {
         }
     }
 
-    /// The next character that is no blank.
+    /// The next character that is not a blank.
     fn peek(&mut self) -> Option<char> {
         while self.characters.get(self.at).is_some_and(|c| c.is_whitespace()) {
             self.at += 1;
@@ -114,7 +114,7 @@ impl Reader {
             'r' | 't' => format!("{c:?} is a side, r reflected or t transmitted, and follows a class: G{c}"),
             'd' | 'g' | 's' | 'v' => format!("events are capital letters: {}", c.to_ascii_uppercase()),
             '!' => "'!' stands once, before everything; a set of other events is [^…]".into(),
-            _ => format!("{c:?} is no event: {known}"),
+            _ => format!("{c:?} is not an event: {known}"),
         };
         self.wrong(cause)
     }

@@ -91,7 +91,7 @@ fn errors_teach() {
         ("emitted,indirect", &["gap"]),
         ("lobes=shiny", &["glossy"]),
         ("lobes=diffuse,lobes=glossy", &["'+'"]),
-        ("LXE", &["column 2", "'X' is no event", "D diffuse"]),
+        ("LXE", &["column 2", "'X' is not an event", "D diffuse"]),
         ("direct, LDXE", &["column 11", "'X'"]),
         ("LD", &["column 3", "lacks E"]),
         ("ED", &["column 3", "lacks L"]),

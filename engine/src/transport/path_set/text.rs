@@ -142,7 +142,7 @@ impl FromStr for PathSet {
                 ranges.push(parse_range(range).ok_or_else(|| {
                     wrong(
                         part,
-                        "is no range of bounces: write bounces=2, bounces=1..3, bounces=2.. or bounces=..3",
+                        "is not a range of bounces: write bounces=2, bounces=1..3, bounces=2.. or bounces=..3",
                     )
                 })?);
             } else if let Some(names) = part.strip_prefix("lobes=") {
@@ -151,7 +151,11 @@ impl FromStr for PathSet {
                 }
             } else if part.starts_with(|c: char| c.is_uppercase() || "!([.".contains(c)) {
                 let read = parser::read(part).map_err(|error| {
-                    let cause = format!("is no path expression: column {}: {}", at + error.at + 1, error.cause);
+                    let cause = format!(
+                        "is not a path expression: column {}: {}",
+                        at + error.at + 1,
+                        error.cause
+                    );
                     wrong(text, &cause)
                 })?;
                 language = language.product(&read, |a, b| a && b).map_err(too_large)?;
@@ -210,7 +214,7 @@ fn parse_lobes(text: &str) -> Result<u32> {
         } else if name == VOLUME {
             volume = LOBE_VOLUME;
         } else if name != "none" {
-            let cause = format!("is no lobe: a path set {GRAMMAR}");
+            let cause = format!("is not a lobe: a path set {GRAMMAR}");
             return Err(Error::setting(NAME, format!("{name:?}"), cause));
         }
     }

@@ -7,7 +7,7 @@ use crate::lobes::{self, LOBES, TABLE_GAIN};
 use crate::scenes::{SMALL, white_furnace};
 use crate::{Easel, HardCase, Judgement};
 
-/// Perceptual roughness of mirrors, of the narrowest lobes that are no mirrors (α = 0.001), and of the widest.
+/// Perceptual roughness of mirrors, of the narrowest lobes that are not mirrors (α = 0.001), and of the widest.
 const ROUGHNESS: [f32; 3] = [0.0, 0.0317, 1.0];
 
 pub(super) const CASE: HardCase = HardCase {

@@ -1,4 +1,4 @@
-//! Lights inside of bodies and in the plane of walls.
+//! Lights inside bodies and in the plane of walls.
 
 use clerestory::Result;
 use clerestory::scene::{LightKind, Material, Scene, load};
@@ -26,7 +26,7 @@ pub(super) const CASE: HardCase = HardCase {
     documented_bias: Some(
         "Kernels of photons reach in their plane as far as they are wide, under a wall that stands on it too: what lies within a kernel's \
          radius of a lit surface of the same plane gets a share of its light. Kernels shrink from pass to pass; choose a smaller radius, or \
-         the final gather, which sees the map from afar alone.",
+         the final gather, which sees the map only from afar.",
     ),
     techniques: Some(judge),
     ..HardCase::BASE

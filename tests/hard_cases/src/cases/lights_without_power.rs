@@ -10,7 +10,7 @@ use crate::{Easel, HardCase, Judgement};
 pub(super) const CASE: HardCase = HardCase {
     name: "lights-without-power",
     breaks: "A choice among lights by power divides by a sum of zero; a density of one over an area of zero is infinite.",
-    expects: "They are no lights: exactly black alone, and beside a light that shines the picture is the same to the bit as without them.",
+    expects: "They are not lights: exactly black alone, and beside a light that shines the picture is the same to the bit as without them.",
     picture: || {
         let mut scene = load("builtin:cornell-box")?;
         point_triangle(&mut scene, lamp(Vec3::splat(1e6)), Vec3::splat(0.25));

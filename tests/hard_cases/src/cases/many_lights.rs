@@ -14,7 +14,7 @@ const SIZE: u32 = 8;
 
 pub(super) const CASE: HardCase = HardCase {
     name: "many-lights",
-    breaks: "A loop over all lights at each bounce never ends (the software driver ends it in silence after 65,535 turns); sums of powers in f32 lose the small lights.",
+    breaks: "A loop over all lights at each bounce never ends (the software driver silently ends it after 65,535 turns); sums of powers in f32 lose the small lights.",
     expects: "A floor under 10⁵ point lights, whose powers span six decades, has the sum of their laws: I cos θ / r² each.",
     picture: || Ok(scene().0),
     techniques: Some(judge),
@@ -51,7 +51,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         };
         lights.iter().map(law).sum::<f64>()
     };
-    // Lights at 1 m and more, pixels of 0.25 m: four points a pixel err by less than 10⁻³, a tenth of the noise of the sum.
+    // Lights at 1 m and more, pixels of 0.25 m: four points per pixel err by less than 10⁻³, a tenth of the noise of the sum.
     let averages = pixel_averages(SIZE, 1.0, 2, irradiance);
     let radiance: Vec<f32> = (averages.iter())
         .flat_map(|e| [(f64::from(RHO) * e / std::f64::consts::PI) as f32; 3])

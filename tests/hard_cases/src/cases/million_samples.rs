@@ -14,7 +14,7 @@ const SAMPLES_PER_PASS: u32 = 4096;
 
 pub(super) const CASE: HardCase = HardCase {
     name: "million-samples",
-    breaks: "A sum in f32 stalls: beyond 2²⁴ times a sample its additions are rounded away, and the picture stops to change or drifts.",
+    breaks: "A sum in f32 stalls: beyond 2²⁴ times a sample its additions are rounded away, and the picture stops changing or drifts.",
     expects: "The mean of 10⁶ equal samples is that sample to the bit, and its variance 0.",
     picture: || Ok(scene()),
     techniques: Some(judge),

@@ -1,4 +1,4 @@
-//! Glass inside of glass.
+//! Glass inside glass.
 
 use clerestory::Result;
 use clerestory::scene::{Material, Scene, load};
@@ -10,7 +10,7 @@ use crate::{Easel, HardCase, Judgement};
 pub(super) const CASE: HardCase = HardCase {
     name: "nested-dielectrics",
     breaks: "At the inner surface light passes from glass to glass, but the renderer takes its outside for air.",
-    expects: "White glass in white glass vanishes in a white furnace. A slab inside of a slab of equal index vanishes where its index is given relative to what is around it (1); given absolutely it reflects as in air, which costs 2R more: T = (1 − R)/(1 + 3R) instead of (1 − R)/(1 + R). Ink around a clear slab absorbs before it and behind it.",
+    expects: "White glass in white glass vanishes in a white furnace. A slab inside a slab of equal index vanishes where its index is given relative to what is around it (1); given absolutely it reflects as in air, which costs 2R more: T = (1 − R)/(1 + 3R) instead of (1 − R)/(1 + R). Ink around a clear slab absorbs before it and behind it.",
     picture: || {
         let mut scene = load("builtin:cornell-box?sphere=glass&boxes=tall")?;
         let glass = scene.add_material(Material::glass("outer", 1.33));

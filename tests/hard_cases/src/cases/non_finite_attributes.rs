@@ -11,7 +11,7 @@ use crate::{Easel, HardCase, Judgement};
 pub(super) const CASE: HardCase = HardCase {
     name: "non-finite-attributes",
     breaks: "A NaN passes every comparison as false: it spreads through boxes and sums until the picture is black, or a loop never ends.",
-    expects: "Every attribute that is no finite number, an index out of range and a count that does not fit are refused by an error that names the place. Rays that are no rays meet nothing, and triangles that are none are left out.",
+    expects: "Every attribute that is not a finite number, an index out of range and a count that does not fit are refused by an error that names the place. Rays that are not rays meet nothing, and triangles that are none are left out.",
     picture: || load("builtin:triangle-soup"),
     techniques: Some(judge),
     rays: Some(|| {
@@ -33,7 +33,7 @@ pub(super) const CASE: HardCase = HardCase {
         rays.push(ray(Vec3::splat(f32::NAN), Vec3::X));
         rays.push(ray(Vec3::splat(1e20), Vec3::NEG_ONE));
         vec![RaySet {
-            what: "what is no ray".into(),
+            what: "what is not a ray".into(),
             triangles,
             rays,
         }]

@@ -8,7 +8,7 @@ use crate::{Easel, HardCase, Judgement};
 
 pub(super) const CASE: HardCase = HardCase {
     name: "picture-sizes",
-    breaks: "Sizes that are no multiple of a workgroup leave pixels out or write beyond the last one; products of sides overflow 32 bits.",
+    breaks: "Sizes that are not multiples of a workgroup leave pixels out or write beyond the last one; products of sides overflow 32 bits.",
     expects: "Every pixel has all of its samples, however few paths are in flight; a size that cannot be is refused by name.",
     picture: || load("builtin:cornell-box"),
     techniques: Some(judge),

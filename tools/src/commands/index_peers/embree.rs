@@ -1,4 +1,4 @@
-//! Intel's Embree as a peer, loaded at run time where it is installed: versions 3 and 4, one ray a call, all threads.
+//! Intel's Embree as a peer, loaded at run time where it is installed: versions 3 and 4, one ray per call, all threads.
 //!
 //! Source of the interface: the headers of Embree 3.13 and 4 (rtcore_*.h, Apache-2.0). Nothing is linked, and a library that is not there,
 //! or is none of these versions, is a peer that is absent, with the reason.

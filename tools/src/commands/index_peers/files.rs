@@ -76,7 +76,7 @@ fn spread(spread: super::Spread, scale: f64, digits: usize) -> String {
 
 fn rates(found: &Found) -> Table {
     let mut table = Table::new(
-        "Builds and rays a second",
+        "Builds and rays per second",
         &[
             "scene",
             "triangles",
@@ -130,10 +130,10 @@ fn work(found: &Found) -> Table {
             "scene",
             "index",
             "rays",
-            "nodes a ray",
-            "triangles a ray",
-            "bytes a ray",
-            "iterations a subgroup",
+            "nodes per ray",
+            "triangles per ray",
+            "bytes per ray",
+            "iterations per subgroup",
             "busy lanes (%)",
             "time at nodes (%)",
             "at triangles (%)",
@@ -168,7 +168,7 @@ fn work(found: &Found) -> Table {
         "Counts are exact: the twin of the kernel gives each ray's steps, and those of a subgroup's rays run side by side. Parts of the rays \
          are traced by themselves, and their times are fitted as a sum over counts, without negative costs: of subgroups, of \
          iterations, and of what nodes and triangles add to these. An iteration's time belongs in equal shares to its lanes. Bytes \
-         are 64 a node and 48 a triangle, every access served by itself, without the stack.",
+         are 64 per node and 48 per triangle, every access served by itself, without the stack.",
     );
     for one in costs {
         let [ends, nodes, triangles, both] = one.costs;
@@ -215,7 +215,7 @@ fn chart_of_rates(found: &Found) -> clerestory::Result<Option<String>> {
         .into_iter()
         .map(group)
         .collect();
-    bars::draw("Million rays a second", &KINDS, &groups)
+    bars::draw("Million rays per second", &KINDS, &groups)
 }
 
 fn chart_of_work(found: &Found) -> clerestory::Result<Option<String>> {

@@ -1,4 +1,4 @@
-//! `clerestory index --peers`: build times, surface area cost and rays a second of our indexes beside those of other libraries, and where our
+//! `clerestory index --peers`: build times, surface area cost and rays per second of our indexes beside those of other libraries, and where our
 //! rays' time goes.
 //!
 //! Ours are traced by the device's kernel, theirs on the processor with all threads; on a software device both share the same cores.
@@ -140,7 +140,7 @@ pub struct Measured {
     build: Spread,
     /// With unit costs; none for wide nodes.
     sah_cost: Option<f64>,
-    /// Millions of rays a second: primary, diffuse.
+    /// Millions of rays per second: primary, diffuse.
     mrays_per_second: [Spread; 2],
     /// Median rates over those of the peer's wide tree of the better build.
     ratios: [f64; 2],

@@ -1,4 +1,4 @@
-//! Our indexes in the comparison: built on the processor, traced by the device's kernel with an invocation a ray.
+//! Our indexes in the comparison: built on the processor, traced by the device's kernel with an invocation per ray.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};

@@ -140,17 +140,17 @@ pub struct Work {
     pub index: &'static str,
     /// Kind of rays.
     pub kind: &'static str,
-    /// Inner nodes a ray visits.
+    /// Inner nodes that a ray visits.
     pub nodes: f64,
-    /// Triangles a ray tests.
+    /// Triangles that a ray tests.
     pub triangles: f64,
-    /// Bytes a ray reads of the index.
+    /// Bytes of the index that a ray reads.
     pub bytes: f64,
     /// Iterations of a subgroup.
     pub iterations: f64,
     /// Share of its lanes that have something to do.
     pub busy_lanes: f64,
-    /// Measured nanoseconds a ray, all threads together.
+    /// Measured nanoseconds per ray, all threads together.
     pub nanoseconds: f64,
     /// Shares of the time: nodes, triangles, lanes that wait, begin and end of rays.
     pub shares: [f64; 4],

@@ -69,7 +69,7 @@ pub fn announce(plan: &Plan, options: &RenderOptions, explain: bool) -> Outcome<
         _ => String::new(),
     };
     output::note(&format!(
-        "chosen: {}, {}, {} samples a pixel; predicted: error {:.4}{parts}, {:.2} s after {:.2} s of pilots",
+        "chosen: {}, {}, {} samples per pixel; predicted: error {:.4}{parts}, {:.2} s after {:.2} s of pilots",
         choice.technique, choice.variant, choice.spp, choice.error, choice.seconds, plan.pilot_seconds
     ));
     if !choice.judged_by.is_empty() {
@@ -85,7 +85,7 @@ fn candidates(plan: &Plan) -> String {
         "pilots",
         "pilot noise",
         "slope",
-        "s a sample",
+        "s per sample",
         "samples",
         "bias",
         "at most",

@@ -80,7 +80,7 @@ fn points_visit_the_same_leaves_in_the_same_order() {
             compact.point_query(point, &mut counters[1], |leaf| b.push(leaf));
             assert_eq!(a, b, "{name}: {point}");
             assert_eq!(counters[0].nodes, counters[1].nodes, "{name}: {point}");
-            // 36 bytes a node, against 32 a pair and 4 an entry.
+            // 36 bytes per node, against 32 per pair and 4 per entry.
             assert_eq!(counters[0].bytes, 36 * counters[0].nodes);
             assert_eq!(counters[1].bytes, 16 * counters[1].nodes + 4 * counters[1].pushes);
             let mut found: Vec<usize> = a.iter().flat_map(|leaf| members(&complete, *leaf)).collect();
