@@ -578,7 +578,7 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
         "  kernels      shaders/techniques/photon_mapping/\n",
         "  tests        tests/tests/photon/convergence.rs\n",
         "  measured by  clerestory report photon-convergence",
-        "  results      RESULTS.md, \"",
+        "  results      results/photon-",
         "  settings     `path_set`, `photons`",
         "  call         clerestory::techniques::photon_mapping::PhotonMapper\n",
     ] {
@@ -586,7 +586,10 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
     }
     assert_eq!(list["techniques"][0]["row"]["role"]["kind"], "technique");
     assert_eq!(list["techniques"][0]["row"]["sources"][0]["key"], "kajiya-1986");
-    assert_eq!(list["techniques"][0]["results"][0], "Error against time");
+    assert_eq!(
+        list["techniques"][0]["results"][0]["path"],
+        "results/error-against-time/README.md"
+    );
     let sources = String::from_utf8(succeed(&["list", "--sources"])?.stdout)?;
     assert!(sources.contains("| kajiya-1986 | J. Kajiya"), "{sources}");
     let devices = json(&succeed(&["info", "--json", "--validation", "off", "--device", "0"])?.stdout)?;
@@ -653,7 +656,6 @@ fn a_benchmark_counts_its_runs() -> Tested {
 #[test]
 fn a_report_has_a_table_for_its_scene() -> Tested {
     let folder = tempfile::tempdir()?;
-    let page = folder.path().join("page.md");
     let (references, out) = (folder.path().join("references"), folder.path().join("out"));
     let arguments = [
         "report",
@@ -662,15 +664,13 @@ fn a_report_has_a_table_for_its_scene() -> Tested {
         "builtin:cornell-box",
         "--repeat",
         "1",
-        "-o",
-        text(&page),
         "--references",
         text(&references),
         "--folder",
         text(&out),
     ];
     succeed(&arguments)?;
-    let written = std::fs::read_to_string(&page)?;
+    let written = std::fs::read_to_string(out.join("error-against-time-smoke/report.md"))?;
     assert!(
         written.contains("### `builtin:cornell-box` (38 triangles)") && written.contains("Smoke run"),
         "{written}"

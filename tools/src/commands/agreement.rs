@@ -23,7 +23,7 @@ It needs a Python with the package `mitsuba`: tools/mitsuba/README.md says how t
 Examples:
   clerestory agreement --list
   clerestory agreement --scene cornell-box --timing-rounds 0
-  clerestory agreement --python ~/mitsuba/bin/python --results tools/mitsuba/results --page RESULTS.md")]
+  clerestory agreement --python ~/mitsuba/bin/python --results tools/mitsuba/results --page results/agreement.md")]
 pub struct Arguments {
     /// Only these scenes
     #[arg(long = "scene", value_name = "NAME", value_delimiter = ',')]

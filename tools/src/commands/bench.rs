@@ -22,7 +22,7 @@ use crate::output::{self, Table};
 Examples:
   clerestory bench
   clerestory bench --scene builtin:sphere-flake --scene model.glb --repeat 9 --json
-  clerestory bench --sort --peers --folder out/sort --page RESULTS.md
+  clerestory bench --sort --peers --folder out/sort --page results/sort.md
   clerestory bench --peers                       sorts, then index builds and rays per second, beside other libraries
 
 A first run, which is not measured, compiles the kernels. Rates are by wall clock from the first step to the last; figures vary with \

@@ -28,7 +28,7 @@ Examples:
   clerestory index --scene 'builtin:sphere-flake?depth=4' --repeat 9 --json
   clerestory index --index-cache out/indexes
   clerestory index --peers --rays 262144
-  clerestory index --peers --rays 262144 --repeat 9 --folder out/index --page RESULTS.md
+  clerestory index --peers --rays 262144 --repeat 9 --folder out/index --page results/index.md
 
 Build times are medians of wall-clock time, from triangles on the host to an index where it is built; times by stage are those of the \
 median build. Builds on the device include the copies to it. Steps are the nodes and triangles that a ray visits, exact counts over the same \

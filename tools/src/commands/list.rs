@@ -14,7 +14,7 @@ use clerestory::techniques::{self, Bias, Card};
 
 use crate::failure::{Failure, Outcome};
 use crate::output::{self, Table};
-use results::Part;
+use results::Page;
 
 /// Lists the techniques and the catalogue of systems: what they cannot do, and where code, kernels, settings, tests and results are
 #[derive(Debug, Args)]
@@ -62,8 +62,8 @@ struct System {
     row: &'static Row,
     /// Commands that measure it.
     measured_by: Vec<String>,
-    /// The parts of `RESULTS.md` that hold it.
-    results: Vec<Part>,
+    /// The pages that hold it.
+    results: Vec<Page>,
     /// The technique that it is.
     #[serde(skip)]
     card: Option<&'static Card>,
@@ -74,7 +74,7 @@ impl From<&'static Row> for System {
         let measured_by = results::commands(row);
         Self {
             row,
-            results: results::parts(&measured_by),
+            results: results::pages(&measured_by),
             measured_by,
             card: card_of(row),
         }
@@ -99,8 +99,8 @@ struct Technique {
     row: Option<&'static Row>,
     /// The folder of its code.
     code: &'static str,
-    /// The parts of `RESULTS.md` that its experiments wrote.
-    results: Vec<&'static str>,
+    /// The pages of what measures it.
+    results: Vec<Page>,
     settings: Vec<SettingInfo>,
     default_settings: serde_json::Value,
 }
@@ -108,7 +108,7 @@ struct Technique {
 impl From<&'static Card> for Technique {
     fn from(card: &'static Card) -> Self {
         let row = catalogue::row_of(card);
-        let parts = row.map(|row| System::from(row).results).unwrap_or_default();
+        let results = row.map(|row| System::from(row).results).unwrap_or_default();
         Self {
             id: card.id,
             summary: card.summary,
@@ -117,7 +117,7 @@ impl From<&'static Card> for Technique {
             needs: card.needs,
             row,
             code: row.map_or("", folder),
-            results: parts.iter().map(|part| part.name).collect(),
+            results,
             settings: card.settings.infos(),
             default_settings: card.settings.defaults(),
         }
@@ -292,11 +292,11 @@ fn cite_text(cite: &Cite) -> String {
 }
 
 /// Where the figures are.
-fn results_text(parts: &[Part]) -> String {
-    if parts.is_empty() {
+fn results_text(pages: &[Page]) -> String {
+    if pages.is_empty() {
         "none kept: the experiment prints them".into()
     } else {
-        lines(parts.iter().map(|part| format!("RESULTS.md, \"{}\"", part.name)))
+        lines(pages.iter().map(|page| page.path.clone()))
     }
 }
 
@@ -447,7 +447,7 @@ mod tests {
             "`accel::lbvh::LbvhSettings`",
             "`clerestory render --index lbvh`",
             "shaders/accel/lbvh_retry.comp",
-            "RESULTS.md, \"Builds of hierarchies for rays by stage\"",
+            "results/build-stages/README.md",
             "\nCL-TREELETS",
             "`clerestory list ID`",
         ] {

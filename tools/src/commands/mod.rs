@@ -43,7 +43,7 @@ Examples:
   clerestory scenes                     generated scenes and their parameters
   clerestory compare picture.exr reference.exr --threshold rmse=1e-3
   clerestory maps sky.hdr sky.exr --to octahedron --size 512
-  clerestory report --smoke             error against time, into RESULTS.md
+  clerestory report --smoke             error against time, in its smallest form
 
 Each command explains itself: clerestory render --help
 

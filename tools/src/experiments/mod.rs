@@ -14,6 +14,7 @@ pub mod legend;
 pub mod lines;
 pub mod measurement;
 pub mod measures;
+pub mod pages;
 pub mod pareto;
 pub mod plot;
 pub mod reference;

@@ -72,10 +72,10 @@ fn details(row: &'static Row) -> String {
         format!("`{}`", short.replace('|', "\\|"))
     };
     let commands = results::commands(row);
-    let parts = results::parts(&commands);
-    let parts = parts
+    let pages = results::pages(&commands);
+    let pages = pages
         .iter()
-        .map(|part| format!("[{}]({FROM_ROOT}RESULTS.md#{})", part.name, part.anchor()));
+        .map(|page| format!("[{}]({FROM_ROOT}{})", page.name, page.path));
     format!(
         "| {} | {} | {} | {} | {} | {} | {} |\n",
         row.id,
@@ -84,7 +84,7 @@ fn details(row: &'static Row) -> String {
         cell(row.shaders.iter().map(|shaders| link("shaders/", shaders))),
         cell(test_files(row.tests).map(|file| link("tests/tests/", file))),
         cell(commands.iter().map(|command| format!("`{command}`"))),
-        cell(parts),
+        cell(pages),
     )
 }
 
@@ -174,9 +174,8 @@ mod tests {
         }
         for target in page.split("](../").skip(1) {
             let target = target.split(')').next().unwrap();
-            let (file, _) = target.split_once('#').unwrap_or((target, ""));
-            assert!(repository(file).exists(), "{target}");
+            assert!(repository(target).exists(), "{target}");
         }
-        assert!(page.contains("](../RESULTS.md#error-against-time-clerestory-report)"));
+        assert!(page.contains("](../results/error-against-time/README.md)"));
     }
 }

@@ -1,41 +1,33 @@
-//! What measures a system, and where its figures are: experiments whose `systems` name it, and the parts of `RESULTS.md` that they and its own
-//! command wrote.
+//! What measures a system, and where its figures are: pages of the experiments whose `systems` name it, and of its own command.
 
 use std::sync::LazyLock;
 
 use clerestory::catalogue::Row;
+use clerestory_tools::experiments::pages::{FOLDER, PAGE};
 use clerestory_tools::experiments::{self, Experiment};
 
-/// The page of results as it was when the program was built.
-const PAGE: &str = include_str!("../../../../RESULTS.md");
-
-/// Parts that commands write without being told names, which have heads of their own, and their experiments.
-const WITHOUT_NAMES: [(&str, &str); 3] = [
-    ("Error against time", "error-against-time"),
-    ("Error against time in media", "error-in-media"),
-    ("Error and speed beside Mitsuba 3", "mitsuba"),
+/// Pages of commands that are not experiments: the words that their commands begin with, what they hold, and their files in the folder of results.
+const OF_COMMANDS: [(&str, &str, &str); 3] = [
+    ("clerestory bench --sort", "Sorted keys per second", "sort.md"),
+    (
+        "clerestory index",
+        "Indexes and rays beside other libraries",
+        "index.md",
+    ),
+    (
+        "clerestory agreement",
+        "Error and speed beside Mitsuba 3",
+        "agreement.md",
+    ),
 ];
 
-/// A part of the page of results.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct Part {
-    /// What it is called.
-    pub name: &'static str,
-    /// Its link in the page, as GitHub makes it of the head.
-    #[serde(skip)]
-    head: &'static str,
-}
-
-impl Part {
-    /// The anchor of its head: lower case, with hyphens for spaces, without punctuation.
-    pub fn anchor(&self) -> String {
-        let letters = self.head.chars().filter_map(|c| match c {
-            ' ' => Some('-'),
-            c if c.is_alphanumeric() || c == '-' || c == '_' => Some(c),
-            _ => None,
-        });
-        letters.flat_map(char::to_lowercase).collect()
-    }
+/// A page of results.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Page {
+    /// What it holds.
+    pub name: String,
+    /// Its path from the repository's root.
+    pub path: String,
 }
 
 /// The experiments that measure a row.
@@ -60,63 +52,59 @@ pub fn commands(row: &Row) -> Vec<String> {
     report.into_iter().chain(own).collect()
 }
 
-/// The parts of the page that hold what these commands measure, in the page's order.
-pub fn parts(commands: &[String]) -> Vec<Part> {
-    let heads = PAGE.lines().filter_map(|line| line.strip_prefix("## "));
-    let heads = heads.filter_map(|head| {
-        let (name, written_by) = head.strip_suffix('`')?.split_once(": `")?;
-        Some((Part { name, head }, written_by))
-    });
-    heads
-        .filter(|(part, written_by)| commands.iter().any(|command| holds(part.name, written_by, command)))
-        .map(|(part, _)| part)
-        .collect()
+/// The pages that hold what these commands measure, in the order of the commands.
+pub fn pages(commands: &[String]) -> Vec<Page> {
+    let mut all: Vec<Page> = Vec::new();
+    for command in commands {
+        let found: Vec<Page> = match command.strip_prefix("clerestory report ") {
+            Some(names) => names.split_whitespace().filter_map(of_experiment).collect(),
+            None => {
+                let begins = |(words, ..): &&(&str, &str, &str)| command.starts_with(words);
+                let page = OF_COMMANDS.iter().find(begins).map(|(_, name, file)| Page {
+                    name: (*name).into(),
+                    path: format!("{FOLDER}/{file}"),
+                });
+                page.into_iter().collect()
+            }
+        };
+        for page in found {
+            if !all.contains(&page) {
+                all.push(page);
+            }
+        }
+    }
+    all
 }
 
-/// Whether the part of this name, which `written_by` wrote, holds what `command` measures.
-fn holds(part: &str, written_by: &str, command: &str) -> bool {
-    if let Some(names) = command.strip_prefix("clerestory report ") {
-        // Parts are called as their experiments are, several of which one command writes.
-        let mut found = names.split_whitespace().filter_map(|name| experiments::find(name).ok());
-        return found.any(|experiment| {
-            let own = WITHOUT_NAMES.iter().find(|(_, name)| *name == experiment.name);
-            own.map_or(experiment.part(), |(part, _)| part) == part
-        });
-    }
-    let words = |text: &'_ str| -> Vec<String> { text.split_whitespace().map(str::to_owned).collect() };
-    let (ours, theirs) = (words(command), words(written_by));
-    // `clerestory agreement` holds the scenes that rows name, and `bench --sort --peers` what `bench --sort` measures.
-    theirs.len() > 1 && ours.starts_with(&theirs) || ours.len() > 2 && theirs.starts_with(&ours)
+fn of_experiment(name: &str) -> Option<Page> {
+    let experiment = experiments::find(name).ok()?;
+    Some(Page {
+        name: experiment.part().into(),
+        path: format!("{FOLDER}/{}/{PAGE}", experiment.name),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn names(command: &str) -> Vec<&'static str> {
-        parts(&[command.to_owned()]).iter().map(|part| part.name).collect()
+    fn paths(command: &str) -> Vec<String> {
+        pages(&[command.to_owned()]).into_iter().map(|page| page.path).collect()
     }
 
     #[test]
-    fn commands_find_their_parts() {
-        assert_eq!(names("clerestory report error-against-time"), ["Error against time"]);
+    fn commands_find_their_pages() {
         assert_eq!(
-            names("clerestory report error-in-media"),
-            ["Error against time in media"]
+            paths("clerestory report photon-ring photon-queues"),
+            ["results/photon-ring/README.md", "results/photon-queues/README.md"]
         );
-        assert_eq!(names("clerestory report photon-ring photon-queues").len(), 2);
-        for beside_mitsuba in [
-            "clerestory agreement --scene fog-box,smoke",
-            "clerestory report mitsuba",
-        ] {
-            assert_eq!(names(beside_mitsuba), ["Error and speed beside Mitsuba 3"]);
-        }
         assert_eq!(
-            names("clerestory bench --sort"),
-            names("clerestory bench --sort --peers")
+            paths("clerestory agreement --scene fog-box,smoke"),
+            ["results/agreement.md"]
         );
+        assert_eq!(paths("clerestory bench --sort --peers"), ["results/sort.md"]);
         for none in ["clerestory bench", "tools/test", "clerestory report no-such", ""] {
-            assert!(names(none).is_empty(), "{none:?}");
+            assert!(paths(none).is_empty(), "{none:?}");
         }
     }
 
@@ -126,15 +114,6 @@ mod tests {
         let commands = commands(row);
         assert!(commands[0].contains("build-stages"), "{commands:?}");
         assert_eq!(commands[1], row.experiment);
-        assert!(parts(&commands).len() > 1, "{commands:?}");
-    }
-
-    #[test]
-    fn anchors_are_those_of_the_heads() {
-        let part = parts(&["clerestory report build-stages".to_owned()])[0];
-        assert_eq!(
-            part.anchor(),
-            "builds-of-hierarchies-for-rays-by-stage-clerestory-report-build-stages"
-        );
+        assert!(pages(&commands).len() > 1, "{commands:?}");
     }
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 use clerestory::Error;
 use clerestory::film::{atomic, png};
 use clerestory_tools::experiments::findings::Findings;
-use clerestory_tools::experiments::measures::Run;
 use clerestory_tools::experiments::reference::slug;
 use clerestory_tools::experiments::results::Results;
 use clerestory_tools::experiments::series::{self, Work};
@@ -23,15 +22,15 @@ fn make(folder: &Path) -> Outcome {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error).into())
 }
 
-/// Writes what a measure found: a page with the verdicts first, JSON, a CSV for each table, and its rows if it keeps any. Returns the page.
-pub fn measure(folder: &Path, experiment: &Experiment, run: &Run) -> Outcome<String> {
+/// Writes what a measure found: a page with the verdicts first, JSON, a CSV for each table, plots and rows. Returns the page.
+pub fn measure(folder: &Path, experiment: &Experiment, findings: &Findings, rows: &str) -> Outcome<String> {
     make(folder)?;
-    let Findings { tables, plots, .. } = &run.findings;
+    let Findings { tables, plots, .. } = findings;
     let mut page = format!(
         "# {}: {}\n\n{}{}\n",
         experiment.name,
         experiment.title,
-        verdicts_first(&run.findings),
+        verdicts_first(findings),
         experiment.about
     );
     for plot in plots {
@@ -46,11 +45,9 @@ pub fn measure(folder: &Path, experiment: &Experiment, run: &Run) -> Outcome<Str
     write(&folder.join("report.md"), &page)?;
     write(
         &folder.join("report.json"),
-        &output::json_text("report.json", &run.findings)?,
+        &output::json_text("report.json", findings)?,
     )?;
-    if let Some(rows) = &run.rows {
-        write(&folder.join("rows.json"), rows)?;
-    }
+    write(&folder.join("rows.json"), rows)?;
     Ok(page)
 }
 
@@ -60,28 +57,6 @@ fn verdicts_first(findings: &Findings) -> String {
         text if text.is_empty() => text,
         text => text + "\n",
     }
-}
-
-/// What a page of results says of a measure: verdicts and tables, but of long ones the file alone.
-pub fn for_a_page(experiment: &Experiment, findings: &Findings) -> String {
-    let mut text = format!(
-        "{}{}. {}\n",
-        verdicts_first(findings),
-        experiment.title,
-        experiment.about.trim_end()
-    );
-    for (index, table) in findings.tables.iter().enumerate() {
-        text += &if table.is_long {
-            let (rows, file) = (table.rows.len(), index + 1);
-            format!(
-                "\n### {}\n\n{rows} rows, in `{file}.csv` of the experiment's folder.\n",
-                table.title
-            )
-        } else {
-            format!("\n{}", table.markdown())
-        };
-    }
-    text
 }
 
 /// Writes everything of a sweep: page, Markdown, JSON, CSV, plots and picture strips. Returns the Markdown of verdicts, facts and tables.

@@ -1,23 +1,25 @@
-//! `clerestory report`: runs experiments by name; without names, error against time on surfaces and in media, into a page of results.
+//! `clerestory report`: runs experiments by name; without names, error against time on surfaces and in media.
 //!
-//! Only the part of the page between two marks is replaced, so that other measurements can stand beside it.
+//! What a run found goes into a folder of its own. With `--results` its rows are kept in the repository's `results/` too, from which all pages there are
+//! made.
 
 mod files;
 
 use std::cell::{Cell, RefCell};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::Args;
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result, scene};
+use clerestory_tools::experiments::findings::Findings;
 use clerestory_tools::experiments::measures::{self, Context};
+use clerestory_tools::experiments::pages::{self, Stored};
 use clerestory_tools::experiments::render_sweep::{self, Places};
 use clerestory_tools::experiments::sweep::Sweep;
 use clerestory_tools::experiments::watch::Watch;
 use clerestory_tools::experiments::{self, Experiment, Kind};
-use clerestory_tools::machine;
-use clerestory_tools::page::Block;
 
 use super::check_validation;
 use super::progress::Bar;
@@ -32,23 +34,34 @@ Examples:
   clerestory report --list                         the experiments
   clerestory report samplers                       into out/report/samplers: index.html, report.md, report.json, CSV, plots, pictures
   clerestory report convergence roulette           two of them
-  clerestory report map-quality --page RESULTS.md  its tables also into a part of that page
+  clerestory report map-quality --results          its rows and its page also into results/map-quality
+  clerestory report --pages                        all pages of results/ anew from the rows that are kept there
+  clerestory report --all --smoke                  the smallest form of every experiment
   clerestory report kd-or-bvh --scene model.ply    a kd-tree beside bounding volumes on a model of your own
   clerestory report my-experiment.toml             an experiment of your own; the format is that of tools/experiments/
-  clerestory report                                error against time on surfaces and in media, also into RESULTS.md
+  clerestory report                                error against time on surfaces and in media
   clerestory report --smoke                        its smallest form, under two minutes on two cores
-  clerestory report --scene model.glb --repeat 3 -o model.md
+  clerestory report --scene model.glb --repeat 3   error against time on a model of your own
 
 Finished pictures are kept in the experiment's folder, references in a folder of their own: an interrupted report goes on where it \
 stopped, and a changed experiment renders only what is missing. Changes of scenes, settings, kernels and driver are noticed by \
 themselves; after a change of the engine's Rust code that changes pictures, --fresh measures anew.")]
 pub struct Arguments {
-    /// Experiments by name or .toml file, into a folder each; without any, error-against-time and error-in-media, also into RESULTS.md
+    /// Experiments by name or .toml file, into a folder each; without any, error-against-time and error-in-media
     #[arg(value_name = "EXPERIMENT")]
     experiments: Vec<String>,
     /// Lists the experiments
     #[arg(long, conflicts_with = "experiments")]
     list: bool,
+    /// Runs every experiment
+    #[arg(long, conflicts_with_all = ["experiments", "list"])]
+    all: bool,
+    /// Keeps what was found in results/ of the working folder too, and writes the pages there
+    #[arg(long, conflicts_with_all = ["smoke", "scenes", "repeat", "list"])]
+    results: bool,
+    /// Runs nothing; writes all pages of results/ anew from what is kept there
+    #[arg(long, conflicts_with_all = ["experiments", "results", "smoke", "list", "all"])]
+    pages: bool,
     /// Folder of the experiments' results
     #[arg(long, value_name = "FOLDER", default_value = "out/report")]
     folder: PathBuf,
@@ -64,12 +77,6 @@ pub struct Arguments {
     /// Measures everything anew, references included
     #[arg(long)]
     fresh: bool,
-    /// File whose marked parts are replaced when no experiment is named, made if there is none; by default RESULTS.md, with --smoke none
-    #[arg(short, long, value_name = "FILE", conflicts_with = "experiments")]
-    output: Option<PathBuf>,
-    /// File of which a named experiment replaces its marked part, made if there is none
-    #[arg(long, value_name = "FILE", requires = "experiments")]
-    page: Option<PathBuf>,
     /// Folder that keeps the references
     #[arg(long, value_name = "FOLDER", default_value = "out/references")]
     references: PathBuf,
@@ -77,57 +84,32 @@ pub struct Arguments {
     device: DeviceOptions,
 }
 
-/// The page of results.
-const PAGE: &str = "RESULTS.md";
-/// What runs without names, and the part of the page that it writes.
-const DEFAULTS: [(&str, Block<'static>); 2] = [
-    (
-        "error-against-time",
-        Block {
-            name: "error against time",
-            command: "clerestory report",
-        },
-    ),
-    (
-        "error-in-media",
-        Block {
-            name: "error against time in media",
-            command: "clerestory report",
-        },
-    ),
-];
+/// What runs without names.
+const DEFAULTS: [&str; 2] = ["error-against-time", "error-in-media"];
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if arguments.list {
         return list();
     }
+    if arguments.pages {
+        pages::write_all(Path::new("."))?;
+        output::note(&format!("wrote {}", pages::FOLDER));
+        return Ok(ExitCode::SUCCESS);
+    }
     let found = wanted(arguments)?;
-    for (experiment, _) in &found {
+    for experiment in &found {
         refuse_scenes(arguments, experiment)?;
     }
     let bar = Bar::start()?;
     // Opened for the first experiment that needs it, and kept: kernels compile once.
     let mut gpu = None;
-    for (experiment, block) in found {
-        let command = format!("clerestory report {}", experiment.name);
-        let own = Block {
-            name: experiment.part(),
-            command: &command,
-        };
-        let part = match block {
-            Some(block) => page_of_all(arguments).map(|page| (block, page)),
-            None => {
-                let known = DEFAULTS.iter().find(|(name, _)| *name == experiment.name);
-                let block = known.map_or(own, |(_, block)| *block);
-                arguments.page.clone().map(|page| (block, page))
-            }
-        };
+    for experiment in found {
         let about = format!("{}: {}", experiment.name, experiment.title);
         let interrupted = match experiment.kind()? {
             Kind::Measure(name) => {
                 output::note(&about);
-                measure(arguments, &experiment, name, &bar, part)?
+                measure(arguments, &experiment, name, &bar)?
             }
             Kind::Sweep(sweep) => {
                 let gpu = match &mut gpu {
@@ -135,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
                     None => gpu.insert(arguments.device.open()?),
                 };
                 output::note(&about);
-                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar, part)?
+                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar)?
             }
         };
         if interrupted {
@@ -151,17 +133,20 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The experiments to run, with the part of the page that each writes. Scenes of the command line's stand in for those of one experiment.
-fn wanted(arguments: &Arguments) -> Result<Vec<(Experiment, Option<Block<'static>>)>> {
+/// The experiments to run. Scenes of the command line's stand in for those of one experiment.
+fn wanted(arguments: &Arguments) -> Result<Vec<Experiment>> {
+    if arguments.all {
+        return experiments::names().map(experiments::find).collect();
+    }
     if arguments.experiments.is_empty() {
         let count = if arguments.scenes.is_empty() { DEFAULTS.len() } else { 1 };
-        let found = DEFAULTS[..count].iter();
-        return found
-            .map(|(name, block)| Ok((experiments::find(name)?, Some(*block))))
-            .collect();
+        return DEFAULTS[..count].iter().map(|name| experiments::find(name)).collect();
     }
-    let found = arguments.experiments.iter();
-    found.map(|name| Ok((experiments::find(name)?, None))).collect()
+    arguments
+        .experiments
+        .iter()
+        .map(|name| experiments::find(name))
+        .collect()
 }
 
 /// Scenes for a measure that has its own.
@@ -204,20 +189,14 @@ fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
 }
 
 /// Verdicts and tables go to standard output and, with all digits, into the folder. Says whether it was interrupted.
-fn measure(
-    arguments: &Arguments,
-    experiment: &Experiment,
-    name: &str,
-    bar: &Bar,
-    part: Option<(Block<'_>, PathBuf)>,
-) -> Outcome<bool> {
-    let device = RefCell::new("none".to_owned());
+fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar) -> Outcome<bool> {
+    let device = RefCell::new(String::new());
     let open = || {
         let gpu = Gpu::headless(&arguments.device.options())?;
         *device.borrow_mut() = format!("{}, driver {}", gpu.caps().device, gpu.caps().driver);
         Ok(gpu)
     };
-    let load = machine::load().unwrap_or_else(|| "unknown".into());
+    let (begun, clock) = (begun(experiment), Instant::now());
     let folder = folder(arguments, experiment);
     let context = Context {
         smoke: arguments.smoke,
@@ -226,40 +205,45 @@ fn measure(
         folder: &folder,
         watch: bar,
     };
-    let run = (measures::find(name)?.run)(&context);
+    let measure = measures::find(name)?;
+    let rows = (measure.run)(&context);
     bar.clear();
-    let mut run = run?;
-    if arguments.smoke {
-        run.findings = run.findings.of_smoke_run();
-    }
+    let rows = rows?;
     if bar.stopped() {
         // Whole tables of an earlier run are worth more than the part of this one.
         return Ok(true);
     }
-    let page = files::measure(&folder, experiment, &run)?;
+    let mut findings = (measure.read)(&rows)?;
+    if arguments.smoke {
+        findings = findings.of_smoke_run();
+    }
+    let page = files::measure(&folder, experiment, &findings, &rows)?;
     output::print(&page)?;
     output::note(&format!("wrote {}", folder.display()));
-    if let Some((block, path)) = part {
-        let facts = output::one_line(&format!(
-            "Machine: {}, {} threads, load average {load} when it began; Vulkan device: {}. Clerestory {}.",
-            machine::processor(),
-            machine::threads(),
-            device.borrow(),
-            env!("CARGO_PKG_VERSION"),
-        ));
-        block.write(
-            &path,
-            &format!("{facts}\n\n{}", files::for_a_page(experiment, &run.findings)),
-        )?;
-        output::note(&format!("wrote {}", path.display()));
+    if arguments.results {
+        let run = begun.end(clock.elapsed().as_secs_f64(), device.take());
+        let found = serde_json::from_str(&rows).map_err(|cause| Error::setting("rows", name, cause.to_string()))?;
+        keep(experiment, &Stored { run, found }, &folder, &findings)?;
     }
     Ok(false)
 }
 
-/// Where the experiments go that run without being named.
-fn page_of_all(arguments: &Arguments) -> Option<PathBuf> {
-    let page = arguments.output.clone();
-    page.or_else(|| (!arguments.smoke).then(|| PAGE.into()))
+/// How an experiment is run that begins now.
+fn begun(experiment: &Experiment) -> pages::Run {
+    pages::Run::begin(format!("clerestory report {} --results", experiment.name))
+}
+
+/// Keeps what was found, with the pictures that the run wrote into a folder of its own.
+fn keep(experiment: &Experiment, stored: &Stored, from: &Path, findings: &Findings) -> Outcome {
+    let folder = Path::new(pages::FOLDER).join(&experiment.name);
+    std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, error))?;
+    for plot in findings.plots.iter().filter(|plot| plot.is_file()) {
+        let (from, to) = (from.join(&plot.file), folder.join(&plot.file));
+        std::fs::copy(&from, &to).map_err(|error| Error::io(&from, error))?;
+    }
+    pages::keep(Path::new("."), experiment, stored)?;
+    output::note(&format!("wrote {}", folder.join(pages::PAGE).display()));
+    Ok(())
 }
 
 /// The sweep with the changes that the command line asks for.
@@ -277,14 +261,8 @@ fn chosen(arguments: &Arguments, sweep: &Sweep) -> Sweep {
 }
 
 /// Renders and writes everything; says whether it was interrupted.
-fn render(
-    arguments: &Arguments,
-    experiment: &Experiment,
-    sweep: &Sweep,
-    gpu: &Gpu,
-    bar: &Bar,
-    part: Option<(Block<'_>, PathBuf)>,
-) -> Outcome<bool> {
+fn render(arguments: &Arguments, experiment: &Experiment, sweep: &Sweep, gpu: &Gpu, bar: &Bar) -> Outcome<bool> {
+    let (begun, clock) = (begun(experiment), Instant::now());
     let places = Places {
         folder: folder(arguments, experiment),
         references: arguments.references.clone(),
@@ -302,12 +280,15 @@ fn render(
         }
     })?;
     let text = files::sweep(&places.folder, experiment, &results)?;
-    match part.filter(|_| !results.interrupted) {
-        Some((block, page)) => {
-            block.write(&page, &text)?;
-            output::note(&format!("wrote {}", page.display()));
-        }
-        None => output::print(&text)?,
+    output::print(&text)?;
+    if arguments.results && !results.interrupted {
+        let run = begun.end(
+            clock.elapsed().as_secs_f64(),
+            format!("{}, driver {}", results.device, results.driver),
+        );
+        let found = serde_json::to_value(&results)
+            .map_err(|cause| Error::setting("results", &experiment.name, cause.to_string()))?;
+        keep(experiment, &Stored { run, found }, &places.folder, &Findings::default())?;
     }
     output::note(&format!(
         "{} pictures measured, {} found from earlier runs; wrote {}",

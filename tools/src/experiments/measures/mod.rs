@@ -30,34 +30,22 @@ pub struct Measure {
     pub needs_device: bool,
     /// Whether it measures scenes that it is told ([`Context::scenes`]).
     pub takes_scenes: bool,
-    /// Takes the measure. Errors and counts are deterministic; times are not.
-    pub run: fn(&Context<'_>) -> Result<Run>,
+    /// Takes the measure, and gives its rows as JSON. Errors and counts are deterministic; times are not.
+    pub run: fn(&Context<'_>) -> Result<String>,
+    /// What such rows say. A verdict must not depend on when it was made: it is always of rows that were read.
+    pub read: fn(&str) -> Result<Findings>,
     /// What it says where nothing was run: its criteria.
     pub declared: fn() -> Findings,
 }
 
-/// What a measure has found.
-#[derive(Debug)]
-pub struct Run {
-    /// Its rows as JSON; `None` of a measure that keeps tables alone.
-    pub rows: Option<String>,
-    /// What they say, as they are read back: text may cost a number its last bit, and a verdict must not depend on when it was made.
-    pub findings: Findings,
-}
-
-/// A measure of rows.
-const fn rows<S: Study>(name: &'static str, needs_device: bool) -> Measure {
+/// A measure of a module's rows.
+const fn of<S: Study>(name: &'static str, needs_device: bool) -> Measure {
     Measure {
         name,
         needs_device,
         takes_scenes: false,
-        run: |context| {
-            let rows = findings::run::<S>(context)?;
-            Ok(Run {
-                findings: findings::read::<S>(&rows)?,
-                rows: Some(rows),
-            })
-        },
+        run: findings::run::<S>,
+        read: findings::read::<S>,
         declared: || S::default().findings(),
     }
 }
@@ -67,25 +55,6 @@ impl Measure {
         self.takes_scenes = true;
         self
     }
-}
-
-/// A [`Measure`] of one of the two kinds: a module has rows of its type `Found`, or a function `measure` that gives tables.
-macro_rules! measure {
-    (rows $name:literal, $needs_device:expr, $topic:ident::$module:ident) => {
-        rows::<$topic::$module::Found>($name, $needs_device)
-    };
-    (tables $name:literal, $needs_device:expr, $topic:ident::$module:ident) => {
-        Measure {
-            name: $name,
-            needs_device: $needs_device,
-            takes_scenes: false,
-            run: |context| {
-                let findings = $topic::$module::measure(context)?.into();
-                Ok(Run { rows: None, findings })
-            },
-            declared: Findings::default,
-        }
-    };
 }
 
 /// Whether a measure opens the device, by a word.
@@ -98,11 +67,11 @@ macro_rules! needs_device {
     };
 }
 
-/// [`MEASURES`], and a test of each measure's quick form, from a line a measure: `where it runs, what it keeps, "name" topic::module`.
+/// [`MEASURES`], and a test of each measure's quick form, from a line a measure: `where it runs, "name" topic::module`.
 macro_rules! measures {
-    ($($place:ident $kind:ident $name:literal $topic:ident::$module:ident $(.$also:ident())?;)*) => {
+    ($($place:ident $name:literal $topic:ident::$module:ident $(.$also:ident())?;)*) => {
         /// All measures, each called as its experiment and, with underscores, its module in the folder of its topic.
-        pub const MEASURES: &[Measure] = &[$(measure!($kind $name, needs_device!($place), $topic::$module)$(.$also())?),*];
+        pub const MEASURES: &[Measure] = &[$(of::<$topic::$module::Found>($name, needs_device!($place))$(.$also())?),*];
 
         /// A test a measure, so that each has its own time and its own failure.
         #[cfg(test)]
@@ -118,55 +87,55 @@ macro_rules! measures {
 }
 
 measures! {
-    on_device rows "absorption" media::absorption;
-    on_device rows "alpha" surfaces::alpha;
-    on_device tables "automatic-choice" rendering::automatic_choice;
-    on_device rows "barriers" device::barriers;
-    on_device rows "build-stages" rays::build_stages;
-    on_host rows "compact-map" photon_maps::compact_map;
-    on_host rows "compact-rays" photon_maps::compact_rays;
-    on_host rows "coupled-reflection" surfaces::coupled_reflection;
-    on_device rows "device-model" device::device_model;
-    on_host rows "free-flight" media::free_flight;
-    on_device rows "kd-caches" kd::kd_caches.of_any_scenes();
-    on_device rows "kd-heuristics" kd::kd_heuristics.of_any_scenes();
-    on_device rows "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
-    on_host rows "kd-probability" kd::kd_probability;
-    on_device rows "kd-rays" kd::kd_rays.of_any_scenes();
-    on_device rows "kd-threads" kd::kd_threads.of_any_scenes();
-    on_device rows "kd-traversal" kd::kd_traversal.of_any_scenes();
-    on_host rows "leaf-sizes" photon_maps::leaf_sizes;
-    on_device rows "live-map-pictures" preview::live_map_pictures;
-    on_device rows "live-maps" preview::live_maps.of_any_scenes();
-    on_host rows "map-borders" maps::map_borders;
-    on_host rows "map-choice" maps::map_choice;
-    on_device rows "map-construction" photon_maps::map_construction;
-    on_host rows "map-density" maps::map_density;
-    on_host rows "map-error" maps::map_error;
-    on_device rows "map-glossiness" maps::map_glossiness;
-    on_host rows "map-levels" maps::map_levels;
-    on_host rows "map-quality" photon_maps::map_quality;
-    on_device rows "map-rendering" maps::map_rendering;
-    on_host rows "merge-example" photon_maps::merge_example;
-    on_device rows "mitsuba" rendering::mitsuba;
-    on_host rows "multiple-scattering" surfaces::multiple_scattering;
-    on_device rows "path-sets" rendering::path_sets;
-    on_device rows "persistent-threads" rays::persistent_threads;
-    on_host rows "phase-functions" media::phase_functions;
-    on_device rows "photon-frame" photons::photon_frame;
-    on_device rows "photon-peers" photons::photon_peers;
-    on_device rows "photon-queues" photons::photon_queues;
-    on_device rows "photon-statistics" photons::photon_statistics;
-    on_host rows "picture-formats" rendering::picture_formats;
-    on_host rows "ray-offsets" rays::ray_offsets;
-    on_host rows "sample-sums" rendering::sample_sums;
-    on_device rows "scene-profile" rendering::scene_profile;
-    on_device rows "shadow-maps" preview::shadow_maps.of_any_scenes();
-    on_host rows "shading-normals" surfaces::shading_normals;
-    on_host rows "sphere-tests" rays::sphere_tests;
-    on_host rows "tangents" surfaces::tangents;
-    on_host rows "tree-quality" rays::tree_quality;
-    on_host rows "triangle-tests" rays::triangle_tests;
+    on_device "absorption" media::absorption;
+    on_device "alpha" surfaces::alpha;
+    on_device "automatic-choice" rendering::automatic_choice;
+    on_device "barriers" device::barriers;
+    on_device "build-stages" rays::build_stages;
+    on_host "compact-map" photon_maps::compact_map;
+    on_host "compact-rays" photon_maps::compact_rays;
+    on_host "coupled-reflection" surfaces::coupled_reflection;
+    on_device "device-model" device::device_model;
+    on_host "free-flight" media::free_flight;
+    on_device "kd-caches" kd::kd_caches.of_any_scenes();
+    on_device "kd-heuristics" kd::kd_heuristics.of_any_scenes();
+    on_device "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
+    on_host "kd-probability" kd::kd_probability;
+    on_device "kd-rays" kd::kd_rays.of_any_scenes();
+    on_device "kd-threads" kd::kd_threads.of_any_scenes();
+    on_device "kd-traversal" kd::kd_traversal.of_any_scenes();
+    on_host "leaf-sizes" photon_maps::leaf_sizes;
+    on_device "live-map-pictures" preview::live_map_pictures;
+    on_device "live-maps" preview::live_maps.of_any_scenes();
+    on_host "map-borders" maps::map_borders;
+    on_host "map-choice" maps::map_choice;
+    on_device "map-construction" photon_maps::map_construction;
+    on_host "map-density" maps::map_density;
+    on_host "map-error" maps::map_error;
+    on_device "map-glossiness" maps::map_glossiness;
+    on_host "map-levels" maps::map_levels;
+    on_host "map-quality" photon_maps::map_quality;
+    on_device "map-rendering" maps::map_rendering;
+    on_host "merge-example" photon_maps::merge_example;
+    on_device "mitsuba" rendering::mitsuba;
+    on_host "multiple-scattering" surfaces::multiple_scattering;
+    on_device "path-sets" rendering::path_sets;
+    on_device "persistent-threads" rays::persistent_threads;
+    on_host "phase-functions" media::phase_functions;
+    on_device "photon-frame" photons::photon_frame;
+    on_device "photon-peers" photons::photon_peers;
+    on_device "photon-queues" photons::photon_queues;
+    on_device "photon-statistics" photons::photon_statistics;
+    on_host "picture-formats" rendering::picture_formats;
+    on_host "ray-offsets" rays::ray_offsets;
+    on_host "sample-sums" rendering::sample_sums;
+    on_device "scene-profile" rendering::scene_profile;
+    on_device "shadow-maps" preview::shadow_maps.of_any_scenes();
+    on_host "shading-normals" surfaces::shading_normals;
+    on_host "sphere-tests" rays::sphere_tests;
+    on_host "tangents" surfaces::tangents;
+    on_host "tree-quality" rays::tree_quality;
+    on_host "triangle-tests" rays::triangle_tests;
 }
 
 /// The measure of that name.
@@ -204,8 +173,8 @@ mod tests {
             folder: folder.path(),
             watch: &Unwatched,
         };
-        let run = (measure.run)(&context).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let findings = run.findings.of_smoke_run();
+        let rows = (measure.run)(&context).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let findings = (measure.read)(&rows).unwrap().of_smoke_run();
         assert!(!findings.tables.is_empty(), "{name}");
         for table in findings.tables {
             assert_eq!(table.fault(), None, "{name}: {}", table.title);

@@ -5,13 +5,14 @@
 
 use std::time::{Duration, Instant};
 
+use clerestory::gpu::Gpu;
 use clerestory::plan::{Goal, plan};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::{Error, Result, scene};
 
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::context::short_name;
-use crate::experiments::table::Table;
 use crate::experiments::unbiased;
 use crate::experiments::watch::Watch;
 
@@ -140,12 +141,129 @@ const CONTESTS: [Contest; 10] = [
 const FACTOR: f64 = 1.5;
 /// Far from the seeds of pilots and pictures.
 const REFERENCE_SEED: u32 = 77_777;
+/// The seed of the first picture; each has one of its own.
+const FIRST_SEED: u32 = 5_000;
+/// Pictures of each technique.
+const PICTURES: usize = 5;
+/// Side and reference's samples per pixel of scenes with goals, in full and of a smoke run. The reference has to be a good deal better than any picture,
+/// of which the fog's takes thousands of samples.
+const GOALS: ((u32, u32), (u32, u32)) = ((64, 16_384), (8, 512));
+/// Side and reference's samples of a contest of a smoke run.
+const SMOKE_CONTEST: (u32, u32) = (8, 16);
 
 /// What is asked of the planner.
 #[derive(Clone, Copy)]
 enum Asked {
     Error(f64),
     Seconds(f64),
+}
+
+rows! {
+    /// A contest between the chosen technique and another one.
+    struct Contested = "Techniques" by [scene, light_paths, asked] {
+        scene: String = "scene",
+        light_paths: String = "light paths",
+        asked: f64 = "asked: error",
+        expected: String = "expected",
+        chosen: String = "chosen",
+        samples: u64 = "samples per pixel",
+        bias: Option<f64> = "predicted bias",
+        noise: f64 = "predicted noise",
+        predicted: f64 = "predicted error",
+        error: Repeats = "error",
+        predicted_seconds: f64 = "predicted seconds",
+        seconds: Repeats = "seconds",
+        pilots: f64 = "pilots: seconds",
+        other: Option<Repeats> = "other: error in as many seconds",
+        why: String = "other: why not",
+    }
+}
+rows! {
+    /// A goal of the path tracer.
+    struct Aimed = "Asked, predicted and reached" by [scene, asked, time] {
+        scene: String = "scene",
+        asked: Option<f64> = "asked: error",
+        time: Option<f64> = "asked: seconds",
+        predicted: f64 = "predicted error",
+        error: Repeats = "error",
+        ratio: Repeats = "error over the asked or predicted one",
+        predicted_seconds: f64 = "predicted seconds",
+        seconds: Repeats = "seconds",
+        pilots: f64 = "pilots: seconds",
+        settings: String = "settings",
+        samples: u64 = "samples per pixel",
+    }
+}
+
+/// What was found.
+#[derive(Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    contests: Vec<Contested>,
+    goals: Vec<Aimed>,
+}
+
+const OF_CONTESTS: &[Criterion<Contested>] = &[
+    Criterion::each(
+        "the chosen technique has the smaller error: its error over the other's in as many seconds",
+        Bound::AtMost(1.0),
+        |row: &Contested| (&row.error.over(row.other.as_ref().unwrap_or(&row.error))).into(),
+    )
+    .among(|row| row.other.is_some()),
+    Criterion::each(
+        "the winner is the one that was named beforehand",
+        Bound::AtLeast(1.0),
+        |row: &Contested| (row.chosen == row.expected).into(),
+    ),
+    Criterion::each(
+        "the chosen technique reaches the error: its error over the one asked for",
+        Bound::AtMost(FACTOR),
+        |row: &Contested| (&row.error.scaled(1.0 / row.asked)).into(),
+    ),
+];
+const OF_GOALS: &[Criterion<Aimed>] = &[
+    Criterion::each(
+        "the error is the one asked for, or the predicted one: their ratio",
+        Bound::Between(1.0 / FACTOR, FACTOR),
+        |row: &Aimed| (&row.ratio).into(),
+    ),
+    Criterion::each(
+        "the time is kept: seconds over those asked for",
+        Bound::AtMost(FACTOR),
+        |row: &Aimed| (&row.seconds.scaled(1.0 / row.time.unwrap_or(f64::INFINITY))).into(),
+    )
+    .among(|row| row.time.is_some()),
+];
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let contests = context.first(&CONTESTS, 1);
+        let pairs = context.first(&PAIRS, 1);
+        Ok(Self {
+            contests: context.each(
+                contests,
+                |contest| contest.address.into(),
+                |contest| Ok(contest.held(context, &gpu)?.into_iter().collect()),
+            )?,
+            goals: context.each(
+                pairs,
+                |(address, _)| (*address).into(),
+                |(address, asked)| Ok(goal(context, &gpu, address, *asked)?.into_iter().collect()),
+            )?,
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let ratios = self.goals.iter().map(|row| row.ratio.measured());
+        Findings::of(&self.contests, OF_CONTESTS)
+            .note(
+                "Errors: root of the relative MSE against a reference of a seed of its own, whose variance is subtracted. Seconds are those of the \
+                 picture, without the pilots; the other technique gets as many, with settings that its pilots found best.",
+            )
+            .headline("error over the asked or predicted one, geometric mean", geometric_mean(ratios))
+            .and(Findings::of(&self.goals, OF_GOALS))
+            .note("Seconds are those of pilots and picture.")
+    }
 }
 
 /// `None` when it was stopped.
@@ -160,217 +278,166 @@ fn render(renderer: &Renderer, options: &RenderOptions, watch: &dyn Watch) -> Re
     rendering.finish().map(Some)
 }
 
-/// The measure.
-pub fn measure(context: &Context<'_>) -> Result<Vec<Table>> {
-    Ok(vec![contests(context)?, goals(context)?])
+/// Root of the relative MSE, and seconds of the picture.
+type ErrorAndSeconds = [f64; 2];
+
+/// Pictures of some options, which take turns, against a reference; `None` when it was stopped.
+fn pictures(
+    context: &Context<'_>,
+    renderer: &Renderer,
+    contenders: &[RenderOptions],
+    reference: &Rendered,
+) -> Result<Option<Vec<Vec<ErrorAndSeconds>>>> {
+    let mut seed = FIRST_SEED;
+    let all = context.in_turns(PICTURES, contenders.len(), |i| {
+        seed += 1;
+        let options = RenderOptions {
+            seed,
+            ..contenders[i].clone()
+        };
+        let Some(rendered) = render(renderer, &options, context.watch)? else {
+            return Ok(None);
+        };
+        let error = unbiased::measure(&rendered.picture, &reference.picture)?;
+        let error = error.relative_mse.max(0.0).sqrt();
+        Ok(Some([error, rendered.report.render_seconds]))
+    })?;
+    Ok(all.into_iter().map(|turns| turns.into_iter().collect()).collect())
 }
 
-/// Which technique is chosen, and how far the other one comes in the same time.
-fn contests(context: &Context<'_>) -> Result<Table> {
-    let contests = if context.smoke { &CONTESTS[..1] } else { &CONTESTS[..] };
-    let (gpu, watch) = ((context.gpu)()?, context.watch);
-    let mut table = Table::new(
-        "Techniques",
-        &[
-            "scene",
-            "light paths",
-            "asked: error",
-            "expected",
-            "chosen",
-            "samples a pixel",
-            "predicted bias",
-            "predicted noise",
-            "predicted error",
-            "error",
-            "predicted seconds",
-            "seconds",
-            "pilots: seconds",
-            "other: error in as many seconds",
-            "other: why not",
-            "wins",
-        ],
-    );
-    let (mut as_expected, mut winning, mut reached, mut done) = (0_u64, 0_u64, 0_u64, 0_usize);
-    for contest in contests {
-        watch.begin(contest.address, done, contests.len());
-        let renderer = Renderer::new(&gpu, &scene::load(contest.address)?)?;
-        let (reference, spp) = contest.reference;
-        let (side, spp) = if context.smoke { (8, 16) } else { (contest.side, spp) };
+impl Contest {
+    /// Which technique is chosen, and how far the other one comes in the same time; `None` when it was stopped.
+    fn held(&self, context: &Context<'_>, gpu: &Gpu) -> Result<Option<Contested>> {
+        let watch = context.watch;
+        let renderer = Renderer::new(gpu, &scene::load(self.address)?)?;
+        let (reference, spp) = self.reference;
+        let (side, spp) = context.pick((self.side, spp), SMOKE_CONTEST);
         let base = RenderOptions {
             size: [side; 2],
-            settings: serde_json::json!({ "path_set": contest.path_set }).into(),
+            settings: serde_json::json!({ "path_set": self.path_set }).into(),
             ..RenderOptions::default()
         };
         let of_reference = RenderOptions {
             technique: Some(reference.into()),
             spp,
             seed: REFERENCE_SEED,
-            settings: serde_json::json!({ "path_set": contest.path_set, "sampler": "pcg" }).into(),
+            settings: serde_json::json!({ "path_set": self.path_set, "sampler": "pcg" }).into(),
             ..base.clone()
         };
         let Some(reference) = render(&renderer, &of_reference, watch)? else {
-            break;
+            return Ok(None);
         };
         let goal = Goal {
-            error: Some(contest.error),
+            error: Some(self.error),
             time: None,
         };
         let plan = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
         let choice = plan.choice();
-        let Some(rendered) = render(&renderer, &plan.options(&base), watch)? else {
-            break;
+        let chosen = plan.options(&base);
+        // Compiles its kernels, and says how many seconds the other one gets.
+        let Some(first) = render(&renderer, &chosen, watch)? else {
+            return Ok(None);
         };
-        let seconds = rendered.report.render_seconds;
-        let error_of = |rendered: &Rendered| -> Result<f64> {
-            let error = unbiased::measure(&rendered.picture, &reference.picture)?;
-            Ok(error.relative_mse.max(0.0).sqrt())
-        };
-        let error = error_of(&rendered)?;
-        let other_id = if choice.technique == contest.rival {
-            contest.winner
+        let other_id = if choice.technique == self.rival {
+            self.winner
         } else {
-            contest.rival
+            self.rival
         };
-        let other = plan.candidates.iter().find(|candidate| candidate.technique == other_id);
-        let other_options = RenderOptions {
+        let candidate = plan.candidates.iter().find(|candidate| candidate.technique == other_id);
+        let other = RenderOptions {
             technique: Some(other_id.into()),
-            settings: other.map_or_else(|| base.settings.clone(), |other| other.settings.clone().into()),
+            settings: candidate.map_or_else(|| base.settings.clone(), |other| other.settings.clone().into()),
             spp: u32::MAX,
-            time_budget: Some(Duration::from_secs_f64(seconds)),
+            time_budget: Some(Duration::from_secs_f64(first.report.render_seconds)),
             ..base.clone()
         };
-        // Its kernels are compiled, as those of the chosen one are, unless the scene is none for it.
-        let other_error = match render(&renderer, &other_options, watch) {
-            Ok(Some(rendered)) => Some(error_of(&rendered)?),
-            Ok(None) => break,
-            Err(Error::Unsupported { .. } | Error::Setting { .. }) => None,
+        let can_render = match render(&renderer, &other, watch) {
+            Ok(Some(_)) => true,
+            Ok(None) => return Ok(None),
+            Err(Error::Unsupported { .. } | Error::Setting { .. }) => false,
             Err(error) => return Err(error),
         };
-        let why = match other {
+        let contenders = if can_render { vec![chosen, other] } else { vec![chosen] };
+        let Some(turns) = pictures(context, &renderer, &contenders, &reference)? else {
+            return Ok(None);
+        };
+        let [error, seconds] = Repeats::by_part(&turns[0]);
+        let other = turns.get(1).map(|turns| {
+            let [error, _] = Repeats::by_part(turns);
+            error
+        });
+        let why = match candidate {
             Some(other) if !other.reason.is_empty() => other.reason.clone(),
             Some(other) => format!("{:.2} s predicted", other.seconds),
-            None => "is none of the techniques".into(),
+            None => "is not one of the techniques".into(),
         };
-        done += 1;
-        let wins = other_error.is_none_or(|other| error < other);
-        as_expected += u64::from(choice.technique == contest.winner);
-        winning += u64::from(wins);
-        reached += u64::from(error <= FACTOR * contest.error);
-        let or_dash = |value: Option<f64>| value.map_or_else(|| "-".into(), Into::into);
-        table.row([
-            short_name(contest.address).into(),
-            contest.path_set.into(),
-            contest.error.into(),
-            contest.winner.into(),
-            choice.technique.into(),
-            u64::from(choice.spp).into(),
-            or_dash(choice.bias),
-            choice.noise.into(),
-            choice.error.into(),
-            error.into(),
-            choice.seconds.into(),
-            seconds.into(),
-            plan.pilot_seconds.into(),
-            or_dash(other_error),
-            why.into(),
-            if wins { "yes" } else { "no" }.into(),
-        ]);
+        Ok(Some(Contested {
+            scene: short_name(self.address).into(),
+            light_paths: self.path_set.into(),
+            asked: self.error,
+            expected: self.winner.into(),
+            chosen: choice.technique.into(),
+            samples: choice.spp.into(),
+            bias: choice.bias,
+            noise: choice.noise,
+            predicted: choice.error,
+            error,
+            predicted_seconds: choice.seconds,
+            seconds,
+            pilots: plan.pilot_seconds,
+            other,
+            why,
+        }))
     }
-    table.note(format!(
-        "Of {done} chosen techniques, {as_expected} are the expected ones, {winning} have the smaller error, and {reached} reach the error that was asked for \
-         within a factor of {FACTOR}. Errors that differ by a few per cent are of one picture each and decide nothing. Pictures are square, of 48 pixels a side for all light, of 256 where 0.1 is asked of \
-         direct light, and of 512 where less. Errors: root of the relative MSE against a reference of a seed of its own, whose variance is subtracted: \
-         24,576, 512 and 256 samples a pixel of the path tracer, 1024 passes of photon mapping where the path tracer cannot find caustics. Seconds are those of the picture, without the pilots; the other technique gets as many."
-    ));
-    Ok(table)
 }
 
-/// Whether errors and times are kept.
-fn goals(context: &Context<'_>) -> Result<Table> {
-    let (side, reference_spp, pairs) = if context.smoke {
-        (8, 512, &PAIRS[..1])
-    } else {
-        (64, 1024, &PAIRS[..])
+/// Whether an error or a time is kept; `None` when it was stopped.
+fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result<Option<Aimed>> {
+    let watch = context.watch;
+    let (full, smoke) = GOALS;
+    let (side, reference_spp) = context.pick(full, smoke);
+    let renderer = Renderer::new(gpu, &scene::load(address)?)?;
+    let base = RenderOptions {
+        technique: Some("path".into()),
+        size: [side; 2],
+        ..RenderOptions::default()
     };
-    let (gpu, watch) = ((context.gpu)()?, context.watch);
-    let mut table = Table::new(
-        "Asked, predicted and reached",
-        &[
-            "scene",
-            "asked: error",
-            "predicted error",
-            "error",
-            "error / asked or predicted",
-            "asked: seconds",
-            "predicted seconds",
-            "seconds",
-            "pilots: seconds",
-            "settings",
-            "samples a pixel",
-        ],
-    );
-    let (mut kept, mut done) = (0_u64, 0_usize);
-    for &(address, asked) in pairs {
-        watch.begin(address, done, pairs.len());
-        let renderer = Renderer::new(&gpu, &scene::load(address)?)?;
-        let base = RenderOptions {
-            technique: Some("path".into()),
-            size: [side; 2],
-            ..RenderOptions::default()
-        };
-        let of_reference = RenderOptions {
-            spp: reference_spp,
-            seed: REFERENCE_SEED,
-            settings: serde_json::json!({ "sampler": "pcg" }).into(),
-            ..base.clone()
-        };
-        let Some(reference) = render(&renderer, &of_reference, watch)? else {
-            break;
-        };
-        let goal = match asked {
-            Asked::Error(error) => Goal {
-                error: Some(error),
-                time: None,
-            },
-            Asked::Seconds(seconds) => Goal {
-                error: None,
-                time: Some(Duration::from_secs_f64(seconds)),
-            },
-        };
-        let start = Instant::now();
-        let plan = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
-        let Some(rendered) = render(&renderer, &plan.options(&base), watch)? else {
-            break;
-        };
-        let seconds = start.elapsed().as_secs_f64();
-        let error = unbiased::measure(&rendered.picture, &reference.picture)?
-            .relative_mse
-            .max(0.0)
-            .sqrt();
-        let choice = plan.choice();
-        let wanted = goal.error.unwrap_or(choice.error);
-        let ratio = error / wanted;
-        let in_time = goal.time.is_none_or(|time| seconds <= FACTOR * time.as_secs_f64());
-        done += 1;
-        kept += u64::from((1.0 / FACTOR..=FACTOR).contains(&ratio) && in_time);
-        let or_dash = |value: Option<f64>| value.map_or_else(|| "-".into(), Into::into);
-        table.row([
-            short_name(address).into(),
-            or_dash(goal.error),
-            choice.error.into(),
-            error.into(),
-            ratio.into(),
-            or_dash(goal.time.map(|time| time.as_secs_f64())),
-            (choice.seconds + plan.pilot_seconds).into(),
-            seconds.into(),
-            plan.pilot_seconds.into(),
-            choice.variant.into(),
-            u64::from(choice.spp).into(),
-        ]);
-    }
-    table.note(format!(
-        "{kept} of {done} within a factor of {FACTOR} of the asked error, or of the predicted one in the asked time. Errors: root of the relative \
-         MSE, {side} × {side} pixels, against {reference_spp} independent samples a pixel whose variance is subtracted."
-    ));
-    Ok(table)
+    let of_reference = RenderOptions {
+        spp: reference_spp,
+        seed: REFERENCE_SEED,
+        settings: serde_json::json!({ "sampler": "pcg" }).into(),
+        ..base.clone()
+    };
+    let Some(reference) = render(&renderer, &of_reference, watch)? else {
+        return Ok(None);
+    };
+    let (error, seconds) = match asked {
+        Asked::Error(error) => (Some(error), None),
+        Asked::Seconds(seconds) => (None, Some(seconds)),
+    };
+    let goal = Goal {
+        error,
+        time: seconds.map(Duration::from_secs_f64),
+    };
+    let start = Instant::now();
+    let plan = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
+    let planned = start.elapsed().as_secs_f64();
+    let Some(turns) = pictures(context, &renderer, &[plan.options(&base)], &reference)? else {
+        return Ok(None);
+    };
+    let choice = plan.choice();
+    let [errors, pictures] = Repeats::by_part(&turns[0]);
+    Ok(Some(Aimed {
+        scene: short_name(address).into(),
+        asked: error,
+        time: seconds,
+        predicted: choice.error,
+        ratio: errors.scaled(1.0 / error.unwrap_or(choice.error)),
+        error: errors,
+        predicted_seconds: choice.seconds + plan.pilot_seconds,
+        seconds: pictures.0.iter().map(|seconds| planned + seconds).collect(),
+        pilots: plan.pilot_seconds,
+        settings: choice.variant.into(),
+        samples: choice.spp.into(),
+    }))
 }
