@@ -16,7 +16,7 @@ use clerestory::transport::{GpuScene, PathSet};
 use clerestory::{Error, Result, scene};
 use clerestory_tests::with_gpu;
 
-/// Predicted and true error may differ by this factor: both are means over 16² pixels whose errors differ much.
+/// Predicted and true error may differ by this factor: both are means over small pictures whose pixels differ much in error.
 const FACTOR: f64 = 1.5;
 
 fn render(renderer: &Renderer, options: &RenderOptions) -> Rendered {
@@ -38,7 +38,7 @@ fn options() -> RenderOptions {
 fn predictions_come_true() {
     with_gpu(|gpu| {
         // The furnace needs no reference: its body, which absorbs nothing, vanishes.
-        let vanished = Picture::from_radiance(16, 16, vec![1.0; 16 * 16 * 3]).unwrap();
+        let vanished = Picture::from_radiance(48, 48, vec![1.0; 48 * 48 * 3]).unwrap();
         for (address, truth) in [
             ("builtin:cornell-box", None),
             ("builtin:furnace-medium", Some(vanished)),
@@ -46,6 +46,7 @@ fn predictions_come_true() {
             let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
             let picture = |spp, seed| {
                 let options = RenderOptions {
+                    size: [48, 48],
                     spp,
                     seed,
                     settings: serde_json::json!({ "sampler": "pcg" }).into(),
@@ -54,17 +55,17 @@ fn predictions_come_true() {
                 render(&renderer, &options).picture
             };
             let mut model = ErrorModel::default();
-            for spp in [16, 64] {
+            for spp in [4, 16] {
                 let pair = [picture(spp, 1), picture(spp, 2)];
                 model.add(
                     spp,
                     relative_mse_of_pair(&pair[0], &pair[1], RELATIVE_MSE_OFFSET).unwrap(),
                 );
             }
-            let predicted = model.relative_mse(256.0).sqrt();
+            let predicted = model.relative_mse(64.0).sqrt();
             // Sixteen times the samples: the reference's own error adds 3 % to what is found.
-            let reference = truth.unwrap_or_else(|| picture(16 * 256, 3));
-            let last = picture(256, 4);
+            let reference = truth.unwrap_or_else(|| picture(16 * 64, 3));
+            let last = picture(64, 4);
             let error = compare(&last, &reference, &CompareOptions::default()).unwrap();
             let error = error.relative_mse.sqrt();
             assert!(
