@@ -152,7 +152,18 @@ pub fn upload(gpu: &Gpu, scene: &Scene) -> Arc<GpuScene> {
 
 /// Makes a tracer of the scene's first camera.
 pub fn tracer(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &PathTracerSettings) -> PathTracer {
-    match PathTracer::new(gpu, upload(gpu, scene), &scene.cameras[0], size, settings.clone()) {
+    tracer_of(gpu, &upload(gpu, scene), &scene.cameras[0], size, settings)
+}
+
+/// As [`tracer`], of a scene that other pictures share.
+pub fn tracer_of(
+    gpu: &Gpu,
+    scene: &Arc<GpuScene>,
+    camera: &Camera,
+    size: [u32; 2],
+    settings: &PathTracerSettings,
+) -> PathTracer {
+    match PathTracer::new(gpu, scene.clone(), camera, size, settings.clone()) {
         Ok(tracer) => tracer,
         Err(error) => panic!("{error}"),
     }

@@ -4,11 +4,13 @@
 //! differences, from the pictures' own variances; parts have seeds of their own, so that they are independent. Blocks, since a pixel's
 //! mean of the rare bright samples of a caustic is far from normal.
 
+use std::sync::Arc;
+
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
 use clerestory::techniques::PathTracerSettings;
-use clerestory::transport::PathSet;
-use clerestory_tests::render::{Rendered, builtin, paths, render, tracer};
+use clerestory::transport::{GpuScene, PathSet};
+use clerestory_tests::render::{Rendered, builtin, finish, paths, tracer_of, upload};
 use clerestory_tests::with_gpu;
 
 const SIZE: usize = 24;
@@ -35,66 +37,97 @@ fn blocks(picture: &Rendered) -> Rendered {
     }
 }
 
-fn part(gpu: &Gpu, scene: &Scene, set: &str, seed: u32) -> Rendered {
-    // Roulette begins where most paths are over: what it adds to the variance is rare and bright.
-    let settings = PathTracerSettings {
-        seed,
-        roulette_start: 6,
-        ..paths(set)
-    };
-    render(gpu, scene, [SIZE as u32; 2], SAMPLES, &settings)
+/// A scene on the device, whose pictures are compared.
+struct Subject<'a> {
+    gpu: &'a Gpu,
+    scene: Scene,
+    uploaded: Arc<GpuScene>,
 }
 
-/// Fails unless the parts sum to the whole and none of them is black.
-fn expect_sum(gpu: &Gpu, scene: &Scene, what: &str, whole: &Rendered, parts: &[&str]) {
-    let mut radiance = vec![0.0f32; whole.radiance.len()];
-    let mut variance = radiance.clone();
-    for (i, set) in parts.iter().enumerate() {
-        let picture = blocks(&part(gpu, scene, set, 100 + i as u32));
-        assert!(
-            picture.mean().iter().any(|(mean, _)| *mean > 1e-6),
-            "{what}: {set} is black"
-        );
-        for (sum, value) in
-            (radiance.iter_mut().zip(&picture.radiance)).chain(variance.iter_mut().zip(&picture.variance))
-        {
-            *sum += value;
-        }
+impl<'a> Subject<'a> {
+    fn new(gpu: &'a Gpu, address: &str) -> Self {
+        let scene = builtin(address);
+        let uploaded = upload(gpu, &scene);
+        Self { gpu, scene, uploaded }
     }
-    whole.expect_same_as(what, &radiance, &variance);
-}
 
-/// Fails unless the sets are a partition of `whole`, in the algebra and in pictures; `there` holds the paths that the scene has.
-fn expect_partition(gpu: &Gpu, scene: &Scene, [whole, there]: [&str; 2], partitions: &[&[&str]]) {
-    let parsed = |text: &str| text.parse::<PathSet>().unwrap_or_else(|error| panic!("{error}"));
-    let picture = blocks(&part(gpu, scene, whole, 7));
-    for parts in partitions {
-        let what = format!("{}: {whole} = {}", scene.name, parts.join(" + "));
-        let union = parts.iter().fold(PathSet::EMPTY, |union, text| {
-            let set = parsed(text)
+    fn part(&self, set: &str, seed: u32) -> Rendered {
+        // Roulette begins where most paths are over: what it adds to the variance is rare and bright.
+        let settings = PathTracerSettings {
+            seed,
+            roulette_start: 6,
+            ..paths(set)
+        };
+        let camera = &self.scene.cameras[0];
+        let picture = finish(
+            &mut tracer_of(self.gpu, &self.uploaded, camera, [SIZE as u32; 2], &settings),
+            SAMPLES,
+        );
+        picture.expect_sound(&format!("{}: {set}", self.scene.name), SAMPLES);
+        picture
+    }
+
+    /// Fails unless the parts sum to the whole and none of them is black.
+    fn expect_sum(&self, what: &str, whole: &Rendered, parts: &[&str]) {
+        let mut radiance = vec![0.0f32; whole.radiance.len()];
+        let mut variance = radiance.clone();
+        for (i, set) in parts.iter().enumerate() {
+            let picture = blocks(&self.part(set, 100 + i as u32));
+            assert!(
+                picture.mean().iter().any(|(mean, _)| *mean > 1e-6),
+                "{what}: {set} is black"
+            );
+            for (sum, value) in
+                (radiance.iter_mut().zip(&picture.radiance)).chain(variance.iter_mut().zip(&picture.variance))
+            {
+                *sum += value;
+            }
+        }
+        whole.expect_same_as(what, &radiance, &variance);
+    }
+
+    /// Fails unless the sets are a partition of `whole`, in the algebra and in pictures; `there` holds the paths that the scene has.
+    fn expect_partition(&self, [whole, there]: [&str; 2], partitions: &[&[&str]]) {
+        let picture = blocks(&self.part(whole, 7));
+        for parts in partitions {
+            let what = format!("{}: {whole} = {}", self.scene.name, parts.join(" + "));
+            let union = parts.iter().fold(PathSet::EMPTY, |union, text| {
+                let set = parsed(text)
+                    .intersection(&parsed(whole))
+                    .unwrap_or_else(|error| panic!("{what}: {error}"));
+                assert!(
+                    set.intersection(&union).is_ok_and(|both| both.is_empty()),
+                    "{what}: {text} overlaps"
+                );
+                union.union(&set).unwrap_or_else(|error| panic!("{what}: {error}"))
+            });
+            let needed = parsed(there)
                 .intersection(&parsed(whole))
                 .unwrap_or_else(|error| panic!("{what}: {error}"));
-            assert!(
-                set.intersection(&union).is_ok_and(|both| both.is_empty()),
-                "{what}: {text} overlaps"
-            );
-            union.union(&set).unwrap_or_else(|error| panic!("{what}: {error}"))
-        });
-        let needed = parsed(there)
-            .intersection(&parsed(whole))
-            .unwrap_or_else(|error| panic!("{what}: {error}"));
-        assert!(needed.is_subset_of(&union), "{what}: {union} is not all");
-        expect_sum(gpu, scene, &what, &picture, parts);
+            assert!(needed.is_subset_of(&union), "{what}: {union} is not all");
+            self.expect_sum(&what, &picture, parts);
+        }
     }
+
+    /// Fails unless two sets of one class a vertex have the sum of their union, which allows two classes at a vertex and has to tell
+    /// afterwards by a drawn label which of them it was.
+    fn expect_drawn_labels_agree(&self, parts: [&str; 2]) {
+        let both = parts.join("|");
+        assert!(parsed(&both).tells_reflections_apart(), "{both}");
+        let labelled = blocks(&self.part(&both, 7));
+        self.expect_sum(&format!("{}: {both}", self.scene.name), &labelled, &parts);
+    }
+}
+
+fn parsed(text: &str) -> PathSet {
+    text.parse().unwrap_or_else(|error| panic!("{text}: {error}"))
 }
 
 #[test]
 fn glass_casts_caustics_that_are_a_part() {
     with_gpu(|gpu| {
-        let scene = builtin("builtin:cornell-box?sphere=glass");
-        expect_partition(
-            gpu,
-            &scene,
+        let subject = Subject::new(gpu, "builtin:cornell-box?sphere=glass");
+        subject.expect_partition(
             ["bounces=0..5", "L[DS]*E"],
             &[
                 // By caustics; by what is scattered first, at the light; last, at the eye.
@@ -115,10 +148,8 @@ fn glass_casts_caustics_that_are_a_part() {
 #[test]
 fn coats_over_diffuse_bases_are_told_apart() {
     with_gpu(|gpu| {
-        let scene = builtin("builtin:materials");
-        expect_partition(
-            gpu,
-            &scene,
+        let subject = Subject::new(gpu, "builtin:materials");
+        subject.expect_partition(
             ["bounces=0..4", "L[^V]*E"],
             &[
                 &[
@@ -134,49 +165,33 @@ fn coats_over_diffuse_bases_are_told_apart() {
                 ],
             ],
         );
+        subject.expect_drawn_labels_agree(["LDDE", "LGGE"]);
+        subject.expect_drawn_labels_agree(["LDGE", "LGDE"]);
     });
 }
 
 #[test]
 fn rough_metal_is_a_part() {
     with_gpu(|gpu| {
-        let scene = builtin("builtin:divider-room?roughness=0.3");
-        expect_partition(
-            gpu,
-            &scene,
+        let subject = Subject::new(gpu, "builtin:divider-room?roughness=0.3");
+        subject.expect_partition(
             ["bounces=0..4", "L[^V]*E"],
             &[
                 &["bounces=0..4,LD*E", "bounces=0..4,L.*[^D].*E"],
                 &["bounces=0..4,LDG.*E", "bounces=0..4,!LDG.*E"],
             ],
         );
-    });
-}
-
-#[test]
-fn drawn_labels_agree_with_masks() {
-    with_gpu(|gpu| {
-        // At each vertex the second form allows one class; the first allows two and has to tell afterwards which it was.
-        for (address, parts) in [
-            ("builtin:materials", ["LDDE", "LGGE"]),
-            ("builtin:materials", ["LDGE", "LGDE"]),
-            ("builtin:divider-room?roughness=0.3", ["LDGE", "LGDE"]),
-        ] {
-            let (scene, both) = (builtin(address), parts.join("|"));
-            let set: PathSet = both.parse().unwrap_or_else(|error| panic!("{error}"));
-            assert!(set.tells_reflections_apart(), "{both}");
-            let labelled = blocks(&part(gpu, &scene, &both, 7));
-            expect_sum(gpu, &scene, &format!("{address}: {both}"), &labelled, &parts);
-        }
+        subject.expect_drawn_labels_agree(["LDGE", "LGDE"]);
     });
 }
 
 #[test]
 fn the_empty_set_is_black_and_plain_sets_compile_no_automaton() {
     with_gpu(|gpu| {
-        let scene = builtin("builtin:cornell-box?sphere=glass");
+        let glass = Subject::new(gpu, "builtin:cornell-box?sphere=glass");
+        let coats = Subject::new(gpu, "builtin:materials");
         for set in ["none", "LVE", "LDE,LSE"] {
-            let picture = part(gpu, &scene, set, 7);
+            let picture = glass.part(set, 7);
             assert!(picture.radiance.iter().all(|v| *v == 0.0), "{set}");
         }
         for (set, automaton, labels) in [
@@ -186,12 +201,8 @@ fn the_empty_set_is_black_and_plain_sets_compile_no_automaton() {
             ("LS+DE", 1, 0),
             ("L.*D.*E", 1, 1),
         ] {
-            let scene = if labels == 1 {
-                builtin("builtin:materials")
-            } else {
-                scene.clone()
-            };
-            let tracer = tracer(gpu, &scene, [8, 8], &paths(set));
+            let Subject { scene, uploaded, .. } = if labels == 1 { &coats } else { &glass };
+            let tracer = tracer_of(gpu, uploaded, &scene.cameras[0], [8, 8], &paths(set));
             let pipelines = tracer.pipelines();
             let value = |name: &str| {
                 let constants = pipelines.iter().flat_map(|pipeline| &pipeline.specialization);

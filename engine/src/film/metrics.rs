@@ -268,7 +268,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Pixels that are not finite in either picture are left out and counted; FLIP sees tone-mapped pictures.",
     sources: &[sources::ROUSSELLE_2011.whole(), sources::ANDERSSON_2020.whole()],
     tests: &[
-        "tests/tests/automatic_choice.rs::predictions_come_true",
         "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
         "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
     ],

@@ -351,6 +351,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/bias.rs::noise_is_seldom_taken_for_bias",
         "engine/src/techniques/path/unseen.rs::caustics_of_lights_without_area_are_said_to_be_missed",
         "engine/src/plan/verdict.rs::what_cannot_be_had_is_said",
+        "tests/tests/automatic_choice.rs::predictions_come_true",
         "tests/tests/automatic_choice.rs::what_cannot_be_chosen_says_why",
         "tests/tests/automatic_choice.rs::what_cannot_be_made_is_no_end_of_the_choice",
         "tests/tests/automatic_choice.rs::frames_too_large_for_the_device_are_no_candidates",

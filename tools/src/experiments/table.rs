@@ -189,15 +189,19 @@ impl Table {
         let mut text = line(heads.collect());
         for row in &self.rows {
             let cells = row.iter().zip(&spans).flat_map(|(cell, spans)| {
-                let values = match cell {
-                    Cell::Text(words) => [quote(words), quote(words), quote(words)],
-                    Cell::Count(count) => [count, count, count].map(u64::to_string),
-                    Cell::Number(number) => [number; 3].map(|number| format!("{number:e}")),
-                    Cell::Interval(Measured { value, low, high }) => {
-                        [value, low, high].map(|number| format!("{number:e}"))
+                let number = |number: f64| format!("{number:e}");
+                match cell {
+                    Cell::Interval(Measured { value, low, high }) => vec![number(*value), number(*low), number(*high)],
+                    exact => {
+                        let text = match exact {
+                            Cell::Text(words) => quote(words),
+                            Cell::Count(count) => count.to_string(),
+                            Cell::Number(value) | Cell::Interval(Measured { value, .. }) => number(*value),
+                        };
+                        // Exact cells beside intervals are their own ends.
+                        vec![text; if *spans { 3 } else { 1 }]
                     }
-                };
-                values.into_iter().take(if *spans { 3 } else { 1 })
+                }
             });
             text += &line(cells.collect());
         }
@@ -227,6 +231,13 @@ mod tests {
         table.rows[1].pop();
         assert!(table.fault().is_some_and(|fault| fault.contains("2 cells for 3 heads")));
         assert!(Table::new("Empty", &["a"]).fault().is_some());
+        let mut table = Table::new("Times", &["what", "time"]);
+        table.row(["a".into(), Measured::within(2.0, 0.5).into()]);
+        table.row(["b".into(), 3.0.into()]);
+        assert_eq!(
+            table.csv(),
+            "what,time,\"time, least\",\"time, greatest\"\na,2e0,1.5e0,2.5e0\nb,3e0,3e0,3e0\n"
+        );
         assert_eq!(Cell::Number(1234.5).to_string(), "1234");
         assert_eq!(Cell::Number(-0.5).to_string(), "-0.5000");
         assert_eq!(Cell::Number(1e-9).to_string(), "1.000e-9");

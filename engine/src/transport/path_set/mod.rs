@@ -393,7 +393,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/path_set/tests.rs::automata_accept_what_backtracking_accepts",
         "tests/tests/path_sets.rs::glass_casts_caustics_that_are_a_part",
         "tests/tests/path_sets.rs::coats_over_diffuse_bases_are_told_apart",
-        "tests/tests/path_sets.rs::drawn_labels_agree_with_masks",
+        "tests/tests/path_sets.rs::rough_metal_is_a_part",
         "tests/tests/path_tracer.rs::path_sets_are_a_partition",
         "engine/src/transport/bsdf/tests.rs::masks_divide_the_whole",
     ],

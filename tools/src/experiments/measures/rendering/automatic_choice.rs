@@ -46,97 +46,61 @@ struct Contest {
 /// small lamps. The ring and direct light at a hundredth or two were expected to be won by photons and by the preview; direct light at a tenth, for which
 /// a sample per pixel is enough or shadow maps are too coarse, by the path tracer.
 const CONTESTS: [Contest; 10] = [
-    Contest {
-        address: "builtin:cornell-box?sphere=glass&boxes=none&source=point",
-        path_set: "all",
-        side: 48,
-        error: 0.1,
-        winner: "photon",
-        rival: "path",
-        reference: ("photon", 1024),
-    },
-    Contest {
-        address: "builtin:cornell-box?sphere=glass&boxes=none&source=spot",
-        path_set: "all",
-        side: 48,
-        error: 0.1,
-        winner: "photon",
-        rival: "path",
-        reference: ("photon", 1024),
-    },
-    Contest {
-        address: "builtin:cornell-box?sphere=gold&boxes=none&source=point",
-        path_set: "all",
-        side: 48,
-        error: 0.1,
-        winner: "photon",
-        rival: "path",
-        reference: ("photon", 1024),
-    },
-    Contest {
-        address: "builtin:cornell-box?sphere=glass&boxes=none&lamp=0.05",
-        path_set: "all",
-        side: 48,
-        error: 0.1,
-        winner: "photon",
-        rival: "path",
-        reference: ("path", 24_576),
-    },
-    Contest {
-        address: "builtin:ring",
-        path_set: "all",
-        side: 48,
-        error: 0.2,
-        winner: "photon",
-        rival: "path",
-        reference: ("photon", 1024),
-    },
-    Contest {
-        address: "builtin:cornell-box?source=point",
-        path_set: "direct",
-        side: 512,
-        error: 0.015,
-        winner: "preview",
-        rival: "path",
-        reference: ("path", 256),
-    },
-    Contest {
-        address: "builtin:box-room?source=point",
-        path_set: "direct",
-        side: 512,
-        error: 0.02,
-        winner: "preview",
-        rival: "path",
-        reference: ("path", 256),
-    },
-    Contest {
-        address: "builtin:cornell-box?sphere=glass&boxes=none&lamp=0.1",
-        path_set: "all",
-        side: 48,
-        error: 0.1,
-        winner: "photon",
-        rival: "path",
-        reference: ("path", 24_576),
-    },
-    Contest {
-        address: "builtin:cornell-box?source=point",
-        path_set: "direct",
-        side: 256,
-        error: 0.1,
-        winner: "path",
-        rival: "preview",
-        reference: ("path", 512),
-    },
-    Contest {
-        address: "builtin:cathedral?source=point",
-        path_set: "direct",
-        side: 256,
-        error: 0.1,
-        winner: "path",
-        rival: "preview",
-        reference: ("path", 512),
-    },
+    Contest::of_all_light(
+        "builtin:cornell-box?sphere=glass&boxes=none&source=point",
+        0.1,
+        BY_PHOTONS,
+    ),
+    Contest::of_all_light(
+        "builtin:cornell-box?sphere=glass&boxes=none&source=spot",
+        0.1,
+        BY_PHOTONS,
+    ),
+    Contest::of_all_light(
+        "builtin:cornell-box?sphere=gold&boxes=none&source=point",
+        0.1,
+        BY_PHOTONS,
+    ),
+    Contest::of_all_light("builtin:cornell-box?sphere=glass&boxes=none&lamp=0.05", 0.1, BY_PATHS),
+    Contest::of_all_light("builtin:ring", 0.2, BY_PHOTONS),
+    Contest::of_direct_light("builtin:cornell-box?source=point", 512, 0.015, ["preview", "path"]),
+    Contest::of_direct_light("builtin:box-room?source=point", 512, 0.02, ["preview", "path"]),
+    Contest::of_all_light("builtin:cornell-box?sphere=glass&boxes=none&lamp=0.1", 0.1, BY_PATHS),
+    Contest::of_direct_light("builtin:cornell-box?source=point", 256, 0.1, ["path", "preview"]),
+    Contest::of_direct_light("builtin:cathedral?source=point", 256, 0.1, ["path", "preview"]),
 ];
+/// References: the technique and its samples per pixel. Photon mapping's is for caustics that the path tracer cannot find.
+const BY_PHOTONS: (&str, u32) = ("photon", 1024);
+const BY_PATHS: (&str, u32) = ("path", 24_576);
+
+impl Contest {
+    /// Which photon mapping is expected to win, beside the path tracer.
+    const fn of_all_light(address: &'static str, error: f64, reference: (&'static str, u32)) -> Self {
+        Self {
+            address,
+            path_set: "all",
+            side: 48,
+            error,
+            winner: "photon",
+            rival: "path",
+            reference,
+        }
+    }
+
+    /// Against a reference of more samples where the picture is smaller.
+    const fn of_direct_light(address: &'static str, side: u32, error: f64, [winner, rival]: [&'static str; 2]) -> Self {
+        Self {
+            address,
+            path_set: "direct",
+            side,
+            error,
+            winner,
+            rival,
+            reference: ("path", 131_072 / side),
+        }
+    }
+}
+
 /// Within this factor an error or a time counts as kept.
 const FACTOR: f64 = 1.5;
 /// Far from the seeds of pilots and pictures.
