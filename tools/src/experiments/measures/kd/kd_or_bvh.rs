@@ -5,7 +5,6 @@
 //! optimised linear hierarchy.
 
 use clerestory::Result;
-use clerestory::accel::RayIndex;
 use clerestory::gpu::Gpu;
 use glam::Vec3;
 

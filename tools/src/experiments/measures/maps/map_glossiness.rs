@@ -241,7 +241,7 @@ fn numbers(context: &Context<'_>, gpu: &Gpu, rows: u32) -> Result<Vec<Numbers>> 
         .map(|((kind, _), subtract)| SphericalSat::new(gpu, &device, *kind, SatRange::of(&source, *subtract)))
         .collect::<Result<_>>()?;
     let times = context.in_turns(TURNS, tables.len(), |table| seconds(|| tables[table].fill(&device)))?;
-    let row = |(((form, subtract), table), times): ((&(&(SatNumbers, &str), bool), &SphericalSat), Vec<f64>)| {
+    let row = |form: &(SatNumbers, &str), subtract: bool, table: &SphericalSat, times: Vec<f64>| {
         let mut worst = [0.0f64; 2];
         for (i, (query, value)) in asked.iter().zip(&table.look_up(&asked)?).enumerate() {
             let Some(at) = MAP.encode(query.truncate().as_dvec3()) else {
@@ -256,14 +256,17 @@ fn numbers(context: &Context<'_>, gpu: &Gpu, rows: u32) -> Result<Vec<Numbers>> 
             texels: squared(rows),
             with_border: squared(rows + 2 * border),
             sums: form.1.into(),
-            mean_off: (if *subtract { "yes" } else { "no" }).into(),
+            mean_off: (if subtract { "yes" } else { "no" }).into(),
             size: tile * tile * 32.0 / f64::from(1 << 20),
             fill: Repeats(times).scaled(1e3),
             small: worst[0],
             large: worst[1],
         })
     };
-    forms.iter().zip(&tables).zip(times).map(row).collect()
+    let filled = forms.iter().zip(&tables).zip(times);
+    filled
+        .map(|(((form, subtract), table), times)| row(form, *subtract, table, times))
+        .collect()
 }
 
 impl Study for Found {

@@ -16,8 +16,11 @@ use crate::experiments::measures::Context;
 
 /// Pixels of the sphere's picture along a side.
 const SIDE: u32 = 256;
+/// Ways to find levels with their names.
+type Ways = &'static [(Way, &'static str)];
+
 /// Maps with the ways of each, and where its picture goes.
-const MAPS: [(Parametrization, &[(Way, &str)], &str); 2] = [
+const MAPS: [(Parametrization, Ways, &str); 2] = [
     (Parametrization::OctahedronQuadratic, &SQUARE, "levels.png"),
     (
         Parametrization::OctahedronRectangular,

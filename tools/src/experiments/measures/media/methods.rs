@@ -32,12 +32,15 @@ pub type Extinction<'a> = dyn Fn(f64) -> f64 + 'a;
 /// Draws from [0, 1).
 pub type Draw<'a> = dyn FnMut() -> f64 + 'a;
 
+/// Estimates or flies once.
+type Run<R> = dyn Fn(&Extinction<'_>, &mut Draw<'_>) -> R;
+
 /// A way to estimate the transmittance, or to fly.
 pub struct Method<R> {
     /// What it is called.
     pub name: String,
     /// Gives one.
-    pub run: Box<dyn Fn(&Extinction<'_>, &mut Draw<'_>) -> R>,
+    pub run: Box<Run<R>>,
 }
 
 fn method<R>(name: impl Into<String>, run: impl Fn(&Extinction<'_>, &mut Draw<'_>) -> R + 'static) -> Method<R> {

@@ -102,6 +102,9 @@ rows! {
     beside "source: linear (ms)" = |row| row.published().map(|source| 1e-3 * f64::from(source.linear_microseconds)).into();
 }
 
+/// Times of a row.
+type Times = fn(&Row) -> &Repeats;
+
 /// What was found.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
@@ -241,7 +244,7 @@ impl Study for Found {
         let first = CASES[0].name();
         let grown: Vec<Row> = self.maps.iter().filter(|row| row.scene == first).cloned().collect();
         let of_headline = grown.iter().find(|row| row.photons == 1 << SIZE);
-        let forms: [(&str, fn(&Row) -> &Repeats); 5] = [
+        let forms: [(&str, Times); 5] = [
             ("volume heuristic, host", |row| &row.by_volume),
             ("linear by merging, host", |row| &row.linear),
             ("split lists, sorted codes, host", |row| &row.lists),

@@ -356,7 +356,7 @@ pub fn of_each_prepared<R>(context: &Context<'_>, mut rows: impl FnMut(&Prepared
         let surfaces = Surfaces::load(case.scene)?;
         let points = surfaces.seen(side)?;
         rows(&Prepared {
-            case: *case,
+            case,
             shape: *shape,
             kernels: Kernels::trace(&surfaces, case.light, photons, case.cover, *shape),
             anywhere: surfaces.anywhere(points.len()),
