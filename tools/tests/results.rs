@@ -50,7 +50,11 @@ fn every_experiment_has_the_page_that_would_be_made_now() -> Tested {
         let unsaid = declared.verdicts.iter().filter(|judged| !page.contains(&judged.name));
         faults.extend(unsaid.map(|judged| format!("{name} does not say \"{}\"", judged.name)));
     }
-    assert!(faults.is_empty(), "run `clerestory report --pages`:\n{}", faults.join("\n"));
+    assert!(
+        faults.is_empty(),
+        "run `clerestory report --pages`:\n{}",
+        faults.join("\n")
+    );
     Ok(())
 }
 
@@ -71,7 +75,10 @@ fn results_are_of_experiments_and_few_bytes() -> Tested {
         let entry = entry?;
         if entry.file_type()?.is_dir() {
             let name = entry.file_name().to_string_lossy().into_owned();
-            assert!(experiments::names().any(|known| known == name), "{name} is not an experiment");
+            assert!(
+                experiments::names().any(|known| known == name),
+                "{name} is not an experiment"
+            );
             for file in std::fs::read_dir(entry.path())? {
                 bytes += file?.metadata()?.len();
             }

@@ -31,6 +31,7 @@ const PAIRS: [(&str, Asked); 12] = [
     ("builtin:fog-box?source=point", Asked::Error(0.1)),
     ("builtin:cloud", Asked::Error(0.1)),
 ];
+
 /// A scene, what is asked for, and the technique that is expected to win.
 struct Contest {
     address: &'static str,
@@ -112,8 +113,17 @@ const PICTURES: usize = 5;
 /// Side and reference's samples per pixel of scenes with goals, in full and of a smoke run. The reference has to be a good deal better than any picture,
 /// of which the fog's takes thousands of samples.
 const GOALS: ((u32, u32), (u32, u32)) = ((64, 16_384), (8, 512));
-/// Side and reference's samples of a contest of a smoke run.
-const SMOKE_CONTEST: (u32, u32) = (8, 16);
+/// Contests and goals of a smoke run, one of each kind.
+const SMOKE_CONTESTS: [Contest; 1] = [Contest::of_direct_light(
+    "builtin:cornell-box?source=point",
+    8,
+    0.3,
+    ["preview", "path"],
+)];
+const SMOKE_PAIRS: [(&str, Asked); 2] = [
+    ("builtin:box-room", Asked::Error(0.5)),
+    ("builtin:box-room", Asked::Seconds(0.5)),
+];
 
 /// What is asked of the planner.
 #[derive(Clone, Copy)]
@@ -201,8 +211,8 @@ const OF_GOALS: &[Criterion<Aimed>] = &[
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let contests = context.first(&CONTESTS, 1);
-        let pairs = context.first(&PAIRS, 1);
+        let contests: &[Contest] = context.pick(&CONTESTS, &SMOKE_CONTESTS);
+        let pairs: &[(&str, Asked)] = context.pick(&PAIRS, &SMOKE_PAIRS);
         Ok(Self {
             contests: context.each(
                 contests,
@@ -275,9 +285,8 @@ impl Contest {
         let watch = context.watch;
         let renderer = Renderer::new(gpu, &scene::load(self.address)?)?;
         let (reference, spp) = self.reference;
-        let (side, spp) = context.pick((self.side, spp), SMOKE_CONTEST);
         let base = RenderOptions {
-            size: [side; 2],
+            size: [self.side; 2],
             settings: serde_json::json!({ "path_set": self.path_set }).into(),
             ..RenderOptions::default()
         };
