@@ -21,17 +21,18 @@ runs an experiment and writes its page; `clerestory report --pages` writes all p
 |---|---|---|---|
 ";
 
-/// The verdict on all criteria in some words.
-pub fn verdict(found: &Findings) -> String {
+/// The verdict on all criteria in some words; of an experiment that was not run, even what needs another machine is only that.
+pub fn verdict(found: &Findings, was_run: bool) -> String {
+    if !was_run {
+        return "undecided: not run".into();
+    }
     let count = |is: fn(&Verdict) -> bool| found.verdicts.iter().filter(|judged| is(&judged.verdict)).count();
     let all = found.verdicts.len();
     let holding = count(|verdict| *verdict == Verdict::Holds);
     let failing = count(|verdict| matches!(verdict, Verdict::Fails { .. }));
-    let not_run = count(|verdict| *verdict == Verdict::NotRun);
     let mut words = Vec::new();
     match all {
         0 => return "no criteria".into(),
-        _ if not_run == all => return "undecided: not run".into(),
         _ if holding == all => return format!("**holds** ({all})"),
         _ => {}
     }
@@ -65,12 +66,13 @@ pub fn of_all(root: &Path) -> Result<String> {
         let experiment = experiments::find(name)?;
         let stored = Stored::read(&root.join(name))?;
         let found = findings(&experiment, stored.as_ref())?;
+        let verdict = verdict(&found, stored.is_some());
         let date = stored.map_or_else(String::new, |stored| stored.run.date);
         text += &format!(
             "| [{}]({name}/README.md): {} | {} | {} | {date} |\n",
             name,
             experiment.part().replace('|', "\\|"),
-            verdict(&found),
+            verdict,
             headline(&found).replace('|', "\\|"),
         );
     }
@@ -82,7 +84,8 @@ pub fn of_all(root: &Path) -> Result<String> {
 /// # Errors
 /// As [`findings`].
 pub fn line(root: &Path, experiment: &Experiment, link: &str) -> Result<String> {
-    let found = findings(experiment, Stored::read(&root.join(&experiment.name))?.as_ref())?;
+    let stored = Stored::read(&root.join(&experiment.name))?;
+    let found = findings(experiment, stored.as_ref())?;
     let number = match headline(&found) {
         words if words.is_empty() => words,
         words => format!("; {words}"),
@@ -91,6 +94,6 @@ pub fn line(root: &Path, experiment: &Experiment, link: &str) -> Result<String> 
         "- [{}]({link}/{}/README.md): {}{number}",
         experiment.part(),
         experiment.name,
-        verdict(&found)
+        verdict(&found, stored.is_some())
     ))
 }

@@ -1,7 +1,7 @@
 //! Figures in other pages: blocks that name experiments, between which their lines are written from the results.
 //!
 //! ```text
-//! <!-- results: photon-or-path, ambient -->
+//! <!-- results: photon-or-path, absorption -->
 //! <!-- end of results -->
 //! ```
 
@@ -48,10 +48,10 @@ mod tests {
     #[test]
     fn blocks_are_filled_again_and_again() {
         let root = Path::new("no such folder");
-        let text = "a\n<!-- results: ambient, roulette -->\nold\n<!-- end of results -->\nb\n";
+        let text = "a\n<!-- results: absorption, roulette -->\nold\n<!-- end of results -->\nb\n";
         let filled = fill(root, text, "results").unwrap();
         assert!(
-            filled.starts_with("a\n<!-- results: ambient, roulette -->\n- ["),
+            filled.starts_with("a\n<!-- results: absorption, roulette -->\n- ["),
             "{filled}"
         );
         assert!(
@@ -63,7 +63,7 @@ mod tests {
             "{filled}"
         );
         assert_eq!(fill(root, &filled, "results").unwrap(), filled);
-        assert!(fill(root, "<!-- results: ambient -->", "results").is_err());
+        assert!(fill(root, "<!-- results: absorption -->", "results").is_err());
         assert!(fill(root, "<!-- results: none such -->\n<!-- end of results -->", "results").is_err());
     }
 }

@@ -44,7 +44,7 @@ fn faults_are_refused_with_their_place() {
         ("nodes[0]", |j| j["nodes"][0]["children"] = json!([0])),
         ("nodes[0].mesh", |j| j["nodes"][0]["mesh"] = 1.into()),
         ("nodes[0].rotation", |j| j["nodes"][0]["rotation"] = json!([0, 0, 0, 0])),
-        ("nodes[0].matrix", |j| {
+        ("number out of range", |j| {
             j["nodes"][0]["matrix"] = json!([1e39, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
         }),
         ("nodes[0].matrix", |j| {
