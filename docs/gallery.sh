@@ -33,7 +33,7 @@ reference() {
     [ -f "$2.exr" ] && return
     render "$scene" --technique path --path-set "$1" --seed 1 --spp $((reference_spp * factor)) --exposure "$exposure" -o "$2.exr" \
         >"$2.txt"
-    sed -n 's/.*noise about \([0-9.]*\) by.*/\1/p' "$2.txt" >"$2.noise"
+    sed -n 's/.*noise at most about \([0-9.]*\), by.*/\1/p' "$2.txt" >"$2.noise"
 }
 
 # One row of the table, or one line where the technique refuses.

@@ -78,8 +78,8 @@ pub enum Kind<'a> {
 }
 
 impl Experiment {
-    /// The name of its part in a page of results: the title up to its colon.
-    pub fn part(&self) -> &str {
+    /// The title up to its colon, for lists.
+    pub fn short_title(&self) -> &str {
         self.title.split(':').next().unwrap_or(&self.name)
     }
 
@@ -202,12 +202,12 @@ mod tests {
     }
 
     #[test]
-    fn each_has_a_part_of_the_page_to_itself() {
-        let mut parts: Vec<String> = names().map(|name| find(name).unwrap().part().to_owned()).collect();
-        let all = parts.len();
-        parts.sort();
-        parts.dedup();
-        assert_eq!(parts.len(), all, "{parts:?}");
+    fn each_has_a_short_title_of_its_own() {
+        let mut titles: Vec<String> = names().map(|name| find(name).unwrap().short_title().to_owned()).collect();
+        let all = titles.len();
+        titles.sort();
+        titles.dedup();
+        assert_eq!(titles.len(), all, "{titles:?}");
     }
 
     #[test]

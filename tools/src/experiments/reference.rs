@@ -13,6 +13,7 @@ use clerestory::render::Rendered;
 use clerestory::{Error, Result};
 
 use super::fingerprint::{self, Fingerprint};
+use super::measures::context::short_name;
 
 /// Far from the seeds of measured pictures.
 pub const SEED: u32 = 1_000_003;
@@ -66,7 +67,7 @@ impl Identity<'_> {
 
 /// A name for files, with the letters and digits of an address.
 pub fn slug(address: &str) -> String {
-    let address = address.strip_prefix("builtin:").unwrap_or(address);
+    let address = short_name(address);
     let dashed: String = address
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' })

@@ -7,6 +7,7 @@ use super::equal_error::{self, Cost, Reading};
 use super::findings::{Measured, Repeats};
 use super::jackknife::{self, mean_without};
 use super::measurement::Measurement;
+use super::measures::context::short_name;
 use super::pareto;
 use super::results::{Point, SceneResults, VariantResults};
 use super::series::{fall, time_and_error};
@@ -42,7 +43,7 @@ impl<'a> Scene<'a> {
             Kind::Front { .. } => vec![(None, kind.on_front().and_then(|on| self.front(on)))],
         };
         let address = &self.results.address;
-        let address = address.strip_prefix("builtin:").unwrap_or(address);
+        let address = short_name(address);
         let row = |(name, number): (Option<String>, Option<Measured>)| {
             let label = name.map_or_else(|| format!("`{address}`"), |name| format!("`{address}`, {name}"));
             (label, number.unwrap_or(Measured::exact(f64::NAN)))

@@ -33,7 +33,7 @@ impl Work {
         match self {
             Self::Seconds => "time (s)",
             Self::Rays => "rays",
-            Self::Samples => "samples a pixel",
+            Self::Samples => "samples per pixel",
         }
     }
 
@@ -61,7 +61,7 @@ impl Work {
 pub struct SeriesPoint {
     /// What was allowed.
     pub budget: Budget,
-    /// Median samples a pixel.
+    /// Median samples per pixel.
     pub samples: f64,
     /// Median rays.
     pub rays: f64,

@@ -27,8 +27,6 @@ pub fn slope_text(slope: Option<Slope>) -> String {
 
 /// How all of it was measured.
 pub fn facts(results: &Results) -> Vec<String> {
-    let sweep = &results.sweep;
-    let [width, height] = sweep.size;
     let mut facts = Vec::new();
     if results.interrupted {
         facts.push("**Interrupted**: the same command goes on where this stopped.".to_owned());
@@ -61,18 +59,34 @@ pub fn facts(results: &Results) -> Vec<String> {
     facts.extend([
         format!("Device: {}; driver: {}.", results.device, results.driver),
         format!("Machine: {}{load}. Clerestory {}.", results.machine, results.engine_version),
+    ]);
+    facts.extend(method(results));
+    facts
+}
+
+/// How a sweep's pictures were made and compared.
+pub fn method(results: &Results) -> Vec<String> {
+    let sweep = &results.sweep;
+    let [width, height] = sweep.size;
+    let mut facts = vec![
         format!(
-            "{width} × {height} pixels, light paths: {}; {} pictures a budget with seeds of their own.",
+            "{width} × {height} pixels, light paths: {}; {} pictures of each budget with seeds of their own.",
             sweep.path_set, sweep.repeats
         ),
         format!(
-            "References: technique {}, {} samples a pixel, a seed of their own; their own variance is subtracted from every MSE.",
+            "References: technique {}, {} samples per pixel, a seed of their own; their own variance is subtracted from every MSE.",
             sweep.reference.technique, sweep.reference.spp
         ),
         "Seconds: wall clock, medians, after a picture that warms the driver's cache. Errors: relative RMSE, the root of the repeats' mean \
          relative MSE. Slopes: fitted on logarithms, with standard errors by the jackknife over the repeats; independent samples give −½."
             .to_owned(),
-    ]);
+    ];
+    if results.found > 0 {
+        facts.push(format!(
+            "Of all pictures {} were measured in this run and {} in earlier ones, whose load is not known.",
+            results.measured, results.found
+        ));
+    }
     facts
 }
 
@@ -148,7 +162,7 @@ pub fn budgets(scene: &SceneSeries) -> Table {
         &[
             "variant",
             "budget",
-            "samples a pixel",
+            "samples per pixel",
             "seconds",
             "million rays",
             "relative MSE",
@@ -196,7 +210,7 @@ pub fn measurements(results: &Results) -> Table {
             "budget (spp)",
             "budget (s)",
             "seed",
-            "samples a pixel",
+            "samples per pixel",
             "seconds",
             "GPU seconds",
             "paths",

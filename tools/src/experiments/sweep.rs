@@ -10,12 +10,12 @@
 //! path_set = "indirect"           # default "all"; the same for every variant and the reference
 //! camera = "main"                 # default: each scene's first
 //! size = [96, 96]                 # pixels across and down
-//! spp = [4, 16, 64]               # samples a pixel, rising; or seconds = [0.1, 0.4, 1.6], time budgets
-//! repeats = 5                     # pictures a budget, with seeds of their own; default 5
+//! spp = [4, 16, 64]               # samples per pixel, rising; or seconds = [0.1, 0.4, 1.6], time budgets
+//! repeats = 5                     # pictures per budget, with seeds of their own; default 5
 //! seed = 0                        # of the first repeat; the others follow it; default 0
 //!
 //! [sweep.reference]
-//! spp = 4096                      # samples a pixel; 16 times the most of a variant leaves its noise below 1/16 of their MSE
+//! spp = 4096                      # samples per pixel; 16 times the most of a variant leaves its noise below 1/16 of their MSE
 //! technique = "path"              # default
 //! settings = { roulette_cap = 0.9 }  # default: the technique's; of its samplers only the independent one, "pcg", is allowed
 //!
@@ -80,7 +80,7 @@ pub struct Sweep {
     pub camera: Option<String>,
     /// Pixels across and down.
     pub size: [u32; 2],
-    /// Budgets in samples a pixel, rising.
+    /// Budgets in samples per pixel, rising.
     #[serde(default)]
     pub spp: Option<Vec<u32>>,
     /// Budgets in seconds of wall clock, rising.
@@ -150,7 +150,7 @@ pub struct Variant {
 pub struct Smoke {
     /// Pixels across and down.
     pub size: Option<[u32; 2]>,
-    /// Budgets in samples a pixel.
+    /// Budgets in samples per pixel.
     pub spp: Option<Vec<u32>>,
     /// Budgets in seconds.
     pub seconds: Option<Vec<f64>>,
@@ -166,14 +166,14 @@ pub struct Smoke {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Budget {
-    /// After this many samples a pixel.
+    /// After this many samples per pixel.
     Spp(u32),
     /// After about this many seconds of wall clock.
     Seconds(f64),
 }
 
 impl Budget {
-    /// Its number: samples a pixel or seconds.
+    /// Its number: samples per pixel or seconds.
     pub fn amount(self) -> f64 {
         match self {
             Self::Spp(spp) => f64::from(spp),

@@ -422,6 +422,7 @@ pub fn findings(experiment: &Experiment, results: &Results, scenes: &[SceneSerie
         tables: std::iter::once(summary::overview(scenes))
             .chain(scenes.iter().map(summary::budgets))
             .collect(),
+        facts: summary::method(results),
         ..Findings::default()
     };
     if let Some(SweepHeadline { words, is, scenes }) = &experiment.headline {

@@ -107,11 +107,6 @@ impl Table {
         }
     }
 
-    /// The same for a folder of results alone, not for a page that holds other results too.
-    pub fn long(self) -> Self {
-        Self { is_long: true, ..self }
-    }
-
     /// Adds a row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
         self.rows.push(cells.into_iter().collect());
@@ -145,9 +140,9 @@ impl Table {
         })
     }
 
-    /// As Markdown below a heading of the third level.
+    /// As Markdown below a heading of the second level.
     pub fn markdown(&self) -> String {
-        let mut text = format!("### {}\n\n| {} |\n|", self.title, self.heads.join(" | "));
+        let mut text = format!("## {}\n\n| {} |\n|", self.title, self.heads.join(" | "));
         for (column, _) in self.heads.iter().enumerate() {
             let words = self
                 .rows

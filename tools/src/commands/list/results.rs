@@ -79,7 +79,7 @@ pub fn pages(commands: &[String]) -> Vec<Page> {
 fn of_experiment(name: &str) -> Option<Page> {
     let experiment = experiments::find(name).ok()?;
     Some(Page {
-        name: experiment.part().into(),
+        name: experiment.short_title().into(),
         path: format!("{FOLDER}/{}/{PAGE}", experiment.name),
     })
 }

@@ -5,6 +5,7 @@ use clerestory::plan::{Plan, relative_mse_by_variance};
 use clerestory::render::{RenderOptions, Rendered};
 
 use super::files::ErrorAgainst;
+use super::summary;
 use crate::failure::Outcome;
 use crate::output::{self, Table};
 
@@ -19,6 +20,9 @@ pub struct ChoiceReport<'a> {
     /// Root of the relative MSE by noise alone that the picture's own spread stands for. Stratified samples have less, those that share a map of photons
     /// more; a bias does not show in it.
     noise_by_variance: f64,
+    /// The error in words, where there is no reference.
+    #[serde(skip)]
+    unmeasured: String,
     /// Root of the relative MSE against the reference, when there is one.
     error_against_reference: Option<f64>,
 }
@@ -30,6 +34,7 @@ impl<'a> ChoiceReport<'a> {
             plan,
             seconds: plan.pilot_seconds + rendered.report.render_seconds,
             noise_by_variance: relative_mse_by_variance(&rendered.picture, RELATIVE_MSE_OFFSET)?.sqrt(),
+            unmeasured: summary::error(None, &rendered.report, &rendered.picture),
             error_against_reference: error.map(|error| error.metrics.relative_mse.sqrt()),
         })
     }
@@ -39,11 +44,7 @@ impl<'a> ChoiceReport<'a> {
         let choice = self.plan.choice();
         let error = match self.error_against_reference {
             Some(error) => format!("{error:.4} against the reference"),
-            // Only noise shows in a picture by itself.
-            None => format!(
-                "not measured, noise about {:.4} by the picture's own spread",
-                self.noise_by_variance
-            ),
+            None => self.unmeasured.clone(),
         };
         format!(
             "predicted: error {:.4}, {:.2} s; outcome: error {error}, {:.2} s, of which pilots {:.2} s",

@@ -133,7 +133,8 @@ fn rates(report: &FrameReport) -> String {
     all.join(", ") + with
 }
 
-fn error(measured: Option<&ErrorAgainst>, report: &FrameReport, picture: &Picture) -> String {
+/// The picture's error, or what the picture itself says of it.
+pub fn error(measured: Option<&ErrorAgainst>, report: &FrameReport, picture: &Picture) -> String {
     if let Some(error) = measured {
         let metrics = &error.metrics;
         let text = format!(
@@ -145,15 +146,15 @@ fn error(measured: Option<&ErrorAgainst>, report: &FrameReport, picture: &Pictur
         );
         return output::one_line(&text);
     }
-    let ask = "not measured, which --reference does";
+    let unknown = "unknown (give --reference PICTURE)";
     // Bias does not show in a picture by itself, nor the spread of a single sample.
     let unbiased = techniques::by_id(&report.technique).is_ok_and(|card| card.bias == Bias::Unbiased);
     let noise = relative_mse_by_variance(picture, RELATIVE_MSE_OFFSET)
         .ok()
         .filter(|noise| noise.is_finite() && unbiased && report.samples[0] > 1);
     match noise {
-        Some(noise) => format!("{ask}; noise about {:.4} by the picture's own spread", noise.sqrt()),
-        None => ask.into(),
+        Some(noise) => format!("{unknown}; noise at most about {:.4}, by the spread of the samples", noise.sqrt()),
+        None => unknown.into(),
     }
 }
 

@@ -92,6 +92,9 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if arguments.list {
         return list();
     }
+    if arguments.pages || arguments.results {
+        needs_results()?;
+    }
     if arguments.pages {
         pages::write_all(Path::new("."))?;
         output::note(&format!("wrote {}", pages::FOLDER));
@@ -100,6 +103,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let found = wanted(arguments)?;
     for experiment in &found {
         refuse_scenes(arguments, experiment)?;
+        if arguments.results && !experiments::names().any(|name| name == experiment.name) {
+            let cause = "is not one of this repository's experiments: leave out --results";
+            return Err(Error::setting("experiment", &experiment.name, cause).into());
+        }
     }
     let bar = Bar::start()?;
     // Opened for the first experiment that needs it, and kept: kernels compile once.
@@ -131,6 +138,16 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         check_validation(&log)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Pages are made where there are some: the repository's root.
+fn needs_results() -> Result<()> {
+    if Path::new(pages::FOLDER).is_dir() {
+        return Ok(());
+    }
+    let folder = std::env::current_dir().unwrap_or_default();
+    let cause = format!("has no {}/: run this in the repository's root", pages::FOLDER);
+    Err(Error::setting("working folder", folder.display().to_string(), cause))
 }
 
 /// The experiments to run. Scenes of the command line's stand in for those of one experiment.

@@ -46,11 +46,17 @@ impl Bound {
 impl std::fmt::Display for Bound {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
-            Self::AtMost(most) => write!(f, "at most {}", number(most)),
-            Self::AtLeast(least) => write!(f, "at least {}", number(least)),
-            Self::Between(least, most) => write!(f, "{} to {}", number(least), number(most)),
+            Self::AtMost(most) => write!(f, "at most {}", shortest(most)),
+            Self::AtLeast(least) => write!(f, "at least {}", shortest(least)),
+            Self::Between(least, most) => write!(f, "{} to {}", shortest(least), shortest(most)),
         }
     }
+}
+
+/// A number that was chosen: no more digits than it has, four of those that are computed.
+fn shortest(value: f64) -> String {
+    let (chosen, computed) = (value.to_string(), Cell::Number(value).to_string());
+    if chosen.len() < computed.len() { chosen } else { computed }.replace('-', "−")
 }
 
 /// An exact number: a whole one as counts are written.
@@ -271,9 +277,9 @@ impl std::fmt::Display for Judged {
         }
         write!(f, ": {}", self.name)?;
         match self.found {
-            Some(found) if found.is_exact() => write!(f, ": {} where {} is wanted", number(found.value), self.bound)?,
-            Some(found) => write!(f, ": {} where {} is wanted", Cell::from(found), self.bound)?,
-            None => write!(f, ": {} is wanted", self.bound)?,
+            Some(found) if found.is_exact() => write!(f, ": {}; required: {}", number(found.value), self.bound)?,
+            Some(found) => write!(f, ": {}; required: {}", Cell::from(found), self.bound)?,
+            None => write!(f, ": required: {}", self.bound)?,
         }
         match (self.failing, self.noisy) {
             (0, 0) if self.rows > 1 => write!(f, ", {} rows", self.rows)?,

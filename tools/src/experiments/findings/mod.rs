@@ -55,33 +55,25 @@ pub struct Findings {
     pub plots: Vec<Plot>,
     /// Tables, in the order of the page.
     pub tables: Vec<Table>,
+    /// How it was measured, besides what each run says of itself.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub facts: Vec<String>,
 }
 
 impl Findings {
     /// A table of all columns, and verdicts.
     pub fn of<R: Sheet>(rows: &[R], criteria: &[Criterion<R>]) -> Self {
-        Self {
-            tables: if rows.is_empty() {
-                Vec::new()
-            } else {
-                vec![R::table(rows)]
-            },
-            ..Self::default()
-        }
-        .judged(rows, criteria)
+        Self::tabled(rows, R::table, criteria)
     }
 
     /// As [`Findings::of`], with the values of one field as heads: a line for each of the other keys, in the order in which they appear.
     pub fn pivoted<R: Sheet>(rows: &[R], across: &str, criteria: &[Criterion<R>]) -> Self {
-        Self {
-            tables: if rows.is_empty() {
-                Vec::new()
-            } else {
-                vec![R::pivoted(rows, across)]
-            },
-            ..Self::default()
-        }
-        .judged(rows, criteria)
+        Self::tabled(rows, |rows| R::pivoted(rows, across), criteria)
+    }
+
+    fn tabled<R: Sheet>(rows: &[R], table: impl Fn(&[R]) -> Table, criteria: &[Criterion<R>]) -> Self {
+        let table = (!rows.is_empty()).then(|| table(rows));
+        Self::from(Vec::from_iter(table)).judged(rows, criteria)
     }
 
     /// The same with verdicts on rows that stand in no table of their own.
@@ -178,6 +170,7 @@ impl Findings {
         self.verdicts.extend(other.verdicts);
         self.plots.extend(other.plots);
         self.tables.extend(other.tables);
+        self.facts.extend(other.facts);
         self
     }
 

@@ -24,7 +24,7 @@ runs an experiment and writes its page; `clerestory report --pages` writes all p
 /// The verdict on all criteria in some words; of an experiment that was not run, even what needs another machine is only that.
 pub fn verdict(found: &Findings, was_run: bool) -> String {
     if !was_run {
-        return "undecided: not run".into();
+        return "not run".into();
     }
     let count = |is: fn(&Verdict) -> bool| found.verdicts.iter().filter(|judged| is(&judged.verdict)).count();
     let all = found.verdicts.len();
@@ -71,7 +71,7 @@ pub fn of_all(root: &Path) -> Result<String> {
         text += &format!(
             "| [{}]({name}/README.md): {} | {} | {} | {date} |\n",
             name,
-            experiment.part().replace('|', "\\|"),
+            experiment.short_title().replace('|', "\\|"),
             verdict,
             headline(&found).replace('|', "\\|"),
         );
@@ -92,7 +92,7 @@ pub fn line(root: &Path, experiment: &Experiment, link: &str) -> Result<String> 
     };
     Ok(format!(
         "- [{}]({link}/{}/README.md): {}{number}",
-        experiment.part(),
+        experiment.short_title(),
         experiment.name,
         verdict(&found, stored.is_some())
     ))

@@ -55,13 +55,9 @@ pub fn write_all(root: &Path) -> Result<()> {
 fn list_and_quote(root: &Path) -> Result<()> {
     let folder = root.join(FOLDER);
     atomic::write(&folder.join(PAGE), list(root)?.as_bytes())?;
-    for (path, _) in QUOTING {
-        let path = root.join(path);
-        if path.exists() {
-            let (old, new) = quoted(root, &path)?;
-            if old != new {
-                atomic::write(&path, new.as_bytes())?;
-            }
+    for (path, old, new) in quotations(root)? {
+        if old != new {
+            atomic::write(&root.join(path), new.as_bytes())?;
         }
     }
     Ok(())
@@ -82,17 +78,11 @@ pub fn list(root: &Path) -> Result<String> {
 pub fn quotations(root: &Path) -> Result<Vec<(&'static str, String, String)>> {
     let there = QUOTING.iter().filter(|(path, _)| root.join(path).exists());
     there
-        .map(|(path, _)| {
-            let (old, new) = quoted(root, &root.join(path))?;
+        .map(|(path, link)| {
+            let file = root.join(path);
+            let old = std::fs::read_to_string(&file).map_err(|error| Error::io(&file, error))?;
+            let new = fill(&root.join(FOLDER), &old, link)?;
             Ok((*path, old, new))
         })
         .collect()
-}
-
-fn quoted(root: &Path, path: &Path) -> Result<(String, String)> {
-    let link = QUOTING.iter().find(|(known, _)| root.join(known) == path);
-    let link = link.map_or(FOLDER, |(_, link)| link);
-    let old = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
-    let new = fill(&root.join(FOLDER), &old, link)?;
-    Ok((old, new))
 }

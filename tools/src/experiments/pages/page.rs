@@ -61,7 +61,7 @@ fn page(experiment: &Experiment, stored: Option<&Stored>, found: &Findings, show
         let file = format!("{}.csv", index + 1);
         parts.push(if table.is_long {
             format!(
-                "### {}\n\n{} rows: [`{file}`]({file}).\n",
+                "## {}\n\n{} rows: [`{file}`]({file}).\n",
                 table.title,
                 table.rows.len()
             )
@@ -70,8 +70,14 @@ fn page(experiment: &Experiment, stored: Option<&Stored>, found: &Findings, show
         });
     }
     parts.extend(shown.iter().skip(1).cloned());
+    let systems = &experiment.systems;
+    parts.push(format!(
+        "Rows of the [catalogue](../../docs/catalogue.md) that it measures: {}. `clerestory list {}` names code, kernels, tests and sources.\n",
+        systems.join(", "),
+        systems[0]
+    ));
     parts.push(match stored {
-        Some(stored) => how_it_was_run(stored),
+        Some(stored) => how_it_was_run(stored, &found.facts),
         None => format!(
             "## How to run it\n\nIt was not run. The command is `clerestory report {} --results`.\n",
             experiment.name
@@ -81,7 +87,7 @@ fn page(experiment: &Experiment, stored: Option<&Stored>, found: &Findings, show
     parts.join("\n")
 }
 
-fn how_it_was_run(Stored { run, .. }: &Stored) -> String {
+fn how_it_was_run(Stored { run, .. }: &Stored, facts: &[String]) -> String {
     let device = if run.device.is_empty() { "none" } else { &run.device };
     let commit = if run.commit.is_empty() { "unknown" } else { &run.commit };
     let note = if run.commit.ends_with('+') {
@@ -90,9 +96,11 @@ fn how_it_was_run(Stored { run, .. }: &Stored) -> String {
         ""
     };
     let commit = commit.trim_end_matches('+');
+    let facts: String = facts.iter().map(|fact| format!("\n- {fact}")).collect();
+    let facts = if facts.is_empty() { facts } else { facts + "\n" };
     format!(
         "## How it was run\n\n`{}` took {:.0} seconds on {}, at commit {commit}{note}. Machine: {}, load average {} when it began and {} when it ended. \
-         Vulkan device: {device}. Numbers in brackets are the ends of intervals; all digits are in the CSV files, all rows in `{}`.\n",
+         Vulkan device: {device}. Numbers in brackets are the ends of intervals; all digits are in the CSV files, all rows in `{}`.\n{facts}",
         run.command,
         run.seconds,
         run.date,

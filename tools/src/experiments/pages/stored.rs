@@ -98,8 +98,9 @@ fn commit() -> String {
     let Some(name) = git(&["rev-parse", "--short", "HEAD"]) else {
         return String::new();
     };
-    // Results themselves are no change of what was run.
-    let changes = git(&["status", "--porcelain", "--untracked-files=no", "--", ".", ":!results"]);
+    // Results themselves, and pages that quote them, are no change of what was run.
+    let places = [".", ":!results", ":!*.md"];
+    let changes = git(&[&["status", "--porcelain", "--untracked-files=no", "--"][..], &places].concat());
     let mark = if changes.is_none_or(|changes| changes.is_empty()) {
         ""
     } else {
@@ -156,9 +157,13 @@ pub fn findings(experiment: &Experiment, stored: Option<&Stored>) -> Result<Find
         (Kind::Measure(name), None) => Ok((measures::find(name)?.declared)()),
         (Kind::Measure(name), Some(stored)) => (measures::find(name)?.read)(&stored.found.to_string()),
         (Kind::Sweep(_), None) => Ok(sweep_criteria::declared(experiment)),
-        (Kind::Sweep(_), Some(stored)) => {
+        (Kind::Sweep(sweep), Some(stored)) => {
             let results =
                 Results::deserialize(&stored.found).map_err(|cause| unreadable(Path::new(&experiment.name), &cause))?;
+            if results.sweep != *sweep {
+                let cause = "are of other pictures than the experiment's now: run it again";
+                return Err(Error::setting("results", &experiment.name, cause));
+            }
             Ok(sweep_criteria::findings(experiment, &results, &series::of(&results)))
         }
     }

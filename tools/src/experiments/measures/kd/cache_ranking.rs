@@ -28,7 +28,7 @@ pub const OF_ORDERS: &[Criterion<Order>] = &[
         |order: &Order| order.speed,
     )
     .among(|order| order.on_hardware)
-    .needs("a device of its own")
+    .needs("a GPU with memory of its own")
     .because("as by bytes"),
 ];
 

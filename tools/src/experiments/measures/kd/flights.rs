@@ -1,7 +1,7 @@
 //! Flights of a camera through the scenes that kd-trees are compared in, and the rays of their frames.
 //!
 //! Source of what the scenes stand for: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, table 2.1 and
-//! §4.1.4: five scenes, camera flights, up to four rays a pixel (camera, reflections at mirrors, a shadow ray from where each ends). The
+//! §4.1.4: five scenes, camera flights, up to four rays per pixel (camera, reflections at mirrors, a shadow ray from where each ends). The
 //! models but the first are not to be had by package; generated scenes of the same kind and number of triangles stand in for them.
 //!
 //! Guarantee: deterministic.
@@ -305,7 +305,7 @@ pub const TURNS: usize = 5;
 
 /// What a race found of one index.
 pub struct Raced {
-    /// Millions of rays a second: closest hits, any hits, both together.
+    /// Millions of rays per second: closest hits, any hits, both together.
     pub rates: [Repeats; 3],
     /// What the last of the timed turns found, closest hits and any hits.
     pub hits: [Vec<Hit>; 2],

@@ -79,7 +79,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.timed_different.into(),
     )
     .among(|row| !row.on_hardware)
-    .needs("a device whose division is exact")
+    .needs("a device with exact division, such as the software driver")
     .in_every_form(),
     Criterion::each(
         "changes of nodes, entries and bytes with another sign than the source's",
@@ -93,7 +93,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         Row::speed_to_its_side,
     )
     .among(|row| row.is_compared() && row.on_hardware)
-    .needs("a device of its own"),
+    .needs("a GPU with memory of its own"),
 ];
 
 impl Row {

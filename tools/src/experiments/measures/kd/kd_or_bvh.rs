@@ -1,4 +1,4 @@
-//! When a kd-tree is better than a bounding volume hierarchy: rays a second and builds of both, from few layers of triangles behind a pixel
+//! When a kd-tree is better than a bounding volume hierarchy: rays per second and builds of both, from few layers of triangles behind a pixel
 //! to many.
 //!
 //! Oracle: every index gives the same hits to the bit. The bounding volumes are the engine's best: binned surface area heuristic, and the
@@ -236,12 +236,12 @@ impl Study for Found {
         findings
             .and(Findings::of(&self.answers, OF_ANSWERS))
             .headline(
-                "rays a second of the best kd-tree over those of the best BVH, geometric mean over the scenes",
+                "rays per second of the best kd-tree over those of the best BVH, geometric mean over the scenes",
                 geometric_mean(self.answers.iter().map(|answer| answer.both.measured())),
             )
             .bars(
                 "ratio",
-                "Rays a second of the best kd-tree over those of the best BVH",
+                "Rays per second of the best kd-tree over those of the best BVH",
                 &self.answers,
                 |answer| ["both kinds of rays".into(), answer.scene.clone()],
                 |answer| answer.both.measured(),

@@ -54,7 +54,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.ratio.scaled(1.0 / row.published().unwrap_or(f64::NAN)).measured(),
     )
     .among(|row| row.published().is_some() && row.on_hardware)
-    .needs("a device with a scheduler of its own")
+    .needs("a GPU, whose scheduler is its own")
     .because("about, for a ratio: within a factor of 1.5 either way"),
 ];
 
@@ -112,12 +112,12 @@ impl Study for Found {
         let queues = self.iter().filter(|row| row.form == QUEUE);
         Findings::of(self, CRITERIA)
             .headline(
-                "rays a second by the queue over those by one thread per ray, geometric mean",
+                "rays per second by the queue over those by one thread per ray, geometric mean",
                 geometric_mean(queues.map(|row| row.ratio.measured())),
             )
             .bars(
                 "rates",
-                "Rays a second over those by one thread per ray",
+                "Rays per second over those by one thread per ray",
                 self,
                 |row| [row.scene.clone(), row.form.clone()],
                 |row| row.ratio.measured(),

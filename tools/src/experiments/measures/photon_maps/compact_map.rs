@@ -1,7 +1,7 @@
 //! Photon maps of compact pairs beside those of complete nodes: stack entries, bytes and time of a query, exact counts before times.
 //!
 //! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.4; bytes by its
-//! model in which every access is served by itself (§4.3.3): 32 bytes a node or compact pair, 4 a stack entry.
+//! model in which every access is served by itself (§4.3.3): 32 bytes per node or compact pair, 4 a stack entry.
 
 use clerestory::Result;
 use clerestory::accel::photon_map::compact_bvh::COMPACT_PAIR_BYTES;

@@ -62,7 +62,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| (&row.pass_ratio).into(),
     )
     .among(|row| row.on_hardware)
-    .needs("a device of its own")
+    .needs("a GPU with memory of its own")
     .because("what is built where it is used spares both copies"),
 ];
 

@@ -1,4 +1,4 @@
-//! Photons traced a second beside other renderers: Mitsuba 3's particle tracer and LuxCore's photon cache, on exported scenes, in turns.
+//! Photons traced per second beside other renderers: Mitsuba 3's particle tracer and LuxCore's photon cache, on exported scenes, in turns.
 //!
 //! Peers run in processes of their own through `tools/mitsuba/photons.py`, with the Python that has Mitsuba; one that is not there is left out,
 //! and a table says so.
@@ -50,7 +50,7 @@ const NEEDED: &str = "Mitsuba 3 or pyluxcore; see tools/mitsuba/README.md";
 
 rows! {
     /// A renderer on a scene.
-    struct Row = "Photons traced a second" by [scene, renderer] {
+    struct Row = "Photons traced per second" by [scene, renderer] {
         scene: String = "scene",
         renderer: String = "renderer",
         version: String = "version",
@@ -201,7 +201,7 @@ impl Study for Found {
             )
             .bars(
                 "rates",
-                "Thousand photons traced a second",
+                "Thousand photons traced per second",
                 &self.rates,
                 |row| [row.scene.clone(), row.renderer.clone()],
                 |row| row.rate.measured(),

@@ -87,7 +87,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| (&row.speed).into(),
     )
     .among(|row| row.builder == ON_DEVICE && row.by_hardware)
-    .needs("a device of its own"),
+    .needs("a GPU with memory of its own"),
 ];
 
 impl Study for Found {

@@ -1,6 +1,6 @@
-//! Persistent threads on a queue of rays beside one thread a ray: rates, exact work, and what the quotas of the queue cost.
+//! Persistent threads on a queue of rays beside one thread per ray: rates, exact work, and what the quotas of the queue cost.
 //!
-//! Oracle: the hits of one thread a ray, to the bit, and its work. Source of the comparison: "Interactive Manycore Photon Mapping", PhD
+//! Oracle: the hits of one thread per ray, to the bit, and its work. Source of the comparison: "Interactive Manycore Photon Mapping", PhD
 //! thesis, Trinity College Dublin, 2011, appendix A.1, whose trees by the surface area heuristic gave the persistent form a ratio of
 //! 0.9 on a trivial scene and of 1.9 to 2.4 on four others.
 
@@ -61,7 +61,7 @@ fn diffuse_rays(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
     .collect()
 }
 
-/// The forms, one thread a ray first, those with a queue tuned to the rays.
+/// The forms, one thread per ray first, those with a queue tuned to the rays.
 fn forms(gpu: &Gpu, index: &Bvh2, rays: &[Ray]) -> Result<Vec<Form>> {
     let threads = PersistentThreads::on(gpu.caps());
     let persistent = |subgroups: u32| {
@@ -111,10 +111,10 @@ rows! {
         form: String = "form",
         differ: u64 = "hits that differ",
         rate: Repeats = "rate (M rays/s)",
-        ratio: Repeats = "rate over one thread a ray's",
+        ratio: Repeats = "rate over one thread per ray's",
         nodes: f64 = "nodes per ray",
         triangles: f64 = "triangles per ray",
-        other_work: u64 = "nodes and triangles more or fewer than one thread a ray's",
+        other_work: u64 = "nodes and triangles more or fewer than one thread per ray's",
         groups: Option<u64> = "workgroups that stay",
         batches: u64 = "batches",
         dispatches: u64 = "dispatches",
@@ -133,7 +133,7 @@ const CRITERIA: &[Criterion<Row>] = &[
     )
     .in_every_form(),
     Criterion::each(
-        "a queue's rate is not below that of one thread a ray",
+        "a queue's rate is not below that of one thread per ray",
         Bound::AtLeast(1.0),
         |row: &Row| (&row.ratio).into(),
     )
@@ -145,7 +145,7 @@ impl Row {
         self.form != ONE_THREAD
     }
 
-    /// All but scene, kind and times of a form, beside what one thread a ray found.
+    /// All but scene, kind and times of a form, beside what one thread per ray found.
     fn of(form: &Form, traced: &Traced, first: &Traced, rays: usize) -> Self {
         let per_ray = |work: u64| work as f64 / rays.max(1) as f64;
         let differ = traced.hits.iter().zip(&first.hits).filter(|(a, b)| bits(a) != bits(b));
@@ -195,7 +195,7 @@ impl Study for Found {
         let queues = self.iter().filter(|row| row.has_queue());
         Findings::of(self, CRITERIA)
             .headline(
-                "rate by queues over one thread a ray's, geometric mean",
+                "rate by queues over one thread per ray's, geometric mean",
                 geometric_mean(queues.map(|row| row.ratio.measured())),
             )
             .note(
@@ -208,7 +208,7 @@ impl Study for Found {
             )
             .bars(
                 "ratio",
-                "Rate over that of one thread a ray",
+                "Rate over that of one thread per ray",
                 self,
                 |row| [format!("{}, {} rays", row.scene, row.kind), row.form.clone()],
                 |row| row.ratio.measured(),

@@ -82,14 +82,14 @@ const OF_AGREEMENT: &[Criterion<Agreement>] = &[
     )
     .needs(MITSUBA),
     Criterion::all(
-        "scenes do not call for another look: the share of those that do",
+        "few scenes look suspicious: the share of those that do",
         Bound::AtMost(0.02),
         |rows: &[&Agreement]| {
             let calls: u64 = rows.iter().map(|row| row.second_looks).sum();
             (!rows.is_empty()).then(|| (calls as f64 / rows.len() as f64).into())
         },
     )
-    .because("chance has blocks or the bias of one scene in a hundred call, each")
+    .because("by chance one scene in a hundred does by its blocks, and one by its bias")
     .needs(MITSUBA),
 ];
 
@@ -159,7 +159,7 @@ impl Found {
     fn of(report: &AgreementReport) -> Self {
         let options = &report.options;
         let compared = format!(
-            "{0} × {0} pixels, {1} samples a pixel on both sides, {2}. Every value is tested at a significance of {SIGNIFICANCE} for the whole \
+            "{0} × {0} pixels, {1} samples per pixel on both sides, {2}. Every value is tested at a significance of {SIGNIFICANCE} for the whole \
              picture. A rejected 8 × 8 block or |bias z| above {BIAS_Z_MAX} calls for another look.",
             options.size,
             options.passes * options.samples_per_pass,

@@ -117,7 +117,7 @@ impl Study for Found {
     }
 }
 
-/// Times of forms, ns a sample.
+/// Times of forms, ns per sample.
 fn times(context: &Context<'_>, forms: &[Form], samples: &[f32]) -> Result<Vec<Repeats>> {
     let times = context.in_turns(9, forms.len(), |i| {
         let all = nanoseconds_once(&[samples], |samples| (forms[i].1)(samples));

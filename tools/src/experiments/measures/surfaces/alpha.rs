@@ -42,7 +42,7 @@ rows! {
         error: f64 = "error over what is behind",
         z: f64 = "z",
         variance: f64 = "variance over the binomial one",
-        rays: f64 = "rays a sample",
+        rays: f64 = "rays per sample",
         samples: u64 = "samples",
         time: f64 = "GPU time of a sample (ns)",
     }

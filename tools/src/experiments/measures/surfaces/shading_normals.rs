@@ -129,7 +129,7 @@ rows! {
         through: f64 = "greatest share of light through the surface",
         scattered_up: f64 = "greatest share of a beam that is scattered up",
         views: u64 = "views",
-        samples: u64 = "samples a view",
+        samples: u64 = "samples per view",
         time: Repeats = "a normal (ns)",
     }
 }
