@@ -672,7 +672,7 @@ fn a_report_has_a_table_for_its_scene() -> Tested {
     succeed(&arguments)?;
     let written = std::fs::read_to_string(out.join("error-against-time-smoke/report.md"))?;
     assert!(
-        written.contains("### `builtin:cornell-box` (38 triangles)") && written.contains("Smoke run"),
+        written.contains("## `builtin:cornell-box` (38 triangles)") && written.contains("Smoke run"),
         "{written}"
     );
     // Two variants, budgets of 2, 8 and 32 samples.

@@ -61,6 +61,11 @@ pub struct Reading {
 }
 
 impl Reading {
+    /// The budgets that it was read off between, by index; of a bound twice the same.
+    pub fn budgets(&self) -> [usize; 2] {
+        self.between
+    }
+
     /// What the error costs on a curve of the same budgets from fewer repeats, by the straight line through the same two of them: how the cost
     /// changes with the curve, for which that line goes on beyond both. Not a number where one of their errors has no logarithm.
     pub fn on(&self, curve: &[(f64, f64)], error: f64) -> f64 {

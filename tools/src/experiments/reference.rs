@@ -13,7 +13,6 @@ use clerestory::render::Rendered;
 use clerestory::{Error, Result};
 
 use super::fingerprint::{self, Fingerprint};
-use super::measures::context::short_name;
 
 /// Far from the seeds of measured pictures.
 pub const SEED: u32 = 1_000_003;
@@ -63,6 +62,11 @@ impl Identity<'_> {
         let name = format!("{}-{width}x{height}-{}-{}.exr", slug(address), self.spp, &key[..DIGITS]);
         Ok(folder.join(name))
     }
+}
+
+/// An address without the word that all generated scenes begin with.
+pub fn short_name(address: &str) -> &str {
+    address.strip_prefix("builtin:").unwrap_or(address)
 }
 
 /// A name for files, with the letters and digits of an address.
@@ -180,6 +184,7 @@ mod tests {
         let path = identity
             .path(Path::new("r"), "builtin:cornell-box?light=1,2,3")
             .unwrap();
+        assert_eq!(short_name("builtin:ring?roughness=0.2"), "ring?roughness=0.2");
         let start = "r/cornell-box-light-1-2-3-8x8-64-";
         assert!(path.to_string_lossy().starts_with(start), "{path:?}");
     }

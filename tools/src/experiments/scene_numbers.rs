@@ -1,5 +1,5 @@
 //! Numbers of a scene that criteria judge, each in the interval by the jackknife over the repeats ([`super::jackknife`]), whose seeds are common to all
-//! variants; of seconds alone, in that of their ratios turn by turn.
+//! variants, and by the noise of the reference, which all repeats share; of seconds alone and of fronts, in that of what each repeat gives by itself.
 //!
 //! What a variant has no number for, since it could not render the scene or its error has no logarithm, is not a number, which no bound holds.
 
@@ -7,11 +7,11 @@ use super::equal_error::{self, Cost, Reading};
 use super::findings::{Measured, Repeats};
 use super::jackknife::{self, mean_without};
 use super::measurement::Measurement;
-use super::measures::context::short_name;
 use super::pareto;
+use super::reference::short_name;
 use super::results::{Point, SceneResults, VariantResults};
-use super::series::{fall, time_and_error};
-use super::slope::stands_out;
+use super::series::fall;
+use super::slope::{at_most, stands_out};
 use super::sweep::Sweep;
 use super::sweep_criteria::{Kind, OnFront};
 
@@ -51,6 +51,16 @@ impl<'a> Scene<'a> {
         found.into_iter().map(row).collect()
     }
 
+    /// How many pixels and samples of all pictures are not finite, with the name of the row; `None` without pictures. A pixel that its picture's error
+    /// leaves out counts in both of a measurement's numbers.
+    pub fn not_finite(&self) -> Option<(String, Measured)> {
+        let points = self.results.variants.iter().flat_map(|variant| &variant.points);
+        let mut measurements = points.flat_map(|point| &point.measurements).peekable();
+        measurements.peek()?;
+        let count: u64 = measurements.map(|one| one.non_finite + one.error.skipped).sum();
+        Some((format!("`{}`", short_name(&self.results.address)), count.into()))
+    }
+
     fn variant(&self, name: &str) -> Option<&'a VariantResults> {
         self.results.variants.iter().find(|variant| variant.name == name)
     }
@@ -64,34 +74,38 @@ impl<'a> Scene<'a> {
 
     fn slope(&self, variant: &str, from: f64) -> Option<Measured> {
         let fit = fall(self.variant(variant)?, from)?;
-        let error = jackknife::standard_error(&fit.without);
-        Some(Measured::within(fit.value, jackknife::margin(error, fit.without.len())))
+        Some(jackknife::measured(fit.without.len(), fit.by_reference, |left_out| {
+            left_out.map_or(fit.value, |repeat| fit.without[repeat])
+        }))
     }
 
     fn slope_below(&self, of: &str, below: &str) -> Option<Measured> {
         let (a, b) = (fall(self.variant(of)?, 0.0)?, fall(self.variant(below)?, 0.0)?);
         let differences: Vec<f64> = a.without.iter().zip(&b.without).map(|(a, b)| a - b).collect();
-        let of_all = a.value - b.value;
-        Some(jackknife::measured(differences.len(), 0.0, |left_out| {
+        let (of_all, by_reference) = (a.value - b.value, a.by_reference - b.by_reference);
+        Some(jackknife::measured(differences.len(), by_reference, |left_out| {
             left_out.map_or(of_all, |repeat| differences[repeat])
         }))
     }
 
-    /// A cost that is only bounded leaves one end of the ratio open.
+    /// Each replicate has the best variants of its own, all at the error that both sides reach with all repeats. A cost that is only bounded leaves one end
+    /// of the ratio open. `None` where one of the variants could not render the scene: a side that lacks one is not the side that is meant.
     fn speed_up(&self, of: &[String], over: &[String]) -> Option<Measured> {
-        let side = |names: &[String]| -> Vec<Curve<'a>> {
-            let known = names.iter().filter_map(|name| self.variant(name));
-            known.map(Curve::of).collect()
+        let side = |names: &[String]| -> Option<Vec<Curve<'a>>> {
+            names.iter().map(|name| Curve::of(self.variant(name)?)).collect()
         };
-        let (of, over) = (side(of), side(over));
-        let reached = |side: &[Curve<'_>]| side.iter().filter_map(Curve::least).reduce(f64::min);
-        let target = reached(&of)?.max(reached(&over)?);
-        let (of, over) = (Best::of(&of, target)?, Best::of(&over, target)?);
-        let repeats = of.curve.repeats().min(over.curve.repeats());
-        let logarithm = jackknife::measured(repeats, 0.0, |left_out| {
-            (over.cost(target, left_out) / of.cost(target, left_out)).ln()
-        });
-        let Measured { value, low, high } = exponential(logarithm);
+        let (of, over) = (side(of)?, side(over)?);
+        let points = || of.iter().chain(&over).flat_map(|curve| curve.points);
+        let repeats = points().map(|point| point.measurements.len()).min()?;
+        let by_reference = points().map(reference_error).fold(0.0, f64::max);
+        let least = |side: &[Curve<'_>]| side.iter().filter_map(Curve::least).reduce(f64::min);
+        let target = least(&of)?.max(least(&over)?);
+        let (of, over) = (Side::of(&of, target)?, Side::of(&over, target)?);
+        let logarithm =
+            |left_out: Option<usize>, added: f64| (over.cost(left_out, added) / of.cost(left_out, added)).ln();
+        let shared = logarithm(None, by_reference) - logarithm(None, 0.0);
+        let found = jackknife::measured(repeats, shared, |left_out| logarithm(left_out, 0.0));
+        let Measured { value, low, high } = exponential(found);
         Some(Measured {
             value,
             low: if over.is_at_most { 0.0 } else { low },
@@ -101,9 +115,8 @@ impl<'a> Scene<'a> {
 
     fn error(&self, of: &str, over: &str, budget: Option<f64>) -> Option<Measured> {
         let points = [self.point(of, budget)?, self.point(over, budget)?];
-        let all = || points.iter().flat_map(|point| &point.measurements);
-        let by_reference = all().map(|one| one.error.reference_relative_error).fold(0.0, f64::max);
-        let [a, b] = points.map(|point| values(point, |one| one.error.relative_mse));
+        let by_reference = points.map(reference_error).into_iter().fold(0.0, f64::max);
+        let [a, b] = points.map(relative_mse);
         Some(ratio(&a, &b, by_reference))
     }
 
@@ -124,7 +137,7 @@ impl<'a> Scene<'a> {
         ))
     }
 
-    /// Fronts have no deviation: from the least to the greatest of what they are without one of the repeats.
+    /// A front has no deviation: each repeat has one of its own, and what is measured is the median.
     fn front(&self, on: OnFront<'_>) -> Option<Measured> {
         let points: Vec<(usize, &Point)> = self
             .results
@@ -134,10 +147,12 @@ impl<'a> Scene<'a> {
             .flat_map(|(variant, results)| results.points.iter().map(move |point| (variant, point)))
             .collect();
         let repeats = points.iter().map(|(_, point)| point.measurements.len()).min()?;
-        let without = |left_out: Option<usize>| {
+        let of_repeat = |repeat: usize| {
+            // An MSE that noise has brought below 0 has no root and is the least there is.
             let at: Vec<(f64, f64)> = points
                 .iter()
-                .map(|(_, point)| time_and_error(point, left_out))
+                .map(|(_, point)| &point.measurements[repeat])
+                .map(|one| (one.seconds, one.error.relative_mse))
                 .collect();
             let on_front = pareto::front(&at).into_iter().zip(&points).zip(&at);
             let on_front = on_front.filter(|((on_front, _), _)| *on_front);
@@ -146,15 +161,7 @@ impl<'a> Scene<'a> {
                 &on_front.map(|((_, point), at)| (point.0, at.0)).collect::<Vec<_>>(),
             )
         };
-        let all: Vec<f64> = (0..repeats).map(|repeat| without(Some(repeat))).collect();
-        let value = without(None);
-        let ends = if repeats < 2 {
-            [f64::NEG_INFINITY, f64::INFINITY]
-        } else {
-            [f64::min, f64::max].map(|end| all.iter().copied().fold(value, end))
-        };
-        let [low, high] = ends;
-        Some(Measured { value, low, high })
+        Some((0..repeats).map(of_repeat).collect::<Repeats>().measured())
     }
 
     /// Of a front's points, each a variant with its seconds.
@@ -202,6 +209,16 @@ fn values(point: &Point, of: impl Fn(&Measurement) -> f64) -> Vec<f64> {
     point.measurements.iter().map(of).collect()
 }
 
+fn relative_mse(point: &Point) -> Vec<f64> {
+    values(point, |one| one.error.relative_mse)
+}
+
+/// The standard error that the reference's noise gives a budget's relative MSE.
+fn reference_error(point: &Point) -> f64 {
+    let errors = point.measurements.iter().map(|one| one.error.reference_relative_error);
+    errors.fold(0.0, f64::max)
+}
+
 fn exponential(logarithm: Measured) -> Measured {
     Measured {
         value: logarithm.value.exp(),
@@ -232,66 +249,81 @@ fn ratio(a: &[f64], b: &[f64], by_reference: f64) -> Measured {
     }
 }
 
-/// Seconds and relative RMSE of a variant, at the budgets whose error has a logarithm.
+/// Seconds and relative RMSE of a variant by rising budget.
 struct Curve<'a> {
-    points: Vec<&'a Point>,
+    points: &'a [Point],
+    /// Of each budget whose error is lost in noise, the most that its MSE may be.
+    lost: Vec<Option<f64>>,
     of_all: Vec<(f64, f64)>,
 }
 
 impl<'a> Curve<'a> {
-    fn of(variant: &'a VariantResults) -> Self {
-        let finite = |point: &&Point| time_and_error(point, None).1.is_finite();
-        let points: Vec<&Point> = variant.points.iter().filter(finite).collect();
-        let of_all = points.iter().map(|point| time_and_error(point, None)).collect();
-        Self { points, of_all }
+    /// `None` of a variant that could not render the scene.
+    fn of(variant: &'a VariantResults) -> Option<Self> {
+        if variant.refused.is_some() || variant.points.is_empty() {
+            return None;
+        }
+        let lost = |point: &Point| {
+            let (mse, by_reference) = (relative_mse(point), reference_error(point));
+            (!stands_out(&mse, by_reference)).then(|| at_most(&mse, by_reference))
+        };
+        let mut curve = Self {
+            points: &variant.points,
+            lost: variant.points.iter().map(lost).collect(),
+            of_all: Vec::new(),
+        };
+        curve.of_all = curve.at(None, 0.0);
+        Some(curve)
+    }
+
+    /// Without one of the repeats, with so much added to every MSE; geometric means of seconds, since the jackknife fails for medians. A budget that is
+    /// lost in noise has the most that its error may be: what is read off beside it is the most that the error may cost.
+    fn at(&self, left_out: Option<usize>, added: f64) -> Vec<(f64, f64)> {
+        let of_budget = |(point, lost): (&Point, &Option<f64>)| {
+            let seconds = mean_without(&values(point, |one| one.seconds.ln()), left_out).exp();
+            let mse = lost.unwrap_or_else(|| mean_without(&relative_mse(point), left_out) + added);
+            (seconds, mse.sqrt())
+        };
+        self.points.iter().zip(&self.lost).map(of_budget).collect()
     }
 
     fn least(&self) -> Option<f64> {
         self.of_all.iter().map(|point| point.1).reduce(f64::min)
     }
-
-    fn repeats(&self) -> usize {
-        let counts = self.points.iter().map(|point| point.measurements.len());
-        counts.min().unwrap_or(0)
-    }
 }
 
-/// The variant of a side that reaches an error first.
-struct Best<'a> {
-    curve: &'a Curve<'a>,
-    reading: Reading,
-    /// Whether one of the side may have reached it earlier, below its least budget.
+/// The variants of a side that reach an error.
+struct Side<'a> {
+    readings: Vec<(&'a Curve<'a>, Reading)>,
+    error: f64,
+    /// Whether one of the side may have reached it earlier: below its least budget, or beside one that is lost in noise.
     is_at_most: bool,
 }
 
-impl<'a> Best<'a> {
-    fn of(side: &'a [Curve<'a>], error: f64) -> Option<Self> {
-        let readings: Vec<(&Curve<'_>, Reading)> = side
-            .iter()
-            .filter_map(|curve| Some((curve, equal_error::read(&curve.of_all, error)?)))
-            .filter(|(_, reading)| !matches!(reading.cost, Cost::Above(_)))
-            .collect();
-        let is_at_most = readings
-            .iter()
-            .any(|(_, reading)| matches!(reading.cost, Cost::AtMost(_)));
-        let (curve, reading) = readings
-            .into_iter()
-            .min_by(|(_, a), (_, b)| a.cost.number().total_cmp(&b.cost.number()))?;
+impl<'a> Side<'a> {
+    fn of(curves: &'a [Curve<'a>], error: f64) -> Option<Self> {
+        let read = |curve: &'a Curve<'a>| Some((curve, equal_error::read(&curve.of_all, error)?));
+        let mut readings = curves.iter().map(read).collect::<Option<Vec<_>>>()?;
+        let is_at_most = readings.iter().any(|(curve, reading)| {
+            let is_lost = reading.budgets().iter().any(|budget| curve.lost[*budget].is_some());
+            is_lost || matches!(reading.cost, Cost::AtMost(_))
+        });
+        readings.retain(|(_, reading)| !matches!(reading.cost, Cost::Above(_)));
         Some(Self {
-            curve,
-            reading,
+            readings,
+            error,
             is_at_most,
         })
     }
 
-    fn cost(&self, error: f64, left_out: Option<usize>) -> f64 {
-        let curve: Vec<(f64, f64)> = self
-            .curve
-            .points
+    /// Seconds of the variant that reaches it first; not a number where one of them has none.
+    fn cost(&self, left_out: Option<usize>, added: f64) -> f64 {
+        let costs = self
+            .readings
             .iter()
-            .map(|point| time_and_error(point, left_out))
-            .collect();
-        self.reading.on(&curve, error)
+            .map(|(curve, reading)| reading.on(&curve.at(left_out, added), self.error));
+        let less = |a: f64, b: f64| if a.is_nan() || a < b { a } else { b };
+        costs.reduce(less).unwrap_or(f64::NAN)
     }
 }
 
@@ -368,6 +400,14 @@ pub(super) mod tests {
         assert!(ends.iter().all(|off| off.abs() < 1e-9), "{found:?}: {value} ± {margin}");
     }
 
+    /// As far as the reference's noise lets it, which is 1e-6 of the MSEs here at most.
+    #[track_caller]
+    fn nearly(found: Measured, value: f64) {
+        let ends = [found.low, found.high].map(|end| (end - value).abs());
+        let is_near = (found.value - value).abs() < 1e-9 && ends.iter().all(|off| *off < 1e-5 * value.abs().max(0.1));
+        assert!(is_near, "{found:?}: {value}");
+    }
+
     #[test]
     fn exact_power_laws_give_exact_numbers() {
         let results = scene(vec![
@@ -375,17 +415,15 @@ pub(super) mod tests {
             variant("b", 5, |n, _| (0.05 * n, 1.0 / n)),
             variant("c", 5, |n, _| (0.1 * n, 4.0 * n.powf(-1.5))),
         ]);
-        near(number(&results, "slope = { of = \"a\" }"), -0.5, 0.0);
-        near(number(&results, "slope = { of = \"c\", from = 16 }"), -0.75, 0.0);
-        near(
-            number(&results, "slope_below = { of = \"c\", below = \"a\" }"),
-            -0.25,
-            0.0,
-        );
+        // Of MSEs of 1/2, 1/8 and 1/32 at work of 4, 16 and 64 an addition changes the slope by (16 − 1) / (2 ln 4).
+        let margin = 2.776 * 2e-9 * 7.5 / 4.0f64.ln();
+        near(number(&results, "slope = { of = \"a\" }"), -0.5, margin);
+        nearly(number(&results, "slope = { of = \"c\", from = 16 }"), -0.75);
+        nearly(number(&results, "slope_below = { of = \"c\", below = \"a\" }"), -0.25);
         near(number(&results, "speed_up = { of = \"b\", over = \"a\" }"), 2.0, 0.0);
         // The best of both sides, b and, at an MSE of 1/64, c: after (4 · 64)^(2/3) samples.
         let best = number(&results, "speed_up = { of = [\"a\", \"b\"], over = [\"c\"] }");
-        near(best, 256.0f64.powf(2.0 / 3.0) / 32.0, 0.0);
+        nearly(best, 256.0f64.powf(2.0 / 3.0) / 32.0);
         // MSEs of 1/64 and 1/32, of which the reference may have 2e-9 each.
         let margin = 0.5 * 2.776 * 2e-9 * (64.0 - 32.0);
         near(number(&results, "error = { of = \"c\", over = \"a\" }"), 0.5, margin);
@@ -410,12 +448,8 @@ pub(super) mod tests {
             variant("a", 5, |n, seed| (n * by_seed(seed), by_seed(seed) / n)),
             variant("b", 5, |n, seed| (0.5 * n * by_seed(seed), 2.0 * by_seed(seed) / n)),
         ]);
-        near(number(&results, "slope = { of = \"a\" }"), -0.5, 0.0);
-        near(
-            number(&results, "slope_below = { of = \"a\", below = \"b\" }"),
-            0.0,
-            0.0,
-        );
+        nearly(number(&results, "slope = { of = \"a\" }"), -0.5);
+        nearly(number(&results, "slope_below = { of = \"a\", below = \"b\" }"), 0.0);
         let error = number(&results, "error = { of = \"b\", over = \"a\" }");
         assert!(
             (error.value - 2.0).abs() < 1e-9 && error.high - error.low < 1e-6,
@@ -472,12 +506,12 @@ pub(super) mod tests {
         ]);
         let faster = number(&results, "speed_up = { of = \"a\", over = \"b\" }");
         assert!(
-            (faster.value - 16.0).abs() < 1e-9 && (faster.low - 16.0).abs() < 1e-9,
+            (faster.value - 16.0).abs() < 1e-9 && (faster.low - 16.0).abs() < 1e-4,
             "{faster:?}"
         );
         assert_eq!(faster.high, f64::INFINITY);
         let slower = number(&results, "speed_up = { of = \"b\", over = \"a\" }");
-        assert!((slower.high - 1.0 / 16.0).abs() < 1e-9, "{slower:?}");
+        assert!((slower.high - 1.0 / 16.0).abs() < 1e-6, "{slower:?}");
         assert_eq!(slower.low, 0.0);
     }
 
@@ -516,6 +550,7 @@ pub(super) mod tests {
         for kind in [
             "slope = { of = \"b\" }",
             "speed_up = { of = \"b\", over = \"a\" }",
+            "speed_up = { of = \"a\", over = [\"a\", \"b\"] }",
             "error = { of = \"a\", over = \"b\" }",
             "seconds = { of = \"a\", over = \"b\" }",
             "bias = { of = \"b\" }",
@@ -523,12 +558,57 @@ pub(super) mod tests {
         ] {
             assert!(number(&results, kind).value.is_nan(), "{kind}");
         }
-        let best = number(&results, "speed_up = { of = \"a\", over = [\"a\", \"b\"] }");
-        assert_eq!(best.value, 1.0, "the others of a side stand for it");
     }
 
     #[test]
-    fn fronts_are_counted_without_each_of_the_repeats() {
+    fn seconds_to_equal_error_are_geometric_means() {
+        let results = scene(vec![
+            variant("a", 5, |n, seed| (if seed == 4 { 16.0 * n } else { n }, 1.0 / n)),
+            variant("b", 5, |n, _| (n, 1.0 / n)),
+        ]);
+        let found = number(&results, "speed_up = { of = \"b\", over = \"a\" }");
+        assert!((found.value - 16.0f64.powf(0.2)).abs() < 1e-9, "{found:?}");
+        // Logarithms of 0, 0, 0, 0 and ln 16 have a deviation of ln 16 / √5, their mean a fifth of ln 16.
+        let margin = 2.776 * 0.2 * 16.0f64.ln();
+        assert!(((found.high / found.value).ln() - margin).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn each_replicate_has_its_own_best_variant() {
+        let results = scene(vec![
+            variant("a", 5, |n, seed| (if seed == 4 { 2.0 * n } else { n }, 1.0 / n)),
+            variant("b", 5, |n, _| (1.15 * n, 1.0 / n)),
+            variant("c", 5, |n, _| (n, 1.0 / n)),
+        ]);
+        let found = number(&results, "speed_up = { of = \"c\", over = [\"a\", \"b\"] }");
+        assert!((found.value - 2.0f64.powf(0.2)).abs() < 1e-9, "{found:?}");
+        // Without the slow repeat it is a, without any other, when a takes 2^(1/4), it is b: four times ln 1.15 and once 0.
+        let margin = 2.776 * 0.8 * 1.15f64.ln();
+        assert!(((found.high / found.value).ln() - margin).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn a_budget_that_is_lost_in_noise_has_reached_what_it_may_be_at_most() {
+        let lost = [3e-3, -2e-3, 1e-3, -3e-3, 1e-3];
+        let results = scene(vec![
+            variant("a", 5, |n, seed| {
+                (n, if n > 16.0 { lost[seed as usize] } else { 1.0 / n })
+            }),
+            variant("b", 5, |n, _| (n, 1.0 / n)),
+        ]);
+        // The lost MSE is at most three standard errors, 2 · 3 · √(24e-6 / 4 / 5), below b's least of 1/32: after at most 64 samples, and on a straight
+        // line through 1/8 after 16, after 30.7.
+        let most = 6.0 * 1.2e-6f64.sqrt();
+        let expected = 4.0f64.powf(1.0 - 4.0f64.ln() / (0.125 / most).ln());
+        let faster = number(&results, "speed_up = { of = \"a\", over = \"b\" }");
+        assert!((faster.value - expected).abs() < 1e-5 && expected > 2.0, "{faster:?}");
+        assert!(faster.low > 2.0 && faster.high == f64::INFINITY, "{faster:?}");
+        let slower = number(&results, "speed_up = { of = \"b\", over = \"a\" }");
+        assert!(slower.low == 0.0 && slower.high < 0.5, "{slower:?}");
+    }
+
+    #[test]
+    fn each_repeat_has_a_front_of_its_own() {
         let results = scene(vec![
             variant("a", 5, |n, _| (0.01 * n, 100.0 / n)),
             variant("b", 5, |n, _| (1.0 * n, 3.0 / n)),
@@ -555,6 +635,12 @@ pub(super) mod tests {
         let mut odd = results.clone();
         odd.variants[1].points[0].measurements[3].error.relative_mse = 1e3;
         let share = number(&odd, "front = { of = \"b\" }");
-        assert_eq!([share.value, share.low, share.high], [2.0 / 8.0, 2.0 / 8.0, 3.0 / 9.0]);
+        assert_eq!([share.value, share.low, share.high], [3.0 / 9.0, 2.0 / 8.0, 3.0 / 9.0]);
+        // What noise brings below 0 stays on it.
+        let mut low = results.clone();
+        for one in &mut low.variants[2].points[2].measurements {
+            one.error.relative_mse = -1e-9;
+        }
+        near(number(&low, "front = { of = \"c\" }"), 1.0 / 3.0, 0.0);
     }
 }

@@ -1,7 +1,8 @@
 //! Convergence slopes: the exponent p of error ∝ work^p, fitted on logarithms, with its standard error from independent repeats.
 //!
 //! The fit is ordinary least squares through (ln work, ln RMSE), where RMSE is the root of the mean of the repeats' MSEs: those are unbiased,
-//! their logarithms and roots are not. The standard error is the jackknife over the repeats ([`super::jackknife`]).
+//! their logarithms and roots are not. The standard error is the jackknife over the repeats ([`super::jackknife`]), and what the reference's noise,
+//! which all budgets share, changes in the fit.
 //! Near the noise only fluctuations upwards have a logarithm, and a fit through those is too flat. A budget counts where its mean MSE is
 //! above [`SIGNIFICANT`] standard errors of it: those of the repeats and of the reference's noise, which all repeats share. The budgets that
 //! count are chosen once and serve every replicate of the jackknife.
@@ -18,7 +19,7 @@ pub const SIGNIFICANT: f64 = 3.0;
 pub struct Slope {
     /// The exponent: −½ for RMSE against independent samples.
     pub value: f64,
-    /// Its standard error; `None` for fewer than two repeats.
+    /// Its standard error, by the repeats and by the reference's noise; `None` for fewer than two repeats.
     pub standard_error: Option<f64>,
     /// Budgets that were fitted.
     pub budgets: usize,
@@ -38,13 +39,24 @@ pub fn least_squares(points: &[(f64, f64)]) -> Option<f64> {
     (points.len() >= 2 && xx > 0.0).then(|| xy / xx)
 }
 
-/// Whether the mean of repeats' MSEs is above [`SIGNIFICANT`] standard errors of it, of which the reference's noise has `reference_error`; that by a
-/// single repeat is not known and counts as 0.
-pub fn stands_out(mse: &[f64], reference_error: f64) -> bool {
-    let mean = mean_without(mse, None);
+/// The mean of repeats' MSEs and its standard error, of which the reference's noise has `reference_error`; that by a single repeat is not known and
+/// counts as 0.
+fn mean_and_error(mse: &[f64], reference_error: f64) -> (f64, f64) {
     let without: Vec<f64> = (0..mse.len()).map(|repeat| mean_without(mse, Some(repeat))).collect();
     let by_repeats = jackknife::standard_error(&without).unwrap_or(0.0);
-    mean > 0.0 && mean > SIGNIFICANT * by_repeats.hypot(reference_error)
+    (mean_without(mse, None), by_repeats.hypot(reference_error))
+}
+
+/// Whether the mean of repeats' MSEs is above [`SIGNIFICANT`] standard errors of it, of which the reference's noise has `reference_error`.
+pub fn stands_out(mse: &[f64], reference_error: f64) -> bool {
+    let (mean, error) = mean_and_error(mse, reference_error);
+    mean > 0.0 && mean > SIGNIFICANT * error
+}
+
+/// The most that an MSE may be: [`SIGNIFICANT`] standard errors above the mean of its repeats, where that is above 0, else above 0.
+pub fn at_most(mse: &[f64], reference_error: f64) -> f64 {
+    let (mean, error) = mean_and_error(mse, reference_error);
+    mean.max(0.0) + SIGNIFICANT * error
 }
 
 /// A fitted exponent with those without each of the repeats.
@@ -54,6 +66,8 @@ pub struct Fit {
     pub value: f64,
     /// Without each of them; what cannot be fitted is not a number.
     pub without: Vec<f64>,
+    /// What one standard error of the reference's noise, which raises all budgets' MSEs together, changes in it.
+    pub by_reference: f64,
     /// Budgets that were fitted.
     pub budgets: usize,
     /// Budgets left out since their error does not stand out from the noise.
@@ -76,8 +90,12 @@ impl Fit {
             let point = |(work, mse): &(f64, &[f64])| (work.ln(), 0.5 * mean_without(mse, left_out).ln());
             least_squares(&counting.iter().map(point).collect::<Vec<_>>())
         };
+        // The fit is linear in the logarithms: their derivatives with respect to what is added to all MSEs have the slope's.
+        let derivative = |(work, mse): &(f64, &[f64])| (work.ln(), 0.5 / mean_without(mse, None));
+        let derivatives: Vec<(f64, f64)> = counting.iter().map(derivative).collect();
         Some(Self {
             value: slope_without(None)?,
+            by_reference: reference_error * least_squares(&derivatives)?,
             without: (0..repeats)
                 .map(|repeat| slope_without(Some(repeat)).unwrap_or(f64::NAN))
                 .collect(),
@@ -90,7 +108,7 @@ impl Fit {
     pub fn slope(&self) -> Slope {
         Slope {
             value: self.value,
-            standard_error: jackknife::standard_error(&self.without),
+            standard_error: jackknife::standard_error(&self.without).map(|error| error.hypot(self.by_reference)),
             budgets: self.budgets,
             hidden: self.hidden,
             repeats: self.without.len(),
@@ -186,6 +204,22 @@ mod tests {
         // The reference's noise hides what its repeats agree on.
         assert_eq!(fit(&[1.0, 4.0, 16.0], &mse, 0.1).map(|slope| slope.hidden), None);
         assert_eq!(fit(&[1.0, 4.0, 16.0], &mse, 0.05).map(|slope| slope.hidden), Some(1));
+    }
+
+    #[test]
+    fn the_noise_of_the_reference_is_part_of_the_standard_error() {
+        // Slope ½ (ln b − ln a) / ln 4, of which an addition to both changes ½ (1 / b − 1 / a) / ln 4.
+        let found = fit(&[1.0, 4.0], &[vec![1.0; 3], vec![0.25; 3]], 0.01).unwrap();
+        let expected = 0.5 * (4.0 - 1.0) * 0.01 / 4.0f64.ln();
+        assert!((found.standard_error.unwrap() - expected).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn what_is_lost_has_an_end_above() {
+        // Two values that differ by 0.2 have a standard error of 0.1.
+        assert!((at_most(&[0.0, 0.2], 0.0) - 0.4).abs() < 1e-12);
+        assert!((at_most(&[-0.3, -0.1], 0.0) - 0.3).abs() < 1e-12);
+        assert!((at_most(&[0.0, 0.0], 0.1) - 0.3).abs() < 1e-12);
     }
 
     #[test]

@@ -43,22 +43,12 @@ pub fn facts(results: &Results) -> Vec<String> {
         .as_ref()
         .filter(|_| results.measured > 0)
         .map_or(String::new(), |load| format!("; load average {load} when it began"));
-    let measurements = || {
-        let variants = results.scenes.iter().flat_map(|scene| &scene.variants);
-        variants
-            .flat_map(|variant| &variant.points)
-            .flat_map(|point| &point.measurements)
-    };
-    let skipped: u64 = measurements().map(|one| one.error.skipped).sum();
-    if skipped > 0 {
-        let pictures = measurements().filter(|one| one.error.skipped > 0).count();
-        facts.push(format!(
-            "**{skipped} pixels left out** of the errors of {pictures} pictures: picture, reference or its variance is not finite there."
-        ));
-    }
     facts.extend([
         format!("Device: {}; driver: {}.", results.device, results.driver),
-        format!("Machine: {}{load}. Clerestory {}.", results.machine, results.engine_version),
+        format!(
+            "Machine: {}{load}. Clerestory {}.",
+            results.machine, results.engine_version
+        ),
     ]);
     facts.extend(method(results));
     facts
@@ -68,7 +58,8 @@ pub fn facts(results: &Results) -> Vec<String> {
 pub fn method(results: &Results) -> Vec<String> {
     let sweep = &results.sweep;
     let [width, height] = sweep.size;
-    let mut facts = vec![
+    let mut facts = Vec::from_iter(left_out(results));
+    facts.extend([
         format!(
             "{width} × {height} pixels, light paths: {}; {} pictures of each budget with seeds of their own.",
             sweep.path_set, sweep.repeats
@@ -77,10 +68,11 @@ pub fn method(results: &Results) -> Vec<String> {
             "References: technique {}, {} samples per pixel, a seed of their own; their own variance is subtracted from every MSE.",
             sweep.reference.technique, sweep.reference.spp
         ),
-        "Seconds: wall clock, medians, after a picture that warms the driver's cache. Errors: relative RMSE, the root of the repeats' mean \
-         relative MSE. Slopes: fitted on logarithms, with standard errors by the jackknife over the repeats; independent samples give −½."
+        "Seconds: wall clock, medians, after a picture that warms the driver's cache; where criteria are of time to equal error, geometric means. \
+         Errors: relative RMSE, the root of the repeats' mean relative MSE. Slopes: fitted on logarithms, with standard errors by the jackknife over \
+         the repeats and by the reference's noise; independent samples give −½."
             .to_owned(),
-    ];
+    ]);
     if results.found > 0 {
         facts.push(format!(
             "Of all pictures {} were measured in this run and {} in earlier ones, whose load is not known.",
@@ -88,6 +80,23 @@ pub fn method(results: &Results) -> Vec<String> {
         ));
     }
     facts
+}
+
+/// What errors leave out; `None` where they leave out nothing.
+fn left_out(results: &Results) -> Option<String> {
+    let variants = results.scenes.iter().flat_map(|scene| &scene.variants);
+    let points = variants.flat_map(|variant| &variant.points);
+    let counts = points
+        .flat_map(|point| &point.measurements)
+        .map(|one| one.error.skipped);
+    let (pixels, pictures) = counts.fold((0_u64, 0_u64), |(pixels, pictures), skipped| {
+        (pixels + skipped, pictures + u64::from(skipped > 0))
+    });
+    (pixels > 0).then(|| {
+        format!(
+            "**{pixels} pixels left out** of the errors of {pictures} pictures: picture, reference or its variance is not finite there."
+        )
+    })
 }
 
 /// One row for each scene and variant: slopes and the cost of equal error.
@@ -336,10 +345,12 @@ pub(super) mod tests {
         assert!(!facts(&results).iter().any(|fact| fact.contains("left out")));
         results.scenes[0].variants[1].points[0].measurements[0].error.skipped = 7;
         results.scenes[0].variants[0].points[1].measurements[2].error.skipped = 1;
-        let text = facts(&results).join("\n");
-        assert!(
-            text.contains("**8 pixels left out** of the errors of 2 pictures"),
-            "{text}"
-        );
+        for facts in [facts(&results), method(&results)] {
+            let text = facts.join("\n");
+            assert!(
+                text.contains("**8 pixels left out** of the errors of 2 pictures"),
+                "{text}"
+            );
+        }
     }
 }

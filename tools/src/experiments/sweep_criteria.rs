@@ -13,7 +13,8 @@
 //! is.speed_up = { of = "Sobol'", over = "independent" }   # without a bound; the mean over the scenes
 //! ```
 //!
-//! [`Kind`] has all that can be said. Bounds are `at` and `within`, `within` alone (of 0), `at_least`, `at_most`, or `between = [least, most]`.
+//! One criterion every sweep has and no file states: [`FINITE`], judged first. [`Kind`] has all that can be said of others.
+//! Bounds are `at` and `within`, `within` alone (of 0), `at_least`, `at_most`, or `between = [least, most]`.
 //! Variants, scenes and budgets that the sweep has not are refused when the file is read.
 
 use clerestory::{Error, Result};
@@ -27,6 +28,9 @@ use super::scene_numbers::Scene;
 use super::series::{SceneSeries, Work};
 use super::sweep::{Budget, Sweep};
 use super::{summary, web_page};
+
+/// The first criterion of every sweep. Errors leave out what is not finite, so that a variant with such pixels would look better than one without.
+pub const FINITE: &str = "no sample or pixel is NaN or infinite";
 
 /// A statement about the scenes of a sweep.
 #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
@@ -105,9 +109,10 @@ pub enum Kind {
         /// The other.
         below: String,
     },
-    /// Seconds of the best of some variants over seconds of the best of others, to the least error that both sides reach.
+    /// Seconds of the best variant of `over` over seconds of the best of `of`, to the least error that both sides reach; not a number where one of them
+    /// could not render the scene. Seconds are geometric means over the repeats.
     SpeedUp {
-        /// One side.
+        /// The side that is to take less.
         of: Names,
         /// The other.
         over: Names,
@@ -135,9 +140,9 @@ pub enum Kind {
         /// Variants.
         of: Names,
     },
-    /// The Pareto front of seconds and error over all variants and budgets, by one of: the share of its points that some variants have; a setting's
-    /// rank correlation with seconds; the share of its points where a setting is neither the least nor the greatest that variants state; without any of
-    /// them, the value of a setting that most of its points state.
+    /// The Pareto front of seconds and error over all variants and budgets, one for each repeat, and of these the median, by one of: the share of its
+    /// points that some variants have; a setting's rank correlation with seconds; the share of its points where a setting is neither the least nor the
+    /// greatest that variants state; without any of them, the value of a setting that most of its points state.
     Front {
         /// Variants whose share is meant.
         of: Option<Names>,
@@ -354,7 +359,7 @@ impl Is {
 pub fn check(criteria: &[SweepCriterion], headline: Option<&SweepHeadline>, sweep: &Sweep) -> Result<()> {
     for (index, criterion) in criteria.iter().enumerate() {
         let SweepCriterion { name, is, scenes, .. } = criterion;
-        if name.is_empty() || criteria[..index].iter().any(|other| other.name == *name) {
+        if name.is_empty() || name == FINITE || criteria[..index].iter().any(|other| other.name == *name) {
             return Err(wrong(name, name, "is empty or there twice"));
         }
         if is.bound.is_none() {
@@ -381,6 +386,16 @@ fn rows(is: &Is, meant: &[String], scenes: &[Scene<'_>]) -> Vec<(String, Measure
         .collect()
 }
 
+/// The verdict on [`FINITE`], which smoke pictures have to hold too.
+fn finite(scenes: &[Scene<'_>]) -> Judged {
+    let because = "errors leave them out";
+    let counts = scenes.iter().filter_map(Scene::not_finite);
+    Judged {
+        in_every_form: true,
+        ..findings::judge(FINITE, Bound::AtMost(0.0), because, counts)
+    }
+}
+
 fn verdicts(experiment: &Experiment, scenes: &[Scene<'_>]) -> Vec<Judged> {
     let judged = experiment.criteria.iter().filter_map(|criterion| {
         let SweepCriterion {
@@ -391,7 +406,7 @@ fn verdicts(experiment: &Experiment, scenes: &[Scene<'_>]) -> Vec<Judged> {
         } = criterion;
         Some(findings::judge(name, is.bound?, because, rows(is, meant, scenes)))
     });
-    judged.collect()
+    std::iter::once(finite(scenes)).chain(judged).collect()
 }
 
 /// The mean of numbers, in the interval of that of their ends; `None` of none.
@@ -571,10 +586,10 @@ mod tests {
         let found = findings(&experiment, &results, &scenes);
         let verdicts: Vec<&Verdict> = found.verdicts.iter().map(|judged| &judged.verdict).collect();
         assert!(
-            matches!(verdicts[..], [Verdict::Holds, Verdict::Fails { by }, Verdict::NotRun] if (by - 0.05).abs() < 1e-9),
+            matches!(verdicts[..], [Verdict::Holds, Verdict::Holds, Verdict::Fails { by }, Verdict::NotRun] if (by - 0.05).abs() < 1e-9),
             "{verdicts:?}"
         );
-        let falls = &found.verdicts[1];
+        let falls = &found.verdicts[2];
         assert_eq!((falls.rows, falls.failing, falls.because.as_str()), (2, 2, "why"));
         assert!(falls.worst.starts_with("`ring`, "), "{}", falls.worst);
         let headline = found.headline.as_ref().unwrap();
@@ -592,17 +607,40 @@ mod tests {
         );
         let not_run = |found: &Findings| {
             let verdicts = found.verdicts.iter();
-            found.headline.is_none() && verdicts.filter(|judged| judged.verdict == Verdict::NotRun).count() == 3
+            found.headline.is_none() && verdicts.filter(|judged| judged.verdict == Verdict::NotRun).count() == 4
         };
         results.interrupted = true;
         assert!(not_run(&findings(&experiment, &results, &scenes)));
         let declared = declared(&experiment);
         assert!(not_run(&declared) && declared.tables.is_empty());
         assert!(
-            declared.summary().contains("falls: -0.6500 to -0.5500 is wanted (why)"),
+            declared.summary().contains("falls: required: −0.65 to −0.5500 (why)"),
             "{}",
             declared.summary()
         );
+    }
+
+    #[test]
+    fn what_is_not_finite_fails_before_all_else() {
+        let experiment = super::super::parse("x", EXPERIMENT).unwrap();
+        let mut results = made_up_results();
+        let first = |results: &Results| {
+            let found = findings(&experiment, results, &series::of(results));
+            (found.verdicts[0].clone(), found.facts)
+        };
+        let (judged, _) = first(&results);
+        assert_eq!((judged.name.as_str(), &judged.verdict), (FINITE, &Verdict::Holds));
+        let one = &mut results.scenes[0].variants[1].points[0].measurements[0];
+        (one.error.skipped, one.non_finite) = (3, 2);
+        assert!(results.smoke, "smoke pictures are judged too");
+        let (judged, facts) = first(&results);
+        assert_eq!(
+            (judged.verdict, judged.worst.as_str()),
+            (Verdict::Fails { by: 5.0 }, "`ring`")
+        );
+        assert!(facts.iter().any(|fact| fact.contains("3 pixels left out")), "{facts:?}");
+        let twice = EXPERIMENT.replace("\"twice\"", &format!("\"{FINITE}\""));
+        assert!(super::super::parse("x", &twice).is_err());
     }
 
     #[test]

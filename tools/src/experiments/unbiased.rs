@@ -7,7 +7,8 @@
 //! What stays is the same for all pictures against one reference: its realised squared error is not its variance. By the central limit
 //! theorem its values are nearly normal, so that (b − E b)² has the variance 2 (var b)²; channels of a pixel count as fully correlated, which
 //! bounds the standard error of the mean from above.
-//! Guarantees: deterministic; pixels that are not finite in the picture, the reference or its variance are left out and counted.
+//! Guarantees: deterministic; pixels that are not finite in the picture, the reference or its variance are left out and counted. Without its worst
+//! pixels a picture looks better than it is: every sweep is judged by that count first ([`super::sweep_criteria`]).
 
 use clerestory::film::Picture;
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;

@@ -153,7 +153,10 @@ pub fn error(measured: Option<&ErrorAgainst>, report: &FrameReport, picture: &Pi
         .ok()
         .filter(|noise| noise.is_finite() && unbiased && report.samples[0] > 1);
     match noise {
-        Some(noise) => format!("{unknown}; noise at most about {:.4}, by the spread of the samples", noise.sqrt()),
+        Some(noise) => format!(
+            "{unknown}; noise at most about {:.4}, by the spread of the samples",
+            noise.sqrt()
+        ),
         None => unknown.into(),
     }
 }

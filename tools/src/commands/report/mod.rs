@@ -40,7 +40,7 @@ Examples:
   clerestory report kd-or-bvh --scene model.ply    a kd-tree beside bounding volumes on a model of your own
   clerestory report my-experiment.toml             an experiment of your own; the format is that of tools/experiments/
   clerestory report                                error against time on surfaces and in media
-  clerestory report --smoke                        its smallest form, under two minutes on two cores
+  clerestory report --smoke                        its smallest form
   clerestory report --scene model.glb --repeat 3   error against time on a model of your own
 
 Finished pictures are kept in the experiment's folder, references in a folder of their own: an interrupted report goes on where it \

@@ -56,7 +56,12 @@ impl std::fmt::Display for Bound {
 /// A number that was chosen: no more digits than it has, four of those that are computed.
 fn shortest(value: f64) -> String {
     let (chosen, computed) = (value.to_string(), Cell::Number(value).to_string());
-    if chosen.len() < computed.len() { chosen } else { computed }.replace('-', "−")
+    if chosen.len() < computed.len() {
+        chosen
+    } else {
+        computed
+    }
+    .replace('-', "−")
 }
 
 /// An exact number: a whole one as counts are written.

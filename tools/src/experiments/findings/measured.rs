@@ -83,8 +83,12 @@ pub struct Repeats(#[serde(with = "any_numbers")] pub Vec<f64>);
 impl Repeats {
     /// The median, with the narrowest interval of order statistics that holds the quantity's median with a probability of 93 % at least, whatever
     /// the distribution of independent turns: the least and the greatest of 5 to 8 values, the second and the last but one of 9 or 10, and so on. Fewer than 5 values
-    /// bound nothing. Source: H. A. David and H. N. Nagaraja, *Order Statistics*, 3rd ed., 2003, §7.1.
+    /// bound nothing, and one that is no number makes all of it none. Source: H. A. David and H. N. Nagaraja, *Order Statistics*, 3rd ed., 2003,
+    /// §7.1.
     pub fn measured(&self) -> Measured {
+        if self.0.iter().any(|value| value.is_nan()) {
+            return Measured::exact(f64::NAN);
+        }
         let mut sorted = self.0.clone();
         sorted.sort_by(f64::total_cmp);
         let value = crate::timing::median(sorted.clone());
@@ -195,6 +199,16 @@ mod tests {
         assert_eq!((five.value, five.low, five.high), (3.0, 1.0, 5.0));
         let few = Repeats(vec![1.0, 2.0]).measured();
         assert_eq!((few.value, few.low.is_finite()), (1.5, false));
+    }
+
+    #[test]
+    fn one_turn_that_is_no_number_is_not_trimmed() {
+        for place in 0..15 {
+            let mut turns = vec![1.0; 15];
+            turns[place] = if place % 2 == 0 { f64::NAN } else { -f64::NAN };
+            let Measured { value, low, high } = Repeats(turns).measured();
+            assert!(value.is_nan() && low.is_nan() && high.is_nan(), "{place}");
+        }
     }
 
     #[test]

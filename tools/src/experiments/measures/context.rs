@@ -106,11 +106,6 @@ impl Context<'_> {
     }
 }
 
-/// An address without the word that all generated scenes begin with.
-pub fn short_name(address: &str) -> &str {
-    address.strip_prefix("builtin:").unwrap_or(address)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,6 +144,5 @@ mod tests {
         assert_eq!(products.unwrap(), [10, 20, 20, 40]);
         assert_eq!(context(true).first(&[1, 2, 3], 2), [1, 2]);
         assert_eq!(context(false).first(&[1, 2, 3], 2), [1, 2, 3]);
-        assert_eq!(short_name("builtin:ring?roughness=0.2"), "ring?roughness=0.2");
     }
 }

@@ -60,11 +60,7 @@ fn page(experiment: &Experiment, stored: Option<&Stored>, found: &Findings, show
     for (index, table) in found.tables.iter().enumerate() {
         let file = format!("{}.csv", index + 1);
         parts.push(if table.is_long {
-            format!(
-                "## {}\n\n{} rows: [`{file}`]({file}).\n",
-                table.title,
-                table.rows.len()
-            )
+            format!("## {}\n\n{} rows: [`{file}`]({file}).\n", table.title, table.rows.len())
         } else {
             table.markdown()
         });

@@ -54,10 +54,7 @@ mod tests {
             filled.starts_with("a\n<!-- results: absorption, roulette -->\n- ["),
             "{filled}"
         );
-        assert!(
-            filled.contains("](results/roulette/README.md): undecided: not run\n"),
-            "{filled}"
-        );
+        assert!(filled.contains("](results/roulette/README.md): not run\n"), "{filled}");
         assert!(
             filled.ends_with("<!-- end of results -->\nb\n") && !filled.contains("old"),
             "{filled}"

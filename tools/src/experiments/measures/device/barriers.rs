@@ -13,7 +13,7 @@ use clerestory::{Result, scene};
 use super::hazards::{BUFFERS, COMMANDS, Command, accepted, needed};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
+use crate::experiments::reference::short_name;
 use crate::random::Random;
 use crate::timing::timed;
 

@@ -288,7 +288,14 @@ pub fn different(hits: &[Hit], expected: &[Hit]) -> u64 {
     (pairs.filter(|(a, b)| bits(a) != bits(b)).count() + missing) as u64
 }
 
-/// The same for both kinds of rays.
+/// How many of the hits answer otherwise than those expected whether there is one; those that are missing too.
+pub fn other_answers(hits: &[Hit], expected: &[Hit]) -> u64 {
+    let pairs = hits.iter().zip(expected);
+    let missing = hits.len().abs_diff(expected.len());
+    (pairs.filter(|(a, b)| a.is_hit() != b.is_hit()).count() + missing) as u64
+}
+
+/// [`different`] of both kinds of rays.
 pub fn different_of_both(hits: &[Vec<Hit>; 2], expected: &[Vec<Hit>; 2]) -> u64 {
     let pairs = hits.iter().zip(expected);
     pairs.map(|(hits, expected)| different(hits, expected)).sum()

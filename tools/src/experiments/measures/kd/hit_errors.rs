@@ -11,6 +11,7 @@ use clerestory::accel::{Hit, MAX_COORDINATE, Ray};
 use glam::{DVec3, Vec3};
 
 use super::flights::different;
+use crate::experiments::measures::errors::greatest;
 
 /// Unit roundoff of f32.
 const U: f64 = 1.0 / 16_777_216.0;
@@ -42,10 +43,7 @@ impl Sheared {
         };
         let d = last(Vec3::from(ray.direction).as_dvec3());
         let from_origin = triangle.map(|corner| corner.as_dvec3() - origin);
-        let reach = from_origin
-            .map(|v| v.abs().max_element())
-            .into_iter()
-            .fold(0.0, f64::max);
+        let reach = greatest(from_origin.iter().flat_map(|v| v.abs().to_array()));
         Self {
             corners: from_origin.map(|v| {
                 let v = last(v);
@@ -119,13 +117,13 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Of both: sums of counts and the largest errors.
+    /// Of both: sums of counts and the largest errors, not a number where one is none.
     pub fn and(self, other: Self) -> Self {
         Self {
             different: self.different + other.different,
             above: self.above + other.above,
-            parameter: self.parameter.max(other.parameter),
-            point: self.point.max(other.point),
+            parameter: greatest([self.parameter, other.parameter]),
+            point: greatest([self.point, other.point]),
         }
     }
 }
@@ -171,7 +169,7 @@ pub fn judge(reachable: &Reachable, ray: &Ray, hit: &Hit) -> Verdict {
         let [u, v] = hit.barycentrics.map(f64::from);
         let [a, b, c] = met.corners;
         let point = a + u * (b - a) + v * (c - a);
-        verdict.point = point.truncate().abs().max_element() / (REPORTED_POINT * met.unit);
+        verdict.point = greatest(point.truncate().abs().to_array()) / (REPORTED_POINT * met.unit);
     }
     for triangle in nearer {
         let (t, bound) = triangle.plane();
@@ -185,10 +183,11 @@ pub fn judge(reachable: &Reachable, ray: &Ray, hit: &Hit) -> Verdict {
             } else {
                 f64::INFINITY
             };
-            verdict.parameter = verdict.parameter.max(lost);
+            verdict.parameter = greatest([verdict.parameter, lost]);
         }
     }
-    verdict.above = u64::from(verdict.parameter > 1.0 || verdict.point > 1.0);
+    let is_within = verdict.parameter <= 1.0 && verdict.point <= 1.0;
+    verdict.above = u64::from(!is_within);
     verdict
 }
 
@@ -240,6 +239,18 @@ mod tests {
             ..hit(2.0, 2)
         };
         assert!(judge(&reachable, &RAY, &beside).point > 1.0);
+        for broken in [
+            hit(f32::NAN, 2),
+            Hit {
+                barycentrics: [f32::NAN; 2],
+                ..hit(2.0, 2)
+            },
+        ] {
+            let verdict = judge(&reachable, &RAY, &broken);
+            let errors = |verdict: Verdict| greatest([verdict.parameter, verdict.point]);
+            assert_eq!(verdict.above, 1, "{verdict:?}");
+            assert!(errors(verdict.and(right)).is_nan() && errors(right.and(verdict)).is_nan());
+        }
         let last_bit = Hit {
             t: f32::from_bits(2.0f32.to_bits() + 1),
             ..hit(2.0, 2)

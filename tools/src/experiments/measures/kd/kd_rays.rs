@@ -13,6 +13,7 @@ use super::ray_checks::{Amount, Check, Place, Way};
 use super::ray_kinds;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, total};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::greatest;
 
 /// Scenes beside the source's: spheres of spheres, streets, soups of small and of large triangles, finely cut spheres.
 static MORE: [Case; 5] = [
@@ -87,7 +88,7 @@ const OF_PLACES: &[Criterion<Place>] = &[
     Criterion::each(
         "no error is above its bound: the largest, of it",
         Bound::AtMost(1.0),
-        |place: &Place| place.parameter.max(place.point).into(),
+        |place: &Place| greatest([place.parameter, place.point]).into(),
     )
     .in_every_form(),
     Criterion::all("rays that are traced", Bound::AtLeast(1e7), |places: &[&Place]| {

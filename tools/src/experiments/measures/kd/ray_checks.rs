@@ -15,6 +15,7 @@ use super::hit_errors::{Reachable, Verdict, judge};
 use super::kd_variants::{Variant, fitted};
 use super::ray_kinds;
 use crate::experiments::findings::rows;
+use crate::experiments::measures::errors::greatest;
 use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
 
 /// How much is traced.
@@ -100,8 +101,8 @@ impl Place {
             tried: self.tried + other.tried,
             different_from_all: self.different_from_all + other.different_from_all,
             above: self.above + other.above,
-            parameter: self.parameter.max(other.parameter),
-            point: self.point.max(other.point),
+            parameter: greatest([self.parameter, other.parameter]),
+            point: greatest([self.point, other.point]),
             ..other
         }
     }

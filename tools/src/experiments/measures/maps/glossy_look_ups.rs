@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 use super::sphere::Sphere;
+use crate::experiments::measures::errors::greatest;
 use crate::experiments::table::Cell;
 
 /// The map.
@@ -195,9 +196,7 @@ pub fn errors(values: &[Vec3], truth: &[Vec3]) -> [f64; 2] {
 pub fn greatest_step(pixels: &[Pixel], values: &[Vec3]) -> f64 {
     let all: Vec<(&Pixel, &Vec3)> = pixels.iter().zip(values).collect();
     let steps = all.windows(2).filter(|pair| pair[0].0.at + 1 == pair[1].0.at);
-    steps
-        .map(|pair| f64::from(pair[0].1.distance(*pair[1].1)))
-        .fold(0.0, f64::max)
+    greatest(steps.map(|pair| f64::from(pair[0].1.distance(*pair[1].1))))
 }
 
 /// Look-ups of one box with the variance of each pixel's lobe.

@@ -6,6 +6,7 @@ use clerestory::maps::{MapImage, MapPoint, Parametrization};
 use glam::{DVec2, DVec3, UVec2};
 use std::f64::consts::PI;
 
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 
 /// Concentrations of the lobes, exp(κ(cos − 1)); widths are 1/√κ.
@@ -86,7 +87,7 @@ pub fn errors_of_irradiance(image: &MapImage, normals: &[DVec3], right: impl Fn(
         let exact = source.irradiance(*n).unwrap_or_default().x;
         let middles: f64 = parts.iter().map(|(d, light)| light * n.dot(*d).max(0.0)).sum();
         for (worst, found) in worst.iter_mut().zip([exact, middles]) {
-            *worst = worst.max((found - right(n)).abs());
+            *worst = greatest([*worst, (found - right(n)).abs()]);
         }
     }
     worst

@@ -13,6 +13,7 @@ use super::environments::{self, Environment, LIGHTS};
 use super::needs::need;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 
 /// Budgets of which needs are told, the largest ones.
@@ -65,9 +66,15 @@ rows! {
     /// A question of the choice.
     struct Verdict = "Verdicts" by [question] {
         question: String = "question",
-        answer: String = "answer that holds at every budget",
+        answer: String = "answer that holds",
         answers: u64 = "maps that it names",
     }
+}
+
+/// What a map needs, also by each turn.
+struct Needed {
+    row: Need,
+    by_turn: Vec<f64>,
 }
 
 /// What was found.
@@ -86,27 +93,29 @@ const CRITERIA: &[Criterion<Verdict>] = &[
     .among(|row| row.question == CUBE_OR_OCTAHEDRON)
     .because("needs on one side of a tenth more or less than the cube's, or within it, bear one answer"),
     Criterion::each(
-        "one rectangle is decided at every budget: maps",
+        "one rectangle is decided at every budget and turn: maps",
         Bound::AtLeast(1.0),
         |row: &Verdict| row.answers.into(),
     )
     .among(|row| row.question == ONE_RECTANGLE)
-    .because("a map within a tenth of the least at each of them"),
+    .because("a map within a tenth of the least at each of them, by all turns together and by each"),
 ];
 
 fn geometric_mean(values: &[f64]) -> f64 {
     (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
 }
 
-/// A number of all turns, least … greatest of each.
-fn measured(all: f64, turns: impl Iterator<Item = f64>) -> Measured {
-    let widest = [f64::INFINITY, f64::NEG_INFINITY];
-    let [low, high] = turns.fold(widest, |[low, high], need| [low.min(need), high.max(need)]);
-    Measured { value: all, low, high }
+/// A number of all turns, least … greatest of each; not a number where one of these is none.
+fn measured(all: f64, turns: &[f64]) -> Measured {
+    Measured {
+        value: all,
+        low: -greatest(turns.iter().map(|need| -need)),
+        high: greatest(turns.iter().copied()),
+    }
 }
 
 /// Needs of all maps at the largest budgets, by environment and together.
-fn needs(look_ups: &[LookUps]) -> Vec<Need> {
+fn needs(look_ups: &[LookUps]) -> Vec<Needed> {
     let mut all = Vec::new();
     let by_map: Vec<&[LookUps]> = look_ups.chunk_by(|a, b| a.map == b.map).collect();
     let Some(of_first) = by_map.first() else { return all };
@@ -130,40 +139,50 @@ fn needs(look_ups: &[LookUps]) -> Vec<Need> {
             };
             let together = of(&|row| row.error);
             let turns: Vec<Vec<f64>> = (0..TURNS as usize).map(|turn| of(&|row| row.turns.0[turn])).collect();
-            let row = |environment: &str, need| Need {
-                map: of_map[0].map.clone(),
-                budget: own[0][end - 1].budget,
-                environment: environment.into(),
-                need,
+            let needed = |environment: &str, all: f64, by_turn: Vec<f64>| Needed {
+                row: Need {
+                    map: of_map[0].map.clone(),
+                    budget: own[0][end - 1].budget,
+                    environment: environment.into(),
+                    need: measured(all, &by_turn),
+                },
+                by_turn,
             };
             for (at, (light, _)) in LIGHTS.iter().enumerate() {
-                all.push(row(light, measured(together[at], turns.iter().map(|needs| needs[at]))));
+                all.push(needed(
+                    light,
+                    together[at],
+                    turns.iter().map(|needs| needs[at]).collect(),
+                ));
             }
             let means = turns.iter().map(|needs| geometric_mean(needs));
-            all.push(row(TOGETHER, measured(geometric_mean(&together), means)));
+            all.push(needed(TOGETHER, geometric_mean(&together), means.collect()));
         }
     }
     all
 }
 
 /// What follows from the numbers.
-fn verdicts(maps: &[Storage], needs: &[Need]) -> Vec<Verdict> {
+fn verdicts(maps: &[Storage], needs: &[Needed]) -> Vec<Verdict> {
     if needs.is_empty() {
         return Vec::new();
     }
     let known = |map: &str| MAPS.iter().copied().find(|known| name(*known) == map);
-    let in_light = |map: &str, light: &str| -> Vec<&Need> {
-        needs
-            .iter()
-            .filter(|row| row.map == map && row.environment == light)
-            .collect()
+    let in_light = |map: &str, light: &str| -> Vec<&Needed> {
+        let is_of_it = |need: &&Needed| need.row.map == map && need.row.environment == light;
+        needs.iter().filter(is_of_it).collect()
     };
-    let fewest = |question: String, light: &str, among: &dyn Fn(Parametrization, &Storage) -> bool| {
+    let by_all_turns = |need: &Needed| vec![need.row.need.value];
+    let by_each_turn = |need: &Needed| [&[need.row.need.value][..], &need.by_turn].concat();
+    let fewest = |question: String,
+                  light: &str,
+                  values: &dyn Fn(&Needed) -> Vec<f64>,
+                  among: &dyn Fn(Parametrization, &Storage) -> bool| {
         // A hemisphere is no choice for the sphere.
         let some = maps
             .iter()
             .filter(|row| known(&row.map).is_some_and(|map| map != Parametrization::Nusselt && among(map, row)));
-        let values = |map: &str| in_light(map, light).iter().map(|row| row.need.value).collect();
+        let values = |map: &str| in_light(map, light).into_iter().flat_map(values).collect();
         let some: Vec<(&str, Vec<f64>)> = some.map(|row| (row.map.as_str(), values(&row.map))).collect();
         let best = best(&some);
         Verdict {
@@ -178,20 +197,23 @@ fn verdicts(maps: &[Storage], needs: &[Need]) -> Vec<Verdict> {
     };
     let lights = LIGHTS.iter().map(|(light, _)| *light).chain([TOGETHER]);
     let mut all: Vec<Verdict> = lights
-        .map(|light| fewest(format!("fewest texels, {light}"), light, &|_, _| true))
+        .map(|light| fewest(format!("fewest texels, {light}"), light, &by_all_turns, &|_, _| true))
         .collect();
     // One rectangle that holds all directions and no unused texel.
     let is_rectangle = |map: Parametrization| map.layers() == 1 && !map.is_disc();
-    all.push(fewest(ONE_RECTANGLE.into(), TOGETHER, &|map, _| is_rectangle(map)));
+    all.push(fewest(ONE_RECTANGLE.into(), TOGETHER, &by_each_turn, &|map, _| {
+        is_rectangle(map)
+    }));
     all.push(fewest(
         format!("the same where no texel may be finer than {FINEST} of the mean, for what is rendered into it or blurred in it"),
         TOGETHER,
+        &by_all_turns,
         &|map, row| is_rectangle(map) && row.least > FINEST,
     ));
     let octahedron = in_light(&name(Parametrization::OctahedronQuadratic), TOGETHER);
     let ends: Vec<f64> = octahedron
         .iter()
-        .flat_map(|row| [row.need.value, row.need.low, row.need.high])
+        .flat_map(|need| [need.row.need.value, need.row.need.low, need.row.need.high])
         .collect();
     let answer = match sign(&ends) {
         Some(std::cmp::Ordering::Greater) => "the cube, where the device filters it",
@@ -291,7 +313,8 @@ impl Study for Found {
     fn findings(&self) -> Findings {
         let needs = needs(&self.look_ups);
         let octahedron = name(Parametrization::OctahedronQuadratic);
-        let octahedron = needs
+        let rows: Vec<Need> = needs.iter().map(|need| need.row.clone()).collect();
+        let octahedron = rows
             .iter()
             .rfind(|row| row.map == octahedron && row.environment == TOGETHER);
         let lights = LIGHTS.map(|(name, about)| format!("{name}: {about}")).join("; ");
@@ -305,9 +328,10 @@ impl Study for Found {
         };
         found
             .note(format!(
-                "Maps within a factor of {ALIKE} of the least count as one. Nusselt's map, of a hemisphere, is no choice for the sphere."
+                "Maps within a factor of {ALIKE} of the least count as one. Answers hold at every budget; those to the choice of cube or octahedron and of one \
+                 rectangle hold by each turn too. Nusselt's map, of a hemisphere, is no choice for the sphere."
             ))
-            .and(Findings::pivoted(&needs, "environment", &[]))
+            .and(Findings::pivoted(&rows, "environment", &[]))
             .note(format!(
                 "Times as many texels in all, unused ones included, as the cube map has at a budget, for its error; from the errors there and the \
                  cube's slope from the budget before. Intervals are least … greatest of {TURNS} turns. Environments ({lights}), each in {TURNS} turns, \

@@ -12,6 +12,7 @@ use super::meridians::with_plots;
 use super::stated_densities::{FAMILY, Figure, OF_FIGURES, STATED, of_document, of_family, statistics};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 
 /// Pixels of a picture of the strip.
@@ -111,8 +112,8 @@ fn word(bits: u32, count: u32) -> Word {
             d
         };
         let off = |word| (unpack_octahedral(word, bits) - d).length();
-        plain = plain.max(off(pack_octahedral(d.as_vec3(), bits)));
-        nearest = nearest.max(off(pack_octahedral_nearest(d, bits)));
+        plain = greatest([plain, off(pack_octahedral(d.as_vec3(), bits))]);
+        nearest = greatest([nearest, off(pack_octahedral_nearest(d, bits))]);
     }
     Word {
         bits: bits.into(),

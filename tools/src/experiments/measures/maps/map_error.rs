@@ -12,6 +12,7 @@ use super::light_fields::{CONCENTRATIONS, LOBES, LobeField, deviation, errors_of
 use super::needs::need;
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Study, curves, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::greatest;
 use crate::experiments::slope::least_squares;
 use crate::random::Random;
 
@@ -142,7 +143,7 @@ impl Study for Found {
             for (d, right) in directions.iter().zip(&right) {
                 let error = field.error(*map, size, *d, *right);
                 squares += error * error;
-                worst = worst.max(error.abs());
+                worst = greatest([worst, error.abs()]);
             }
             Ok(LookUps {
                 map: map.to_string(),

@@ -18,6 +18,7 @@ use super::lobe_errors::{LobeSource, half_angle};
 use super::sphere::{Sphere, sheet};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 use crate::timing::timed;
 
@@ -244,12 +245,12 @@ fn numbers(context: &Context<'_>, gpu: &Gpu, rows: u32) -> Result<Vec<Numbers>> 
     let row = |form: &(SatNumbers, &str), subtract: bool, table: &SphericalSat, times: Vec<f64>| {
         let mut worst = [0.0f64; 2];
         for (i, (query, value)) in asked.iter().zip(&table.look_up(&asked)?).enumerate() {
-            let Some(at) = MAP.encode(query.truncate().as_dvec3()) else {
-                continue;
-            };
-            let right = exact.sat_mean(at.uv, query.w.into());
-            let off = ((value.as_dvec3() - right) / right).abs().max_element();
-            worst[i % 2] = worst[i % 2].max(off);
+            let off = MAP.encode(query.truncate().as_dvec3()).map(|at| {
+                let right = exact.sat_mean(at.uv, query.w.into());
+                ((value.as_dvec3() - right) / right).abs().to_array()
+            });
+            let off = off.map_or(f64::NAN, greatest);
+            worst[i % 2] = greatest([worst[i % 2], off]);
         }
         let tile = f64::from(rows + 2 * border + 1);
         Ok(Numbers {

@@ -13,6 +13,7 @@ use super::seam_levels::{
 use super::sphere::{Sphere, sheet};
 use crate::experiments::findings::{Bound, Criterion, Findings, Study, largest, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::greatest;
 
 /// Pixels of the sphere's picture along a side.
 const SIDE: u32 = 256;
@@ -59,6 +60,11 @@ const CRITERIA: &[Criterion<Row>] = &[
     .among(Row::is_the_engines),
 ];
 
+/// The level that a look-up samples, the finest at least; not a number of one that is none.
+fn sampled(level: f64) -> f64 {
+    level.clamp(0.0, f64::INFINITY)
+}
+
 impl Row {
     fn is_the_engines(&self) -> bool {
         self.way == BY_OCTANT
@@ -69,19 +75,17 @@ impl Row {
         let side = sphere.side as usize;
         let inside = |i: usize| sphere.place((i % side) as u32, (i / side) as u32).length() < RIM;
         for i in (0..found.len()).filter(|i| inside(*i)) {
-            let (Some(here), Some(right)) = (found[i], exact[i]) else {
-                continue;
-            };
+            // All pixels inside have a level: one without is as wrong as one that is no number.
+            let [here, right] = [found[i], exact[i]].map(|level| level.unwrap_or(f64::NAN));
+            let is_near = (here - right).abs() <= 1.0;
             self.pixels += 1;
-            self.too_coarse = self.too_coarse.max(here - right);
-            self.too_fine = self.too_fine.max(right - here);
-            self.off += u64::from((here - right).abs() > 1.0);
+            self.too_coarse = greatest([self.too_coarse, here - right]);
+            self.too_fine = greatest([self.too_fine, right - here]);
+            self.off += u64::from(!is_near);
             let next = [i + 1, i + side].into_iter();
             for next in next.filter(|next| *next < found.len() && inside(*next)) {
-                if let Some(there) = found[next] {
-                    // What is sampled: levels are clamped to the finest.
-                    self.jump = self.jump.max((there.max(0.0) - here.max(0.0)).abs());
-                }
+                let [here, there] = [found[i], found[next]].map(|level| level.map_or(f64::NAN, sampled));
+                self.jump = greatest([self.jump, (there - here).abs()]);
             }
         }
         self
@@ -139,5 +143,26 @@ impl Study for Found {
                  so all ways are off by a little everywhere. The rectangle's seam is its upper and lower edge, on the equator, where a mirrored \
                  direction is no other place. In pictures level {WHITE_LEVEL} is white."
             ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_that_are_none_are_jumps_and_off() {
+        let sphere = Sphere::new(EYE, 4);
+        let even = vec![Some(-1.0); 16];
+        let right = Row::default().compared(&sphere, &even, &even);
+        assert_eq!((right.jump, right.off), (0.0, 0));
+        for broken in [None, Some(f64::NAN)] {
+            // A pixel in the middle.
+            let mut found = even.clone();
+            found[5] = broken;
+            let row = Row::default().compared(&sphere, &found, &even);
+            assert!(row.jump.is_nan() && row.too_coarse.is_nan() && row.too_fine.is_nan());
+            assert_eq!((row.off, row.pixels), (1, right.pixels));
+        }
     }
 }

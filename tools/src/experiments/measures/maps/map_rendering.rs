@@ -18,7 +18,8 @@ use crate::experiments::findings::{
     Axes, Bound, Criterion, Findings, Measured, Repeats, Study, curves, geometric_mean, rows,
 };
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
+use crate::experiments::measures::errors::mean_ratio_of_shares;
+use crate::experiments::reference::short_name;
 use crate::experiments::slope::least_squares;
 
 /// Scenes, and the place in the box around each that the map is of.
@@ -106,6 +107,15 @@ rows! {
     }
 }
 
+rows! {
+    /// Shadows by a whole octahedron beside those by the cube.
+    struct Shadow = "Shadow errors of octahedra over the cube's" by [scene, way] {
+        scene: String = "scene",
+        way: String = "way",
+        ratio: Measured = "shadow error over that of the cube by passes",
+    }
+}
+
 /// What was found.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
@@ -116,24 +126,24 @@ pub struct Found {
 
 const OF_ORDERS: &[Criterion<Order>] = &[
     Criterion::each(
-        "the document's order: neighbours that times tell apart the other way",
-        Bound::AtMost(0.0),
-        |row: &Order| row.reversed.into(),
+        "the document's order: time of each over that of its slower neighbour",
+        Bound::AtMost(1.0),
+        |row: &Order| row.ratio,
     )
     .among(|row| !row.has_clip_distances()),
     Criterion::each(
-        "clip distances stand next to the cube: neighbours that times tell apart the other way",
-        Bound::AtMost(0.0),
-        |row: &Order| row.reversed.into(),
+        "clip distances stand next to the cube: time of each over that of its slower neighbour",
+        Bound::AtMost(1.0),
+        |row: &Order| row.ratio,
     )
     .among(Order::has_clip_distances),
 ];
-const OF_WAYS: &[Criterion<Row>] = &[Criterion::each(
+const OF_SHADOWS: &[Criterion<Shadow>] = &[Criterion::each(
     "shadows of octahedra are within a fifth of the cube's error: their ratio",
     Bound::Between(0.8, 1.2),
-    |row: &Row| row.over_shadow.unwrap_or(f64::INFINITY).into(),
+    |row: &Shadow| row.ratio,
 )
-.among(Row::is_a_whole_octahedron)];
+.because("intervals of 95 % by the number of points")];
 const OF_FALLS: &[Criterion<Fall>] = &[Criterion::each(
     "errors of unsplit maps fall with the length of edges: the power of wrong triangles",
     Bound::AtLeast(0.5),
@@ -170,6 +180,11 @@ impl Row {
         }
     }
 
+    fn is_the_cube(&self) -> bool {
+        ways_of(&self.way).is_some_and(|way| way.way == CUBE)
+    }
+
+    /// Points whose shadow is wrong, %.
     fn shadow_error(&self) -> f64 {
         self.wrongly_lit + self.wrongly_dark
     }
@@ -236,11 +251,7 @@ fn compare(context: &Context<'_>, gpu: &Gpu, (address, share): (&str, Vec3)) -> 
         split_vertices: ratio(split.vertices, clip.vertices),
         scene,
     };
-    let cube = rows
-        .iter()
-        .find(|row| ways_of(&row.way).is_some_and(|way| way.way == CUBE))
-        .cloned()
-        .unwrap_or_default();
+    let cube = rows.iter().find(|row| row.is_the_cube()).cloned().unwrap_or_default();
     Ok((rows.into_iter().map(|row| row.beside(&cube)).collect(), summary))
 }
 
@@ -276,17 +287,40 @@ fn unsplit(context: &Context<'_>, gpu: &Gpu, (address, share): (&str, Vec3)) -> 
     Ok(rows)
 }
 
-/// Powers of the length of edges, over all levels with an error.
+/// Shadows of whole octahedra beside those of the cube, by the points of each scene.
+fn shadows(ways: &[Row], scenes: &[Scene]) -> Vec<Shadow> {
+    let shadow = |row: &Row| {
+        let cube = ways
+            .iter()
+            .find(|other| other.scene == row.scene && other.is_the_cube());
+        let scene = scenes.iter().find(|scene| scene.scene == row.scene);
+        let pair = cube.zip(scene).map(|(cube, scene)| {
+            let shares = [row, cube].map(|row| 0.01 * row.shadow_error());
+            (shares, scene.points)
+        });
+        Shadow {
+            scene: row.scene.clone(),
+            way: row.way.clone(),
+            ratio: mean_ratio_of_shares(pair),
+        }
+    };
+    ways.iter()
+        .filter(|row| row.is_a_whole_octahedron())
+        .map(shadow)
+        .collect()
+}
+
+/// Powers of the length of edges, over all levels with an error; not a number of fewer than two of these.
 fn falls(unsplit: &[Unsplit]) -> Vec<Fall> {
     let power = |rows: &[Unsplit], error: fn(&Unsplit) -> f64| {
-        let points = rows.iter().filter(|row| error(row) > 0.0);
+        let points = rows.iter().filter(|row| error(row) != 0.0);
         least_squares(&points.map(|row| (row.edge.ln(), error(row).ln())).collect::<Vec<_>>())
     };
     let fall = |rows: &[Unsplit]| {
         Some(Fall {
             scene: rows.first()?.scene.clone(),
             map: rows.first()?.map.clone(),
-            wrong: power(rows, |row| row.wrong)?,
+            wrong: power(rows, |row| row.wrong).unwrap_or(f64::NAN),
             angle: power(rows, |row| row.angle),
         })
     };
@@ -318,16 +352,24 @@ impl Study for Found {
             .iter()
             .map(|row| (row.scene.as_str(), row.way.as_str(), &row.time))
             .collect();
-        let cube = self
-            .ways
-            .iter()
-            .filter(|row| ways_of(&row.way).is_some_and(|way| way.way == CUBE));
+        let cube = self.ways.iter().filter(|row| row.is_the_cube());
         let first = self
             .unsplit
             .chunk_by(|a, b| a.scene == b.scene)
             .next()
             .unwrap_or_default();
         let side = FULL.0;
+        let sizes = [
+            ("square", Parametrization::OctahedronQuadratic),
+            ("rectangle", Parametrization::OctahedronRectangular),
+            ("cube", Parametrization::Cube),
+            ("paraboloids", Parametrization::DualParaboloid),
+        ];
+        let sizes = sizes.map(|(name, map)| {
+            let size = variant(name, map, CUBE, side).size;
+            format!("{name} {} × {} × {}", map.layers(), size.x, size.y)
+        });
+        let sizes = sizes.join(", ");
         Findings::of(&Order::all(&times), OF_ORDERS)
             .headline(
                 "GPU time of the cube by passes (ms, geometric mean over scenes)",
@@ -344,13 +386,14 @@ impl Study for Found {
                  distances, of which it has no figure, between its two fastest. Ratios are of the same turns. The document's figures are of other \
                  machines, scenes and pictures: their order counts.",
             )
-            .and(Findings::of(&self.ways, OF_WAYS))
+            .and(Findings::of(&self.ways, &[]).judged(&shadows(&self.ways, &self.scenes), OF_SHADOWS))
             .note(format!(
-                "About {side} × {side} texels in all: square 512², rectangle 724 × 362, cube 6 × 209², paraboloids 2 × 362² at full size, whose corners \
-                 hold nothing. A pass draws depth and distances, which the rasterizer interpolates. Shadow errors: points spread evenly over all \
+                "In a full run about {side} × {side} texels in all: {sizes}; the corners of paraboloids hold nothing. A pass draws depth \
+                 and distances, which the rasterizer interpolates. Shadow errors: points spread evenly over all \
                  surfaces but those seen at a cosine below {LEAST_COSINE}; a point is lit when its distance d is at most the texel's and a bias of \
                  d (w tan θ + {ROUNDING_BIAS:e}), w being the mean width of the map's texels in radians, θ the angle to the normal; the truth is a \
-                 ray. Wrong triangles: against the ray through the texel's centre; of points also where holes were filled. Attribute error: the angle \
+                 ray; intervals of ratios take points and both maps' errors as independent. Wrong triangles: against the ray through the \
+                 texel's centre; of points also where holes were filled. Attribute error: the angle \
                  between a texel and the interpolated position that it holds. {SPLATS_PER_TEXEL} points per texel are splatted, evenly over all surfaces."
             ))
             .and(Findings::of(&self.scenes, &[]))

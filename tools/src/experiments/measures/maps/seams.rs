@@ -4,6 +4,7 @@ use clerestory::Result;
 use clerestory::maps::{MapImage, Parametrization};
 use glam::{DVec3, IVec2, UVec2};
 
+use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
 
 /// How far directions lie beside a seam.
@@ -47,11 +48,10 @@ pub fn pairs(count: u32) -> Vec<[DVec3; 2]> {
     (0..count).map(pair).collect()
 }
 
-/// RMS difference of look-ups over pairs of directions.
+/// RMS difference of look-ups over pairs of directions; not a number where one of them fails.
 pub fn jump(pairs: &[[DVec3; 2]], look_up: impl Fn(DVec3) -> Option<DVec3>) -> f64 {
-    let squares = pairs
-        .iter()
-        .filter_map(|[a, b]| Some((look_up(*a)? - look_up(*b)?).length_squared()));
+    let square = |[a, b]: &[DVec3; 2]| Some((look_up(*a)? - look_up(*b)?).length_squared());
+    let squares = pairs.iter().map(|pair| square(pair).unwrap_or(f64::NAN));
     (squares.sum::<f64>() / (3.0 * pairs.len() as f64)).sqrt()
 }
 
@@ -87,5 +87,18 @@ pub fn deviation(image: &MapImage) -> f64 {
 
 /// Relative change of ∫ L dω, worst of the channels.
 pub fn lost(image: &MapImage, before: DVec3) -> f64 {
-    ((image.integral() - before) / before).abs().max_element()
+    greatest(((image.integral() - before) / before).abs().to_array())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_look_up_that_fails_is_no_continuous_one() {
+        let pairs = pairs(4);
+        assert!(jump(&pairs, Some) < 2.0 * ASIDE);
+        let [_, failing] = pairs[2];
+        assert!(jump(&pairs, |d| (d != failing).then_some(d)).is_nan());
+    }
 }

@@ -20,7 +20,7 @@ const SHARES: [f64; 2] = [0.5, 0.05];
 /// The longest of them, m.
 const LONGEST: f64 = 0.125;
 /// Majorants as multiples of the greatest extinction.
-const LOOSENESS: [f64; 2] = [1.0, 8.0];
+pub const LOOSENESS: [f64; 2] = [1.0, 8.0];
 
 /// Of the transmittance, without bias.
 pub const RATIO: &str = "ratio tracking";

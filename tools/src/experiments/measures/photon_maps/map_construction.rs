@@ -129,18 +129,20 @@ const CRITERIA: &[Criterion<Row>] = &[
     ),
 ];
 
+/// Below what n log n has.
+const LINEAR: Bound = Bound::AtMost(1.05);
 const N_LOG_N: &str = "sorting by comparisons alone, n log n, has 1.09 over this range";
 const OF_GROWTH: &[Criterion<Growth>] = &[
     Criterion::each(
         "build time on the host is linear in the number of kernels: exponent",
-        Bound::AtMost(1.1),
+        LINEAR,
         |growth: &Growth| (&growth.exponent).into(),
     )
     .among(|growth| growth.stage == ON_HOST)
     .because(N_LOG_N),
     Criterion::each(
         "build time on the device is linear in the number of kernels: exponent",
-        Bound::AtMost(1.1),
+        LINEAR,
         |growth: &Growth| (&growth.exponent).into(),
     )
     .among(|growth| growth.stage == ON_DEVICE)

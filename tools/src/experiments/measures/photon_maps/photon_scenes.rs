@@ -11,7 +11,7 @@ use clerestory::scene::{Camera, Scene};
 use clerestory::{Result, scene};
 use glam::Vec3;
 
-use crate::experiments::measures::context::short_name;
+use crate::experiments::reference::short_name;
 use crate::geometry::{self, area, triangles_with_materials};
 use crate::random::Random;
 

@@ -74,6 +74,15 @@ impl Trees {
         })
     }
 
+    /// Bytes of the pairs of both layouts as they lie in memory, complete ones first.
+    pub fn bytes(&self) -> [u64; 2] {
+        [
+            size_of_val(self.complete.pairs.as_slice()),
+            size_of_val(self.compact.pairs.as_slice()),
+        ]
+        .map(|bytes| bytes as u64)
+    }
+
     /// What a ray finds in one of the layouts.
     pub fn answer(&self, query: &Query, is_compact: bool) -> Answer {
         let mut answer = Answer {

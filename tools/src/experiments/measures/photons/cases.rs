@@ -12,7 +12,7 @@ use clerestory::techniques::photon_mapping::kernel::{KernelProfile, KernelShape}
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
+use crate::experiments::reference::short_name;
 
 /// Photons land twice after they were scattered first, as the source's: light of two bounces before the eye's.
 const PATHS: &str = "bounces=0..3";

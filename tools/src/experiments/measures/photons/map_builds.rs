@@ -21,6 +21,7 @@ rows! {
     struct Row = "Maps built by the device and by the host" by [scene] {
         scene: String = "scene",
         on_hardware: bool = "on a device of its own",
+        by_device: bool = "the device can build",
         records: f64 = "records",
         host: Repeats = "map by the host (ms)",
         device: Repeats = "map by the device (ms)",
@@ -54,6 +55,8 @@ const CRITERIA: &[Criterion<Row>] = &[
         Bound::AtMost(0.0),
         |row: &Row| row.different.into(),
     )
+    .among(|row| row.by_device)
+    .needs("a device with shaderFloat64")
     .because("both build the same map of the same photons")
     .in_every_form(),
     Criterion::each(
@@ -61,8 +64,8 @@ const CRITERIA: &[Criterion<Row>] = &[
         Bound::AtMost(1.0),
         |row: &Row| (&row.pass_ratio).into(),
     )
-    .among(|row| row.on_hardware)
-    .needs("a GPU with memory of its own")
+    .among(|row| row.on_hardware && row.by_device)
+    .needs("a GPU with memory of its own and shaderFloat64")
     .because("what is built where it is used spares both copies"),
 ];
 
@@ -132,6 +135,7 @@ fn build(context: &Context<'_>, gpu: &Gpu, case: &Case, size: [u32; 2]) -> Resul
     let row = Row {
         scene: case.name().into(),
         on_hardware: gpu.caps().kind != DeviceKind::Cpu,
+        by_device: gpu.caps().float64,
         records: mappers[1].counts().records as f64 / f64::from(passes[1]),
         ratio: device.over(&host),
         pass_ratio: pass_device.over(&pass_host),

@@ -1,4 +1,5 @@
-//! Photons traced per second beside other renderers: Mitsuba 3's particle tracer and LuxCore's photon cache, on exported scenes, in turns.
+//! Photons and their segments traced per second beside other renderers: Mitsuba 3's particle tracer and LuxCore's photon cache, on exported
+//! scenes, in turns.
 //!
 //! Peers run in processes of their own through `tools/mitsuba/photons.py`, with the Python that has Mitsuba; one that is not there is left out,
 //! and a table says so.
@@ -14,9 +15,9 @@ use clerestory::{Error, Result, scene};
 
 use super::cases::mapper;
 use crate::agreement::PYTHON_VARIABLE;
-use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
+use crate::experiments::reference::short_name;
 use crate::mitsuba::{self, ExportOptions};
 use crate::python;
 use crate::timing::median;
@@ -60,7 +61,7 @@ rows! {
         segment_rate: Option<Repeats> = "thousand segments/s",
         map: Option<Repeats> = "map (ms)",
         ours_over: Repeats = "photons/s, ours over this",
-        our_segments_over: Option<Repeats> = "segments/s, ours over this",
+        our_segments_over: Option<Repeats> = "segments/s, ours over this or the most that it can have",
     }
 }
 
@@ -81,20 +82,21 @@ pub struct Found {
     left_out: Vec<LeftOut>,
 }
 
-const SMALL_FACTOR: &str = "a small factor is half an order of magnitude at most";
+const SMALL_FACTOR: &str =
+    "a small factor is half an order of magnitude at most; photons are of different length, segments are the same work";
 const CRITERIA: &[Criterion<Row>] = &[
     Criterion::each(
-        "photons per second are a third of Mitsuba's or more",
+        "segments per second are a third of Mitsuba's or more",
         Bound::AtLeast(1.0 / 3.0),
-        |row: &Row| (&row.ours_over).into(),
+        Row::segments_over,
     )
     .among(|row| row.renderer == MITSUBA)
     .needs("Mitsuba")
     .because(SMALL_FACTOR),
     Criterion::each(
-        "photons per second are a third of LuxCore's or more",
+        "segments per second are a third of LuxCore's or more",
         Bound::AtLeast(1.0 / 3.0),
-        |row: &Row| (&row.ours_over).into(),
+        Row::segments_over,
     )
     .among(|row| row.renderer == LUXCORE)
     .needs("LuxCore")
@@ -112,6 +114,13 @@ struct Turn {
     segments: Option<f64>,
     segment_rate: Option<f64>,
     map_seconds: Option<f64>,
+}
+
+impl Turn {
+    /// Segments a second; of a renderer that tells none, those of photons that all go on to the end.
+    fn most_segments(&self) -> f64 {
+        self.segment_rate.unwrap_or(f64::from(DEPTH) * self.rate)
+    }
 }
 
 /// What the script prints.
@@ -148,6 +157,12 @@ impl From<Answer> for Turn {
 }
 
 impl Row {
+    /// Segments a second, ours over this one's; not a number where ours are not known.
+    fn segments_over(&self) -> Measured {
+        let ratio = self.our_segments_over.as_ref();
+        ratio.map_or(f64::NAN.into(), Repeats::measured)
+    }
+
     /// Of turns of a renderer beside ours, of which it may have left some out; none without any.
     fn of(scene: &str, renderer: &str, turns: &[Option<Turn>], ours: &[Option<Turn>]) -> Option<Self> {
         let both = turns.iter().zip(ours);
@@ -170,7 +185,7 @@ impl Row {
             segment_rate: known(&|this, _| Some(1e-3 * this.segment_rate?)),
             map: known(&|this, _| Some(1e3 * this.map_seconds?)),
             ours_over: both.iter().map(|(this, ours)| ours.rate / this.rate).collect(),
-            our_segments_over: known(&|this, ours| Some(ours.segment_rate? / this.segment_rate?)),
+            our_segments_over: known(&|this, ours| Some(ours.segment_rate? / this.most_segments())),
         })
     }
 }
@@ -196,8 +211,8 @@ impl Study for Found {
         let mitsubas = self.rates.iter().filter(|row| row.renderer == MITSUBA);
         Findings::of(&self.rates, CRITERIA)
             .headline(
-                "photons per second over Mitsuba's, geometric mean",
-                geometric_mean(mitsubas.map(|row| row.ours_over.measured())),
+                "segments per second over the most that Mitsuba's photons can have, geometric mean",
+                geometric_mean(mitsubas.map(Row::segments_over)),
             )
             .bars(
                 "rates",
@@ -210,8 +225,9 @@ impl Study for Found {
                 "{DEPTH} edges of a light path asked for at most; a turn is the median of {ROUNDS} rounds. Photons of different renderers are of \
                  different length: ours meet Russian roulette at every landing, Mitsuba's from the fifth on and are joined to the camera at every \
                  vertex, by a shadow ray each, LuxCore's go on without roulette. A segment is a ray from one landing to the next; LuxCore tells \
-                 landings alone, which are no more than segments, Mitsuba neither. Ours is wall clock of tracing alone; the map is that of \
-                 kernels, LuxCore's of radiance photons where the camera sees.",
+                 landings alone, which are no more than segments, Mitsuba neither: beside it, ours stand against {DEPTH} segments of each of its \
+                 photons, the most that they can have. Ours is wall clock of tracing alone; the map is that of kernels, LuxCore's of radiance \
+                 photons where the camera sees.",
             ))
             .and(Findings::of(&self.left_out, &[]))
     }

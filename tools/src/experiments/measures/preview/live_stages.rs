@@ -14,9 +14,10 @@ use rayon::prelude::*;
 
 use crate::random::Random;
 
-/// Texels along a side of the reference.
-pub const REFERENCE: u32 = 1024;
-/// Means of the reference that lobes are summed over, texels along a side: lobes are many times wider.
+/// Texels along a side of the reference: the most that 128 MiB of a storage buffer hold, which some drivers end at.
+pub const REFERENCE: u32 = 2048;
+/// Means of the reference that lobes are summed over, texels along a side. A texel is 0.014 wide: wide lobes span many, the narrowest about one, whose
+/// sums are blurred by as much.
 pub const SUMMED: u32 = 256;
 /// Widths of lobes with their names: irradiance, two of the levels' own, one between them, and narrower ones than the narrowest.
 const LOBES: [(f64, &str); 7] = [
@@ -32,8 +33,10 @@ const LOBES: [(f64, &str); 7] = [
 pub const IRRADIANCE: &str = "irradiance";
 /// The narrowest.
 pub const MIRROR: &str = "mirror";
-/// Directions of look-ups.
+/// Directions of look-ups by lobes.
 pub const DIRECTIONS: usize = 300;
+/// Directions of mirrors, of which few meet an edge.
+pub const MIRRORS: usize = 20_000;
 /// The finest level that is filtered, texels along a side.
 pub const FINEST: u32 = 128;
 /// The same of the reference, which is asked for none.
@@ -136,6 +139,7 @@ fn error(values: &[Vec3], truth: &[DVec3]) -> f64 {
 pub struct Reference {
     directions: Vec<DVec3>,
     lobes: Vec<Vec<DVec3>>,
+    mirrors: Vec<DVec3>,
     sharp: Vec<DVec3>,
 }
 
@@ -146,7 +150,8 @@ impl Reference {
     /// Those of the device.
     pub fn new(stage: &Stage<'_>, (side, summed): (u32, u32)) -> Result<Self> {
         let mut random = Random::new(5);
-        let directions: Vec<DVec3> = (0..DIRECTIONS).map(|_| random.direction()).collect();
+        let mut draw = |count: usize| -> Vec<DVec3> { (0..count).map(|_| random.direction()).collect() };
+        let (directions, mirrors) = (draw(DIRECTIONS), draw(MIRRORS));
         let finest = FINEST_OF_REFERENCE;
         let mirror = stage.live(LightProbeDesc { side, finest })?.probe().map().read(0)?;
         let mut image = mirror.clone();
@@ -158,8 +163,12 @@ impl Reference {
                 .iter()
                 .map(|(alpha, _)| truth(&image, &directions, *alpha))
                 .collect(),
-            sharp: directions.iter().filter_map(|d| mirror.look_up(*d)).collect(),
+            sharp: mirrors
+                .iter()
+                .map(|d| mirror.look_up(*d).unwrap_or(DVec3::NAN))
+                .collect(),
             directions,
+            mirrors,
         })
     }
 
@@ -169,15 +178,16 @@ impl Reference {
     /// Those of the device.
     pub fn errors(&self, live: &LiveProbe) -> Result<Vec<(&'static str, f64)>> {
         let probe = live.probe();
-        let of = |level: f32, right: &[DVec3]| -> Result<f64> {
-            let queries: Vec<Vec4> = self.directions.iter().map(|d| d.as_vec3().extend(level)).collect();
+        let of = |level: f32, directions: &[DVec3], right: &[DVec3]| -> Result<f64> {
+            let queries: Vec<Vec4> = directions.iter().map(|d| d.as_vec3().extend(level)).collect();
             Ok(error(&probe.filtered().look_up(&queries)?, right))
         };
         let mut errors = Vec::new();
         for ((alpha, name), right) in LOBES.iter().zip(&self.lobes) {
-            errors.push((*name, of(probe_level(probe.alphas(), *alpha) as f32, right)?));
+            let level = probe_level(probe.alphas(), *alpha) as f32;
+            errors.push((*name, of(level, &self.directions, right)?));
         }
-        errors.push((MIRROR, of(0.0, &self.sharp)?));
+        errors.push((MIRROR, of(0.0, &self.mirrors, &self.sharp)?));
         Ok(errors)
     }
 }

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
+use crate::experiments::reference::short_name;
 use crate::geometry;
 use crate::timing::timed;
 

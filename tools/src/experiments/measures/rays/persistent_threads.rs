@@ -14,7 +14,7 @@ use glam::Vec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
+use crate::experiments::reference::short_name;
 use crate::geometry;
 use crate::random::Random;
 use crate::timing::timed;
@@ -98,6 +98,13 @@ fn count(gpu: &Gpu, index: &Bvh2, rays: &[Ray], form: &Form) -> Result<Traced> {
     RayTracer::new(gpu, index, &settings)?.trace(rays)
 }
 
+/// How many of the hits are not those expected, to the bit; those that are missing too.
+fn different(hits: &[Hit], expected: &[Hit]) -> u64 {
+    let pairs = hits.iter().zip(expected);
+    let missing = hits.len().abs_diff(expected.len());
+    (pairs.filter(|(a, b)| bits(a) != bits(b)).count() + missing) as u64
+}
+
 fn bits(hit: &Hit) -> [u32; 4] {
     let [u, v] = hit.barycentrics.map(f32::to_bits);
     [hit.t.to_bits(), u, v, hit.triangle]
@@ -109,7 +116,7 @@ rows! {
         scene: String = "scene",
         kind: String = "rays",
         form: String = "form",
-        differ: u64 = "hits that differ",
+        differ: u64 = "hits that differ, of timed and of counting kernels",
         rate: Repeats = "rate (M rays/s)",
         ratio: Repeats = "rate over one thread per ray's",
         nodes: f64 = "nodes per ray",
@@ -145,14 +152,13 @@ impl Row {
         self.form != ONE_THREAD
     }
 
-    /// All but scene, kind and times of a form, beside what one thread per ray found.
-    fn of(form: &Form, traced: &Traced, first: &Traced, rays: usize) -> Self {
+    /// All but scene, kind and times of a form, with the hits of its timed kernels, beside what one thread per ray found.
+    fn of(form: &Form, traced: &Traced, timed: &[Hit], first: &Traced, rays: usize) -> Self {
         let per_ray = |work: u64| work as f64 / rays.max(1) as f64;
-        let differ = traced.hits.iter().zip(&first.hits).filter(|(a, b)| bits(a) != bits(b));
         let steps = |traced: &Traced| traced.work.nodes + traced.work.triangles;
         Self {
             form: form.name.into(),
-            differ: differ.count() as u64,
+            differ: different(&traced.hits, &first.hits) + different(timed, &first.hits),
             nodes: per_ray(traced.work.nodes),
             triangles: per_ray(traced.work.triangles),
             other_work: steps(traced).abs_diff(steps(first)),
@@ -199,7 +205,8 @@ impl Study for Found {
                 geometric_mean(queues.map(|row| row.ratio.measured())),
             )
             .note(
-                "Rates by GPU timestamps, in turns. Workgroups are the fastest power of two. Rays stopped by their quota go on in another round, \
+                "Rates by GPU timestamps, in turns. Hits are those of the last timed turn and of the kernel that counts the work, both against one thread \
+                 per ray's with counts. Workgroups are the fastest power of two. Rays stopped by their quota go on in another round, \
                  which fetches all batches again.",
             )
             .note(
@@ -219,21 +226,25 @@ impl Study for Found {
 /// All forms on some rays.
 fn of_rays(context: &Context<'_>, gpu: &Gpu, index: &Bvh2, rays: &[Ray]) -> Result<Vec<Row>> {
     let forms = forms(gpu, index, rays)?;
+    // Of the last of the timed turns.
+    let mut hits = vec![Vec::new(); forms.len()];
     let seconds = context.in_turns(15, forms.len(), |i| {
         let (traced, wall) = timed(|| forms[i].tracer.trace(rays));
-        let on_device = traced?.seconds();
+        let traced = traced?;
+        let on_device = traced.seconds();
+        hits[i] = traced.hits;
         Ok(if on_device > 0.0 { on_device } else { wall })
     })?;
     let seconds: Vec<Repeats> = seconds.into_iter().map(Repeats).collect();
     let first = count(gpu, index, rays, &forms[0])?;
-    let of = |(form, time): (&Form, &Repeats)| {
+    let of = |((form, time), hits): ((&Form, &Repeats), &Vec<Hit>)| {
         let traced = count(gpu, index, rays, form)?;
         let rate = |seconds: &f64| rays.len() as f64 / seconds * 1e-6;
         Ok(Row {
             rate: time.0.iter().map(rate).collect(),
             ratio: seconds[0].over(time),
-            ..Row::of(form, &traced, &first, rays.len())
+            ..Row::of(form, &traced, hits, &first, rays.len())
         })
     };
-    forms.iter().zip(&seconds).map(of).collect()
+    forms.iter().zip(&seconds).zip(&hits).map(of).collect()
 }

@@ -11,8 +11,8 @@ use glam::Vec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
 use crate::experiments::measures::photon_maps::photon_scenes::{Intersection, Surfaces};
+use crate::experiments::reference::short_name;
 use crate::random::Random;
 use crate::timing::timed;
 

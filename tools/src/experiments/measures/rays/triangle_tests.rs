@@ -55,8 +55,7 @@ const CRITERIA: &[Criterion<Row>] = &[
     )
     .among(Row::is_the_kernels)
     .because(
-        "a few units of rounding of the reach, and of its slopes: what `clerestory::accel::triangle` and its derivation at `BOX_SLACK` state for \
-         every ray",
+        "18 roundings of the reach and 16 of its slopes: what `clerestory::accel::triangle` and its derivation at `BOX_SLACK` state for every ray",
     )
     .in_every_form(),
 ];

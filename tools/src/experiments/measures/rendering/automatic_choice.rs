@@ -1,7 +1,8 @@
 //! Automatic choice: is the error of the picture the one that was asked for, and is the technique the one that wins?
 //!
 //! Oracle: a reference with many independent samples, whose own variance is subtracted. Where the path tracer cannot find all paths, it is photon
-//! mapping's, of a seed of its own and many more passes.
+//! mapping's, of a seed of its own, more passes and far smaller kernels: a picture by photon mapping must not share its bias with what it is held
+//! against, or the other technique alone would bear it.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +13,7 @@ use clerestory::{Error, Result, scene};
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
+use crate::experiments::reference::short_name;
 use crate::experiments::unbiased;
 use crate::experiments::watch::Watch;
 
@@ -71,8 +72,12 @@ const CONTESTS: [Contest; 10] = [
     Contest::of_direct_light("builtin:cathedral?source=point", 256, 0.1, ["path", "preview"]),
 ];
 /// References: the technique and its samples per pixel. Photon mapping's is for caustics that the path tracer cannot find.
-const BY_PHOTONS: (&str, u32) = ("photon", 1024);
+const BY_PHOTONS: (&str, u32) = (PHOTON, 2048);
 const BY_PATHS: (&str, u32) = ("path", 24_576);
+const PHOTON: &str = "photon";
+/// Radius of the first kernels of a reference by photons over the scene's diagonal: a quarter of the hundredth that pictures have by default. In each pass
+/// they have a sixteenth of the area, and kernels of more passes are smaller still.
+const REFERENCE_RADIUS: f64 = 0.25 / 100.0;
 
 impl Contest {
     /// Which photon mapping is expected to win, beside the path tracer.
@@ -82,7 +87,7 @@ impl Contest {
             path_set: "all",
             side: 48,
             error,
-            winner: "photon",
+            winner: PHOTON,
             rival: "path",
             reference,
         }
@@ -149,6 +154,7 @@ rows! {
         seconds: Repeats = "seconds",
         pilots: f64 = "pilots: seconds",
         other: Option<Repeats> = "other: error in as many seconds",
+        other_seconds: Option<Repeats> = "other: seconds",
         why: String = "other: why not",
     }
 }
@@ -184,6 +190,13 @@ const OF_CONTESTS: &[Criterion<Contested>] = &[
     )
     .among(|row| row.other.is_some()),
     Criterion::each(
+        "the other technique has as many seconds: its seconds over the chosen one's",
+        Bound::Between(0.75, 1.25),
+        |row: &Contested| (&row.other_seconds.as_ref().unwrap_or(&row.seconds).over(&row.seconds)).into(),
+    )
+    .among(|row| row.other_seconds.is_some())
+    .because("a quarter to either side: noise falls as the root of time, which is about an eighth of an error"),
+    Criterion::each(
         "the winner is the one that was named beforehand",
         Bound::AtLeast(1.0),
         |row: &Contested| (row.chosen == row.expected).into(),
@@ -201,7 +214,7 @@ const OF_GOALS: &[Criterion<Aimed>] = &[
         |row: &Aimed| (&row.ratio).into(),
     ),
     Criterion::each(
-        "the time is kept: seconds over those asked for",
+        "no more time is taken than was asked for, less is no fault: seconds over those asked for",
         Bound::AtMost(FACTOR),
         |row: &Aimed| (&row.seconds.scaled(1.0 / row.time.unwrap_or(f64::INFINITY))).into(),
     )
@@ -234,6 +247,12 @@ impl Study for Found {
                 "Errors: root of the relative MSE against a reference of a seed of its own, whose variance is subtracted. Seconds are those of the \
                  picture, without the pilots; the other technique gets as many, with settings that its pilots found best.",
             )
+            .note(format!(
+                "References by photon mapping have {} passes, with kernels of a sixteenth of the area that a picture's have in the same pass. What \
+                 bias is left in them falls in that proportion where light varies smoothly; along the rim of a caustic, where blur is as wide as a \
+                 kernel, a quarter of the picture's squared error at most is common to both, and less by the passes that the reference has more.",
+                BY_PHOTONS.1
+            ))
             .headline("error over the asked or predicted one, geometric mean", geometric_mean(ratios))
             .and(Findings::of(&self.goals, OF_GOALS))
             .note("Seconds are those of pilots and picture.")
@@ -280,24 +299,33 @@ fn pictures(
 }
 
 impl Contest {
+    /// Options of the reference.
+    fn reference(&self, renderer: &Renderer, base: &RenderOptions) -> RenderOptions {
+        let (technique, spp) = self.reference;
+        let mut settings = serde_json::json!({ "path_set": self.path_set, "sampler": "pcg" });
+        if technique == PHOTON {
+            let [lower, upper] = renderer.gpu_scene().bounds();
+            settings["radius"] = (REFERENCE_RADIUS * f64::from((upper - lower).length())).into();
+        }
+        RenderOptions {
+            technique: Some(technique.into()),
+            spp,
+            seed: REFERENCE_SEED,
+            settings: settings.into(),
+            ..base.clone()
+        }
+    }
+
     /// Which technique is chosen, and how far the other one comes in the same time; `None` when it was stopped.
     fn held(&self, context: &Context<'_>, gpu: &Gpu) -> Result<Option<Contested>> {
         let watch = context.watch;
         let renderer = Renderer::new(gpu, &scene::load(self.address)?)?;
-        let (reference, spp) = self.reference;
         let base = RenderOptions {
             size: [self.side; 2],
             settings: serde_json::json!({ "path_set": self.path_set }).into(),
             ..RenderOptions::default()
         };
-        let of_reference = RenderOptions {
-            technique: Some(reference.into()),
-            spp,
-            seed: REFERENCE_SEED,
-            settings: serde_json::json!({ "path_set": self.path_set, "sampler": "pcg" }).into(),
-            ..base.clone()
-        };
-        let Some(reference) = render(&renderer, &of_reference, watch)? else {
+        let Some(reference) = render(&renderer, &self.reference(&renderer, &base), watch)? else {
             return Ok(None);
         };
         let goal = Goal {
@@ -307,8 +335,11 @@ impl Contest {
         let plan = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
         let choice = plan.choice();
         let chosen = plan.options(&base);
-        // Compiles its kernels, and says how many seconds the other one gets.
-        let Some(first) = render(&renderer, &chosen, watch)? else {
+        // The first one compiles the kernels; the second one's seconds are those that the other technique gets.
+        if render(&renderer, &chosen, watch)?.is_none() {
+            return Ok(None);
+        }
+        let Some(warm) = render(&renderer, &chosen, watch)? else {
             return Ok(None);
         };
         let other_id = if choice.technique == self.rival {
@@ -321,13 +352,13 @@ impl Contest {
             technique: Some(other_id.into()),
             settings: candidate.map_or_else(|| base.settings.clone(), |other| other.settings.clone().into()),
             spp: u32::MAX,
-            time_budget: Some(Duration::from_secs_f64(first.report.render_seconds)),
+            time_budget: Some(Duration::from_secs_f64(warm.report.render_seconds)),
             ..base.clone()
         };
         let can_render = match render(&renderer, &other, watch) {
             Ok(Some(_)) => true,
             Ok(None) => return Ok(None),
-            Err(Error::Unsupported { .. } | Error::Setting { .. }) => false,
+            Err(Error::Unsupported { .. }) => false,
             Err(error) => return Err(error),
         };
         let contenders = if can_render { vec![chosen, other] } else { vec![chosen] };
@@ -335,10 +366,13 @@ impl Contest {
             return Ok(None);
         };
         let [error, seconds] = Repeats::by_part(&turns[0]);
-        let other = turns.get(1).map(|turns| {
-            let [error, _] = Repeats::by_part(turns);
-            error
-        });
+        let (other, other_seconds) = match turns.get(1) {
+            Some(turns) => {
+                let [error, seconds] = Repeats::by_part(turns);
+                (Some(error), Some(seconds))
+            }
+            None => (None, None),
+        };
         let why = match candidate {
             Some(other) if !other.reason.is_empty() => other.reason.clone(),
             Some(other) => format!("{:.2} s predicted", other.seconds),
@@ -359,6 +393,7 @@ impl Contest {
             seconds,
             pilots: plan.pilot_seconds,
             other,
+            other_seconds,
             why,
         }))
     }

@@ -6,10 +6,10 @@ use clerestory::gpu::Gpu;
 use clerestory::render::Renderer;
 use clerestory::{Result, scene};
 
-use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows, z_most};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::context::short_name;
 use crate::experiments::measures::pictures::Image;
+use crate::experiments::reference::short_name;
 
 /// Paths of a whole picture and the parts that they divide into.
 struct Division {
@@ -89,11 +89,11 @@ const CRITERIA: &[Criterion<Sum>] = &[
     )
     .because("one value of a right sum is refused once in a hundred pictures, by Šidák"),
     Criterion::each(
-        "the sum's mean is right: |z| over √3",
-        Bound::AtMost(2.93),
-        |row: &Sum| (row.z.abs() / CHANNELS_VARY_AS_ONE).into(),
+        "the sum's mean is right: |z| over what chance exceeds in one of the divisions once in a hundred runs",
+        Bound::AtMost(1.0),
+        |row: &Sum| (row.z.abs() / CHANNELS_VARY_AS_ONE / z_most(DIVISIONS.len())).into(),
     )
-    .because("the largest of three is beyond that once in a hundred runs, by Šidák, when channels vary as one"),
+    .because("by Šidák, when channels vary as one"),
 ];
 
 impl Study for Found {

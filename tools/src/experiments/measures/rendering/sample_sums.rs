@@ -5,7 +5,7 @@
 use clerestory::Result;
 
 use super::sums::{
-    CASES, EQUAL, Form, KURTOSIS, OF_VARIANCE, PAIRS, SUMS, VARIANCES, exact_sum, exact_variance, samples,
+    BY_ROUNDING, CASES, EQUAL, Form, KURTOSIS, OF_VARIANCE, PAIRS, SUMS, VARIANCES, exact_sum, exact_variance, samples,
 };
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, largest, rows};
 use crate::experiments::measures::Context;
@@ -48,6 +48,8 @@ pub struct Found {
 /// Errors over the noise that are far below it.
 const FAR_BELOW: Bound = Bound::AtMost(0.01);
 const HUNDREDTH: &str = "far is a hundredth";
+/// Relative error of a number that is rounded to f32, at most.
+const ROUNDING: f64 = 0.5 * f32::EPSILON as f64;
 
 const OF_SUMS: &[Criterion<Sum>] = &[
     Criterion::each(
@@ -55,8 +57,16 @@ const OF_SUMS: &[Criterion<Sum>] = &[
         FAR_BELOW,
         |row: &Sum| row.of_noise.unwrap_or(f64::NAN).into(),
     )
-    .among(|row| row.form == PAIRS && row.of_noise.is_some())
+    .among(|row| row.is_the_engines() && !row.is_by_rounding())
     .because(HUNDREDTH)
+    .in_every_form(),
+    Criterion::each(
+        "the error of a sum of equal or of cancelling samples is no larger than rounding the sum to f32 makes: over it",
+        Bound::AtMost(1.0),
+        |row: &Sum| (row.error.abs() / ROUNDING).into(),
+    )
+    .among(|row| row.is_the_engines() && row.is_by_rounding())
+    .because("equal samples have no noise, and that of cancelling ones hides what any sum loses")
     .in_every_form(),
     Criterion::each("a sum has few bytes", Bound::AtMost(8.0), |row: &Sum| row.bytes.into())
         .among(Sum::is_the_engines)
@@ -70,12 +80,15 @@ const OF_VARIANCES: &[Criterion<Variance>] = &[Criterion::each(
     |row: &Variance| row.of_noise.into(),
 )
 .among(|row| row.form == PAIRS)
-.because(HUNDREDTH)
-.in_every_form()];
+.because(HUNDREDTH)];
 
 impl Sum {
     fn is_the_engines(&self) -> bool {
         self.form == PAIRS
+    }
+
+    fn is_by_rounding(&self) -> bool {
+        BY_ROUNDING.contains(&self.samples.as_str())
     }
 }
 

@@ -73,9 +73,12 @@ pub const EQUAL: &str = "equal, 0.1";
 const UNIFORM: &str = "uniform";
 const HEAVY: &str = "heavy tail";
 const NARROW: &str = "mean 1000 times the deviation";
+/// Samples whose noise is far larger than what any sum of them loses.
 const CANCELLING: &str = "cancelling";
 /// Kinds of samples.
 pub const CASES: [&str; 5] = [EQUAL, UNIFORM, HEAVY, NARROW, CANCELLING];
+/// Those whose noise is no measure of a sum's error: there is none, or it hides all errors.
+pub const BY_ROUNDING: [&str; 2] = [EQUAL, CANCELLING];
 /// Those whose variances are measured too: both uniform.
 pub const OF_VARIANCE: [&str; 2] = [UNIFORM, NARROW];
 /// Fourth moment over the squared variance of uniform numbers.
@@ -98,14 +101,21 @@ pub fn samples(case: &str, count: usize) -> Vec<f32> {
 /// A way to add up, and the bytes that it keeps.
 pub type Form = (&'static str, fn(&[f32]) -> f64, u64);
 
+const fn bytes_of<T>() -> u64 {
+    size_of::<T>() as u64
+}
+
 /// The engine's.
 pub const PAIRS: &str = "pairs of f32 (engine)";
 /// Ways to sums.
 pub const SUMS: [Form; 4] = [
-    ("f32", plain, 4),
-    ("f32, Kahan", kahan, 8),
-    (PAIRS, pairs, 8),
-    ("f64", double, 8),
+    ("f32", plain, bytes_of::<f32>()),
+    ("f32, Kahan", kahan, bytes_of::<[f32; 2]>()),
+    (PAIRS, pairs, bytes_of::<TwoFloat>()),
+    ("f64", double, bytes_of::<f64>()),
 ];
-/// Ways to variances.
-pub const VARIANCES: [Form; 2] = [("f32", plain_variance, 8), (PAIRS, pair_variance, 16)];
+/// Ways to variances, of a sum and a sum of squares.
+pub const VARIANCES: [Form; 2] = [
+    ("f32", plain_variance, bytes_of::<[f32; 2]>()),
+    (PAIRS, pair_variance, bytes_of::<[TwoFloat; 2]>()),
+];

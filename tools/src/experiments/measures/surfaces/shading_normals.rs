@@ -124,6 +124,7 @@ rows! {
         normal: String = "normal",
         tilt: f64 = "tilt (degrees)",
         greatest: f64 = "greatest reflectance seen",
+        least: f64 = "least reflectance seen",
         mean: f64 = "mean reflectance seen",
         black: f64 = "views that see black",
         through: f64 = "greatest share of light through the surface",
@@ -141,6 +142,13 @@ const CRITERIA: &[Criterion<Row>] = &[
         "the greatest reflectance seen is 1",
         Bound::Between(0.99, 1.01),
         |row: &Row| row.greatest.into(),
+    )
+    .among(Row::is_adapted)
+    .because("half of what an eye sees"),
+    Criterion::each(
+        "the least reflectance seen is 1",
+        Bound::Between(0.99, 1.01),
+        |row: &Row| row.least.into(),
     )
     .among(Row::is_adapted)
     .because("half of what an eye sees"),
@@ -176,6 +184,7 @@ impl Row {
             normal: name.into(),
             tilt,
             greatest: of_all(|seen| seen.reflected),
+            least: -of_all(|seen| -seen.reflected),
             mean: all.iter().map(|seen| seen.reflected).sum::<f64>() / all.len() as f64,
             black: black as f64 / all.len() as f64,
             through: of_all(|seen| seen.through),
