@@ -146,7 +146,7 @@ fn a_rendering_is_summed_up_in_lines_that_matter() -> Tested {
         ("samples", "2 per pixel"),
         ("rates", "rays/s"),
         ("memory", "on the device"),
-        ("error", "not measured"),
+        ("error", "unknown"),
         ("more", "--stats table"),
     ] {
         assert!(said(&first, name).contains(word), "{name}: {first:?}");

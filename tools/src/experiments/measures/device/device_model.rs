@@ -1,7 +1,7 @@
 //! The cost model of the device: what a load costs by the size of what it lies in, what copies, tickets of a queue, boundaries between
 //! dispatches and submissions cost.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §2.2.2 to §2.2.4.
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §2.2.2 to §2.2.4.
 
 use clerestory::accel::Ray;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};

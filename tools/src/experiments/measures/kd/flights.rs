@@ -1,6 +1,6 @@
 //! Flights of a camera through the scenes that kd-trees are compared in, and the rays of their frames.
 //!
-//! Source of what the scenes stand for: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, table 2.1 and
+//! Source of what the scenes stand for: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, table 2.1 and
 //! §4.1.4: five scenes, camera flights, up to four rays per pixel (camera, reflections at mirrors, a shadow ray from where each ends). The
 //! models but the first are not to be had by package; generated scenes of the same kind and number of triangles stand in for them.
 //!

@@ -1,6 +1,6 @@
 //! Caches of kd-trees that kernels manage themselves: what they keep from memory, and what that gains.
 //!
-//! Oracle: all give the same hits to the bit. Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College
+//! Oracle: all give the same hits to the bit. Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College
 //! Dublin, 2011, tables 4.8 and 4.10.
 
 use clerestory::Result;

@@ -1,6 +1,6 @@
 //! kd-trees by what weighs their children: size, build time, what rays visit, rays per second; with the light among the surfaces and outside.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, tables 4.1 to 4.4. Its trees
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, tables 4.1 to 4.4. Its trees
 //! weigh triangles by their boxes; ours do also by what of them lies in a node.
 
 use clerestory::Result;

@@ -1,6 +1,6 @@
 //! Persistent threads in kd-trees beside one thread per ray: rates of both on flights through the source's scenes.
 //!
-//! Oracle: the hits of one thread per ray, to the bit. Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity
+//! Oracle: the hits of one thread per ray, to the bit. Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity
 //! College Dublin, 2011, table 4.1 and appendix A.1, whose code bases I and II are the two models of execution.
 
 use clerestory::Result;

@@ -1,6 +1,6 @@
 //! Ways through a kd-tree: with a stack, and without one by a word of flags, with push-down, a short stack or both.
 //!
-//! Oracle: all give the same hits to the bit. Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College
+//! Oracle: all give the same hits to the bit. Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College
 //! Dublin, 2011, tables 4.5 and 4.6.
 
 use clerestory::Result;

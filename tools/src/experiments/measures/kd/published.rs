@@ -1,6 +1,6 @@
 //! What the source says of kd-trees over its five scenes, by their names.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, tables 4.1 to 4.10. Changes are in per cent.
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, tables 4.1 to 4.10. Changes are in per cent.
 
 /// A figure of each scene.
 type Table<P> = [(&'static str, P); 5];

@@ -1,6 +1,6 @@
 //! Photon maps of compact pairs beside those of complete nodes: stack entries, bytes and time of a query, exact counts before times.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.4; bytes by its
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.4; bytes by its
 //! model in which every access is served by itself (§4.3.3): 32 bytes per node or compact pair, 4 a stack entry.
 
 use clerestory::Result;

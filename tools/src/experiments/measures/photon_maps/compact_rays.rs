@@ -1,6 +1,6 @@
 //! Ray queries of compact pairs beside those of complete pairs of 56 bytes: stack entries, bytes and time, exact counts before times.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.5 (b); bytes by its
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.5 (b); bytes by its
 //! model in which every access is served by itself (§4.3.3): 28 bytes per node of a complete pair, 32 a compact pair, stack entries of 8
 //! bytes (4 for shadow rays) and 12.
 

@@ -1,6 +1,6 @@
 //! Frames of the source by leaf size, and what they take by our counts of nodes and kernels.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.1.
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.1.
 
 use super::photon_kernels::Work;
 use crate::least_squares::{Fit, non_negative};

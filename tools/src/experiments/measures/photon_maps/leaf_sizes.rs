@@ -1,6 +1,6 @@
 //! Leaf sizes of photon maps: what a query reads, tests and takes, from 1 kernel a leaf to 128, beside the size chosen from the kernels.
 //!
-//! Source of the sweep: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.1.
+//! Source of the sweep: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.1.
 
 use clerestory::Result;
 use clerestory::accel::box_tree::BoxTree;

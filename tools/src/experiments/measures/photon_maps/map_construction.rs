@@ -1,7 +1,7 @@
 //! Construction of photon maps: nodes of the linear hierarchy and of the voxel volume heuristic, and build times against the number of kernels,
 //! stage by stage; and with kernels that lie in memory in the order of the tree, which tells what the memory costs.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.2.
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.2.
 
 use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::BoxTree;

@@ -1,6 +1,6 @@
 //! Photon maps of the linear hierarchy beside those of the voxel volume heuristic: nodes fetched, kernels tested and time of a query.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.3.
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 6.3.
 
 use clerestory::Result;
 use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;

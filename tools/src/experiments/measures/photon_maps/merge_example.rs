@@ -1,6 +1,6 @@
 //! The worked example of building a linear hierarchy by merging: every array after every level beside the values computed by hand.
 //!
-//! Source of the method: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2. Oracle: the example
+//! Source of the method: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2. Oracle: the example
 //! carried out by hand; for more codes, the tree by lists of splits, which is built from the root.
 
 use clerestory::accel::Aabb;

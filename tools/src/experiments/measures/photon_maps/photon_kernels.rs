@@ -1,7 +1,7 @@
 //! Stand-ins for photon maps: kernels about the second and third hits of photons that walk through a scene, and the surface points that
 //! cameras see.
 //!
-//! Source of what they stand for: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6. Photons
+//! Source of what they stand for: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6. Photons
 //! leave a point evenly, surfaces but mirrors scatter them by the cosine with probability [`SURVIVAL`], and hits two and three are kept.
 //! Radii go by the fourth root of the photon's way, the source's dampening; their scale is set so that a point of the scene's surfaces
 //! lies in a given number of kernels on average. The source's kernels are ellipsoids that lie on the surface; [`Shape`] has them stretched as

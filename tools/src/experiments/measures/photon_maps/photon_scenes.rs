@@ -1,6 +1,6 @@
 //! Scenes of photon maps: with a light, what the source says of their counterparts, and surfaces that rays meet.
 //!
-//! Source of what they stand for: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6.
+//! Source of what they stand for: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6.
 //!
 //! Guarantee: deterministic.
 

@@ -1,6 +1,6 @@
 //! Scenes of whole photon mappings: the settings that the source has for their counterparts, and what it found there.
 //!
-//! Source: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Tables 5.1 and 6.6.
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Tables 5.1 and 6.6.
 
 use std::sync::Arc;
 

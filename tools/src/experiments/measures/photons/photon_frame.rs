@@ -1,6 +1,6 @@
 //! What a frame of photon mapping costs when the light moves: milliseconds of photons, of their map and of the picture, and rates of each.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.3 and Table 6.6, on a GPU of
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.3 and Table 6.6, on a GPU of
 //! its time. Its figures stand beside ours.
 
 use std::time::Instant;

@@ -1,6 +1,6 @@
 //! What queues of queries cost and gain: milliseconds of a gather with the stages of its queue, by themselves and by packets.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4 and Table 7.5, of rays through
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4 and Table 7.5, of rays through
 //! photons in media, on a GPU of its time; points on surfaces are queued here.
 
 use clerestory::gpu::Gpu;

@@ -1,7 +1,7 @@
 //! What photons and kernels come to: interactions, discarded and clamped kernels, contributions to a query, lengths of axes, and what the
 //! dampening changes of it.
 //!
-//! Source of the comparison: "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2.2, Table 5.1 and Figure
+//! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2.2, Table 5.1 and Figure
 //! 5.2. Its figures stand beside ours, which are exact counts of other scenes of the same size.
 
 use clerestory::gpu::Gpu;

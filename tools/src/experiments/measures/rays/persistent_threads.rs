@@ -1,6 +1,6 @@
 //! Persistent threads on a queue of rays beside one thread per ray: rates, exact work, and what the quotas of the queue cost.
 //!
-//! Oracle: the hits of one thread per ray, to the bit, and its work. Source of the comparison: "Interactive Manycore Photon Mapping", PhD
+//! Oracle: the hits of one thread per ray, to the bit, and its work. Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD
 //! thesis, Trinity College Dublin, 2011, appendix A.1, whose trees by the surface area heuristic gave the persistent form a ratio of
 //! 0.9 on a trivial scene and of 1.9 to 2.4 on four others.
 
