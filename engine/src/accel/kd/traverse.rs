@@ -443,6 +443,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+            "engine/src/accel/kd/tests.rs::leaves_come_in_the_order_of_the_ray",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[
