@@ -415,6 +415,26 @@ fn work_is_in_the_order_of_the_schemes() {
 }
 
 #[test]
+fn a_hit_ends_a_ray_without_a_restart_for_each_far_child_that_is_left() {
+    let triangles = soup(&mut Random(76), 4000, 0.12, 1.0, Vec3::ZERO);
+    let tree = build(&triangles, &KdSettings::default());
+    for scheme in [flags(false, 0), flags(true, 0)] {
+        let mut random = Random(77);
+        let (mut restarts, mut needed, mut hits) = (0, 0, 0);
+        for _ in 0..4000 {
+            let (hit, work) = tested(&tree, scheme, &ray(random.vector(), random.direction()));
+            restarts += work.restarts;
+            // The way to the first leaf is none.
+            needed += work.leaves.saturating_sub(1);
+            hits += u32::from(hit.is_hit());
+        }
+        println!("{scheme:?}: {restarts} restarts for {needed} leaves, {hits} hits");
+        // Hits within the slack of their leaf's end still cost some.
+        assert!(hits > 1000 && restarts >= needed && (restarts - needed) * 50 < restarts);
+    }
+}
+
+#[test]
 fn settings_out_of_range_are_refused() {
     let default = KdSettings::default();
     for wrong in [
