@@ -241,12 +241,17 @@ fn check_host(count: usize, part: usize) {
         for first in (0..count).step_by(part) {
             let rays = mesh.rays(&mesh.seams, part.min(count - first), &mut random);
             for (kind, index) in &indexes {
-                assert_eq!(lost_on_host(&**index, &rays), 0, "{}, {kind}: lost at seams", mesh.what);
+                assert_eq!(
+                    lost_on_host(index.as_ref(), &rays),
+                    0,
+                    "{}, {kind}: lost at seams",
+                    mesh.what
+                );
             }
         }
         if !mesh.outer.is_empty() {
             let rays = mesh.rays(&mesh.outer, part.min(count), &mut random);
-            let past = lost_on_host(&*indexes[0].1, &rays);
+            let past = lost_on_host(indexes[0].1.as_ref(), &rays);
             println!("{}: {past} of {} rays pass outer edges", mesh.what, rays.len());
             assert!(past > 0 && past < rays.len(), "{past}");
         }
