@@ -101,6 +101,12 @@ float far_begins(float slack, float near_ended, float t_min) {
     return max(begins, t_min);
 }
 
+// Whether all that is left begins beyond a hit when a part has ended.
+bool ends_beyond(float largest_slack, float ended, float hit) {
+    precise float earliest = ended - 2.0 * largest_slack;
+    return earliest > hit;
+}
+
 bool kd_is_leaf(uvec2 node) { return (node.y & KD_LEAF) == KD_LEAF; }
 
 KdTurn kd_turn(uvec2 node, BoxTest boxes, vec2 span) {
@@ -164,7 +170,7 @@ void kd_descend(inout KdDescent at, KdTurn turn, bool far_is_left, float t_min) 
     { \
         flags += KD_FLAGS ? at.parent : 0u; \
         bool empty = (KD_CAPACITY == 0u || KD_SIZE == 0u) && head.x == 0u && bytes.x == 0u; \
-        if (KD_FLAGS ? flags == 0u : empty) { \
+        if ((KD_FLAGS ? flags == 0u : empty) || ends_beyond(largest_slack, at.span.y, hit.t)) { \
             is_end = true; \
         } else if (empty) { \
             at = restart; \
@@ -215,6 +221,7 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         return INDEX_FINISHED;
     }
     RayShear shear = ray_shear(ray.origin, ray.direction);
+    float largest_slack = largest_component(boxes.slack);
     KdDescent at = root;
     KdDescent restart = root;
     bool can_push_down = KD_PUSH_DOWN;

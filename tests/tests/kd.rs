@@ -8,9 +8,13 @@ use clerestory::accel::bvh2::FINISHED;
 use clerestory::accel::kd::{KdCaches, KdCounters, KdNode, KdSettings, KdTraversal, KdTree, MAX_BYTE_LEVELS, Scheme};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
 use clerestory::accel::{Hit, Ray, RayIndex};
-use clerestory::gpu::{DeviceKind, Gpu};
+use clerestory::gpu::ash::vk;
+use clerestory::gpu::shaders::constants::{KD_HEAP_LEVELS, KD_LEAF, KD_STACK_CACHE_BYTES, KD_STACK_CACHE_NONE};
+use clerestory::gpu::{Category, DeviceKind, Gpu};
 use clerestory_hard_cases::misses;
 use clerestory_tests::random::Random;
+use clerestory_tests::shaders::kd_cache_probe;
+use clerestory_tests::shaders::sets::IndexSet;
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
@@ -287,6 +291,144 @@ fn caches_are_those_of_the_twin_and_change_no_hit() {
                 check(gpu, &cases, &with(caches, Query::Any, SMALL_QUOTA)) > 1000,
                 "{caches:?}"
             );
+        }
+    });
+}
+
+/// The nodes of a tree as a workgroup reads them that adds `mark` to those in its shared memory, and the boxes that it holds.
+fn cached(gpu: &Gpu, tree: &KdTree, levels: u32, with_boxes: bool, mark: u32) -> (Vec<KdNode>, Vec<[Vec3; 2]>) {
+    let spec = kd_cache_probe::Spec {
+        cache_probe_mark: mark,
+        kd_cache_levels: levels,
+        kd_stack_cache: if with_boxes {
+            KD_STACK_CACHE_BYTES
+        } else {
+            KD_STACK_CACHE_NONE
+        },
+        ..Default::default()
+    };
+    let pipeline = gpu.compute_pipeline::<kd_cache_probe::Kernel>(&spec).unwrap();
+    let format = vk::Format::R32G32B32A32_UINT;
+    let texels = gpu.texels_with("tree", Category::Index, format, tree.texels()).unwrap();
+    let count = tree.nodes().len();
+    let boxes_held = if with_boxes { count.min(1 << levels) } else { 0 };
+    let zeroed = |name, words: usize| gpu.buffer_with(name, Category::Work, &vec![0u32; words]).unwrap();
+    let (nodes, boxes) = (zeroed("nodes", 2 * count), zeroed("boxes", 6 * boxes_held.max(1)));
+    let mut recorder = gpu.recorder("caches").unwrap();
+    recorder
+        .pass("caches", |pass| {
+            let set = kd_cache_probe::Set0 {
+                cache_probe_nodes: nodes.view(),
+                cache_probe_boxes: boxes.view(),
+            };
+            let index = IndexSet { index_texels: &texels };
+            let push = kd_cache_probe::Push { count: count as u32 };
+            pass.dispatch(&pipeline, &[&set, &index], &push, [1, 1, 1])
+        })
+        .unwrap();
+    recorder.submit().unwrap().wait().unwrap();
+    let mut held = gpu.read::<[Vec3; 2]>(boxes.view(), boxes_held.max(1)).unwrap();
+    held.truncate(boxes_held);
+    (gpu.read::<KdNode>(nodes.view(), count).unwrap(), held)
+}
+
+/// The boxes of the nodes at a tree's top by their places; `None` for holes.
+fn boxes_of_top(tree: &KdTree, places: usize) -> Vec<Option<[Vec3; 2]>> {
+    let mut boxes = vec![None; places];
+    let bounds = tree.bounds();
+    let mut pending = vec![(0, [bounds.lower, bounds.upper])];
+    while let Some((place, bounds)) = pending.pop() {
+        if place >= places {
+            continue;
+        }
+        boxes[place] = Some(bounds);
+        let node = tree.nodes()[place];
+        let (axis, children) = (node.word & KD_LEAF, (node.word >> 2) as usize);
+        if axis != KD_LEAF {
+            let (mut below, mut above) = (bounds, bounds);
+            below[1][axis as usize] = f32::from_bits(node.value);
+            above[0][axis as usize] = f32::from_bits(node.value);
+            pending.extend([(children, below), (children + 1, above)]);
+        }
+    }
+    boxes
+}
+
+#[test]
+fn caches_hold_the_top_of_the_tree_and_are_what_is_read() {
+    const MARK: u32 = 0x0010_0100;
+    with_gpu(|gpu| {
+        let cases: Vec<Case> = cases()
+            .into_iter()
+            .filter(|case| case.what.starts_with("soup") || case.what.starts_with("chain") || case.what == "one leaf")
+            .collect();
+        assert!(cases.iter().any(|case| case.tree.nodes().len() > 2 << KD_HEAP_LEVELS));
+        let with_boxes = [1, 3, MAX_BYTE_LEVELS].map(|levels| (levels, true));
+        let without = [1, 3, MAX_BYTE_LEVELS, KD_HEAP_LEVELS].map(|levels| (levels, false));
+        for (levels, boxes_too) in with_boxes.into_iter().chain(without) {
+            for case in &cases {
+                let what = format!("{}, {levels} levels, boxes: {boxes_too}", case.what);
+                let (nodes, boxes) = cached(gpu, &case.tree, levels, boxes_too, MARK);
+                for (place, (found, node)) in nodes.iter().zip(case.tree.nodes()).enumerate() {
+                    let mark = if place < 1 << levels { MARK } else { 0 };
+                    let expected = [node.value, node.word].map(|word| word.wrapping_add(mark));
+                    assert_eq!([found.value, found.word], expected, "{what}: node {place}");
+                }
+                let expected = boxes_of_top(&case.tree, boxes.len());
+                for (place, (found, expected)) in boxes.iter().zip(&expected).enumerate() {
+                    assert!(
+                        expected.is_none_or(|expected| expected == *found),
+                        "{what}: box {place}"
+                    );
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none() {
+    with_gpu(|gpu| {
+        if !gpu.caps().subgroup.vote {
+            return;
+        }
+        const LEVELS: u32 = 32;
+        let case = chain(LEVELS);
+        // Along the axis the first leaf lies behind one plane, and against it behind all of them.
+        let short = ray(Vec3::new(-1.0, 0.1, 0.1), Vec3::X);
+        let long = ray(Vec3::new(LEVELS as f32 + 2.0, 0.1, 0.1), -Vec3::X);
+        let lanes = gpu.caps().subgroup_size;
+        let settings = TraceSettings {
+            execution: Execution::Persistent(PersistentThreads {
+                groups: 1,
+                batch: lanes,
+                fetches: 1,
+                subgroups: 1,
+            }),
+            caches: KdCaches::SPECULATION,
+            ..settings(Scheme::Stack, Query::Closest, 1000)
+        };
+        let tracer = RayTracer::new(gpu, &case.tree, &settings).unwrap();
+        // Rays that go against the axis, of a subgroup's.
+        for longs in [0, 1, lanes] {
+            let rays: Vec<Ray> = (0..lanes).map(|lane| if lane < longs { long } else { short }).collect();
+            let traced = tracer.trace(&rays).unwrap();
+            for (ray, hit) in rays.iter().zip(&traced.hits) {
+                let expected = if *ray == long { LEVELS } else { 0 };
+                assert_eq!(hit.triangle, expected, "{longs} of {lanes}: {ray:?}");
+            }
+            if gpu.caps().kind == DeviceKind::Cpu {
+                // A short ray that has to wait goes on behind its leaf, through one more node, to the next leaf, which its hit then spares it.
+                let (longs, lanes) = (u64::from(longs), u64::from(lanes));
+                let of_short = if longs > 0 { 2 } else { 1 };
+                let work = &traced.kd_work;
+                assert_eq!(
+                    work.nodes,
+                    u64::from(LEVELS) * longs + of_short * (lanes - longs),
+                    "{longs} of {lanes}"
+                );
+                assert_eq!((work.leaves, work.triangles), (lanes, lanes), "{longs} of {lanes}");
+            }
         }
     });
 }

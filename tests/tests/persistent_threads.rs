@@ -225,6 +225,23 @@ fn a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quot
 }
 
 #[test]
+fn a_queue_of_many_rays_traces_each_once() {
+    with_gpu(|gpu| {
+        let mut random = Random(5);
+        let triangles = soup(300, &mut random);
+        let rays = rays(262_144, &mut random);
+        let bvh = Bvh2::build(&triangles, &Bvh2Settings::default()).unwrap();
+        let settings = TraceSettings {
+            count: true,
+            ..TraceSettings::persistent(gpu.caps())
+        };
+        // Every ray has its hit, and no more were fetched than there are: none was fetched twice.
+        let traced = check(gpu, "262,144 rays", &triangles, &bvh, &rays, &settings);
+        assert_eq!(traced.fetched_rays, rays.len() as u64 * u64::from(traced.rounds));
+    });
+}
+
+#[test]
 fn settings_that_could_lose_rays_are_refused() {
     with_gpu(|gpu| {
         let bvh = Bvh2::build(&[[Vec3::ZERO, Vec3::X, Vec3::Y]], &Bvh2Settings::default()).unwrap();

@@ -236,6 +236,8 @@ impl RayIndex for KdTree {
 }
 
 #[cfg(test)]
+mod cost_tests;
+#[cfg(test)]
 mod shifted_restart_tests;
 #[cfg(test)]
 mod tests;

@@ -45,12 +45,13 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "PM-I-1",
     name: "ray/sphere hit and closest approach",
     role: Role::Kernel,
-    limits: "One sphere at a time: no index holds spheres.",
+    limits: "One sphere at a time: no index holds spheres, and no kernel of the engine includes it, so that it serves hosts' kernels alone.",
     sources: &[sources::HAINES_2019.whole()],
     shaders: &["shaders/accel/sphere.glsl"],
     tests: &[
         "engine/src/accel/sphere.rs::approach_matches_the_definition",
         "engine/src/accel/sphere.rs::spheres_are_hit_from_outside_inside_and_behind_and_touched_once",
+        "tests/tests/twins/geometry.rs::spheres_agree_with_their_twins",
     ],
     api: &[
         "clerestory::accel::sphere::intersect_sphere",

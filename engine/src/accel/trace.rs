@@ -525,6 +525,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
             "tests/tests/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
+            "tests/tests/persistent_threads.rs::a_queue_of_many_rays_traces_each_once",
             "tests/tests/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
         ],
         api: &["clerestory::accel::trace::RayTracer"],

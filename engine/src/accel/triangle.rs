@@ -184,14 +184,16 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-TRIANGLE",
         name: "watertight triangle test",
         role: Role::Kernel,
-        limits: "Misses triangles with two equal corners or seen exactly edge-on; its bounds hold for edge products above 2⁻¹⁰⁰ m².",
+        limits: "Misses triangles with two equal corners or seen exactly edge-on; rays at outer edges, with no neighbour behind them, may pass; its bounds hold for edge products above 2⁻¹⁰⁰ m².",
         sources: &[sources::WOOP_2013.whole()],
         shaders: &["shaders/accel/triangle.glsl"],
         tests: &[
             "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
             "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
+            "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
+            "tests/tests/seams.rs::no_ray_is_lost_at_seams_in_any_index",
+            "tests/tests/seams.rs::kernels_lose_no_ray_at_seams_in_any_index",
         ],
-        experiment: "clerestory bench",
         api: &[
             "clerestory::accel::triangle::intersect_triangle",
             "clerestory::accel::triangle::ray_shear",

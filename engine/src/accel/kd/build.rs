@@ -9,7 +9,7 @@
 
 use super::bounds::Bounds;
 use super::clip::clipped_bounds;
-use super::probability::{Heuristic, InteriorOrigin};
+use super::probability::{AreaTerms, Heuristic, InteriorOrigin};
 use super::{KdSettings, MAX_DEPTH};
 use crate::accel::Aabb;
 use crate::accel::input::bounds_of;
@@ -164,18 +164,19 @@ impl Builder<'_> {
         let node = Bounds::from(work.bounds);
         let settings = self.settings;
         let count = work.triangles.len();
-        let interior = InteriorOrigin::new(&node, &self.scene);
-        let own = match settings.heuristic {
-            Heuristic::InteriorOrigin => interior.sum(),
-            heuristic => heuristic.probability(&node, &self.scene),
+        let handed_down = settings.heuristic == Heuristic::InteriorOrigin;
+        let interior = handed_down.then(|| InteriorOrigin::new(&node, &self.scene));
+        let own = match &interior {
+            Some(interior) => interior.sum(),
+            None => settings.heuristic.probability(&node, &self.scene),
         };
         let leaf_cost = own * count as f64 * settings.intersection_cost;
+        let sweep = |axis| self.sweep(work, &node, own, interior.as_ref(), axis);
         let axes: [Option<Plane>; 3] = if count > PARALLEL_TRIANGLES {
-            let sweep = |axis| self.sweep(work, &node, own, &interior, axis);
             let ((x, y), z) = rayon::join(|| rayon::join(|| sweep(0), || sweep(1)), || sweep(2));
             [x, y, z]
         } else {
-            [0, 1, 2].map(|axis| self.sweep(work, &node, own, &interior, axis))
+            [0, 1, 2].map(sweep)
         };
         let mut best: Option<Plane> = None;
         for plane in axes.into_iter().flatten() {
@@ -186,23 +187,51 @@ impl Builder<'_> {
         best.filter(|best| best.cost < leaf_cost)
     }
 
-    /// The cheapest plane across an axis of a node with probability `own`.
-    fn sweep(&self, work: &Work, node: &Bounds, own: f64, interior: &InteriorOrigin, axis: usize) -> Option<Plane> {
-        let extent = node.extent()[axis];
-        if extent <= 0.0 {
+    /// The cheapest plane across an axis of a node with probability `own`. What its candidates share is found once, by surface area as by
+    /// SIROH, and the sweep is compiled for each heuristic.
+    fn sweep(
+        &self,
+        work: &Work,
+        node: &Bounds,
+        own: f64,
+        interior: Option<&InteriorOrigin>,
+        axis: usize,
+    ) -> Option<Plane> {
+        if node.extent()[axis] <= 0.0 {
             return None;
         }
+        let scene = &self.scene;
+        let extents = |plane: f64| [plane - node.lower[axis], node.upper[axis] - plane];
+        match (interior, self.settings.heuristic) {
+            (Some(interior), _) => {
+                let terms = interior.terms(node, scene, axis);
+                let to_scene = |plane: f64| [plane - scene.lower[axis], scene.upper[axis] - plane];
+                self.cheapest(work, node, own, axis, |plane| {
+                    terms.split(extents(plane), to_scene(plane))
+                })
+            }
+            (None, Heuristic::SurfaceArea) => {
+                let terms = AreaTerms::new(node, scene, axis);
+                self.cheapest(work, node, own, axis, |plane| terms.split(extents(plane)))
+            }
+            (None, heuristic) => self.cheapest(work, node, own, axis, |plane| {
+                node.split(axis, plane)
+                    .map(|child| heuristic.probability(&child, scene))
+            }),
+        }
+    }
+
+    /// The same with the probabilities of the children of a plane.
+    fn cheapest(
+        &self,
+        work: &Work,
+        node: &Bounds,
+        own: f64,
+        axis: usize,
+        probabilities: impl Fn(f64) -> [f64; 2],
+    ) -> Option<Plane> {
         let settings = self.settings;
-        let terms = interior.terms(node, &self.scene, axis);
-        let probabilities = |plane: f64| match settings.heuristic {
-            Heuristic::InteriorOrigin => terms.split(
-                [plane - node.lower[axis], node.upper[axis] - plane],
-                [plane - self.scene.lower[axis], self.scene.upper[axis] - plane],
-            ),
-            heuristic => node
-                .split(axis, plane)
-                .map(|child| heuristic.probability(&child, &self.scene)),
-        };
+        let extent = node.extent()[axis];
         let count = work.triangles.len() as u32;
         let events = &work.events[axis];
         let (mut below, mut above) = (0, count);
@@ -368,9 +397,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Built on the host, the slowest of the builds; what moves is rebuilt.",
     sources: &[sources::WALD_HAVRAN_2006.whole()],
     tests: &[
+        "engine/src/accel/kd/cost_tests.rs::every_plane_has_the_least_cost_and_every_leaf_costs_less",
         "engine/src/accel/kd/tests.rs::every_point_of_a_triangle_lies_in_a_leaf_that_holds_it",
         "engine/src/accel/kd/tests.rs::a_wall_ends_in_a_leaf_without_volume",
         "engine/src/accel/kd/tests.rs::bytes_do_not_depend_on_the_number_of_threads",
+        "engine/src/accel/kd/probability/tests.rs::shared_terms_give_the_areas_of_the_children_to_the_bit",
     ],
     api: &["clerestory::accel::kd::KdTree"],
     settings: &["clerestory::accel::kd::KdSettings", "clerestory render --index kd"],

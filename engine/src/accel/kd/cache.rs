@@ -138,7 +138,11 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Only persistent threads that traverse kd-trees by a stack have it, and for the top 10 levels at most (8 KiB).",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
-        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
+        ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
@@ -150,7 +154,11 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Exists only with stack cache II, whose entries it gives their ends, and for the top 8 levels at most (8 KiB).",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
-        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
+        ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
@@ -162,7 +170,10 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Only persistent threads that traverse kd-trees by a stack have it, for one entry.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
-        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+        ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
@@ -174,7 +185,10 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Eight entries at most, which name cached nodes only: needs node cache II.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
-        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+        ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
@@ -186,7 +200,10 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Visits leaves that a hit would have spared.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
-        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+        ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
@@ -201,7 +218,10 @@ pub(crate) const ROWS: &[Row] = &[
             sources::FABIANOWSKI_2011.at("§4.3.2.3"),
         ],
         shaders: &["shaders/accel/trace_queue_vote.comp"],
-        tests: &["tests/tests/kd.rs::votes_change_no_hit"],
+        tests: &[
+            "tests/tests/kd.rs::votes_change_no_hit",
+            "tests/tests/kd.rs::rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none",
+        ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
@@ -213,7 +233,11 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "As its two caches.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.3")],
         shaders: &["shaders/accel/kd_cache.glsl"],
-        tests: &["engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit"],
+        tests: &[
+            "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
+        ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())

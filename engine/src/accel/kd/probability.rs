@@ -83,6 +83,43 @@ fn perimeter(bounds: &Bounds, axis: usize) -> f64 {
     2.0 * (bounds.extent()[a] + bounds.extent()[b])
 }
 
+/// Of one axis of a parent, what the surface area heuristic of its children shares wherever it is split.
+#[derive(Debug, Clone, Copy)]
+pub struct AreaTerms {
+    axis: usize,
+    /// Extents of the two axes that follow, in cyclic order, and the area of the cross-section.
+    extents: [f64; 2],
+    section: f64,
+    /// Half the scene's surface area.
+    scene: f64,
+}
+
+impl AreaTerms {
+    /// What candidates on `axis` of `node` share.
+    pub fn new(node: &Bounds, scene: &Bounds, axis: usize) -> Self {
+        Self {
+            axis,
+            extents: across(axis).map(|a| node.extent()[a]),
+            section: section(node, axis),
+            scene: scene.half_area(),
+        }
+    }
+
+    /// Probabilities of the children below and above a split, by their extents, to the bit those of [`Heuristic::probability`]: terms are
+    /// added in the order of [`Bounds::half_area`]. Each takes two products, two additions and a division.
+    pub fn split(&self, extents: [f64; 2]) -> [f64; 2] {
+        extents.map(|extent| {
+            let [a, b] = self.extents.map(|side| side * extent);
+            let half_area = match self.axis {
+                0 => a + self.section + b,
+                1 => b + a + self.section,
+                _ => self.section + b + a,
+            };
+            half_area / self.scene
+        })
+    }
+}
+
 /// The scene-interior ray origin heuristic of a node, part by part, as it is handed down to children.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InteriorOrigin {

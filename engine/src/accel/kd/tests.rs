@@ -2,6 +2,7 @@ use super::tree::KdKind;
 use super::*;
 use crate::accel::bvh2::FINISHED;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
+use crate::accel::bvh2::traverse::BoxTest;
 use crate::accel::test_support::{Random, brute_force, ray};
 
 const SCHEMES: [Scheme; 7] = [
@@ -299,6 +300,104 @@ fn ways_as_long_as_the_word_of_flags_are_gone_to_their_end() {
 }
 
 #[test]
+fn bytes_are_eight_for_each_node_and_entry_that_memory_serves() {
+    // Per ray: inner nodes, entries of the stack, and bytes as the source prints them (its table 4.8 a, b and d).
+    for (nodes, entries, bytes) in [
+        (7.31, 2.01, 74.51),
+        (29.81, 12.31, 336.95),
+        (37.63, 14.46, 416.72),
+        (37.43, 16.96, 435.06),
+        (19.57, 6.69, 210.03),
+    ] {
+        let hundred = |per_ray: f64| (100.0 * per_ray).round() as u64;
+        let work = KdCounters {
+            nodes: hundred(nodes),
+            pushes: hundred(entries) - 50,
+            pops: 50,
+            leaves: 1000,
+            triangles: 1000,
+            register_pushes: 1000,
+            register_pops: 1000,
+            ..KdCounters::default()
+        };
+        // Both numbers are rounded to hundredths.
+        assert!((0.01 * work.bytes() as f64 - bytes).abs() <= 0.0801, "{work:?}");
+    }
+    // A way of 32 nodes that leaves a far child at each: 32 entries pushed and popped.
+    let (tree, _) = chain(32);
+    let ray = ray(Vec3::new(34.0, 0.1, 0.1), -Vec3::X);
+    let with = |node_levels, stack| KdCaches {
+        node_levels,
+        stack,
+        ..KdCaches::default()
+    };
+    for (caches, words) in [
+        (with(0, StackCache::None), 32 + 32 + 32),
+        (with(3, StackCache::None), 29 + 32 + 32),
+        // The last entry never comes to memory.
+        (with(0, StackCache::Head), 32 + 31 + 31),
+        (with(10, StackCache::Head), 22 + 31 + 31),
+    ] {
+        let mut work = KdCounters::default();
+        let traversal = KdTraversal::closest(Scheme::Stack, &ray).with_caches(caches);
+        traversal
+            .expect("caches")
+            .run(&tree, &ray, u64::MAX, &mut |_, _| false, &mut work);
+        assert_eq!(work.bytes(), 8 * words, "{caches:?}");
+    }
+}
+
+/// Where a ray enters and leaves a box by its planes, in f64 with the reciprocals of the traversal.
+fn exact_span(boxes: &BoxTest, bounds: &Aabb) -> [f64; 2] {
+    let mut span = [f64::NEG_INFINITY, f64::INFINITY];
+    for axis in 0..3 {
+        let at = |plane: f32| (f64::from(plane) - f64::from(boxes.origin[axis])) * f64::from(boxes.inverse[axis]);
+        let (a, b) = (at(bounds.lower[axis]), at(bounds.upper[axis]));
+        span = [span[0].max(a.min(b)), span[1].min(a.max(b))];
+    }
+    span
+}
+
+#[test]
+fn leaves_come_in_the_order_of_the_ray() {
+    let mut random = Random(75);
+    let mut followed = 0;
+    for (name, triangles) in hard_scenes() {
+        for settings in settings_of_all_kinds() {
+            let tree = build(&triangles, &settings);
+            let mut bounds_of = vec![Aabb::EMPTY; tree.nodes().len()];
+            tree.walk(|node, _, bounds, _| bounds_of[node as usize] = *bounds);
+            for (i, ray) in hard_rays(&mut random, &triangles, 40).into_iter().enumerate() {
+                let boxes = BoxTest::new(&tree.bounds(), &ray);
+                let leaves = SCHEMES.map(|scheme| {
+                    let mut leaves = Vec::new();
+                    // Every second ray goes through everything.
+                    let mut filter = |_: u32, _: [f32; 2]| i % 2 == 0;
+                    let mut work = KdCounters::default();
+                    let mut traversal = KdTraversal::closest(scheme, &ray);
+                    traversal.run_watched(&tree, &ray, u64::MAX, &mut filter, &mut work, &mut |leaf| {
+                        leaves.push(leaf)
+                    });
+                    leaves
+                });
+                for (scheme, other) in SCHEMES.iter().zip(&leaves) {
+                    assert_eq!(other, &leaves[0], "{name} {scheme:?} {ray:?}");
+                }
+                // No leaf begins before one that came earlier has ended: a plane parts each two, and the near side comes first.
+                let mut ended = f64::NEG_INFINITY;
+                for leaf in &leaves[0] {
+                    let [enter, leave] = exact_span(&boxes, &bounds_of[*leaf as usize]);
+                    assert!(enter >= ended, "{name} {ray:?}: {enter} after {ended}");
+                    ended = ended.max(leave);
+                    followed += 1;
+                }
+            }
+        }
+    }
+    assert!(followed > 5000, "{followed} leaves");
+}
+
+#[test]
 fn work_is_in_the_order_of_the_schemes() {
     let triangles = soup(&mut Random(65), 4000, 0.05, 1.0, Vec3::ZERO);
     let tree = build(&triangles, &KdSettings::default());
@@ -313,6 +412,26 @@ fn work_is_in_the_order_of_the_schemes() {
     println!("{nodes:?}");
     let [stack, plain, push_down, _, short, _, both] = nodes;
     assert!(plain > push_down && push_down > short && short >= both && both >= stack);
+}
+
+#[test]
+fn a_hit_ends_a_ray_without_a_restart_for_each_far_child_that_is_left() {
+    let triangles = soup(&mut Random(76), 4000, 0.12, 1.0, Vec3::ZERO);
+    let tree = build(&triangles, &KdSettings::default());
+    for scheme in [flags(false, 0), flags(true, 0)] {
+        let mut random = Random(77);
+        let (mut restarts, mut needed, mut hits) = (0, 0, 0);
+        for _ in 0..4000 {
+            let (hit, work) = tested(&tree, scheme, &ray(random.vector(), random.direction()));
+            restarts += work.restarts;
+            // The way to the first leaf is none.
+            needed += work.leaves.saturating_sub(1);
+            hits += u32::from(hit.is_hit());
+        }
+        println!("{scheme:?}: {restarts} restarts for {needed} leaves, {hits} hits");
+        // Hits within the slack of their leaf's end still cost some.
+        assert!(hits > 1000 && restarts >= needed && (restarts - needed) * 50 < restarts);
+    }
 }
 
 #[test]

@@ -5,7 +5,9 @@
 //!
 //! One bit a level of the way from the root: 0 where the near subtree of a node with both children met is in progress, 1 where nothing is
 //! left but the child that the way takes. Adding the lowest bit of the way carries to the deepest node with something left, or out of the
-//! word. A subtree that begins beyond the best hit is skipped by the same addition.
+//! word. A subtree that begins beyond the best hit is skipped by the same addition, and where all that is left does, the ray ends: what is
+//! left begins no earlier than the part just left has ended, less twice the largest slack. Without that a ray would go back to each far child
+//! that its hit has made needless, by a restart each. Rays nearly parallel to an axis still do, since their slack across it has no bound.
 
 use super::entries::{Entries, Entry};
 use super::tree::KdKind;
@@ -89,6 +91,12 @@ fn children_met(test: &PlaneTest, plane: f32, [enter, leave]: [f32; 2]) -> Met {
 /// Where the far child begins when the near one has ended. A function of this alone, so that stack entries need not hold it.
 fn far_begins(slack: f32, near_ended: f32, t_min: f32) -> f32 {
     (near_ended - 2.0 * slack).max(t_min)
+}
+
+/// Whether all that is left begins beyond a hit when a part has ended: each far child that is left begins by [`far_begins`] of an end that is
+/// not nearer, and roundings keep that order.
+fn ends_beyond(largest_slack: f32, ended: f32, hit: f32) -> bool {
+    ended - 2.0 * largest_slack > hit
 }
 
 /// A place to descend from.
@@ -401,9 +409,10 @@ impl<'a> Walk<'a> {
 
     /// On to what is left, an iteration for each subtree that is skipped since it begins beyond the hit; false at the end.
     fn next(&mut self, hit: f32, counters: &mut KdCounters, iterations: &mut u64) -> bool {
+        let largest_slack = self.boxes.slack.max_element();
         loop {
             self.flags = self.flags.wrapping_add(self.at.parent);
-            if self.flags == 0 {
+            if self.flags == 0 || ends_beyond(largest_slack, self.at.span[1], hit) {
                 return false;
             }
             let (tree, boxes, t_max) = (self.tree, self.boxes, self.ray.t_max);
@@ -443,6 +452,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
+            "engine/src/accel/kd/tests.rs::leaves_come_in_the_order_of_the_ray",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[
@@ -457,12 +467,13 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-TR-3",
         name: "traversal of kd-trees without a stack, by a word of flags",
         role: Role::PartOf("PM-KD-1"),
-        limits: "Walks down from the root again after each leaf.",
+        limits: "Walks down from the root again after each leaf, and for each far child that a hit leaves where a ray is nearly parallel to an axis.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.2.2")],
         shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
+            "engine/src/accel/kd/tests.rs::a_hit_ends_a_ray_without_a_restart_for_each_far_child_that_is_left",
             "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[

@@ -314,8 +314,12 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
+            "engine/src/accel/kd/tests.rs::bytes_are_eight_for_each_node_and_entry_that_memory_serves",
         ],
-        api: &["clerestory::accel::photon_map::complete_bvh::QueryCounters"],
+        api: &[
+            "clerestory::accel::photon_map::complete_bvh::QueryCounters",
+            "clerestory::accel::kd::KdCounters",
+        ],
         ..Row::of(file!())
     },
     Row {
@@ -337,6 +341,8 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Tells that a leaf's box is hit, not what inside it is.",
         sources: &[sources::KAY_KAJIYA_1986.whole()],
         tests: &[
+            "engine/src/accel/photon_map/complete_bvh/tests.rs::rays_along_axes_meet_boxes_at_every_face_edge_and_corner_and_not_beside_them",
+            "engine/src/accel/photon_map/complete_bvh/tests.rs::spans_of_rays_at_faces_edges_and_corners_are_those_of_f64",
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",
         ],
@@ -354,3 +360,6 @@ pub(crate) const ROWS: &[Row] = &[
         ..Row::of(file!())
     },
 ];
+
+#[cfg(test)]
+mod tests;

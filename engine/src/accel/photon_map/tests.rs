@@ -142,6 +142,78 @@ fn sorting_by_clusters_is_the_stable_sort() {
     }
 }
 
+/// Primitives below a child.
+fn members(tree: &BoxTree, child: Child) -> Vec<u32> {
+    match child {
+        Child::Leaf { first, count } => tree.order[first as usize..(first + count) as usize].to_vec(),
+        Child::Inner(node) => {
+            let children = tree.nodes[node as usize].children;
+            children.into_iter().flat_map(|child| members(tree, child)).collect()
+        }
+    }
+}
+
+/// What a split costs: of each side the measure of its box, times how many primitives it has.
+fn split_cost(boxes: &[Aabb], [left, right]: [&[u32]; 2], measure: fn(&Aabb) -> f64) -> f64 {
+    let side = |some: &[u32]| {
+        let whole = some
+            .iter()
+            .fold(Aabb::EMPTY, |whole, i| whole.union(boxes[*i as usize]));
+        measure(&whole) * some.len() as f64
+    };
+    side(left) + side(right)
+}
+
+/// The least that any border between centres costs, on any axis.
+fn least_split_cost(boxes: &[Aabb], all: &[u32], measure: fn(&Aabb) -> f64) -> f64 {
+    let mut least = f64::INFINITY;
+    for axis in 0..3 {
+        let centre = |i: &u32| boxes[*i as usize].lower[axis] + boxes[*i as usize].upper[axis];
+        let mut sorted = all.to_vec();
+        sorted.sort_by(|a, b| centre(a).total_cmp(&centre(b)).then(a.cmp(b)));
+        for border in 1..sorted.len() {
+            let (left, right) = sorted.split_at(border);
+            least = least.min(split_cost(boxes, [left, right], measure));
+        }
+    }
+    least
+}
+
+/// Inner nodes of a tree that some other border would have split at a lower cost.
+fn dearer_splits(tree: &BoxTree, boxes: &[Aabb], measure: fn(&Aabb) -> f64) -> usize {
+    let is_dearer = |children: &[Child; 2]| {
+        let [left, right] = children.map(|child| members(tree, child));
+        let all = [left.as_slice(), right.as_slice()].concat();
+        split_cost(boxes, [&left, &right], measure) > least_split_cost(boxes, &all, measure)
+    };
+    tree.nodes.iter().filter(|node| is_dearer(&node.children)).count()
+}
+
+#[test]
+fn every_split_of_a_sweep_has_the_least_cost_by_its_own_measure() {
+    let mut random = Random(62);
+    for scale in [Vec3::ONE, Vec3::new(1.0, 0.2, 0.05)] {
+        let boxes: Vec<Aabb> = (0..80)
+            .map(|_| {
+                let (centre, half) = (random.vector(), random.vector().abs() * 0.3 * scale);
+                Aabb {
+                    lower: centre - half,
+                    upper: centre + half,
+                }
+            })
+            .collect();
+        let [volume, area]: [fn(&Aabb) -> f64; 2] = [Aabb::volume, Aabb::half_area];
+        let by_volume = sweep_tree(&boxes, 1, Heuristic::Volume);
+        let by_area = sweep_tree(&boxes, 1, Heuristic::Area);
+        assert_eq!((by_volume.nodes.len(), by_area.nodes.len()), (79, 79));
+        assert_eq!(dearer_splits(&by_volume, &boxes, volume), 0);
+        assert_eq!(dearer_splits(&by_area, &boxes, area), 0);
+        // Neither is a tree by the other's measure.
+        assert!(dearer_splits(&by_area, &boxes, volume) > 0);
+        assert!(dearer_splits(&by_volume, &boxes, area) > 0);
+    }
+}
+
 #[test]
 fn sweeps_are_valid_and_beat_the_linear_tree() {
     for (name, boxes) in hard_boxes() {

@@ -129,7 +129,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
     role: Role::Yardstick,
     limits: "Built by full sweeps: too slow for a map that is rebuilt for each pass.",
     sources: &[sources::FABIANOWSKI_2011.at("§6.1.1")],
-    tests: &["engine/src/accel/photon_map/tests.rs::sweeps_are_valid_and_beat_the_linear_tree"],
+    tests: &[
+        "engine/src/accel/photon_map/tests.rs::every_split_of_a_sweep_has_the_least_cost_by_its_own_measure",
+        "engine/src/accel/photon_map/tests.rs::sweeps_are_valid_and_beat_the_linear_tree",
+    ],
     api: &["clerestory::accel::photon_map::vvh::sweep_tree"],
     ..Row::of(file!())
 }];

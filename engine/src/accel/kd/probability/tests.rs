@@ -1,4 +1,5 @@
 use super::*;
+use crate::test_random::Random;
 
 fn bounds(lower: [f64; 3], upper: [f64; 3]) -> Bounds {
     Bounds {
@@ -172,6 +173,40 @@ fn parts_handed_down_are_those_of_the_children() {
                 for side in 0..2 {
                     assert!((found[side] - expected[side]).abs() < 1e-12, "{node:?} {axis} {share}");
                 }
+            }
+        }
+    }
+}
+
+#[test]
+fn shared_terms_give_the_areas_of_the_children_to_the_bit() {
+    let mut random = Random(74);
+    for _ in 0..2000 {
+        let mut corners = [(); 4].map(|()| (random.vector() * random.magnitude(-8, 8)).as_dvec3());
+        // The scene, and the node within it; some have no extent.
+        let whole = corners
+            .iter()
+            .fold((corners[0], corners[0]), |(a, b), c| (a.min(*c), b.max(*c)));
+        let axis = random.below(3);
+        if random.below(8) == 0 {
+            corners[1][axis] = corners[0][axis];
+        }
+        let scene = bounds(whole.0.into(), whole.1.into());
+        let node = bounds(corners[0].min(corners[1]).into(), corners[0].max(corners[1]).into());
+        for axis in 0..3 {
+            let terms = AreaTerms::new(&node, &scene, axis);
+            for share in [0.0, random.unit(), random.unit(), 1.0] {
+                let plane = node.lower[axis] + f64::from(share) * node.extent()[axis];
+                let plane = plane.clamp(node.lower[axis], node.upper[axis]);
+                let found = terms.split([plane - node.lower[axis], node.upper[axis] - plane]);
+                let expected = node
+                    .split(axis, plane)
+                    .map(|child| Heuristic::SurfaceArea.probability(&child, &scene));
+                assert_eq!(
+                    found.map(f64::to_bits),
+                    expected.map(f64::to_bits),
+                    "{node:?} {axis} {plane}"
+                );
             }
         }
     }

@@ -63,6 +63,8 @@ rows! {
         depth: u64 = "depth",
         longest_leaf: u64 = "longest leaf",
     }
+    beside "source: build, change (%), its processor I" = |row| row.source_build(0).into();
+    beside "source: build, change (%), its processor II" = |row| row.source_build(1).into();
     beside "source: inner nodes by surface area" = |row| published(&row.counterpart, &row.form).map(|trees| trees.nodes).into();
     beside "source: change of nodes (%)" = |row| row.changes().and_then(|changes| changes.nodes).into();
 }
@@ -97,6 +99,11 @@ impl Grown {
         published_changes(&self.counterpart, &self.form, &self.heuristic)
     }
 
+    /// What the source says that the build takes more, on one of its processors.
+    fn source_build(&self, processor: usize) -> Option<f64> {
+        self.changes()?.build.map(|build| build[processor])
+    }
+
     /// A tree beside the first one of its form.
     pub fn of(case: &Case, form: &Form, one: &Tree, first: &Tree) -> Self {
         let statistics = one.tree.statistics();
@@ -108,8 +115,8 @@ impl Grown {
             heuristic: one.heuristic.name().into(),
             build: one.build.clone(),
             build_change: changes(&one.build, &first.build),
-            nodes: inner_nodes(&one.tree),
-            nodes_change: change(inner_nodes(&one.tree) as f64, inner_nodes(&first.tree) as f64),
+            nodes: statistics.nodes,
+            nodes_change: change(statistics.nodes as f64, first.tree.statistics().nodes as f64),
             references: one.tree.references().len() as u64,
             depth: statistics.max_depth.into(),
             longest_leaf: one.tree.longest_leaf().into(),
@@ -156,10 +163,4 @@ pub fn grow(context: &Context<'_>, surfaces: &Surfaces, form: &Form) -> Result<V
             build: Repeats(times),
         })
         .collect())
-}
-
-/// Inner nodes of a tree.
-fn inner_nodes(tree: &KdTree) -> u64 {
-    let statistics = tree.statistics();
-    statistics.nodes - statistics.leaves
 }

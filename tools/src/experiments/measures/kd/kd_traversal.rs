@@ -147,6 +147,21 @@ impl Study for Found {
         let small = |row: &&Row| row.leaf_size == 1;
         let shown: Vec<Row> = self.schemes.iter().filter(small).cloned().collect();
         let both = shown.iter().filter(|row| row.scheme == SCHEMES[4].0);
+        let short = || {
+            self.schemes
+                .iter()
+                .filter(|row| row.has_short_stack())
+                .map(|row| row.change)
+        };
+        let least = short().fold(f64::INFINITY, f64::min);
+        let most = short().fold(f64::NEG_INFINITY, f64::max);
+        let short_stack = match least <= most {
+            true => format!(
+                " With a short stack of {SHORT_STACK}, with push-down or without, inner nodes change by {least:.1} to {most:.1} % of a \
+                 stack's; in the source by 0 to 0.8 %."
+            ),
+            false => String::new(),
+        };
         Findings::of(&self.schemes, CRITERIA)
             .headline(
                 "inner nodes of flags with push-down and a short stack over those of a stack, leaves of 1, geometric mean",
@@ -159,15 +174,16 @@ impl Study for Found {
                 |row| [row.scene.clone(), row.scheme.clone()],
                 |row| row.nodes.into(),
             )
-            .note(
+            .note(format!(
                 "Flights as in `kd-heuristics`, SIROH trees over boxes; leaves of 4 are those of the source's text, leaves of 1 come nearer \
                  to the numbers of nodes that it gives (see there). Hits, of closest and of any hits, are compared with those of the host by \
                  a stack: first the host's, then those of the kernels that were timed. Here rays go on until leaves begin beyond their hit, \
                  so that no rounding loses one. Counts are exact and the same on every machine: inner nodes, entries of stacks written and \
                  read, and bytes by the source's model of 8 for each of these. Visits are independent of hardware, so their changes can be \
                  held against the source's; their sizes need not be its own: flags restart once for each leaf that is left, and rays meet \
-                 more leaves in these trees. Schemes take turns, one invocation per ray.",
-            )
+                 more leaves in these trees. A hit ends a ray where all that is left begins behind it, but for rays nearly parallel to an \
+                 axis, which still restart at each far child that is left. Schemes take turns, one invocation per ray.{short_stack}",
+            ))
             .and(Findings::of(&self.restarts, &[]))
             .note(
                 "Without flags a ray that restarts behind the leaf that it has left (at its end, or a step behind it) does not know which of \
