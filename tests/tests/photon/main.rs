@@ -9,6 +9,7 @@
 mod convergence;
 mod determinism;
 mod flux;
+mod footprints;
 mod lights;
 mod maps;
 mod materials;

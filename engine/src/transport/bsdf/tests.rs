@@ -189,6 +189,35 @@ fn samples_follow_their_density() {
     assert!(tests > 20);
 }
 
+#[test]
+fn delta_lobes_are_chosen_as_often_as_they_say() {
+    let c = context(BsdfFeatures::ALL);
+    let draws = 2000;
+    let mut seen = 0;
+    for (name, b) in zoo().into_iter().filter(|(_, b)| b.is_delta()) {
+        for cos_o in [0.9, 0.2, -0.5, -0.9] {
+            let samples: Vec<BsdfSample> = (0..draws)
+                .map(|i| {
+                    let u = DVec3::new(0.3, 0.6, (f64::from(i) + 0.5) / f64::from(draws));
+                    bsdf_sample(&c, &b, direction(cos_o, 0.4), u, LOBE_ALL)
+                })
+                .collect();
+            for lobe in [LOBE_SPECULAR & LOBE_REFLECTION, LOBE_SPECULAR & LOBE_TRANSMISSION] {
+                let chosen: Vec<&BsdfSample> = samples.iter().filter(|s| s.flags == lobe).collect();
+                let share = chosen.len() as f64 / f64::from(draws);
+                // Of draws so even, a lobe gets its share up to one.
+                for s in &chosen {
+                    let error = (s.choice - share).abs() * f64::from(draws);
+                    assert!(error < 1.001, "{name}, cos {cos_o}: {} for {share}", s.choice);
+                }
+                seen += usize::from(share > 0.0 && share < 1.0);
+            }
+            assert!(samples.iter().all(|s| s.pdf == 0.0 || s.choice == 1.0), "{name}");
+        }
+    }
+    assert!(seen > 20, "{seen} lobes were chosen among several");
+}
+
 /// The density where lobes are too narrow for cells: what is sampled must have the density and value that are evaluated.
 #[test]
 fn weight_is_value_over_density_and_density_integrates() {
