@@ -13,6 +13,7 @@ mod footprints;
 mod lights;
 mod maps;
 mod materials;
+mod neighbours;
 mod queues;
 mod scale;
 mod settings;
