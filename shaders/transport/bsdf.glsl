@@ -56,6 +56,7 @@ struct Bsdf {
 struct BsdfSample {
     vec3 wi;
     float pdf;     // solid angle; 0 for a delta lobe
+    float choice;  // probability that this delta lobe was chosen; 1 for others, whose density has it
     vec3 weight;   // f |cos| / pdf, all probabilities included
     uint flags;    // the lobe; 0 when no direction was found: the path ends
 };
@@ -283,7 +284,7 @@ vec3 bsdf_eval(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo
 float bsdf_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).a; }
 
 BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
-    BsdfSample s = BsdfSample(vec3(0.0), 0.0, vec3(0.0), 0u);
+    BsdfSample s = BsdfSample(vec3(0.0), 0.0, 1.0, vec3(0.0), 0u);
     bool below = wo.z < 0.0;
     bool inside = HAS_TRANSMISSION && below && b.transmission > 0.0 && (b.flags & BSDF_THIN) == 0u;
     float side = below ? -1.0 : 1.0;
@@ -308,13 +309,15 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
         wi = 2.0 * cos_h * h - wo;
         uint shape = delta ? LOBE_SPECULAR : LOBE_GLOSSY;
         flags = shape & LOBE_REFLECTION;
-        float scale = 1.0 / (p_reflection * (1.0 - p_cosine));
+        float choice = p_reflection * (1.0 - p_cosine);
+        float scale = 1.0 / choice;
         if (wi.z <= 0.0 && (reflected || (b.flags & BSDF_THIN) != 0u)) {
             return s;
         }
         if (HAS_TRANSMISSION && !reflected) {
             flags = shape & LOBE_TRANSMISSION;
-            scale = 1.0 / ((1.0 - p_reflection) * (1.0 - p_cosine));
+            choice = (1.0 - p_reflection) * (1.0 - p_cosine);
+            scale = 1.0 / choice;
             if ((b.flags & BSDF_THIN) != 0u) {
                 wi.z = -wi.z;
             } else {
@@ -328,6 +331,7 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
             }
         }
         if (delta) {
+            s.choice = choice;
             s.weight = (reflected ? r : t) * scale;
             s.wi = vec3(wi.xy, wi.z * side);
             s.flags = s.weight == vec3(0.0) ? 0u : flags;

@@ -1,9 +1,10 @@
-// Shading normals that never gain energy.
+// Shading normals under which no more light is seen than arrives.
 //
 // Method: the shading normal is turned to the side of the geometric normal and, where it faces away from the viewer, bent towards him
 // until it is just visible; scattered directions that lie on different sides of the two normals are rejected (Veach 1997, 5.3,
-// describes the trouble). Guarantee: reflectances are those of the scattering function or less, since f |cos to the shading normal|
-// is integrated over a part of its domain. Reciprocity is lost, as with every shading normal.
+// describes the trouble). Guarantee: reflectances seen from any direction are those of the scattering function or less, since
+// f |cos to the shading normal| is integrated over a part of its domain. Reciprocity is lost, as with every shading normal, and with it the
+// same for beams: one that comes in flat to the surface, but not to the shading normal, scatters more energy than it brings.
 #ifndef CLERESTORY_TRANSPORT_SHADING_NORMAL_GLSL
 #define CLERESTORY_TRANSPORT_SHADING_NORMAL_GLSL
 

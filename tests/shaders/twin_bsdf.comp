@@ -37,5 +37,6 @@ void main() {
         out1(3u, s.pdf);
         out3(4u, s.weight);
         out_bits(7u, s.flags);
+        out1(8u, s.choice);
     }
 }

@@ -207,11 +207,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-MULTISCATTER",
     name: "compensation of rough metals for scattering among microfacets",
     role: Role::PartOf("BG-3"),
-    limits: "Metals only; keeps the energy, with a lobe that is not that of the microfacets.",
+    limits: "Metals only; keeps the energy of white ones, with a lobe that is not that of the microfacets; coloured ones reflect up to 0.03 less than walks among microfacets do, at roughness 1.",
     sources: &[sources::KULLA_CONTY_2017.whole()],
     shaders: &["shaders/transport/albedo.glsl"],
     tests: &[
         "engine/src/transport/bsdf/tests.rs::white_furnace",
+        "engine/src/transport/bsdf/tests.rs::rough_metals_reflect_as_walks_among_their_microfacets",
         "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
     ],
     settings: &["multiple_scattering"],

@@ -136,7 +136,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-LIGHTS",
     name: "choice of lights by power, limited for distant ones",
     role: Role::PartOf("BG-3"),
-    limits: "Blind to shadows and to where a light is from the point that it lights.",
+    limits: "Blind to shadows and to where a light is from the point that it lights. Distant lights keep half of the choices at most where there are others, so that what each light adds has at most twice the second moment that it has by power alone.",
     sources: &[sources::SHIRLEY_1996.at("inversion of the cumulative distribution")],
     shaders: &["shaders/transport/distribution.glsl"],
     bias: Some(Bias::Unbiased),
@@ -144,6 +144,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/distribution.rs::probabilities_follow_weights_and_none_is_lost",
         "engine/src/transport/distribution.rs::cells_follow_their_probability",
         "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
+        "engine/src/transport/gpu_scene/lights.rs::no_light_loses_more_than_half_of_its_choices",
     ],
     api: &["clerestory::transport::distribution"],
     ..Row::of(file!())

@@ -106,6 +106,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/lights.rs::point_light_irradiance_and_flux",
             "engine/src/transport/lights.rs::spot_flux_and_falloff",
             "engine/src/transport/lights.rs::a_triangle_seen_by_its_density_has_its_solid_angle",
+            "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
             "tests/tests/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
             "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
         ],

@@ -32,12 +32,12 @@ struct KernelSettings {
     float unit_length;  // m
     float length_min;   // of axes, in unit lengths
     float length_max;
-    float flatness;     // least |z1 x z2| / longer^2
+    float flatness;     // least |z1 x z2| / longer^2, FLATNESS_MIN if that is more
     uint widens_flat;   // flatter footprints are widened to it, instead of being left without a kernel
 };
 
-// Least flatness that footprints are widened to.
-const float WIDENED_FLATNESS_MIN = 1.0 / 1024.0;
+// Least flatness of all: weights are divided by the product of axes, which keeps ten bits less than they have.
+const float FLATNESS_MIN = 1.0 / 1024.0;
 
 struct PhotonKernel {
     vec3 along;
@@ -92,7 +92,8 @@ bool photon_kernel(KernelSettings s, Differentials d, vec3 n, out PhotonKernel k
         lengths = lengths.yx;
     }
     float area = length(cross(a, b));
-    if (!(area > 0.0 && area >= s.flatness * lengths.x * lengths.x)) {
+    float flatness = max(s.flatness, FLATNESS_MIN);
+    if (!(area > 0.0 && area >= flatness * lengths.x * lengths.x)) {
         if (s.widens_flat == 0u) {
             return false;
         }
@@ -101,7 +102,6 @@ bool photon_kernel(KernelSettings s, Differentials d, vec3 n, out PhotonKernel k
             return true;
         }
         principal_axes(a, b);
-        float flatness = max(s.flatness, WIDENED_FLATNESS_MIN);
         b = flatness * cross(n, a);
         lengths = length(a) * vec2(1.0, flatness);
         area = lengths.x * lengths.y;

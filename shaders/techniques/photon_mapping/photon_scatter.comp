@@ -185,7 +185,8 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
             guard_differentials(footprint, push.kernel.unit_length);
         }
         footprint = scattered_differentials(footprint, hit, bsdf, photon.direction, normal, frame.wo.z > 0.0, scattered, wi);
-        footprint = roulette_differentials(footprint, survival);
+        // Of the photons that arrive only this share goes the same way on.
+        footprint = roulette_differentials(footprint, scattered.choice * survival);
         photon_differentials[slot] = footprint;
     }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {

@@ -9,9 +9,11 @@
 mod convergence;
 mod determinism;
 mod flux;
+mod footprints;
 mod lights;
 mod maps;
 mod materials;
+mod neighbours;
 mod queues;
 mod scale;
 mod settings;

@@ -73,17 +73,19 @@ fn nearest_neighbours_agree_with_the_path_tracer() {
         // The last of k neighbours only says how wide the kernel is: even, it holds k - 1 of k of its light without bias where the light is
         // even. Others are as wide, and hold the same light.
         let neighbors = 64;
-        let settings = PhotonSettings {
-            neighbors,
-            profile: KernelProfile::Uniform,
-            ..settings(set)
-        };
-        let found = means(gpu, &scene, &settings, 16);
-        let asked = found.counts.gather;
-        let each = asked.photons as f64 / asked.queries as f64;
-        println!("{each:.1} photons per query");
-        assert!(each > 0.9 * f64::from(neighbors) && each < 1.1 * f64::from(neighbors));
-        found.expect_same_as("nearest", &reference, [BIAS + NEAREST_BIAS; 3]);
+        for profile in [KernelProfile::Uniform, KernelProfile::Epanechnikov] {
+            let settings = PhotonSettings {
+                neighbors,
+                profile,
+                ..settings(set)
+            };
+            let found = means(gpu, &scene, &settings, 16);
+            let asked = found.counts.gather;
+            let each = asked.photons as f64 / asked.queries as f64;
+            println!("{profile:?}: {each:.1} photons per query");
+            assert!(each > 0.9 * f64::from(neighbors) && each < 1.1 * f64::from(neighbors));
+            found.expect_same_as(&format!("nearest, {profile:?}"), &reference, [BIAS + NEAREST_BIAS; 3]);
+        }
     });
 }
 

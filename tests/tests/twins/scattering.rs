@@ -136,6 +136,8 @@ fn the_scattering_function_agrees_with_its_twin() {
                     case.0
                 );
                 assert_eq!(result.0[3] == 0.0, s.pdf == 0.0);
+                let choice = (f64::from(result.0[8]) - s.choice).abs();
+                assert!(choice <= 256.0 * bound, "{} {} {:?}", result.0[8], s.choice, case.0);
             }
         }
         assert!(agreed * 1000 >= total * 998, "{agreed} of {total} lobes agree");

@@ -409,10 +409,14 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-DE-3",
         name: "nearest neighbours: one kernel about each point, up to its k-th photon",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Wrong where light changes within the width of the nearest photons, as at edges and contacts.",
+        limits: "Wrong where light changes within the width of the nearest photons, as at edges and contacts. Where photons lie too densely for a query's steps, the area searched is halved, and neighbours may be fewer than asked for.",
         sources: &[sources::JENSEN_2001.at("§7"), sources::FABIANOWSKI_2011.at("§3.4.2.1")],
         shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
-        tests: &["tests/tests/photon/settings.rs::nearest_neighbours_agree_with_the_path_tracer"],
+        tests: &[
+            "tests/tests/photon/settings.rs::nearest_neighbours_agree_with_the_path_tracer",
+            "tests/tests/photon/neighbours.rs::neighbours_are_those_of_brute_force",
+            "tests/tests/photon/neighbours.rs::fewer_neighbours_than_asked_for_have_the_kernel_that_was_searched",
+        ],
         settings: &["neighbors", "radius"],
         ..Row::of(file!())
     },

@@ -68,14 +68,14 @@ pub struct KernelSettings {
     pub length_min: f64,
     /// Greatest length of an axis, in unit lengths.
     pub length_max: f64,
-    /// Least |z1 × z2| / longer² of a footprint that is not flat.
+    /// Least |z1 × z2| / longer² of a footprint that is not flat; [`FLATNESS_MIN`] if that is more.
     pub flatness: f64,
     /// Widens flat footprints to the least flatness, and points to the least length, instead of leaving them without a kernel.
     pub widens_flat: bool,
 }
 
-/// Least flatness that footprints are widened to.
-const WIDENED_FLATNESS_MIN: f64 = 1.0 / 1024.0;
+/// Least flatness of all: weights are divided by the product of axes, which keeps ten bits less than they have.
+pub const FLATNESS_MIN: f64 = 1.0 / 1024.0;
 
 /// An ellipsoid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,7 +135,8 @@ pub fn photon_kernel(s: &KernelSettings, d: &Differentials, n: DVec3) -> Option<
     }
     let mut lengths = DVec2::new(a.length(), b.length());
     let mut area = a.cross(b).length();
-    if !(area > 0.0 && area >= s.flatness * lengths.x * lengths.x) {
+    let flatness = s.flatness.max(FLATNESS_MIN);
+    if !(area > 0.0 && area >= flatness * lengths.x * lengths.x) {
         if !s.widens_flat {
             return None;
         }
@@ -143,7 +144,6 @@ pub fn photon_kernel(s: &KernelSettings, d: &Differentials, n: DVec3) -> Option<
             return Some(disk_kernel(s.length_min * s.unit_length, n));
         }
         a = principal_axes(a, b)[0];
-        let flatness = s.flatness.max(WIDENED_FLATNESS_MIN);
         b = flatness * n.cross(a);
         lengths = a.length() * DVec2::new(1.0, flatness);
         area = lengths.x * lengths.y;
@@ -304,11 +304,13 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-DE-6",
         name: "dampening, clamp and discard of kernels",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Discarding loses the light of footprints that are too flat; widening them blurs instead.",
+        limits: "Discarding loses the light of footprints that are too flat; widening them blurs instead. No kernel is flatter than 1/1024, whatever `flatness` is set to.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.2.2")],
         shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
         tests: &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::flat_footprints_are_widened_where_asked_for",
+            "engine/src/techniques/photon_mapping/kernel/tests.rs::records_keep_the_area_of_the_flattest_kernels",
+            "tests/tests/twins/photons.rs::kernels_agree_with_their_twins",
             "engine/src/techniques/photon_mapping/kernel/tests.rs::dampening_takes_the_root_of_the_longer_axis",
             "engine/src/techniques/photon_mapping/kernel/tests.rs::flat_and_empty_footprints_have_no_kernel_and_long_ones_are_clamped",
             "engine/src/techniques/photon_mapping/kernel/tests.rs::scaling_the_scene_and_the_unit_scales_the_kernel",

@@ -89,7 +89,8 @@ crate::settings! {
         pub dampening: f32 = 0.25, in AboveTo(0.0, 1.0), unit "exponent";
         /// Size that the dampening leaves as it is; 0 for a ninth of the scene's diagonal.
         pub unit_length: f32 = 0.0, in 0.0.., unit "m";
-        /// For kernels that follow footprints: a footprint is flat if its area over the square of its longer axis is less.
+        /// For kernels that follow footprints: a footprint is flat if its area over the square of its longer axis is less. Values below
+        /// 1/1024 stand for 1/1024, as weights are divided by that area.
         pub flatness: f32 = 0.05, in 0.0..1.0;
         /// Widens flat footprints to that flatness; otherwise photons that have them are left out, with their light, in every pass.
         ///

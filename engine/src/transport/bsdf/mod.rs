@@ -62,6 +62,8 @@ pub struct BsdfSample {
     pub wi: DVec3,
     /// Density per solid angle; 0 for a delta lobe.
     pub pdf: f64,
+    /// Probability that this delta lobe was chosen; 1 for others, whose density has it.
+    pub choice: f64,
     /// f |cos| / pdf with all probabilities included.
     pub weight: DVec3,
     /// The lobe of the strategy that was used, one bit; 0 when no direction was found. A path is restricted to lobes by the mask, not
@@ -73,6 +75,7 @@ impl BsdfSample {
     const NONE: Self = Self {
         wi: DVec3::ZERO,
         pdf: 0.0,
+        choice: 1.0,
         weight: DVec3::ZERO,
         flags: 0,
     };
@@ -226,13 +229,15 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
         wi = 2.0 * cos_h * h - wo;
         let shape = if delta { LOBE_SPECULAR } else { LOBE_GLOSSY };
         flags = shape & LOBE_REFLECTION;
-        let mut scale = 1.0 / (p_reflection * (1.0 - p_cosine));
+        let mut choice = p_reflection * (1.0 - p_cosine);
+        let mut scale = 1.0 / choice;
         if wi.z <= 0.0 && (reflected || b.is_thin()) {
             return BsdfSample::NONE;
         }
         if !reflected {
             flags = shape & LOBE_TRANSMISSION;
-            scale = 1.0 / ((1.0 - p_reflection) * (1.0 - p_cosine));
+            choice = (1.0 - p_reflection) * (1.0 - p_cosine);
+            scale = 1.0 / choice;
             if b.is_thin() {
                 wi.z = -wi.z;
             } else {
@@ -250,6 +255,7 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
             return BsdfSample {
                 wi: DVec3::new(wi.x, wi.y, wi.z * side),
                 pdf: 0.0,
+                choice,
                 weight,
                 flags: if weight == DVec3::ZERO { 0 } else { flags },
             };
@@ -262,6 +268,7 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
     BsdfSample {
         wi: DVec3::new(wi.x, wi.y, wi.z * side),
         pdf,
+        choice: 1.0,
         weight: value / pdf,
         flags,
     }

@@ -5,7 +5,8 @@
 //! "Interactive Manycore Photon Mapping" (2011), §3.1.2 and §5.1. Conventions: vectors are derivatives, unscaled by the step √(4π/n) that n photons are apart in
 //! either parameter ([`global_step`]). A direction of density p per solid angle has derivatives of length 1/√(4πp): one rule for
 //! emission, diffuse reflection and every sampled lobe. The density counts every choice up to the class of paths: one of two lights that
-//! are chosen evenly emits with half of its own density. Likewise the exact account of an earlier roulette with survival Q is to hand p·Q
+//! are chosen evenly emits with half of its own density. A specular lobe has no density: the probability of choosing it is that of a
+//! roulette ([`BsdfSample::choice`](super::bsdf::BsdfSample::choice)). Likewise the exact account of an earlier roulette with survival Q is to hand p·Q
 //! and Ω/Q to a re-emission. Guarantees: scaling the scene scales `z1` and `z2` and nothing else; in a direction of finite density the
 //! results are finite. Bias: none by itself, since footprints only choose the size of kernels. Twin of `transport/differentials.glsl`.
 
@@ -194,7 +195,7 @@ pub fn rough_reemission(d: &Differentials, direction: DVec3, pdf: f64) -> Differ
     reemission_differentials(footprint_side(d), direction, density, 1.0 / density)
 }
 
-/// Survival of a roulette; to be applied once the new direction's derivatives are known, since a re-emission would forget it.
+/// Survival of a roulette, or the probability of a specular lobe among others; to be applied once the new direction's derivatives are known, since a re-emission would forget it.
 pub fn roulette_differentials(d: &Differentials, survival: f64) -> Differentials {
     let scale = 1.0 / survival.sqrt();
     Differentials {
@@ -286,6 +287,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/chain_tests.rs::each_event_agrees_with_finite_differences",
             "engine/src/transport/differentials/footprint_tests.rs::a_concave_mirror_about_the_light_focuses_to_nothing",
             "engine/src/transport/differentials/footprint_tests.rs::mirrors_and_flat_glass_have_the_areas_of_unfolded_paths",
+            "tests/tests/photon/footprints.rs::footprints_behind_mirrors_and_coats_are_those_of_finite_differences",
         ],
         api: &["clerestory::transport::differentials::reflect_differentials"],
         ..Row::of(file!())
@@ -314,6 +316,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/transport/differentials/chain_tests.rs::each_event_agrees_with_finite_differences",
             "engine/src/transport/differentials/footprint_tests.rs::mirrors_and_flat_glass_have_the_areas_of_unfolded_paths",
+            "tests/tests/photon/footprints.rs::footprints_behind_glass_are_those_of_finite_differences",
         ],
         api: &["clerestory::transport::differentials::refract_differentials"],
         ..Row::of(file!())
@@ -338,12 +341,18 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-PD-7",
-        name: "differentials of Russian roulette",
+        name: "differentials of Russian roulette, and of the choice among specular lobes",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Right for many photons and not for each; the next diffuse reflection keeps only the area of the footprint, and derives new directions from its density.",
+        limits: "Right for many photons and not for each; the next diffuse reflection keeps only the area of the footprint, and derives new directions from its density. Not counted: the probability of a rough lobe in the area that a footprint keeps there, of labels of lobes with `final_gather`, and of being stopped by blended surfaces or not.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.1.4")],
         shaders: &["shaders/transport/differentials.glsl"],
-        tests: &["engine/src/transport/differentials/footprint_tests.rs::roulette_makes_up_for_those_that_it_ends"],
+        tests: &[
+            "engine/src/transport/differentials/footprint_tests.rs::roulette_makes_up_for_those_that_it_ends",
+            "engine/src/transport/bsdf/tests.rs::delta_lobes_are_chosen_as_often_as_they_say",
+            "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
+            "tests/tests/photon/footprints.rs::footprints_behind_glass_are_those_of_finite_differences",
+            "tests/tests/photon/footprints.rs::footprints_behind_mirrors_and_coats_are_those_of_finite_differences",
+        ],
         api: &["clerestory::transport::differentials::roulette_differentials"],
         ..Row::of(file!())
     },

@@ -149,22 +149,37 @@ impl Lights {
 }
 
 /// Limits the choices of distant lights, whose power grows with the square of the scene's radius while what they add to a picture does not:
-/// half of them at most for the environment, which scattered rays may find too, and half for all distant lights where there are others.
-/// Against a choice by power alone that at most doubles the variance of what a light adds.
+/// where there are others, distant ones have half of the choices at most; where there are none, the environment, which scattered rays may
+/// find too, has half at most.
+///
+/// One of the limits is enough, since an environment among distant lights has no more than they. So no light keeps less than half of its
+/// probability by power alone, and the second moment of what it adds, in inverse proportion to that, at most doubles.
 fn share_choices(records: &[SceneLight], powers: &mut [f64]) {
-    let total = |powers: &[f64], wanted: &dyn Fn(u32) -> bool| -> f64 {
-        let of = records.iter().zip(powers).filter(|(light, _)| wanted(light.kind));
-        of.map(|(_, power)| *power).sum()
+    let is_environment = |kind: u32| kind == LIGHT_ENVIRONMENT;
+    let is_distant = |kind: u32| kind == LIGHT_ENVIRONMENT || kind == LIGHT_DIRECTIONAL;
+    let has_near = records
+        .iter()
+        .zip(powers.iter())
+        .any(|(light, power)| !is_distant(light.kind) && *power > 0.0);
+    let is_limited = |kind: u32| {
+        if has_near {
+            is_distant(kind)
+        } else {
+            is_environment(kind)
+        }
     };
-    let is_environment = |kind| kind == LIGHT_ENVIRONMENT;
-    let is_distant = |kind| kind == LIGHT_ENVIRONMENT || kind == LIGHT_DIRECTIONAL;
-    for limited in [&is_environment as &dyn Fn(u32) -> bool, &is_distant] {
-        let (own, others) = (total(powers, limited), total(powers, &|kind| !limited(kind)));
-        if others > 0.0 && own > others {
-            for (light, power) in records.iter().zip(powers.iter_mut()) {
-                if limited(light.kind) {
-                    *power *= others / own;
-                }
+    let (mut own, mut others) = (0.0f64, 0.0f64);
+    for (light, power) in records.iter().zip(powers.iter()) {
+        if is_limited(light.kind) {
+            own += *power;
+        } else {
+            others += *power;
+        }
+    }
+    if others > 0.0 && own > others {
+        for (light, power) in records.iter().zip(powers.iter_mut()) {
+            if is_limited(light.kind) {
+                *power *= others / own;
             }
         }
     }
@@ -264,4 +279,79 @@ pub(super) fn read_environment(gpu: &Gpu, block: &Buffer) -> Result<Environment>
         rotation: Quat::from_mat3(&Mat3::from_cols(right, up, back)),
         strength: 1.0,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_random::Random;
+
+    /// Probabilities by power alone, and as they are shared.
+    fn choices(lights: &[(u32, f64)]) -> (Vec<f64>, Vec<f64>) {
+        let records: Vec<SceneLight> = lights
+            .iter()
+            .map(|(kind, _)| SceneLight {
+                kind: *kind,
+                ..SceneLight::default()
+            })
+            .collect();
+        let powers: Vec<f64> = lights.iter().map(|(_, power)| *power).collect();
+        let shares = |powers: &[f64]| -> Vec<f64> {
+            let total: f64 = powers.iter().sum();
+            powers.iter().map(|power| power / total).collect()
+        };
+        let mut shared = powers.clone();
+        share_choices(&records, &mut shared);
+        (shares(&powers), shares(&shared))
+    }
+
+    #[test]
+    fn no_light_loses_more_than_half_of_its_choices() {
+        let mut random = Random(31);
+        let mut least = 1.0f64;
+        for _ in 0..5000 {
+            let mut lights: Vec<(u32, f64)> = Vec::new();
+            for (kind, most) in [
+                (LIGHT_POINT, 2),
+                (LIGHT_TRIANGLE, 2),
+                (LIGHT_DIRECTIONAL, 3),
+                (LIGHT_ENVIRONMENT, 1),
+            ] {
+                lights.extend((0..random.below(most + 1)).map(|_| (kind, f64::from(random.magnitude(-20, 40)))));
+            }
+            if lights.is_empty() {
+                continue;
+            }
+            let (by_power, shared) = choices(&lights);
+            for (before, after) in by_power.iter().zip(&shared) {
+                assert!(*after >= 0.5 * before * (1.0 - 1e-12), "{lights:?}: {before}, {after}");
+                least = least.min(after / before);
+            }
+            let of = |wanted: &[u32]| -> f64 {
+                let of = lights
+                    .iter()
+                    .zip(&shared)
+                    .filter(|(light, _)| wanted.contains(&light.0));
+                of.map(|(_, share)| share).sum()
+            };
+            let (environment, sun) = (of(&[LIGHT_ENVIRONMENT]), of(&[LIGHT_DIRECTIONAL]));
+            let near = 1.0 - environment - sun;
+            assert!(
+                environment <= 0.5 + 1e-12 || lights.len() == 1,
+                "{lights:?}: {environment}"
+            );
+            assert!(
+                environment + sun <= 0.5 + 1e-12 || near < 1e-12,
+                "{lights:?}: {environment} and {sun}"
+            );
+        }
+        // The bound is reached.
+        assert!(least < 0.501, "{least}");
+        // A sky far above a sun far above a lamp.
+        let (by_power, shared) = choices(&[(LIGHT_POINT, 1.0), (LIGHT_DIRECTIONAL, 1e4), (LIGHT_ENVIRONMENT, 1e8)]);
+        assert!(
+            by_power[2] > 0.99 && shared[2] > 0.49 && (shared[0] - 0.5).abs() < 1e-12,
+            "{shared:?}"
+        );
+    }
 }

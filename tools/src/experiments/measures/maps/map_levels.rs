@@ -8,7 +8,8 @@ use clerestory::film::png;
 use clerestory::maps::Parametrization;
 
 use super::seam_levels::{
-    BY_OCTANT, EYE, RECTANGLE, RIM, SQUARE, SQUARES, TEXELS, WHITE_LEVEL, Way, checkers, exact_levels, levels, pictures,
+    BY_OCTANT, EYE, GATED, MIRRORED, RECTANGLE, RIM, SQUARE, SQUARES, TEXELS, WHITE_LEVEL, Way, checkers, exact_levels,
+    levels, pictures,
 };
 use super::sphere::{Sphere, sheet};
 use crate::experiments::findings::{Bound, Criterion, Findings, Study, largest, rows};
@@ -17,6 +18,10 @@ use crate::experiments::measures::errors::greatest;
 
 /// Pixels of the sphere's picture along a side.
 const SIDE: u32 = 256;
+/// Height over width of the pixels of another one: those that straddle the equator look finer, mirrored, than they are.
+const TALL: u32 = 8;
+/// Columns of it.
+const TALL_SIDE: u32 = 512;
 /// Ways to find levels with their names.
 type Ways = &'static [(Way, &'static str)];
 
@@ -32,8 +37,9 @@ const MAPS: [(Parametrization, Ways, &str); 2] = [
 
 rows! {
     /// A way to find levels, in a map.
-    struct Row = "Levels of detail over seams" by [map, way] {
+    struct Row = "Levels of detail over seams" by [map, tall, way] {
         map: String = "map",
+        tall: u64 = "height of pixels over their width",
         way: String = "level by",
         jump: f64 = "largest jump between neighbours (levels)",
         too_coarse: f64 = "too coarse by at most (levels)",
@@ -58,6 +64,18 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.off.into(),
     )
     .among(Row::is_the_engines),
+    Criterion::each(
+        "with its gate the repair by a mirrored direction is too fine by a level at most",
+        Bound::AtMost(1.0),
+        |row: &Row| row.too_fine.into(),
+    )
+    .among(|row| row.way == GATED),
+    Criterion::each(
+        "without it the repair is too fine by more than two levels where tall pixels straddle the equator",
+        Bound::AtLeast(2.0),
+        |row: &Row| row.too_fine.into(),
+    )
+    .among(|row| row.way == MIRRORED && row.tall > 1),
 ];
 
 /// The level that a look-up samples, the finest at least; not a number of one that is none.
@@ -94,26 +112,33 @@ impl Row {
 
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
-        let sphere = Sphere::new(EYE, context.pick(SIDE, 48));
+        let side = context.pick(SIDE, 48);
+        let tall = context.pick(TALL_SIDE, 256);
+        let spheres = [[side, side], [tall, tall / TALL]].map(|pixels| Sphere::of_pixels(EYE, pixels));
         let name = |(map, ..): &(Parametrization, &[(Way, &str)], &str)| map.to_string();
         context.each(&MAPS, name, |(map, ways, file)| {
             let mut chain = vec![checkers(*map)?];
             while let Some(next) = chain.last().and_then(|last| last.coarser().ok()) {
                 chain.push(next);
             }
-            let exact = exact_levels(&sphere, *map);
             let (mut rows, mut seen, mut shown) = (Vec::new(), Vec::new(), Vec::new());
-            for (way, name) in *ways {
-                let found = levels(&sphere, *map, *way);
-                let row = Row {
-                    map: map.to_string(),
-                    way: (*name).into(),
-                    ..Row::default()
-                };
-                rows.push(row.compared(&sphere, &found, &exact));
-                let [a, b] = pictures(&sphere, &chain, &found);
-                seen.push(a);
-                shown.push(b);
+            for sphere in &spheres {
+                let exact = exact_levels(sphere, *map);
+                for (way, name) in *ways {
+                    let found = levels(sphere, *map, *way);
+                    let row = Row {
+                        map: map.to_string(),
+                        tall: u64::from(sphere.side / sphere.rows),
+                        way: (*name).into(),
+                        ..Row::default()
+                    };
+                    rows.push(row.compared(sphere, &found, &exact));
+                    if sphere.side == sphere.rows {
+                        let [a, b] = pictures(sphere, &chain, &found);
+                        seen.push(a);
+                        shown.push(b);
+                    }
+                }
             }
             png::write(context.file(file)?, &sheet(&[seen, shown]))?;
             Ok(rows)
@@ -136,7 +161,7 @@ impl Study for Found {
                 )
             })
             .note(format!(
-                "A sphere of {SIDE} × {SIDE} pixels painted by its normals with a map of {TEXELS} rows and {SQUARES} squares over them, seen from \
+                "A sphere of {SIDE} × {SIDE} pixels, and one of {TALL_SIDE} columns of pixels {TALL} times as high as wide, painted by its normals with a map of {TEXELS} rows and {SQUARES} squares over them, seen from \
                  below. Levels are found for quads of two by two pixels, as devices find them, with each pixel's own direction where a way takes \
                  one. The truth is the level by exact derivatives at each pixel's middle, through those of the map's decoding. Pixels farther than \
                  {RIM} of the radius from the middle do not count. Differences are finite: a quad sees about the mean of the derivatives over it, \

@@ -40,12 +40,15 @@ pub enum Way {
 
 /// The engine's way.
 pub const BY_OCTANT: &str = "derivatives of the octant's map";
+/// The document's repair, as printed and with its gate.
+pub const MIRRORED: &str = "least of those and of the mirrored ones, as printed";
+pub const GATED: &str = "the same where the whole quad has z < 0";
 
 /// Ways in the square layout, with their names.
 pub const SQUARE: [(Way, &str); 4] = [
     (Way::Plain, "differences of coordinates"),
-    (Way::Mirrored, "least of those and of the mirrored ones, as printed"),
-    (Way::Gated, "the same where the whole quad has z < 0"),
+    (Way::Mirrored, MIRRORED),
+    (Way::Gated, GATED),
     (Way::Octant, BY_OCTANT),
 ];
 /// Ways in the rectangle.
@@ -79,7 +82,7 @@ fn level(map: Parametrization, way: Way, quad: Quad, own: DVec3) -> f64 {
 
 /// Levels of all pixels, as quads of two by two find them.
 pub fn levels(sphere: &Sphere, map: Parametrization, way: Way) -> Vec<Option<f64>> {
-    let pixels = (0..sphere.side).flat_map(|y| (0..sphere.side).map(move |x| (x, y)));
+    let pixels = (0..sphere.rows).flat_map(|y| (0..sphere.side).map(move |x| (x, y)));
     pixels
         .map(|(x, y)| {
             let at = |x: u32, y: u32| sphere.normal(sphere.place(x, y));
@@ -102,7 +105,7 @@ fn moved([along, down]: [DVec3; 2], v: DVec3) -> DVec2 {
 /// Levels of all pixels by the derivatives of the sphere's normal at their middles.
 pub fn exact_levels(sphere: &Sphere, map: Parametrization) -> Vec<Option<f64>> {
     let texels = DVec2::new(f64::from(map.aspect() * TEXELS), f64::from(TEXELS));
-    let pixels = (0..sphere.side).flat_map(|y| (0..sphere.side).map(move |x| (x, y)));
+    let pixels = (0..sphere.rows).flat_map(|y| (0..sphere.side).map(move |x| (x, y)));
     pixels
         .map(|(x, y)| {
             let p = sphere.place(x, y);
@@ -146,7 +149,7 @@ pub fn pictures(sphere: &Sphere, chain: &[MapImage], levels: &[Option<f64>]) -> 
     }
     [seen, shown].map(|bytes| Rgb8 {
         width: sphere.side,
-        height: sphere.side,
+        height: sphere.rows,
         bytes,
     })
 }

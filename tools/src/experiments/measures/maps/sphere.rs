@@ -12,11 +12,18 @@ pub struct Sphere {
     up: DVec3,
     /// Pixels across.
     pub side: u32,
+    /// Pixels down.
+    pub rows: u32,
 }
 
 impl Sphere {
     /// Seen from `eye`, with +z up, on so many pixels across and down.
     pub fn new(eye: DVec3, side: u32) -> Self {
+        Self::of_pixels(eye, [side, side])
+    }
+
+    /// The same, of pixels that need not be square.
+    pub fn of_pixels(eye: DVec3, [side, rows]: [u32; 2]) -> Self {
         let towards = eye.normalize();
         let right = DVec3::Z.cross(towards).normalize();
         Self {
@@ -24,12 +31,13 @@ impl Sphere {
             right,
             up: towards.cross(right),
             side,
+            rows,
         }
     }
 
     /// A pixel's place in \[-1, 1\]², up and to the right.
     pub fn place(&self, x: u32, y: u32) -> DVec2 {
-        let p = (DVec2::new(f64::from(x), f64::from(y)) + 0.5) / f64::from(self.side);
+        let p = (DVec2::new(f64::from(x), f64::from(y)) + 0.5) / DVec2::new(f64::from(self.side), f64::from(self.rows));
         DVec2::new(2.0 * p.x - 1.0, 1.0 - 2.0 * p.y)
     }
 
@@ -42,10 +50,10 @@ impl Sphere {
     /// What the normal changes by from a pixel to the one across, and to the one below: derivatives.
     pub fn normal_derivatives(&self, p: DVec2) -> Option<[DVec3; 2]> {
         let squared = p.length_squared();
-        let pixel = 2.0 / f64::from(self.side);
+        let [wide, high] = [self.side, self.rows].map(|pixels| 2.0 / f64::from(pixels));
         (squared < 1.0).then(|| {
             let by = |axis: DVec3, coordinate: f64| axis - coordinate / (1.0 - squared).sqrt() * self.towards;
-            [pixel * by(self.right, p.x), -pixel * by(self.up, p.y)]
+            [wide * by(self.right, p.x), -high * by(self.up, p.y)]
         })
     }
 
