@@ -5,6 +5,7 @@
 //! call; an unknown value fails the tests.
 
 pub mod child;
+pub mod driver;
 pub mod render;
 pub mod shaders;
 pub mod statistics;

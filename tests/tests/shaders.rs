@@ -74,6 +74,33 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("kernels/histogram.comp", "InvalidArraySize"),
 ];
 
+/// The whole workgroup comes to each of them: branches that lanes take apart end before, and loops and early returns about them are the same for
+/// all. SPIR-V 1.3 (its definition of uniform control flow) promises that such lanes are together.
+const BY_WHOLE_WORKGROUPS: &str = "the whole workgroup comes to it";
+/// Votes by which lanes wait for each other, or go where another one must; what each finds is its own, with any others beside it or none.
+const WITH_ANY_COMPANY: &str = "no result depends on who votes";
+
+/// Modules with subgroup operations, each with why its results do not depend on lanes coming together again where SPIR-V does not promise it.
+const WITH_SUBGROUP_OPERATIONS: &[(&str, &str)] = &[
+    ("accel/trace_queue_vote.comp", WITH_ANY_COMPANY),
+    ("kernels/model_queue.comp", BY_WHOLE_WORKGROUPS),
+    ("kernels/partition_subgroup.comp", BY_WHOLE_WORKGROUPS),
+    ("kernels/radix_scatter_subgroup.comp", BY_WHOLE_WORKGROUPS),
+    ("kernels/scan_apply_subgroup.comp", BY_WHOLE_WORKGROUPS),
+    ("kernels/scan_reduce_subgroup.comp", BY_WHOLE_WORKGROUPS),
+    ("techniques/photon_mapping/photon_gather_packet.comp", WITH_ANY_COMPANY),
+];
+
+#[test]
+fn every_module_with_subgroup_operations_is_known_not_to_depend_on_reconvergence() {
+    let found: BTreeSet<_> = all()
+        .filter(|shader| shader.subgroups)
+        .map(|shader| shader.name)
+        .collect();
+    let known: BTreeSet<_> = WITH_SUBGROUP_OPERATIONS.iter().map(|(name, _)| *name).collect();
+    assert_eq!(found, known, "read it, and say why it is sound");
+}
+
 /// The module without its line numbers, which naga takes only inside functions.
 fn without_lines(spirv: &[u8]) -> Vec<u8> {
     const HEADER_BYTES: usize = 20;

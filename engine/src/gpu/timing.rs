@@ -28,7 +28,7 @@ pub struct Drawn {
     pub vertices: u64,
     /// Primitives that reached clipping: as draws or geometry shaders emit them.
     pub primitives: u64,
-    /// Fragment shader invocations.
+    /// Fragment shader invocations: of some drivers blocks of pixels, of others only what an early test of depth lets pass.
     pub fragments: u64,
 }
 

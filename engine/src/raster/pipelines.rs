@@ -359,6 +359,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/raster/directions.rs::octahedra_are_as_rays_see_them_and_have_no_holes",
         "tests/tests/raster/cuts.rs::exact_cuts_interpolate_what_rays_meet",
         "tests/tests/raster/cuts.rs::cuts_emit_what_their_twins_say",
+        "tests/tests/raster/cuts.rs::masks_shade_more_than_clipping_where_fragments_are_counted",
     ],
     api: &["clerestory::raster::OctantCut", "clerestory::raster::GBuffer"],
     settings: &["clerestory::raster::Layering", "clerestory::raster::GBufferDesc"],

@@ -25,6 +25,8 @@ pub(super) struct LibraryMaterial {
 /// The line of the first fault and what is wrong: a number that is none, a material without a name, a key before the first material.
 pub(super) fn parse(text: &str) -> Result<Vec<LibraryMaterial>, String> {
     let mut materials: Vec<LibraryMaterial> = Vec::new();
+    // Some editors begin a file with a mark of its encoding.
+    let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
     for (i, line) in text.lines().enumerate() {
         let fault = |cause: &str| format!("line {}: {cause}", i + 1);
         let line = line.trim();

@@ -1,7 +1,8 @@
 //! Wavefront OBJ: positions, normals, texture coordinates and faces, with the Kd and Ke of `.mtl` files.
 //!
 //! Read by the crate `tobj`, libraries by `mtl.rs`; polygons are cut into fans. Materials are Lambert with their Kd, and emit their Ke; everything else an
-//! `.mtl` says is reported. Texts that are not UTF-8 (names in older encodings) are read as far as they are.
+//! `.mtl` says is reported, and so are free-form curves and surfaces. Texts that are not UTF-8 (names in older encodings) are read as far as they are;
+//! what older exporters write that the crate does not take is made plain before.
 
 use std::cell::RefCell;
 use std::io::Cursor;
@@ -28,7 +29,9 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
 }
 
 fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>) -> Result<Scene> {
-    check_indices(bytes).map_err(|(line, cause)| Error::scene(source, format!("line {line}"), cause))?;
+    let at_line = |(line, cause): (usize, String)| Error::scene(source, format!("line {line}"), cause);
+    let text = plain(bytes).map_err(at_line)?;
+    check_indices(&text).map_err(at_line)?;
     let options = tobj::LoadOptions {
         single_index: true,
         triangulate: true,
@@ -40,7 +43,7 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
         ..Scene::default()
     };
     let (materials, unread) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
-    let loaded = tobj::load_obj_buf(&mut Cursor::new(utf8(bytes)), &options, |name| {
+    let loaded = tobj::load_obj_buf(&mut Cursor::new(text.as_bytes()), &options, |name| {
         let text = library(name).ok_or_else(|| "there is no such file".to_owned());
         match text.and_then(|text| mtl::parse(&String::from_utf8_lossy(&text))) {
             Ok(read) => {
@@ -61,6 +64,13 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
         }
     });
     let (models, _) = loaded.map_err(|error| Error::scene(source, "content", error.to_string()))?;
+    if let Some(number) = (text.lines()).position(|line| FREE_FORM.contains(&key_of(line))) {
+        scene.notes.push(Note {
+            feature: "free-form curves and surfaces".into(),
+            at: format!("line {}", number + 1),
+            instead: "left out".into(),
+        });
+    }
     for (name, cause) in unread.into_inner() {
         scene.notes.push(Note {
             feature: format!("material library that cannot be read: {cause}"),
@@ -137,9 +147,60 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
     Ok(scene)
 }
 
-/// The text with what is not UTF-8 replaced, in the library as in the model, so that names still meet.
-fn utf8(bytes: &[u8]) -> Vec<u8> {
-    String::from_utf8_lossy(bytes).into_owned().into_bytes()
+/// Keys of shapes that are no faces.
+const FREE_FORM: [&str; 3] = ["surf", "curv", "curv2"];
+
+fn key_of(line: &str) -> &str {
+    line.split_ascii_whitespace().next().unwrap_or("")
+}
+
+/// The text line by line as the crate takes it, each line with the number it has in the file: what is not UTF-8 is replaced, in the library as
+/// in the model, so that names still meet; lines that a backslash continues are one, with empty ones behind it; a mark of the encoding, line
+/// ends of a carriage return alone, comments behind numbers, `fo` for `f` and Microsoft's ways to print NaN are gone.
+fn plain(bytes: &[u8]) -> Result<String, (usize, String)> {
+    if bytes.starts_with(b"\xFE\xFF") || bytes.starts_with(b"\xFF\xFE") {
+        return Err((1, "is UTF-16; save the file as UTF-8".into()));
+    }
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.strip_prefix('\u{FEFF}').unwrap_or(&text);
+    let end = if text.contains('\n') { '\n' } else { '\r' };
+    let mut plain = String::with_capacity(text.len() + 1);
+    let (mut whole, mut continued) = (String::new(), 0);
+    for line in text.split(end) {
+        let line = line.trim_ascii_end();
+        // Comments may end in a folder's name.
+        let is_comment = whole.is_empty() && key_of(line).starts_with('#');
+        if let (Some(part), false) = (line.strip_suffix('\\'), is_comment) {
+            whole += part;
+            whole.push(' ');
+            continued += 1;
+            continue;
+        }
+        whole += line;
+        push_plain(&mut plain, &whole);
+        plain.extend(std::iter::repeat_n('\n', continued + 1));
+        whole.clear();
+        continued = 0;
+    }
+    push_plain(&mut plain, &whole);
+    Ok(plain)
+}
+
+fn push_plain(plain: &mut String, line: &str) {
+    let key = match key_of(line) {
+        "fo" => "f",
+        key => key,
+    };
+    if !["v", "vt", "vn", "f"].contains(&key) {
+        *plain += line;
+        return;
+    }
+    *plain += key;
+    let words = line.split_ascii_whitespace().skip(1);
+    for word in words.take_while(|word| !word.starts_with('#')) {
+        plain.push(' ');
+        *plain += if key != "f" && word.contains(".#") { "nan" } else { word };
+    }
 }
 
 fn add_material(scene: &mut Scene, source: &LibraryMaterial) {
@@ -160,14 +221,10 @@ fn add_material(scene: &mut Scene, source: &LibraryMaterial) {
 }
 
 /// Checks faces and numbers line by line before the crate sees them, so that faults have a line.
-fn check_indices(bytes: &[u8]) -> Result<(), (usize, String)> {
+fn check_indices(text: &str) -> Result<(), (usize, String)> {
     // Counts of v, vt, vn so far: faces may refer backwards only, by the format's rules; forwards is refused.
     let mut counts = [0i64; 3];
-    if bytes.starts_with(b"\xFE\xFF") || bytes.starts_with(b"\xFF\xFE") {
-        return Err((1, "is UTF-16; save the file as UTF-8".into()));
-    }
-    for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
-        let line = String::from_utf8_lossy(line);
+    for (i, line) in text.lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
         let Some(key) = words.next() else {
             continue;
@@ -233,6 +290,52 @@ mod tests {
             "{:?}",
             scene.notes
         );
+    }
+
+    #[test]
+    fn lines_of_older_exporters_are_read() {
+        let expected = read(TEXT).expect("scene");
+        let same = |text: &str| {
+            let scene = read(text).unwrap_or_else(|error| panic!("{error}: {text:?}"));
+            assert_eq!(scene.meshes.len(), expected.meshes.len(), "{text:?}");
+            for (mesh, other) in scene.meshes.iter().zip(&expected.meshes) {
+                assert_eq!(
+                    (&mesh.positions, &mesh.triangles),
+                    (&other.positions, &other.triangles),
+                    "{text:?}"
+                );
+                assert_eq!(mesh.material, other.material, "{text:?}");
+            }
+        };
+        same(&TEXT.replace("2/2/1 3/3/1", "2/2/1 \\\n 3/3/1"));
+        same(&TEXT.replace("2/2/1 3/3/1", "2/2/1 \\\r\n\\\r\n 3/3/1"));
+        same(&format!("\u{FEFF}{TEXT}"));
+        same(&TEXT.replace('\n', "\r"));
+        same(&TEXT.replace("v 1 1 0", "v 1 1 0 # the third"));
+        same(&TEXT.replace("1//1 2//1 3//1", "1//1 2//1 3//1 # the lamp"));
+        same(&TEXT.replace("f 1//1", "fo 1//1"));
+        same(&TEXT.replace("mtllib", "# C:\\models\\\nmtllib"));
+        let scene = read(&TEXT.replace("vn 0 0 2", "vn -1.#IND00 0 1.#QNAN")).expect("scene");
+        assert_eq!(scene.meshes[0].normals[0], Vec3::Y);
+        // Lines have the numbers that they have in the file.
+        let text = TEXT.replace("2/2/1 3/3/1", "2/2/1 \\\n 3/3/1");
+        let error = read(&text.replace("1//1 2//1 3//1", "1//1 2//1 9//1")).expect_err("fault");
+        assert!(error.to_string().contains("line 14"), "{error}");
+        // A library with a mark of its encoding.
+        let library = format!("\u{FEFF}{MTL}").into_bytes();
+        let scene = parse(TEXT.as_bytes(), "a.obj", |_| Some(library.clone())).expect("scene");
+        assert!(scene.materials.iter().any(|material| material.name == "lamp"));
+    }
+
+    #[test]
+    fn free_form_surfaces_are_left_out_by_name() {
+        let scene = read(&format!("{TEXT}cstype bezier\ndeg 3 3\nsurf 0 1 0 1 1 2 3 4\nend\n")).expect("scene");
+        let note = scene
+            .notes
+            .iter()
+            .find(|note| note.feature.contains("free-form"))
+            .expect("note");
+        assert_eq!(note.at, "line 16");
     }
 
     #[test]

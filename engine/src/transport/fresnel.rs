@@ -77,7 +77,10 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Unpolarized light at a smooth interface, by three bands.",
         sources: &[sources::BORN_WOLF_1999.at("14.2")],
         shaders: &["shaders/transport/fresnel.glsl"],
-        tests: &["engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric"],
+        tests: &[
+            "engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric",
+            "tests/tests/twins/reflection.rs::fresnel_factors_agree_with_their_twins",
+        ],
         experiment: "clerestory agreement --scene cornell-metals,ring-mirror",
         api: &["clerestory::transport::fresnel"],
         ..Row::of(file!())
@@ -89,7 +92,10 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Unpolarized light at a smooth interface, with one index for all bands.",
         sources: &[sources::BORN_WOLF_1999.at("1.5")],
         shaders: &["shaders/transport/fresnel.glsl"],
-        tests: &["engine/src/transport/fresnel.rs::dielectric_equals_the_textbook_form_and_its_edges"],
+        tests: &[
+            "engine/src/transport/fresnel.rs::dielectric_equals_the_textbook_form_and_its_edges",
+            "tests/tests/twins/reflection.rs::fresnel_factors_agree_with_their_twins",
+        ],
         experiment: "clerestory agreement --scene cornell-glass",
         api: &["clerestory::transport::fresnel"],
         ..Row::of(file!())

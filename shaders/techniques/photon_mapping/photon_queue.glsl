@@ -1,7 +1,7 @@
 // The queue of eye paths that ask the photon map (descriptor set 3), of one of three types.
 //
 // QUEUE_SLOTS: an invocation per place of the wave; those that ask nothing idle. QUEUE_COMPACTED: flags by place and a stable compaction.
-// QUEUE_BLOCKS: subgroups collect places in shared memory and append whole blocks, as wide as they are, to a list. A block number is all that
+// QUEUE_BLOCKS: teams as wide as subgroups collect places in shared memory and append whole blocks of as many to a list. A block number is all that
 // a consumer needs, so that consumers take the blocks of their own numbers instead of drawing tickets.
 //
 // PM-ST-2 to PM-ST-4: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §7.4.1. The order of blocks may differ from run to run, what is in a block
@@ -14,7 +14,7 @@
 const uint QUEUE_SLOTS = 0u;
 const uint QUEUE_COMPACTED = 1u;
 const uint QUEUE_BLOCKS = 2u;
-// Subgroups' worth of places that a subgroup collects before it appends them.
+// Blocks that a team collects before it appends them.
 const uint QUEUE_BUFFER_BLOCKS = 7u;
 
 const uint NO_PLACE = 0xFFFFFFFFu;

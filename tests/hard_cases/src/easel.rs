@@ -13,9 +13,16 @@ use serde_json::Value;
 
 /// Seed of all pictures.
 const SEED: u32 = 7;
-/// What the mean over a picture of a technique with a bias may be wrong by, relatively: five standard deviations of 1 %, which the photons of
-/// one pass leave in closed rooms, where no pixel is independent of another.
-const TOLERANCE: f64 = 0.05;
+/// What the mean over a picture may be wrong by, relatively, where photons light it, times the square root of their number: five standard deviations of
+/// 1 %, which 16,384 of them leave in closed rooms. All pixels share them, so that no variance of pixels tells of it.
+const PHOTON_TOLERANCE: f64 = 6.4;
+/// The same of techniques with a bias that have no photons.
+pub(crate) const OTHER_TOLERANCE: f64 = 0.05;
+
+/// What the mean over a picture may be wrong by where so many photons light it.
+pub(crate) fn photon_tolerance(photons: f64) -> f64 {
+    PHOTON_TOLERANCE / photons.sqrt()
+}
 
 /// A technique with settings on a device.
 #[derive(Debug, Clone)]
@@ -151,11 +158,27 @@ impl<'a> Easel<'a> {
     /// As [`Easel::prepare`] and [`Technique::step`].
     pub fn paint(&self, scene: &Scene, size: [u32; 2], spp: u32) -> Result<Painted> {
         let painted = finish(self.prepare(scene, size)?.as_mut(), spp)?;
-        let tolerance = match self.info.bias {
-            Bias::Unbiased => 0.0,
-            Bias::Consistent(_) | Bias::Biased(_) => TOLERANCE,
-        };
-        Ok(Painted { tolerance, ..painted })
+        Ok(Painted {
+            tolerance: self.tolerance(spp),
+            ..painted
+        })
+    }
+
+    /// Whether its pictures have a bias.
+    pub fn has_bias(&self) -> bool {
+        !matches!(self.info.bias, Bias::Unbiased)
+    }
+
+    /// What means over its pictures of so many samples may be wrong by, relatively, beside what their variance says: [`Painted::tolerance`].
+    pub fn tolerance(&self, spp: u32) -> f64 {
+        let number = |name: &str| self.settings.get(name).and_then(Value::as_f64);
+        if !self.has_bias() {
+            return 0.0;
+        }
+        number("photons").map_or(OTHER_TOLERANCE, |photons| {
+            let passes = (f64::from(spp) / number("samples_per_pass").unwrap_or(1.0)).ceil();
+            photon_tolerance(photons * passes.max(1.0))
+        })
     }
 }
 

@@ -28,7 +28,7 @@ mod tests;
 pub use easel::{Easel, Painted};
 pub use judgement::{FALSE_ALARM, Figure, Judgement};
 pub use lobes::{LOBES, Lobe};
-pub use page::{PAGE, PICTURES, Row, case_section, markdown};
+pub use page::{PAGE, PICTURES, Row, case_section, markdown, promises};
 pub use rays::{INDEXES, IndexKind, RaySet, misses};
 pub use run::{Outcome, Subject, Verdict, judge, subjects};
 

@@ -1,7 +1,9 @@
 //! The registry as a page of Markdown: every case with its picture, and the table of verdicts.
 
+use clerestory::techniques;
+
 use crate::run::WAY_ROUND;
-use crate::{HardCase, Outcome, Verdict};
+use crate::{HardCase, Outcome, Subject, Verdict};
 
 /// The page, from the repository's root.
 pub const PAGE: &str = "docs/stability.md";
@@ -51,6 +53,7 @@ pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: i
         }
         page.push('\n');
     }
+    page += &promises();
     let remarks = remarks(rows);
     if !remarks.is_empty() {
         page += "\n## What does not pass, and what to do\n";
@@ -62,6 +65,21 @@ pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: i
         page += &case_section(case, pictured(case));
     }
     page
+}
+
+/// What each technique is held to where a case says no more: by its id, since samplers change nothing of it.
+pub fn promises() -> String {
+    let mut text = "\n## What techniques are held to\n\n\
+        Where a case allows more, it says so below; what a cell calls *allowed* is both, and the noise.\n\n"
+        .to_owned();
+    for card in techniques::all() {
+        let subject = Subject::Technique {
+            info: card,
+            sampler: None,
+        };
+        text += &format!("- {}: {}\n", card.id, subject.promise().unwrap_or_default());
+    }
+    text
 }
 
 /// A link to a case's section.

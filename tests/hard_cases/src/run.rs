@@ -5,6 +5,7 @@ use clerestory::techniques::{self, Bias, Card};
 use clerestory::transport::PathSet;
 use clerestory::{Error, Result};
 
+use crate::easel::{OTHER_TOLERANCE, photon_tolerance};
 use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
 
 /// Photons of a pass, of techniques that have them, and samples of a pixel that ask them: one pass for nearly all pictures, whose noise is a
@@ -84,6 +85,30 @@ impl Subject {
         of_parts.then(|| format!("its pictures hold only the light paths {}{bias}", info.path_set))
     }
 
+    /// What its pictures are judged by beside their own variance, in words: from the bias that its card states. `None` for what is no technique.
+    pub fn promise(&self) -> Option<String> {
+        let Self::Technique { info, .. } = self else {
+            return None;
+        };
+        if !self.has_bias() {
+            return Some("unbiased: pixels and means have what is expected, but for their noise".to_owned());
+        }
+        let percent = |tolerance: f64| format!("{:.1} %", 100.0 * tolerance);
+        let allowed = if info.settings.has("photons") {
+            format!(
+                "single pixels promise nothing; means over pictures may err by {} beside their variance, which does not tell of photons that \
+                 all pixels share: five standard deviations of a pass of {PHOTONS}; of n passes √n times less",
+                percent(photon_tolerance(f64::from(PHOTONS)))
+            )
+        } else {
+            format!(
+                "single pixels promise nothing; means over pictures may err by {} beside their variance",
+                percent(OTHER_TOLERANCE)
+            )
+        };
+        Some(format!("{}; {allowed}", info.bias))
+    }
+
     /// Whether a case concerns it.
     pub fn concerns(&self, case: &HardCase) -> bool {
         match self {
@@ -146,20 +171,24 @@ pub struct Outcome {
     pub figures: Vec<Figure>,
 }
 
+/// A technique with the settings that all cases begin with.
+fn easel_of<'a>(gpu: &'a Gpu, info: &'static Card) -> Easel<'a> {
+    Easel::new(gpu, info, serde_json::Map::new())
+        .with("photons", PHOTONS)
+        .with("samples_per_pass", SAMPLES_PER_PASS)
+        .with("probe_side", PROBE_SIDE)
+        .with("probe_finest", PROBE_FINEST)
+}
+
 /// Runs a case on a subject; `None` when it does not concern it.
 pub fn judge(gpu: &Gpu, case: &HardCase, subject: &Subject) -> Option<Outcome> {
     let judged = match subject {
         Subject::Technique { info, sampler } => {
             let sampler = sampler.map(|sampler| ("sampler", sampler));
-            let easel = Easel::new(gpu, info, serde_json::Map::new())
-                .with("photons", PHOTONS)
-                .with("samples_per_pass", SAMPLES_PER_PASS)
-                .with("probe_side", PROBE_SIDE)
-                .with("probe_finest", PROBE_FINEST);
             (case.techniques?)(
                 &sampler
                     .into_iter()
-                    .fold(easel, |easel, (name, value)| easel.with(name, value)),
+                    .fold(easel_of(gpu, info), |easel, (name, value)| easel.with(name, value)),
             )
         }
         Subject::Index(kind) => crate::rays::judge(kind, &(case.rays?)()),

@@ -59,6 +59,7 @@ fn the_page_describes_every_case_and_names_every_subject() {
         .map(|case| case_section(case, picture(case).is_file()))
         .collect();
     assert!(page.ends_with(&sections.join("\n")), "{again}");
+    assert!(page.contains(&promises()), "{again}");
     for subject in subjects() {
         assert!(
             page.contains(&format!("| {} |", subject.name())),
@@ -108,6 +109,30 @@ fn passes(check: impl FnOnce(&mut Judgement)) -> bool {
     let mut judgement = Judgement::default();
     check(&mut judgement);
     judgement.figures().iter().all(Figure::passes)
+}
+
+#[test]
+fn tolerances_are_those_of_the_photons_and_no_promise_hides_in_them() {
+    use crate::easel::photon_tolerance;
+    let of_a_pass = photon_tolerance(f64::from(1u32 << 14));
+    assert!((of_a_pass - 0.05).abs() < 1e-12);
+    assert!((photon_tolerance(4.0 * f64::from(1u32 << 14)) - 0.5 * of_a_pass).abs() < 1e-12);
+    // An error of 3.3 %, that of a room far from the origin, is more than the noise of four passes: it has to be documented.
+    let judged = |documented| {
+        let mut judgement = Judgement::default();
+        let room = Painted {
+            variance: vec![1e-8; 3],
+            tolerance: photon_tolerance(f64::from(1u32 << 16)),
+            ..painted(1.033)
+        };
+        judgement
+            .mean_documented("", &room, [1.0; 3], [0.0, documented])
+            .expect("picture");
+        let worst = judgement.worst().expect("figures").clone();
+        (worst.passes(), worst.is_documented())
+    };
+    assert_eq!(judged(0.0), (false, false));
+    assert_eq!(judged(0.04), (false, true));
 }
 
 #[test]

@@ -2,10 +2,11 @@
 
 use super::settings::room;
 use super::*;
+use clerestory::gpu::{GpuOptions, Lesser, OptionalFeatures};
 use clerestory::techniques::photon_mapping::{GatherCounts, MapQueue};
 use clerestory_tests::child::hash_in_child;
 use clerestory_tests::render::builtin;
-use clerestory_tests::{gpu, with_gpu};
+use clerestory_tests::{gpu, gpu_with, with_gpu};
 
 /// Set in the processes that only print their pictures' hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_QUEUE_HASH";
@@ -155,6 +156,24 @@ fn queues_take_queries_that_a_quota_stops() {
             }
         }
     });
+}
+
+/// A device without any of them: what is in blocks is told by shared memory alone.
+#[test]
+fn blocks_need_no_subgroup_operations() {
+    let plain = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            features: Some(OptionalFeatures::NONE),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    assert!(!plain.caps().full_subgroups);
+    let of = |queue| made(&plain, &seen_little(), &direct(), (queue, MapQuery::Single));
+    let slots = of(MapQueue::Slots);
+    assert!(slots.gather.queries > 0);
+    assert!(slots == of(MapQueue::Blocks));
+    clerestory_tests::assert_no_messages(&plain);
 }
 
 #[test]

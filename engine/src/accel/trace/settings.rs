@@ -119,10 +119,23 @@ impl TraceSettings {
             return self;
         }
         let mut fetches = 1;
-        if let Execution::Persistent(threads) = &mut self.execution {
+        if let Execution::Persistent(mut threads) = self.execution {
             threads.batch = threads.batch.min(threads.lanes(caps));
+            let fits = |fetches| {
+                let least = Self {
+                    execution: Execution::Persistent(PersistentThreads { fetches, ..threads }),
+                    ray_quota: MAX_DEPTH + 1,
+                    ..self
+                };
+                least.iterations(caps, traversal) <= u64::from(SOFTWARE_LOOP_CAP)
+            };
+            // Rays finish the leaf that they are in: the longer leaves are, the fewer batches fit.
             fetches = threads.fetches.clamp(1, FITTED_FETCHES);
+            while fetches > 1 && !fits(fetches) {
+                fetches -= 1;
+            }
             threads.fetches = fetches;
+            self.execution = Execution::Persistent(threads);
         }
         let unstopped = Self { ray_quota: 0, ..self }.iterations(caps, traversal);
         let left = u64::from(SOFTWARE_LOOP_CAP).saturating_sub(unstopped);

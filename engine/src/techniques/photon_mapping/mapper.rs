@@ -101,8 +101,8 @@ impl PhotonMapper {
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with
-    /// participating media and for a path set that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for queries or queues of subgroups on
-    /// a device without votes or ballots, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// participating media and for a path set that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for packets of queries on
+    /// a device without votes, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
         gpu: &Gpu,
         scene: Arc<GpuScene>,

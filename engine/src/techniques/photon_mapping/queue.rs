@@ -50,7 +50,7 @@ pub(super) struct Compacted {
     scratch: Buffer,
 }
 
-/// Blocks of places, appended by subgroups.
+/// Blocks of places, as wide as subgroups.
 pub(super) struct Blocks {
     append: ComputePipeline<photon_queue_blocks::Kernel>,
     head: Buffer,
@@ -62,7 +62,7 @@ impl Queue {
     /// A queue for waves of up to `slots` paths.
     ///
     /// # Errors
-    /// [`Error::MissingFeature`] for blocks on a device without full subgroups or ballots, [`Error::OutOfMemory`].
+    /// [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, scene: &GpuScene, queue: MapQueue, spec: AskSpec, slots: u32) -> Result<Self> {
         let words = |name: &str, words: u32| {
             let bytes = u64::from(words) * size_of::<u32>() as u64;
@@ -101,29 +101,22 @@ impl Queue {
                 })))
             }
             MapQueue::Blocks => {
-                let caps = gpu.caps();
-                let divides = caps.subgroup_size > 0 && WALK_GROUP.is_multiple_of(caps.subgroup_size);
-                if !(caps.subgroup.basic && caps.subgroup.ballot && caps.full_subgroups && divides) {
-                    return Err(Error::MissingFeature {
-                        feature: "VK_SUBGROUP_FEATURE_BALLOT_BIT in full subgroups (computeFullSubgroups) of at most 64 lanes".into(),
-                        needed_by: "photon_queue_blocks".into(),
-                        device: caps.device.clone(),
-                        instead: "queue points without subgroups: \"queue\": \"slots\" or \"compacted\"".into(),
-                    });
-                }
+                // Both are powers of two, so that the lesser one divides the other.
+                let queue_width = gpu.caps().subgroup_size.clamp(1, WALK_GROUP);
                 let append = surface_spec!(photon_queue_blocks, scene, {
+                    queue_width,
                     has_path_automaton,
                     counts_bounces,
                     ..Default::default()
                 });
-                // Only the last block of a subgroup is partial, and its subgroup had walked a block's places for it.
+                // Only the last block of a team is partial, and its team had walked a block's places for it.
                 let places = slots.next_multiple_of(PLACES_PER_GROUP);
                 let head = BufferDesc::storage("gather queue", size_of::<Head>() as u64, Category::Work);
                 Ok(Self::Blocks(Box::new(Blocks {
                     append: gpu.compute_pipeline(&append)?,
                     head: gpu.buffer(&head)?,
                     places: words("gather places", places)?,
-                    // However narrow subgroups are.
+                    // However narrow blocks are.
                     blocks: words("gather blocks", places)?,
                 })))
             }
@@ -265,14 +258,15 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-ST-4",
-        name: "queue of queries, type III: places that ask, in blocks that subgroups collect in shared memory",
+        name: "queue of queries, type III: places that ask, in blocks as wide as subgroups, collected in shared memory",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Needs full subgroups with ballots, of a size that divides 64; blocks may be partial and come in any order, which no picture shows.",
+        limits: "Those who collect wait for each other, a workgroup at a time; blocks may be partial and come in any order, which no picture shows.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
         shaders: &["shaders/techniques/photon_mapping/photon_queue_blocks.comp"],
         tests: &[
             "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
             "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
+            "tests/tests/photon/queues.rs::blocks_need_no_subgroup_operations",
         ],
         settings: &["queue"],
         ..Row::of(file!())

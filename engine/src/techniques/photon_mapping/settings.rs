@@ -47,7 +47,7 @@ pub enum MapQueue {
     Slots,
     /// Places that ask, listed in order by stream compaction (type II).
     Compacted,
-    /// Places that ask, in blocks as wide as the subgroups that append them, where the device has full subgroups with ballots (type III).
+    /// Places that ask, in blocks as wide as subgroups (type III).
     Blocks,
 }
 
