@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
+use clerestory::film::metrics::{RELATIVE_MSE_OFFSET, relative_mse_epsilon};
 use clerestory::film::{CompareOptions, NonFiniteSamples, Picture, PixelFormat, Step, compare};
 use clerestory::gpu::{Buffer, Gpu, PipelineInfo};
 use clerestory::plan::{ErrorModel, Goal, plan, plan_among, relative_mse_by_variance, relative_mse_of_pair};
@@ -76,6 +76,39 @@ fn predictions_come_true() {
             assert!(
                 error < FACTOR * by_variance && by_variance < FACTOR * error,
                 "{address}: {error}, by the variance layer {by_variance}"
+            );
+        }
+    });
+}
+
+// One round of pilots of one candidate, as many in every run.
+#[test]
+fn the_unit_of_radiance_changes_neither_choice_nor_error() {
+    with_gpu(|gpu| {
+        let of = |light: &str| {
+            let renderer =
+                Renderer::new(gpu, &scene::load(&format!("builtin:box-room?light={light}")).unwrap()).unwrap();
+            let goal = Goal {
+                error: Some(0.1),
+                time: None,
+            };
+            let plan = plan(&renderer, &options(), goal, &mut || false).unwrap();
+            let picture = |spp, seed| {
+                let options = RenderOptions { spp, seed, ..options() };
+                render(&renderer, &options).picture
+            };
+            let error = compare(&picture(16, 1), &picture(256, 2), &CompareOptions::default()).unwrap();
+            (f64::from(plan.choice().spp), error.relative_mse)
+        };
+        let (spp, error) = of("12");
+        assert!(spp > 10.0 && error > 0.0, "{spp}, {error}");
+        for light in ["0.012", "12000"] {
+            // Rounding alone differs.
+            let (other_spp, other_error) = of(light);
+            assert!((other_spp / spp - 1.0).abs() < 0.02, "{light}: {other_spp} for {spp}");
+            assert!(
+                (other_error / error - 1.0).abs() < 0.01,
+                "{light}: {other_error} for {error}"
             );
         }
     });
@@ -247,18 +280,10 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
                 ..options.clone()
             },
         );
-        let squares: Vec<f64> = truth
-            .picture
-            .main_layer()
-            .unwrap()
-            .values()
-            .iter()
-            .map(|value| f64::from(*value).powi(2))
-            .collect();
-        let weighted = squares
-            .iter()
-            .map(|square| square / (square + RELATIVE_MSE_OFFSET))
-            .sum::<f64>();
+        let values = truth.picture.main_layer().unwrap().values();
+        let epsilon = relative_mse_epsilon(values.iter().copied(), RELATIVE_MSE_OFFSET);
+        let squares: Vec<f64> = values.iter().map(|value| f64::from(*value).powi(2)).collect();
+        let weighted = squares.iter().map(|square| square / (square + epsilon)).sum::<f64>();
         let expected = 0.05 * (weighted / squares.len() as f64).sqrt();
         // How many pilots there are depends on the clock: fewer find it less exactly, and say so.
         let at_most = choice.bias_at_most.unwrap();

@@ -9,7 +9,7 @@
 //! pixels share. Noise that more of the picture shares makes the standard error too small: photons' kernels that are seen wider than an eighth of
 //! the picture, and frames that have one place within the pixel for all of them, whose edges err alike.
 
-use super::noise::{channel_of_pair, same_size};
+use super::noise::{channel_of_pair, epsilon_of_pair, same_size};
 use crate::Result;
 use crate::film::picture::Picture;
 
@@ -25,7 +25,7 @@ const MARGIN: f64 = 2.0;
 /// Mean squared bias relative to the radiance's square, and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct BiasEstimate {
-    /// Mean of bias² ∕ (radiance² + offset) over pixels and channels. Unbiased, so that it may come out below 0.
+    /// Mean of bias² ∕ (radiance² + ε) over pixels and channels. Unbiased, so that it may come out below 0.
     pub square: f64,
     /// Its standard error, by tiles: too small where tiles share their noise.
     pub deviation: f64,
@@ -51,6 +51,7 @@ impl BiasEstimate {
 }
 
 /// Relative squared bias of the technique that has made `pair`, against that of `reference`; all four pictures independent of each other.
+/// `offset` is that of [`relative_mse_of_pair`](super::relative_mse_of_pair), over the reference's mean.
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) when sizes differ; [`Error::Picture`](crate::Error::Picture) without radiance.
@@ -117,6 +118,7 @@ struct Tile {
 /// Mean of the products over the squared radiance that the two pictures know, with its standard error by tiles.
 fn tiled([p, q]: [&Picture; 2], offset: f64, values: impl Fn(usize) -> Values) -> Result<BiasEstimate> {
     let (width, height) = (p.width() as usize, p.height() as usize);
+    let epsilon = epsilon_of_pair(p, q, offset)?;
     let side = ((width * height) as f64 / TILES).sqrt() as usize;
     let side = side.clamp(*TILE_SIDES.start(), *TILE_SIDES.end());
     let across = width.div_ceil(side);
@@ -125,7 +127,9 @@ fn tiled([p, q]: [&Picture; 2], offset: f64, values: impl Fn(usize) -> Values) -
         let (_, truth) = channel_of_pair(p, q, channel, TRUST)?;
         for (i, truth) in truth.iter().enumerate() {
             let values = values(i * 3 + channel);
-            let weight = 1.0 / (truth.max(values.mean * values.mean) + offset);
+            // Of black pictures nothing is known.
+            let level = truth.max(values.mean * values.mean) + epsilon;
+            let weight = if level > 0.0 { 1.0 / level } else { 0.0 };
             let value = values.product * weight;
             // A pixel without a finite sample says nothing.
             let (value, difference) = if value.is_finite() {
@@ -192,8 +196,8 @@ mod tests {
 
     #[test]
     fn known_biases_are_recovered() {
-        // 0.2² ∕ (0.2² + 0.01) and 2² ∕ (2² + 0.01) of the squared bias, each on half of the picture.
-        let share = 0.5 * (0.04 / 0.05 + 4.0 / 4.01);
+        // 0.2² ∕ (0.2² + ε) and 2² ∕ (2² + ε) of the squared bias, each on half of the picture, whose mean is 1.1.
+        let share = 0.5 * (0.04 / 0.0521 + 4.0 / 4.0121);
         let mut random = Random(11);
         // The weight of a pixel is known as badly as its radiance: with noise of 30 % of the reference, the square is found a third too small.
         for (bias, noise, shared, allowed) in [
@@ -237,7 +241,7 @@ mod tests {
     #[test]
     fn drifts_are_told_from_noise_that_both_stages_share() {
         let mut random = Random(3);
-        let share = 0.5 * (0.04 / 0.05 + 4.0 / 4.01);
+        let share = 0.5 * (0.04 / 0.0521 + 4.0 / 4.0121);
         let early = [(); 2].map(|()| picture(0.2, 0.1, 1, &mut random));
         let late = [(); 2].map(|()| picture(0.1, 0.05, 1, &mut random));
         let found = relative_drift_of_pairs([&early[0], &early[1]], [&late[0], &late[1]], 0.01).unwrap();

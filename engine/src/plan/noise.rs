@@ -5,6 +5,7 @@
 //! error also needs the true radiance, for which the product of the two stands: it is unbiased for its square. Where noise hides a
 //! pixel, that square is taken from its neighbourhood.
 
+use crate::film::metrics::{relative_mse_epsilon, relative_square};
 use crate::film::picture::{Picture, VARIANCE};
 use crate::{Error, Result};
 
@@ -23,8 +24,14 @@ pub(super) enum Truth {
     Pixel,
 }
 
-/// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + `offset`) over pixels and channels, as
-/// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it.
+/// ε of what is relative to two pictures of one view: `offset` of the square of their mean.
+pub(super) fn epsilon_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64> {
+    let values = a.main_layer()?.values().iter().chain(b.main_layer()?.values());
+    Ok(relative_mse_epsilon(values.copied(), offset))
+}
+
+/// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + ε) over pixels and channels, as
+/// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it. ε is `offset` of the square of the mean radiance.
 ///
 /// # Errors
 /// [`Error::Setting`] when the sizes differ; [`Error::Picture`] without radiance.
@@ -35,6 +42,7 @@ pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64
 /// As [`relative_mse_of_pair`], relative to that truth.
 pub(super) fn noise_of_pair(a: &Picture, b: &Picture, offset: f64, kind: Truth) -> Result<f64> {
     same_size(a, b)?;
+    let epsilon = epsilon_of_pair(a, b, offset)?;
     let (mut sum, mut count) = (0.0, 0_usize);
     for channel in 0..3 {
         let (variances, mut truth) = channel_of_pair(a, b, channel, TRUST)?;
@@ -45,7 +53,8 @@ pub(super) fn noise_of_pair(a: &Picture, b: &Picture, offset: f64, kind: Truth) 
                 *truth = truth.max(mean * mean);
             }
         }
-        sum += variances.iter().zip(&truth).map(|(v, t)| v / (t + offset)).sum::<f64>();
+        let terms = variances.iter().zip(&truth);
+        sum += terms.map(|(v, t)| relative_square(*v, t.sqrt(), epsilon)).sum::<f64>();
         count += variances.len();
     }
     Ok(sum / count.max(1) as f64)
@@ -101,17 +110,18 @@ pub(super) fn channel_of_pair(a: &Picture, b: &Picture, channel: usize, trust: f
 }
 
 /// Relative mean squared error that the `variance` layer of a picture stands for: what independent samples of that spread would have.
-/// Samples that are stratified within a pixel have less.
+/// Samples that are stratified within a pixel have less. The offset is that of [`relative_mse_of_pair`].
 ///
 /// # Errors
 /// [`Error::Picture`] without radiance or variance.
 pub fn relative_mse_by_variance(picture: &Picture, offset: f64) -> Result<f64> {
     let radiance = picture.main_layer()?.values();
     let variance = picture.require(VARIANCE)?.values();
+    let epsilon = relative_mse_epsilon(radiance.iter().copied(), offset);
     let each = radiance.iter().zip(variance).map(|(radiance, variance)| {
         let (radiance, variance) = (f64::from(*radiance), f64::from(*variance));
         // The square of a noisy mean is too large by its variance.
-        variance / ((radiance * radiance - variance).max(0.0) + offset)
+        relative_square(variance, (radiance * radiance - variance).max(0.0).sqrt(), epsilon)
     });
     Ok(each.sum::<f64>() / radiance.len().max(1) as f64)
 }
@@ -161,7 +171,7 @@ mod tests {
         values[3 * 500] = 400.0;
         let a = Picture::from_radiance(32, 32, values).unwrap();
         let of = |kind| noise_of_pair(&a, &b, 0.01, kind).unwrap() * 3.0 * 1024.0;
-        // 400² ∕ 2 over some radiance near 0.5, or over 200².
+        // 400² ∕ 2 over some radiance near 0.5, or over 200². The mean is 0.56.
         assert!(of(Truth::Neighbourhood) > 1e4, "{}", of(Truth::Neighbourhood));
         assert!((of(Truth::Pixel) - 2.0).abs() < 0.02, "{}", of(Truth::Pixel));
     }
@@ -171,7 +181,9 @@ mod tests {
         let mut random = Random(7);
         for deviation in [0.01, 0.1, 0.5, 1.0] {
             let (a, b) = (noisy(deviation, &mut random), noisy(deviation, &mut random));
-            let expected = 0.5 * deviation * deviation * (0.04 / 0.05 + 4.0 / 4.01);
+            // The mean of both halves is 1.1.
+            let share = |radiance: f64| radiance * radiance / (radiance * radiance + 0.0121);
+            let expected = 0.5 * deviation * deviation * (share(0.2) + share(2.0));
             let found = relative_mse_of_pair(&a, &b, 0.01).unwrap();
             // Noise of the estimate: √(2 ∕ 12288) = 1.3 %; the trust in noisy pixels costs the rest.
             let allowed = if deviation > 0.3 { 0.25 } else { 0.08 };
@@ -179,6 +191,18 @@ mod tests {
                 (found / expected - 1.0).abs() < allowed,
                 "{deviation}: {found} for {expected}"
             );
+        }
+        // Of lamps a thousand times dimmer or brighter the same pictures have the same error.
+        let (a, b) = (noisy(0.3, &mut random), noisy(0.3, &mut random));
+        let of = |unit: f32| {
+            let [a, b] = [&a, &b].map(|picture| {
+                let values = picture.main_layer().unwrap().values().iter().map(|value| value * unit);
+                Picture::from_radiance(64, 64, values.collect()).unwrap()
+            });
+            relative_mse_of_pair(&a, &b, 0.01).unwrap()
+        };
+        for unit in [1e-3, 1e3] {
+            assert!((of(unit) / of(1.0) - 1.0).abs() < 1e-5, "{unit}");
         }
         let black = Picture::from_radiance(8, 8, vec![0.0; 192]).unwrap();
         assert_eq!(relative_mse_of_pair(&black, &black, 0.01).unwrap(), 0.0);
