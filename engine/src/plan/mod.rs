@@ -3,8 +3,8 @@
 //! Nothing is known beforehand: each candidate renders small pilot pictures of the view at hand, twice with independent seeds, in rounds that have no
 //! seed in common. Their difference gives its noise ([`relative_mse_of_pair`]), their time its cost, and two or more numbers of samples the slope of
 //! its noise ([`ErrorModel`]). Rounds decide how far pilots go and what is chosen. The prediction is by a last pair of pilots of the chosen one, which
-//! nothing was decided by: the lowest of several errors is lower than what comes, and so is one at which rounds end. A technique that cannot model the scene, that the device cannot run, or whose pictures hold other light paths
-//! than those asked for is never chosen, and [`Plan::candidates`] says why.
+//! nothing was decided by: the lowest of several errors is lower than what comes, and so is one at which rounds end. A technique that cannot model the
+//! scene, that the device cannot run, or whose pictures hold other light paths than those asked for is never chosen, and [`Plan::candidates`] says why.
 //!
 //! Bias is judged as well ([`Candidate::judged_by`] says by what). Both pilots of a technique against two of the reference, an unbiased technique, of
 //! other seeds, give the square of its bias without the noise of either ([`relative_bias_of_pairs`]):

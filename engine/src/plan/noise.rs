@@ -86,9 +86,9 @@ pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Re
         let (_, [a, b]) = pair;
         let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
         let mut tiles = Tiles::new(width, height);
-        let mut squares = 0.0;
+        let mut squares = 0.0_f64;
         for pixel in 0..pixels {
-            let mut of_pixel = 0.0;
+            let mut of_pixel = 0.0_f64;
             for (channel, levels) in levels.iter().enumerate() {
                 let (a, b) = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]).unwrap_or_default();
                 of_pixel += relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon);
@@ -325,7 +325,7 @@ mod tests {
                 .sum();
             // A sample has a relative variance of a third.
             let lamp = side / 3..side / 3 + side / 5;
-            let (mut mean, mut expected) = (0.0, 0.0);
+            let (mut mean, mut expected) = (0.0_f64, 0.0_f64);
             let pixels = (side * side) as f64;
             let is_lamp = |i: usize| lamp.contains(&(i % side)) && lamp.contains(&(i / side));
             let radiance = |i: usize| 0.1 + 0.2 * (i % side) as f64 / side as f64;
