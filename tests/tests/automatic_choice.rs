@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
+use clerestory::film::metrics::{RELATIVE_MSE_OFFSET, relative_mse_epsilon};
 use clerestory::film::{CompareOptions, NonFiniteSamples, Picture, PixelFormat, Step, compare};
 use clerestory::gpu::{Buffer, Gpu, PipelineInfo};
 use clerestory::plan::{ErrorModel, Goal, plan, plan_among, relative_mse_by_variance, relative_mse_of_pair};
@@ -55,12 +55,11 @@ fn predictions_come_true() {
                 render(&renderer, &options).picture
             };
             let mut model = ErrorModel::default();
-            for spp in [4, 16] {
-                let pair = [picture(spp, 1), picture(spp, 2)];
-                model.add(
-                    spp,
-                    relative_mse_of_pair(&pair[0], &pair[1], RELATIVE_MSE_OFFSET).unwrap(),
-                );
+            for (spp, seed) in [(4, 1), (16, 5)] {
+                let pair = [picture(spp, seed), picture(spp, seed + 1)];
+                let found = relative_mse_of_pair(&pair[0], &pair[1], RELATIVE_MSE_OFFSET).unwrap();
+                // 7,000 values of a few degrees of freedom each.
+                model.add(spp, found, 0.05 * found);
             }
             let predicted = model.relative_mse(64.0).sqrt();
             // Sixteen times the samples: the reference's own error adds 3 % to what is found.
@@ -76,6 +75,81 @@ fn predictions_come_true() {
             assert!(
                 error < FACTOR * by_variance && by_variance < FACTOR * error,
                 "{address}: {error}, by the variance layer {by_variance}"
+            );
+        }
+    });
+}
+
+// The whole choice, with its last pair, and several pictures of what it chose. How many pilots there are is the clock's; the interval says what that
+// costs. The eight pictures share a prediction: half of them lie outside where that is off by more than 2.3 of its standard errors, in 2 of 100 runs.
+#[test]
+fn pictures_have_the_error_that_was_predicted() {
+    with_gpu(|gpu| {
+        for (address, asked) in [("builtin:cornell-box", 0.3), ("builtin:box-room", 0.3)] {
+            let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
+            let of = |spp, seed| RenderOptions {
+                size: [32, 32],
+                spp,
+                seed,
+                settings: serde_json::json!({ "sampler": "pcg" }).into(),
+                ..options()
+            };
+            let plan = plan(&renderer, &of(1, 1), goal(asked), &mut || true).unwrap();
+            let choice = plan.choice();
+            assert!(
+                choice.last_pilot_spp >= 4 && plan.pilot_share > 0.0,
+                "{address}: {plan:?}"
+            );
+            let [low, high] = choice.error_interval.unwrap();
+            assert!(
+                low < choice.error && choice.error < high && high < 3.0 * low,
+                "{address}: {choice:?}"
+            );
+            assert!(choice.error <= asked * 1.001, "{address}: {choice:?}");
+            // Its own noise adds 2 % to the errors.
+            let reference = render(&renderer, &of(32 * choice.spp.max(16), 99)).picture;
+            let mut errors: Vec<f64> = (0..8)
+                .map(|seed| {
+                    let picture = render(&renderer, &plan.options(&of(1, 200 + seed))).picture;
+                    let error = compare(&picture, &reference, &CompareOptions::default()).unwrap();
+                    error.relative_mse.sqrt()
+                })
+                .collect();
+            errors.sort_by(f64::total_cmp);
+            let outside = errors.iter().filter(|error| !(low..=high).contains(*error)).count();
+            assert!(outside < 4, "{address}: {errors:?}, predicted {choice:?}");
+        }
+    });
+}
+
+// One round of pilots of one candidate, as many in every run.
+#[test]
+fn the_unit_of_radiance_changes_neither_choice_nor_error() {
+    with_gpu(|gpu| {
+        let of = |light: &str| {
+            let renderer =
+                Renderer::new(gpu, &scene::load(&format!("builtin:box-room?light={light}")).unwrap()).unwrap();
+            let goal = Goal {
+                error: Some(0.1),
+                time: None,
+            };
+            let plan = plan(&renderer, &options(), goal, &mut || false).unwrap();
+            let picture = |spp, seed| {
+                let options = RenderOptions { spp, seed, ..options() };
+                render(&renderer, &options).picture
+            };
+            let error = compare(&picture(16, 1), &picture(256, 2), &CompareOptions::default()).unwrap();
+            (f64::from(plan.choice().spp), error.relative_mse)
+        };
+        let (spp, error) = of("12");
+        assert!(spp > 10.0 && error > 0.0, "{spp}, {error}");
+        for light in ["0.012", "12000"] {
+            // Rounding alone differs.
+            let (other_spp, other_error) = of(light);
+            assert!((other_spp / spp - 1.0).abs() < 0.02, "{light}: {other_spp} for {spp}");
+            assert!(
+                (other_error / error - 1.0).abs() < 0.01,
+                "{light}: {other_error} for {error}"
             );
         }
     });
@@ -247,18 +321,10 @@ fn a_bias_beyond_the_goal_is_refused_with_its_figure() {
                 ..options.clone()
             },
         );
-        let squares: Vec<f64> = truth
-            .picture
-            .main_layer()
-            .unwrap()
-            .values()
-            .iter()
-            .map(|value| f64::from(*value).powi(2))
-            .collect();
-        let weighted = squares
-            .iter()
-            .map(|square| square / (square + RELATIVE_MSE_OFFSET))
-            .sum::<f64>();
+        let values = truth.picture.main_layer().unwrap().values();
+        let epsilon = relative_mse_epsilon(values.iter().copied(), RELATIVE_MSE_OFFSET);
+        let squares: Vec<f64> = values.iter().map(|value| f64::from(*value).powi(2)).collect();
+        let weighted = squares.iter().map(|square| square / (square + epsilon)).sum::<f64>();
         let expected = 0.05 * (weighted / squares.len() as f64).sqrt();
         // How many pilots there are depends on the clock: fewer find it less exactly, and say so.
         let at_most = choice.bias_at_most.unwrap();

@@ -1,6 +1,6 @@
 //! Parts of the light by path expressions: those of a partition sum to the whole.
 //!
-//! Acceptance: blocks of 4 × 4 pixels by the z-test of `film::z_test` (Šidák at 1 %, 99.75 % accepted) and the test of the sum of all
+//! Acceptance: blocks of 4 × 4 pixels by the z-test of `film::z_test` (Šidák at 1 %; 99.75 % accepted where tails are heavy) and the test of the sum of all
 //! differences, from the pictures' own variances; parts have seeds of their own, so that they are independent. Blocks, since a pixel's
 //! mean of the rare bright samples of a caustic is far from normal.
 

@@ -1,7 +1,7 @@
 //! The path tracer against pictures that are known in closed form.
 //!
 //! Acceptance: the mean over a picture by a z-test with a false-alarm rate of 10⁻⁶ a channel, from the picture's own variances; pixels by
-//! the z-test of `film::z_test` (Šidák at 1 %, 99.75 % accepted). Samples are independent (PCG), so z-scores are what they say.
+//! the z-test of `film::z_test` (Šidák at 1 %; 99.75 % accepted where tails are heavy). Samples are independent (PCG), so z-scores are what they say.
 
 use std::f64::consts::PI;
 

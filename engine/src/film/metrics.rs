@@ -13,8 +13,31 @@ use super::tone::ToneMap;
 use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
-/// ε of the relative MSE, in squared units of the reference's radiance.
+/// ε of the relative MSE over the square of the reference's mean radiance: what has a tenth of that mean weighs half.
 pub const RELATIVE_MSE_OFFSET: f64 = 0.01;
+
+/// ε of the relative MSE against a reference of these values: `share` of the square of their mean magnitude. It depends on the reference alone, and
+/// scales with it, so that a relative error is the same in every unit of radiance. Values that are not finite are left out. A black reference has 0.
+///
+/// The mean, not the median: that of a noisy picture has the same expectation as that of a converged one, however rarely light is met.
+pub fn relative_mse_epsilon(reference: impl IntoIterator<Item = f32>, share: f64) -> f64 {
+    let (mut sum, mut count) = (Sum::default(), 0_u64);
+    for value in reference.into_iter().filter(|value| value.is_finite()) {
+        sum.add(f64::from(value).abs());
+        count += 1;
+    }
+    let mean = sum.value() / count.max(1) as f64;
+    share * mean * mean
+}
+
+/// A term of the relative MSE: `square` over the square of the reference's `level` + ε. No error is none, even where there is nothing to relate it to.
+pub fn relative_square(square: f64, level: f64, epsilon: f64) -> f64 {
+    if square == 0.0 {
+        0.0
+    } else {
+        square / (level * level + epsilon)
+    }
+}
 
 /// The quantile of the absolute error that is reported.
 pub const QUANTILE: f64 = 0.999;
@@ -23,7 +46,7 @@ pub const QUANTILE: f64 = 0.999;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct CompareOptions {
-    /// ε in (a − b)² / (b² + ε); default [`RELATIVE_MSE_OFFSET`].
+    /// ε in (a − b)² / (b² + ε) over the square of the reference's mean radiance ([`relative_mse_epsilon`]); default [`RELATIVE_MSE_OFFSET`].
     pub relative_mse_offset: f64,
     /// Tone map applied to both pictures before FLIP; default: exposure 0, clipped sRGB.
     pub tone: ToneMap,
@@ -53,9 +76,9 @@ pub struct ErrorReport {
     pub mse: f64,
     /// Root of the MSE.
     pub rmse: f64,
-    /// Relative mean squared error, mean of (a − b)² / (b² + ε).
+    /// Relative mean squared error, mean of (a − b)² / (b² + ε); against a black reference 0 where it is matched, else not finite.
     pub relative_mse: f64,
-    /// ε of the relative MSE.
+    /// ε of the relative MSE, in squared units of the reference's radiance.
     pub relative_mse_offset: f64,
     /// Mean signed error (bias), mean of a − b.
     pub bias: f64,
@@ -82,7 +105,7 @@ impl std::fmt::Display for ErrorReport {
         let Self {
             width, height, pixels, ..
         } = self;
-        let offset = format!("relative MSE (ε = {})", self.relative_mse_offset);
+        let offset = format!("relative MSE (ε = {:.3e})", self.relative_mse_offset);
         let flip = format!("FLIP ({:.2} pixels/degree)", self.pixels_per_degree);
         writeln!(f, "{:<28} {pixels} of {width} × {height}", "pixels compared")?;
         for (name, value) in [
@@ -186,6 +209,7 @@ fn compare_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &C
             ),
         });
     }
+    let epsilon = relative_mse_epsilon(reference.values().iter().copied(), options.relative_mse_offset);
     let (mut squared, mut relative, mut signed, mut level) =
         (Sum::default(), Sum::default(), Sum::default(), Sum::default());
     let (mut non_finite_test, mut non_finite_reference) = (0, 0);
@@ -205,7 +229,7 @@ fn compare_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &C
             let (a, b) = (f64::from(*a), f64::from(*b));
             let error = a - b;
             squared.add(error * error);
-            relative.add(error * error / (b * b + options.relative_mse_offset));
+            relative.add(relative_square(error * error, b, epsilon));
             signed.add(error);
             level.add(b);
             errors.push(error.abs());
@@ -226,7 +250,7 @@ fn compare_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &C
         mse: mean(squared),
         rmse: mean(squared).sqrt(),
         relative_mse: mean(relative),
-        relative_mse_offset: options.relative_mse_offset,
+        relative_mse_offset: epsilon,
         bias: mean(signed),
         relative_bias,
         quantile_999: errors.get(rank.saturating_sub(1)).copied().unwrap_or(0.0),
@@ -269,6 +293,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     sources: &[sources::ROUSSELLE_2011.whole(), sources::ANDERSSON_2020.whole()],
     tests: &[
         "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
+        "engine/src/film/metrics.rs::relative_errors_are_the_same_in_every_unit",
         "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
     ],
     api: &["clerestory::film::compare", "clerestory::film::ErrorReport"],
@@ -292,7 +317,11 @@ mod tests {
         // Errors 0, 1, 2, 0, 0, −½.
         assert_eq!(report.mse, 5.25 / 6.0);
         assert_eq!(report.rmse, (5.25f64 / 6.0).sqrt());
-        assert!((report.relative_mse - (1.0 / 1.01 + 4.0 / 1.01 + 0.25 / 0.26) / 6.0).abs() < 1e-15);
+        // The reference's mean is 3.5 / 6.
+        let epsilon = 0.01 * 12.25 / 36.0;
+        assert!((report.relative_mse_offset / epsilon - 1.0).abs() < 1e-14);
+        let relative = (1.0 / (1.0 + epsilon) + 4.0 / (1.0 + epsilon) + 0.25 / (0.25 + epsilon)) / 6.0;
+        assert!((report.relative_mse - relative).abs() < 1e-14);
         assert_eq!(report.bias, 2.5 / 6.0);
         assert_eq!(report.relative_bias, 2.5 / 3.5);
         assert_eq!((report.quantile_999, report.max_error), (2.0, 2.0));
@@ -301,6 +330,27 @@ mod tests {
             (2, 0, 0)
         );
         assert!(report.flip > 0.0 && report.flip <= 1.0);
+        Ok(())
+    }
+
+    #[test]
+    fn relative_errors_are_the_same_in_every_unit() -> Result<()> {
+        let (test, reference) = ([1.0, 2.0, 3.0, 0.0, 0.1, 0.0], [1.0, 1.0, 1.0, 0.0, 0.0, 0.5]);
+        let of = |unit: f32| {
+            let [test, reference] = [test, reference].map(|values| picture(&values.map(|value: f32| value * unit)));
+            compare(&test?, &reference?, &CompareOptions::default()).map(|report| report.relative_mse)
+        };
+        let one = of(1.0)?;
+        for unit in [1e-12, 1e-3, 1e3, 1e12] {
+            // Of the pictures in f32: 2⁻²⁴ a value.
+            assert!((of(unit)? / one - 1.0).abs() < 1e-6, "{unit}");
+        }
+        // Black is related to nothing.
+        let black = picture(&[0.0; 6])?;
+        let against_black =
+            |test: &Picture| compare(test, &black, &CompareOptions::default()).map(|report| report.relative_mse);
+        assert_eq!(against_black(&black)?, 0.0);
+        assert!(against_black(&picture(&test)?)?.is_infinite());
         Ok(())
     }
 

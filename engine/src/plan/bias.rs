@@ -2,20 +2,18 @@
 //!
 //! Two independent pictures a, b of a technique and two independent pictures p, q of a reference have E[(a − p)(b − q)] = (E a − E p)² in every
 //! pixel: the noise of all four drops out, whatever it is like within a picture (photons that several pixels share included). The mean of both
-//! ways to pair them is the same as the squared difference of the means less both variances. Between two stages of the same two renderings,
+//! ways to pair them is the same as the squared difference of the means less both variances. Between two pairs of other numbers of samples,
 //! (a₄ − a₁)(b₄ − b₁) likewise gives the square of how far the expected picture moves.
 //! The standard error is that of sums over square tiles. It counts the bias's own unevenness over the picture as noise, and so errs to the safe
 //! side: bias² + 2 standard errors lies below the true one in at most 1 of 40 pictures, as long as tiles, 64 of them, are wider than what neighbouring
 //! pixels share. Noise that more of the picture shares makes the standard error too small: photons' kernels that are seen wider than an eighth of
 //! the picture, and frames that have one place within the pixel for all of them, whose edges err alike.
 
-use super::noise::{channel_of_pair, same_size};
+use super::noise::{epsilon_of_pair, same_size, truth_of_pair};
+use super::tiles::Tiles;
 use crate::Result;
 use crate::film::picture::Picture;
 
-/// Tiles that a picture is divided into, where it has the pixels, and sides of a tile.
-const TILES: f64 = 64.0;
-const TILE_SIDES: std::ops::RangeInclusive<usize> = 2..=32;
 /// Standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half. It is smaller than for noise alone, since
 /// what a pixel's own noise does to its weight would count as bias.
 const TRUST: f64 = 0.005;
@@ -25,7 +23,7 @@ const MARGIN: f64 = 2.0;
 /// Mean squared bias relative to the radiance's square, and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct BiasEstimate {
-    /// Mean of bias² ∕ (radiance² + offset) over pixels and channels. Unbiased, so that it may come out below 0.
+    /// Mean of bias² ∕ (radiance² + ε) over pixels and channels. Unbiased, so that it may come out below 0.
     pub square: f64,
     /// Its standard error, by tiles: too small where tiles share their noise.
     pub deviation: f64,
@@ -51,6 +49,7 @@ impl BiasEstimate {
 }
 
 /// Relative squared bias of the technique that has made `pair`, against that of `reference`; all four pictures independent of each other.
+/// `offset` is that of [`relative_mse_of_pair`](super::relative_mse_of_pair), over the reference's mean.
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) when sizes differ; [`Error::Picture`](crate::Error::Picture) without radiance.
@@ -73,7 +72,7 @@ pub fn relative_bias_of_pairs([a, b]: [&Picture; 2], reference: [&Picture; 2], o
     tiled(reference, offset, values)
 }
 
-/// Relative squared distance by which the expected picture moves between two stages of two independent renderings.
+/// Relative squared distance by which the expected picture moves between two pairs of pictures of other numbers of samples.
 ///
 /// # Errors
 /// As [`relative_bias_of_pairs`].
@@ -106,26 +105,19 @@ struct Values {
     mean: f64,
 }
 
-/// Sums over a tile.
-#[derive(Clone, Default)]
-struct Tile {
-    square: f64,
-    difference: f64,
-    count: f64,
-}
-
 /// Mean of the products over the squared radiance that the two pictures know, with its standard error by tiles.
 fn tiled([p, q]: [&Picture; 2], offset: f64, values: impl Fn(usize) -> Values) -> Result<BiasEstimate> {
     let (width, height) = (p.width() as usize, p.height() as usize);
-    let side = ((width * height) as f64 / TILES).sqrt() as usize;
-    let side = side.clamp(*TILE_SIDES.start(), *TILE_SIDES.end());
-    let across = width.div_ceil(side);
-    let mut tiles = vec![Tile::default(); across * height.div_ceil(side)];
+    let epsilon = epsilon_of_pair(p, q, offset)?;
+    let mut tiles = Tiles::new(width, height);
+    let mut differences = vec![0.0; tiles.count()];
     for channel in 0..3 {
-        let (_, truth) = channel_of_pair(p, q, channel, TRUST)?;
+        let truth = truth_of_pair(p, q, channel, TRUST)?;
         for (i, truth) in truth.iter().enumerate() {
             let values = values(i * 3 + channel);
-            let weight = 1.0 / (truth.max(values.mean * values.mean) + offset);
+            // Of black pictures nothing is known.
+            let level = truth.max(values.mean * values.mean) + epsilon;
+            let weight = if level > 0.0 { 1.0 / level } else { 0.0 };
             let value = values.product * weight;
             // A pixel without a finite sample says nothing.
             let (value, difference) = if value.is_finite() {
@@ -133,29 +125,20 @@ fn tiled([p, q]: [&Picture; 2], offset: f64, values: impl Fn(usize) -> Values) -
             } else {
                 (0.0, 0.0)
             };
-            let tile = &mut tiles[i / width / side * across + i % width / side];
-            tile.square += value;
-            tile.difference += difference;
-            tile.count += 1.0;
+            tiles.add(i, value);
+            differences[tiles.of(i)] += difference;
         }
     }
-    let (sum, count) = tiles
-        .iter()
-        .fold((0.0, 0.0), |(sum, count), tile| (sum + tile.square, count + tile.count));
-    let mean = sum / f64::max(count, 1.0);
-    let deviations = tiles.iter().map(|tile| tile.square - tile.count * mean);
-    let squares: f64 = deviations.map(|deviation| deviation * deviation).sum();
-    let number = tiles.len() as f64;
-    let brighter = tiles.iter().filter(|tile| tile.difference > 0.0);
+    let (square, deviation) = tiles.mean();
+    let of_brighter = tiles
+        .sums()
+        .zip(&differences)
+        .filter(|(_, difference)| **difference > 0.0);
+    let brighter: f64 = of_brighter.map(|(sum, _)| sum).sum();
     Ok(BiasEstimate {
-        square: mean,
-        brighter: brighter.map(|tile| tile.square).sum::<f64>() > sum / 2.0,
-        // A single tile tells nothing of its own spread.
-        deviation: if number > 1.0 {
-            (squares * number / (number - 1.0)).sqrt() / count
-        } else {
-            f64::INFINITY
-        },
+        square,
+        deviation,
+        brighter: brighter > tiles.sums().sum::<f64>() / 2.0,
     })
 }
 
@@ -192,8 +175,8 @@ mod tests {
 
     #[test]
     fn known_biases_are_recovered() {
-        // 0.2² ∕ (0.2² + 0.01) and 2² ∕ (2² + 0.01) of the squared bias, each on half of the picture.
-        let share = 0.5 * (0.04 / 0.05 + 4.0 / 4.01);
+        // 0.2² ∕ (0.2² + ε) and 2² ∕ (2² + ε) of the squared bias, each on half of the picture, whose mean is 1.1.
+        let share = 0.5 * (0.04 / 0.0521 + 4.0 / 4.0121);
         let mut random = Random(11);
         // The weight of a pixel is known as badly as its radiance: with noise of 30 % of the reference, the square is found a third too small.
         for (bias, noise, shared, allowed) in [
@@ -227,8 +210,9 @@ mod tests {
             assert!(alarms <= 13, "{shared}: {alarms} of 200");
             let mean = found.iter().map(|estimate| estimate.square).sum::<f64>() / 200.0;
             let deviation = found.iter().map(|estimate| estimate.deviation).sum::<f64>() / 200.0;
+            // A pixel's weight knows its noise, which takes a fifth of a standard error away at most, with the truth itself as with this one.
             assert!(
-                mean.abs() < 4.0 * deviation / 200_f64.sqrt(),
+                mean.abs() < (4.0 / 200_f64.sqrt() + 0.2) * deviation,
                 "{shared}: {mean} ± {deviation}"
             );
         }
@@ -237,7 +221,7 @@ mod tests {
     #[test]
     fn drifts_are_told_from_noise_that_both_stages_share() {
         let mut random = Random(3);
-        let share = 0.5 * (0.04 / 0.05 + 4.0 / 4.01);
+        let share = 0.5 * (0.04 / 0.0521 + 4.0 / 4.0121);
         let early = [(); 2].map(|()| picture(0.2, 0.1, 1, &mut random));
         let late = [(); 2].map(|()| picture(0.1, 0.05, 1, &mut random));
         let found = relative_drift_of_pairs([&early[0], &early[1]], [&late[0], &late[1]], 0.01).unwrap();

@@ -1,9 +1,10 @@
 //! Floor 8: automatic choice. Which technique, with which settings and how many samples, meets an asked error or time.
 //!
-//! Nothing is known beforehand: each candidate renders small pilot pictures of the view at hand, twice with independent seeds. Their
-//! difference gives its noise ([`relative_mse_of_pair`]), their time its cost, and two or more numbers of samples the slope of its
-//! noise ([`ErrorModel`]). A technique that cannot model the scene, that the device cannot run, or whose pictures hold other light paths
-//! than those asked for is never chosen, and [`Plan::candidates`] says why.
+//! Nothing is known beforehand: each candidate renders small pilot pictures of the view at hand, twice with independent seeds, in rounds that have no
+//! seed in common. Their difference gives its noise ([`relative_mse_of_pair`]), their time its cost, and two or more numbers of samples the slope of
+//! its noise ([`ErrorModel`]). Rounds decide how far pilots go and what is chosen. The prediction is by a last pair of pilots of the chosen one, which
+//! nothing was decided by: the lowest of several errors is lower than what comes, and so is one at which rounds end. A technique that cannot model the
+//! scene, that the device cannot run, or whose pictures hold other light paths than those asked for is never chosen, and [`Plan::candidates`] says why.
 //!
 //! Bias is judged as well ([`Candidate::judged_by`] says by what). Both pilots of a technique against two of the reference, an unbiased technique, of
 //! other seeds, give the square of its bias without the noise of either ([`relative_bias_of_pairs`]):
@@ -16,12 +17,14 @@
 //!   without area give by way of mirrors and smooth glass. It is then held against a consistent technique as if biased, and where there is none,
 //!   it comes last, and [`Candidate::misses`] and [`Plan::shortfall`] name the lights.
 //!
-//! The predicted error is √(bias² + noise²). Pilots take one first round of each candidate with the compilation of its kernels, and then at
-//! most 15 % of the time predicted, or two seconds where no time is to be kept. What they find is the same in every run for as many rounds;
-//! how many there are, and what is predicted to be faster, is the clock's.
+//! The predicted error is √(bias² + noise²), with an interval for 9 of 10 pictures ([`Candidate::error_interval`]). Pilots take one first round of each
+//! candidate with the compilation of its kernels, and then two seconds, or a quarter of all predicted time where that is above five seconds; first rounds
+//! of further settings of a technique are left out where they would exceed it, those of further techniques only where a time is to be kept.
+//! [`Plan::pilot_share`] says what share they took. What they find is the same in every run for as many rounds; how many there are, and what is predicted to be
+//! faster, is the clock's.
 //!
-//! Predictions are estimates: a pilot does not see what is rarer than its samples (a caustic of one path in a million), and times are
-//! those of a machine that does nothing else.
+//! Predictions are estimates: a pilot does not see what is rarer than its samples (a caustic of one path in a million), nor how a picture of more pixels
+//! differs from a small one, and times are those of a machine that does nothing else. The interval does not know of these either.
 
 mod bias;
 mod judgement;
@@ -29,6 +32,7 @@ mod model;
 mod noise;
 mod paths;
 mod rounds;
+mod tiles;
 mod trial;
 mod verdict;
 
@@ -46,14 +50,14 @@ use crate::techniques::{self, Bias, Card};
 use crate::transport::PathSet;
 use crate::{Error, Result};
 use judgement::reference_trial;
-use rounds::{PILOT_SHARE, run_rounds};
+use rounds::{PILOT_SHARE, is_late, run_last_pair, run_rounds, seconds_of_rounds};
 use trial::{Asked, Trial};
 use verdict::{score, shortfall};
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct Goal {
-    /// Root of the relative MSE to reach (0.02 is 2 %), with the metric's usual offset.
+    /// Root of the relative MSE to reach (0.02 is 2 %), with the metric's usual offset: the same in every unit of radiance.
     pub error: Option<f64>,
     /// Wall-clock time to keep, the pilots' included.
     pub time: Option<Duration>,
@@ -73,8 +77,11 @@ pub struct Candidate {
     pub reason: String,
     /// What of the light paths asked for it does not find, in words; empty where it finds all.
     pub misses: String,
-    /// Samples per pixel of its last pilots, 0 without.
+    /// Samples per pixel of its last round of pilots, 0 without.
     pub pilot_spp: u32,
+    /// Samples per pixel of the last pair of pilots, which says how large the error is and nothing was decided by; 0 without, where the prediction is by
+    /// rounds and rather too low.
+    pub last_pilot_spp: u32,
     /// Root of the relative MSE of those by noise alone.
     pub pilot_noise: f64,
     /// Whether its pilots have met any light. Without it `error` is that of a black picture: nothing is known.
@@ -96,6 +103,9 @@ pub struct Candidate {
     pub judged_by: String,
     /// Predicted root of the relative MSE: √(bias² + noise²).
     pub error: f64,
+    /// What a picture's error lies between in 9 of 10 cases, by how well the pilots know noise, slope and bias and by the picture's own spread; `None`
+    /// where nothing is known.
+    pub error_interval: Option<[f64; 2]>,
     /// Predicted seconds of rendering, without the pilots.
     pub seconds: f64,
 }
@@ -128,7 +138,7 @@ pub struct Plan {
     pub pilot_seconds: f64,
     /// Their share of the whole predicted time.
     pub pilot_share: f64,
-    /// The share that rounds of pilots after the first are kept to.
+    /// The share that pilots after the first round are kept to where a time is to be kept and where picture and pilots take more than five seconds.
     pub pilot_share_limit: f64,
     /// Why the goal cannot be met; empty when it can.
     pub shortfall: String,
@@ -198,10 +208,10 @@ pub fn plan_among(
     let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) = candidates(cards, &fixed).into_iter().unzip();
     let mut trials: Vec<Option<Trial<'_>>> = Vec::new();
     for (index, (candidate, card)) in candidates.iter_mut().zip(&cards).enumerate() {
-        let late = goal
-            .time
-            .is_some_and(|time| start.elapsed().as_secs_f64() > PILOT_SHARE * time.as_secs_f64());
         let tried = trials.iter().any(Option::is_some);
+        // Settings can be left out, techniques only where a time is to be kept.
+        let can_wait = goal.time.is_some() || trials.iter().flatten().any(|trial| trial.card.id == card.id);
+        let late = can_wait && is_late(&trials, goal, start.elapsed().as_secs_f64());
         let trial = if tried && (late || !proceed()) {
             candidate.reason = "there was no time to try it".into();
             None
@@ -218,26 +228,28 @@ pub fn plan_among(
     if !trials.iter().flatten().any(is_unbiased) {
         for card in techniques::all().iter().filter(|card| card.bias == Bias::Unbiased) {
             let mut candidate = Candidate::of(card, "reference", merged(serde_json::json!({}), &fixed, card));
-            if let Some(trial) = Trial::start_reference(&asked, card, &mut candidate)? {
+            if let Some(trial) = Trial::start_reference(&asked, card, &mut candidate, candidates.len())? {
                 trials.push(Some(trial));
                 break;
             }
         }
     }
     run_rounds(&mut trials, &asked, start, proceed)?;
-    let pilot_seconds = start.elapsed().as_secs_f64();
-    // A reference that is not a candidate stands at the end, beyond all of them.
-    for (candidate, trial) in candidates.iter_mut().zip(&trials) {
-        if let Some(trial) = trial {
-            trial.predict(candidate, goal, pilot_seconds);
+    let chosen = loop {
+        let chosen = best(&mut candidates, &trials, &asked, start)?;
+        if proceed() {
+            let rounds = seconds_of_rounds(&trials);
+            if let Some(trial) = &mut trials[chosen] {
+                run_last_pair(trial, &asked, start.elapsed().as_secs_f64(), rounds)?;
+            }
         }
-    }
-    let score = |index: &usize| score(&candidates[*index], goal);
-    let able = |index: &usize| trials[*index].as_ref().is_some_and(Trial::can_be_chosen);
-    let able = (0..candidates.len()).filter(able);
-    let Some(chosen) = able.min_by(|a, b| score(a).total_cmp(&score(b))) else {
-        return Err(none_can(&candidates));
+        // One whose last pair fails is out.
+        if let Some(trial) = trials[chosen].as_ref().filter(|trial| trial.can_be_chosen()) {
+            trial.predict(&mut candidates[chosen], &asked, start.elapsed().as_secs_f64());
+            break chosen;
+        }
     };
+    let pilot_seconds = start.elapsed().as_secs_f64();
     let shortfall = shortfall(&candidates[chosen], goal, pilot_seconds);
     Ok(Plan {
         goal,
@@ -249,6 +261,27 @@ pub fn plan_among(
         shortfall,
         candidates,
     })
+}
+
+/// Writes what rounds have found to the candidates, and returns the best one that can be chosen.
+fn best(
+    candidates: &mut [Candidate],
+    trials: &[Option<Trial<'_>>],
+    asked: &Asked<'_>,
+    start: Instant,
+) -> Result<usize> {
+    let spent = start.elapsed().as_secs_f64();
+    // A reference that is not a candidate stands at the end, beyond all of them.
+    for (candidate, trial) in candidates.iter_mut().zip(trials) {
+        if let Some(trial) = trial {
+            trial.predict(candidate, asked, spent);
+        }
+    }
+    let score = |index: &usize| score(&candidates[*index], asked.goal);
+    let able = |index: &usize| trials[*index].as_ref().is_some_and(Trial::can_be_chosen);
+    let able = (0..candidates.len()).filter(able);
+    able.min_by(|a, b| score(a).total_cmp(&score(b)))
+        .ok_or_else(|| none_can(candidates))
 }
 
 fn none_can(candidates: &[Candidate]) -> Error {
@@ -311,6 +344,7 @@ impl Candidate {
             reason: String::new(),
             misses: String::new(),
             pilot_spp: 0,
+            last_pilot_spp: 0,
             pilot_noise: 0.0,
             slope: 0.0,
             lit: false,
@@ -321,6 +355,7 @@ impl Candidate {
             bias_at_most: None,
             judged_by: String::new(),
             error: 0.0,
+            error_interval: None,
             seconds: 0.0,
         }
     }
@@ -341,10 +376,17 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-PLAN",
     name: "automatic choice of technique, settings and samples by pilot pictures",
     role: Role::Service,
-    limits: "Pilots do not see what is rarer than their samples, and times assume a machine that does nothing else.",
+    limits: "Pilots do not see what is rarer than their samples, nor does the interval printed with a prediction; below five seconds they may take \
+             longer than the picture; times assume a machine that does nothing else.",
     tests: &[
         "engine/src/plan/noise.rs::pairs_know_their_error",
+        "engine/src/plan/noise.rs::a_bright_square_does_not_hide_the_noise_of_dark_pixels",
+        "engine/src/plan/noise.rs::pairs_of_one_view_keep_the_ratio_of_their_errors",
         "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",
+        "engine/src/plan/model.rs::slopes_are_believed_alike_to_either_side_of_the_law",
+        "engine/src/plan/model.rs::the_last_pair_alone_says_how_large_the_error_is",
+        "engine/src/plan/model.rs::neither_stopping_nor_choosing_makes_predictions_optimistic",
+        "engine/src/plan/rounds.rs::pilots_keep_to_a_quarter_of_what_is_long",
         "engine/src/plan/model.rs::biases_fall_as_they_were_seen_to",
         "engine/src/plan/model.rs::pictures_that_cannot_move_show_no_bias",
         "engine/src/plan/bias.rs::known_biases_are_recovered",
@@ -352,6 +394,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/techniques/path/unseen.rs::caustics_of_lights_without_area_are_said_to_be_missed",
         "engine/src/plan/verdict.rs::what_cannot_be_had_is_said",
         "tests/tests/automatic_choice.rs::predictions_come_true",
+        "tests/tests/automatic_choice.rs::pictures_have_the_error_that_was_predicted",
+        "tests/tests/automatic_choice.rs::the_unit_of_radiance_changes_neither_choice_nor_error",
         "tests/tests/automatic_choice.rs::what_cannot_be_chosen_says_why",
         "tests/tests/automatic_choice.rs::what_cannot_be_made_is_no_end_of_the_choice",
         "tests/tests/automatic_choice.rs::frames_too_large_for_the_device_are_no_candidates",

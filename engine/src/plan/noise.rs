@@ -2,14 +2,21 @@
 //!
 //! Half the squared difference of two independent, equally distributed pixels is an unbiased estimate of their variance, whatever the
 //! samples within each are like (stratified samples of one pixel are not independent, so their own spread says nothing). The relative
-//! error also needs the true radiance, for which the product of the two stands: it is unbiased for its square. Where noise hides a
-//! pixel, that square is taken from its neighbourhood.
+//! error also needs the true radiance, for which all pairs of a view stand together: the product of their two means is unbiased for its square, and
+//! one weight a pixel for all pairs leaves the ratios of their errors, and so the slope, as they are. Where noise hides a pixel, that square is taken
+//! from its neighbourhood, by the median of the means over nine blocks: what is bright in fewer than five of them, such as a lamp, does not hide the
+//! relative noise of what is dark around it.
 
+use super::tiles::Tiles;
+use crate::film::metrics::{relative_mse_epsilon, relative_square};
 use crate::film::picture::{Picture, VARIANCE};
 use crate::{Error, Result};
 
-/// Pixels to each side of the neighbourhoods, the widest first; the last is the pixel alone.
-const REACHES: [usize; 3] = [8, 2, 0];
+/// Pixels to each side of a block of the widest neighbourhood, and from the middle of one to that of the next: nine lie in a square of 19 × 19 pixels.
+const BLOCK_REACH: usize = 3;
+const BLOCK_STEP: usize = 6;
+/// Pixels to each side of the narrower neighbourhoods, the widest first; the last is the pixel alone.
+const REACHES: [usize; 2] = [1, 0];
 /// Standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half.
 const TRUST: f64 = 0.05;
 
@@ -19,36 +26,115 @@ pub(super) enum Truth {
     /// From its neighbourhood where noise hides it: whatever is bright in one picture alone is rare light that pixels around may get, too.
     Neighbourhood,
     /// No less than the square of both pictures' mean: what is bright in one picture alone belongs to the pixel. So it is where light that
-    /// is scattered diffusely comes from kernels, and only what the eye sees by way of mirrors is sampled.
+    /// is scattered diffusely comes from kernels, and only what the eye sees by way of mirrors is sampled. Neighbouring pixels share their noise.
     Pixel,
 }
 
-/// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + `offset`) over pixels and channels, as
-/// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it.
+/// A relative MSE of pilots, and how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NoiseEstimate {
+    pub relative_mse: f64,
+    /// Standard error.
+    pub deviation: f64,
+}
+
+/// Two independent pictures of so many samples per pixel.
+pub(super) type Pair<'a> = (u32, [&'a Picture; 2]);
+
+/// ε of what is relative to two pictures of one view: `offset` of the square of their mean.
+pub(super) fn epsilon_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64> {
+    let values = a.main_layer()?.values().iter().chain(b.main_layer()?.values());
+    Ok(relative_mse_epsilon(values.copied(), offset))
+}
+
+/// Relative mean squared error of either of two pictures: the mean of variance ∕ (radiance² + ε) over pixels and channels, as
+/// [`ErrorReport::relative_mse`](crate::film::ErrorReport) against a perfect reference would give it. ε is `offset` of the square of the mean radiance.
 ///
 /// # Errors
 /// [`Error::Setting`] when the sizes differ; [`Error::Picture`] without radiance.
 pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64> {
-    noise_of_pair(a, b, offset, Truth::Neighbourhood)
+    let found = noise_of_pairs(&[(1, [a, b])], offset, Truth::Neighbourhood)?;
+    Ok(found.first().map_or(0.0, |found| found.relative_mse))
 }
 
-/// As [`relative_mse_of_pair`], relative to that truth.
-pub(super) fn noise_of_pair(a: &Picture, b: &Picture, offset: f64, kind: Truth) -> Result<f64> {
-    same_size(a, b)?;
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for channel in 0..3 {
-        let (variances, mut truth) = channel_of_pair(a, b, channel, TRUST)?;
+/// As [`relative_mse_of_pair`], of each of several pairs of one technique and view, all relative to the truth that they show together.
+pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Result<Vec<NoiseEstimate>> {
+    let Some((_, [first, _])) = pairs.first() else {
+        return Ok(Vec::new());
+    };
+    for (_, pair) in pairs {
+        for picture in pair {
+            same_size(first, picture)?;
+        }
+    }
+    let (width, height) = (first.width() as usize, first.height() as usize);
+    let pixels = width * height;
+    let halves = [0, 1, 2].map(|channel| pooled(pairs, channel, pixels));
+    let halves: Vec<[Vec<f64>; 2]> = halves.into_iter().collect::<Result<_>>()?;
+    let epsilon = relative_mse_epsilon(halves.iter().flatten().flatten().map(|value| *value as f32), offset);
+    let mut levels: Vec<Vec<f64>> = Vec::new();
+    for [a, b] in &halves {
+        let mut truth = truth(a, b, width, TRUST);
         if kind == Truth::Pixel {
-            let values = a.main_layer()?.values().iter().zip(b.main_layer()?.values());
-            for (truth, (a, b)) in truth.iter_mut().zip(values.skip(channel).step_by(3)) {
-                let mean = (f64::from(*a) + f64::from(*b)) / 2.0;
-                *truth = truth.max(mean * mean);
+            for (truth, (a, b)) in truth.iter_mut().zip(a.iter().zip(b)) {
+                *truth = truth.max(0.25 * (a + b) * (a + b));
             }
         }
-        sum += variances.iter().zip(&truth).map(|(v, t)| v / (t + offset)).sum::<f64>();
-        count += variances.len();
+        levels.push(truth.into_iter().map(f64::sqrt).collect());
     }
-    Ok(sum / count.max(1) as f64)
+    let estimate = |pair: &Pair<'_>| -> Result<NoiseEstimate> {
+        let (_, [a, b]) = pair;
+        let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
+        let mut tiles = Tiles::new(width, height);
+        let mut squares = 0.0_f64;
+        for pixel in 0..pixels {
+            let mut of_pixel = 0.0_f64;
+            for (channel, levels) in levels.iter().enumerate() {
+                let (a, b) = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]).unwrap_or_default();
+                of_pixel += relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon);
+            }
+            squares += of_pixel * of_pixel;
+            tiles.add(pixel, of_pixel / 3.0);
+        }
+        let (relative_mse, by_tiles) = tiles.mean();
+        Ok(NoiseEstimate {
+            relative_mse,
+            deviation: match kind {
+                // Var x ≤ E x² for each pixel, whose channels count as one.
+                Truth::Neighbourhood => squares.sqrt() / (3 * pixels.max(1)) as f64,
+                Truth::Pixel => by_tiles,
+            },
+        })
+    };
+    pairs.iter().map(estimate).collect()
+}
+
+/// Both values of a pixel; a pixel without a finite sample says nothing.
+fn finite(a: f32, b: f32) -> Option<(f64, f64)> {
+    (a.is_finite() && b.is_finite()).then_some((a.into(), b.into()))
+}
+
+/// Means of all first pictures and of all second ones in a channel, by their samples; 0 where none is finite.
+fn pooled(pairs: &[Pair<'_>], channel: usize, pixels: usize) -> Result<[Vec<f64>; 2]> {
+    let mut sums = [vec![0.0; pixels], vec![0.0; pixels]];
+    let mut weights = vec![0.0; pixels];
+    for (spp, [a, b]) in pairs {
+        let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
+        let spp = f64::from(*spp);
+        for (pixel, weight) in weights.iter_mut().enumerate() {
+            if let Some((a, b)) = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]) {
+                sums[0][pixel] += spp * a;
+                sums[1][pixel] += spp * b;
+                *weight += spp;
+            }
+        }
+    }
+    for sum in &mut sums {
+        for (sum, weight) in sum.iter_mut().zip(&weights) {
+            *sum = if *weight > 0.0 { *sum / weight } else { 0.0 };
+        }
+    }
+    Ok(sums)
 }
 
 /// Refuses two pictures that cannot be compared.
@@ -61,57 +147,66 @@ pub(super) fn same_size(a: &Picture, b: &Picture) -> Result<()> {
     Err(Error::setting("pair of pictures", size, "have different sizes"))
 }
 
-/// Of each pixel of a channel: the variance of either picture, and the square of its true radiance, as far as the two know them. `trust` is the
-/// standard deviation, relative to the square of the radiance, at which a neighbourhood is believed half.
-pub(super) fn channel_of_pair(a: &Picture, b: &Picture, channel: usize, trust: f64) -> Result<(Vec<f64>, Vec<f64>)> {
-    let (width, height) = (a.width() as usize, a.height() as usize);
-    let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
-    let pair = |i: usize| {
-        let (a, b) = (f64::from(a[i * 3 + channel]), f64::from(b[i * 3 + channel]));
-        // A pixel without a finite sample says nothing.
-        if a.is_finite() && b.is_finite() {
-            (a, b)
-        } else {
-            (0.0, 0.0)
-        }
+/// Of each pixel of a channel: the square of its true radiance, as far as two pictures know it. `trust` is the standard deviation, relative to the square
+/// of the radiance, at which a neighbourhood is believed half.
+pub(super) fn truth_of_pair(a: &Picture, b: &Picture, channel: usize, trust: f64) -> Result<Vec<f64>> {
+    let pixels = a.width() as usize * a.height() as usize;
+    let [first, second] = pooled(&[(1, [a, b])], channel, pixels)?;
+    Ok(truth(&first, &second, a.width() as usize, trust))
+}
+
+/// As [`truth_of_pair`], of values.
+fn truth(a: &[f64], b: &[f64], width: usize, trust: f64) -> Vec<f64> {
+    let near = |reach: usize| -> Vec<f64> {
+        let means = blurred(a, width, reach).into_iter().zip(blurred(b, width, reach));
+        means.map(|(a, b)| (a * b).max(0.0)).collect()
     };
-    let squares: Vec<f64> = (0..width * height).map(pair).map(|(a, b)| a * b).collect();
-    let variances: Vec<f64> = (0..width * height)
-        .map(pair)
-        .map(|(a, b)| (a - b) * (a - b) / 2.0)
-        .collect();
-    let mut truth = vec![0.0; width * height];
+    let variances: Vec<f64> = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b) / 2.0).collect();
+    let mut truth = medians(&near(BLOCK_REACH), width);
     for reach in REACHES {
-        let (near_squares, near_variances) = (blurred(&squares, width, reach), blurred(&variances, width, reach));
-        let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
-        for (truth, (square, variance)) in truth.iter_mut().zip(near_squares.iter().zip(&near_variances)) {
+        let (squares, variances) = (near(reach), blurred(&variances, width, reach));
+        let count = (2 * reach + 1) as f64;
+        for (truth, (square, variance)) in truth.iter_mut().zip(squares.iter().zip(&variances)) {
             // A narrower neighbourhood only where there is little noise: a large difference makes the product small, and the two
             // must not meet in one quotient.
-            let (signal, noise) = (square.max(0.0) * trust, variance / count.sqrt());
+            let (signal, noise) = (square * trust, variance / count);
             let all = signal * signal + noise * noise;
-            let trust = if all > 0.0 && reach != REACHES[0] {
-                signal * signal / all
-            } else {
-                1.0
-            };
-            *truth += trust * (square.max(0.0) - *truth);
+            let trust = if all > 0.0 { signal * signal / all } else { 1.0 };
+            *truth += trust * (square - *truth);
         }
     }
-    Ok((variances, truth))
+    truth
+}
+
+/// Of each pixel: the median over the blocks around it.
+fn medians(means: &[f64], width: usize) -> Vec<f64> {
+    let height = means.len() / width.max(1);
+    let steps = |at: usize, count: usize| {
+        let last = count.saturating_sub(1);
+        [at.saturating_sub(BLOCK_STEP), at, (at + BLOCK_STEP).min(last)]
+    };
+    let median = |i: usize| {
+        let (xs, ys) = (steps(i % width, width), steps(i / width, height));
+        let mut blocks: [f64; 9] = std::array::from_fn(|k| means[ys[k / 3] * width + xs[k % 3]]);
+        blocks.sort_by(f64::total_cmp);
+        blocks[4]
+    };
+    (0..means.len()).map(median).collect()
 }
 
 /// Relative mean squared error that the `variance` layer of a picture stands for: what independent samples of that spread would have.
-/// Samples that are stratified within a pixel have less.
+/// Samples that are stratified within a pixel have less. The offset is that of [`relative_mse_of_pair`].
 ///
 /// # Errors
 /// [`Error::Picture`] without radiance or variance.
 pub fn relative_mse_by_variance(picture: &Picture, offset: f64) -> Result<f64> {
     let radiance = picture.main_layer()?.values();
     let variance = picture.require(VARIANCE)?.values();
+    let epsilon = relative_mse_epsilon(radiance.iter().copied(), offset);
     let each = radiance.iter().zip(variance).map(|(radiance, variance)| {
         let (radiance, variance) = (f64::from(*radiance), f64::from(*variance));
         // The square of a noisy mean is too large by its variance.
-        variance / ((radiance * radiance - variance).max(0.0) + offset)
+        relative_square(variance, (radiance * radiance - variance).max(0.0).sqrt(), epsilon)
     });
     Ok(each.sum::<f64>() / radiance.len().max(1) as f64)
 }
@@ -160,8 +255,8 @@ mod tests {
         let b = Picture::from_radiance(32, 32, values.clone()).unwrap();
         values[3 * 500] = 400.0;
         let a = Picture::from_radiance(32, 32, values).unwrap();
-        let of = |kind| noise_of_pair(&a, &b, 0.01, kind).unwrap() * 3.0 * 1024.0;
-        // 400² ∕ 2 over some radiance near 0.5, or over 200².
+        let of = |kind| noise_of_pairs(&[(1, [&a, &b])], 0.01, kind).unwrap()[0].relative_mse * 3.0 * 1024.0;
+        // 400² ∕ 2 over some radiance near 0.5, or over 200². The mean is 0.56.
         assert!(of(Truth::Neighbourhood) > 1e4, "{}", of(Truth::Neighbourhood));
         assert!((of(Truth::Pixel) - 2.0).abs() < 0.02, "{}", of(Truth::Pixel));
     }
@@ -171,7 +266,9 @@ mod tests {
         let mut random = Random(7);
         for deviation in [0.01, 0.1, 0.5, 1.0] {
             let (a, b) = (noisy(deviation, &mut random), noisy(deviation, &mut random));
-            let expected = 0.5 * deviation * deviation * (0.04 / 0.05 + 4.0 / 4.01);
+            // The mean of both halves is 1.1.
+            let share = |radiance: f64| radiance * radiance / (radiance * radiance + 0.0121);
+            let expected = 0.5 * deviation * deviation * (share(0.2) + share(2.0));
             let found = relative_mse_of_pair(&a, &b, 0.01).unwrap();
             // Noise of the estimate: √(2 ∕ 12288) = 1.3 %; the trust in noisy pixels costs the rest.
             let allowed = if deviation > 0.3 { 0.25 } else { 0.08 };
@@ -180,7 +277,98 @@ mod tests {
                 "{deviation}: {found} for {expected}"
             );
         }
+        // Of lamps a thousand times dimmer or brighter the same pictures have the same error.
+        let (a, b) = (noisy(0.3, &mut random), noisy(0.3, &mut random));
+        let of = |unit: f32| {
+            let [a, b] = [&a, &b].map(|picture| {
+                let values = picture.main_layer().unwrap().values().iter().map(|value| value * unit);
+                Picture::from_radiance(64, 64, values.collect()).unwrap()
+            });
+            relative_mse_of_pair(&a, &b, 0.01).unwrap()
+        };
+        for unit in [1e-3, 1e3] {
+            assert!((of(unit) / of(1.0) - 1.0).abs() < 1e-5, "{unit}");
+        }
         let black = Picture::from_radiance(8, 8, vec![0.0; 192]).unwrap();
         assert_eq!(relative_mse_of_pair(&black, &black, 0.01).unwrap(), 0.0);
+    }
+
+    /// A dark room of noisy pixels, with a bright square of a fifth of its side that has no noise.
+    fn with_a_lamp(side: usize, samples: u32, random: &mut Random) -> Picture {
+        let lamp = side / 3..side / 3 + side / 5;
+        let values = (0..side * side * 3).map(|i| {
+            let (x, y) = (i / 3 % side, i / 3 / side);
+            if lamp.contains(&x) && lamp.contains(&y) {
+                return 17.0;
+            }
+            // Means of samples that are uniform in 0 … 2, times a radiance that varies by three.
+            let radiance = 0.1 + 0.2 * x as f32 / side as f32;
+            let sum: f32 = (0..samples).map(|_| 2.0 * random.unit()).sum();
+            radiance * sum / samples as f32
+        });
+        Picture::from_radiance(side as u32, side as u32, values.collect()).unwrap()
+    }
+
+    // The truth of dark pixels is their own, not the lamp's: with that of a mean over 17 × 17 pixels the root was found half as large at 16 × 16.
+    #[test]
+    fn a_bright_square_does_not_hide_the_noise_of_dark_pixels() {
+        let mut random = Random(21);
+        for (side, samples) in [(16, 2), (16, 16), (32, 4), (48, 2), (48, 16)] {
+            let found: f64 = (0..8)
+                .map(|_| {
+                    let (a, b) = (
+                        with_a_lamp(side, samples, &mut random),
+                        with_a_lamp(side, samples, &mut random),
+                    );
+                    relative_mse_of_pair(&a, &b, 0.01).unwrap()
+                })
+                .sum();
+            // A sample has a relative variance of a third.
+            let lamp = side / 3..side / 3 + side / 5;
+            let (mut mean, mut expected) = (0.0_f64, 0.0_f64);
+            let pixels = (side * side) as f64;
+            let is_lamp = |i: usize| lamp.contains(&(i % side)) && lamp.contains(&(i / side));
+            let radiance = |i: usize| 0.1 + 0.2 * (i % side) as f64 / side as f64;
+            for i in 0..side * side {
+                let level = if is_lamp(i) { 17.0 } else { radiance(i) };
+                mean += level / pixels;
+            }
+            for i in (0..side * side).filter(|i| !is_lamp(*i)) {
+                let square = radiance(i) * radiance(i);
+                expected += square / (square + 0.01 * mean * mean) / (3.0 * f64::from(samples)) / pixels;
+            }
+            // Pixels beside the square still lose: 9 % at most, of the smallest picture. The spread of eight pairs adds 2 %.
+            let ratio = (found / 8.0 / expected).sqrt();
+            assert!((0.85..1.15).contains(&ratio), "{side}, {samples}: {ratio}");
+        }
+    }
+
+    // One truth for all pairs: their errors stand to each other as their samples do, whatever is not known of the truth.
+    #[test]
+    fn pairs_of_one_view_keep_the_ratio_of_their_errors() {
+        let mut random = Random(23);
+        let pictures: Vec<[Picture; 2]> = [2, 8, 32]
+            .iter()
+            .map(|samples| [(); 2].map(|()| with_a_lamp(32, *samples, &mut random)))
+            .collect();
+        let pairs: Vec<Pair<'_>> = pictures
+            .iter()
+            .zip([2, 8, 32])
+            .map(|([a, b], spp)| (spp, [a, b]))
+            .collect();
+        let found = noise_of_pairs(&pairs, 0.01, Truth::Neighbourhood).unwrap();
+        for pair in found.windows(2) {
+            let ratio = pair[0].relative_mse / pair[1].relative_mse;
+            let deviation = pair
+                .iter()
+                .map(|one| (one.deviation / one.relative_mse).powi(2))
+                .sum::<f64>()
+                .sqrt();
+            // The standard error is an upper bound; four of it.
+            assert!(
+                (ratio / 4.0).ln().abs() < 4.0 * deviation && deviation < 0.15,
+                "{found:?}"
+            );
+        }
     }
 }

@@ -1,4 +1,8 @@
-//! How far pilots go: further rounds of what can still be chosen, as long as they cost little beside the picture itself.
+//! How far pilots go: further rounds of what can still be chosen, as long as they cost little beside the picture itself, and a last pair of what is
+//! chosen.
+//!
+//! Whoever goes on until an error comes out low, and takes the candidate with the lowest one, finds both too low. So rounds decide, and what is predicted is
+//! by a pair that nothing was decided by.
 
 use std::time::Instant;
 
@@ -8,16 +12,56 @@ use super::trial::{Asked, ROUNDS, Trial};
 use crate::Result;
 use crate::techniques::Bias;
 
-/// Share of the predicted time that pilots may take.
-pub const PILOT_SHARE: f64 = 0.15;
+/// Share of all predicted time that pilots may take where that is longer than [`LONG`].
+pub const PILOT_SHARE: f64 = 0.25;
+/// Of what pilots may take, what is for rounds; the rest is the last pair's.
+const ROUNDS_SHARE: f64 = 0.6;
+/// Seconds from which on a picture with its pilots is long.
+const LONG: f64 = 5.0;
+/// Most samples per pixel of the last pair: beyond them what is not known of the slope weighs more, and nobody waits for pilots.
+const LAST_PAIR: u32 = 4 * ROUNDS[ROUNDS.len() - 1];
 /// Beyond the relative MSE of what has met light.
 const UNLIT_COST: f64 = f64::MAX;
 /// Beyond every other cost: of what cannot be chosen.
 const IMPOSSIBLE_COST: f64 = f64::INFINITY;
-/// Seconds of rounds that pilots may take whatever the picture costs, where no time is to be kept.
+/// Seconds that pilots may take after their beginning beside a picture that is not long, where no time is to be kept.
 const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
 const HOPELESS: f64 = 2.0;
+
+/// Seconds that pilots may still take of a part of what they may take in all, beside a picture of `picture` seconds: after `spent` ones, of which rounds took
+/// `rounds`.
+fn room(part: f64, goal: Goal, picture: f64, spent: f64, rounds: f64) -> f64 {
+    match goal.time {
+        Some(time) => part * PILOT_SHARE * time.as_secs_f64() - spent,
+        None if picture + FREE_SECONDS > LONG => part * PILOT_SHARE / (1.0 - PILOT_SHARE) * picture - spent,
+        None => part * FREE_SECONDS - rounds,
+    }
+}
+
+/// Whether a candidate more would take pilots beyond their share of a long picture, or of the time.
+pub fn is_late(trials: &[Option<Trial<'_>>], goal: Goal, spent: f64) -> bool {
+    if let Some(time) = goal.time {
+        return spent > ROUNDS_SHARE * PILOT_SHARE * time.as_secs_f64();
+    }
+    let predicted = |trial: &Trial<'_>| trial.cost.seconds(f64::from(trial.samples(goal, spent)));
+    let picture = trials.iter().flatten().map(predicted).fold(f64::INFINITY, f64::min);
+    let all = picture + spent;
+    all.is_finite() && all > LONG && spent > PILOT_SHARE * all
+}
+
+/// The last pair of the chosen one: as many samples as there is time for, and no more than the picture needs. Nothing happens where its pilots have met no light
+/// and where a time leaves no room.
+pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, spent: f64, rounds: f64) -> Result<()> {
+    let wanted = trial.samples(asked.goal, spent);
+    let picture = trial.cost.seconds(f64::from(wanted));
+    let fits = trial.pair_samples(room(1.0, asked.goal, picture, spent, rounds));
+    if !trial.lit || asked.goal.time.is_some() && fits < ROUNDS[0] {
+        return Ok(());
+    }
+    // Where nothing is to be kept, as many as the first round had.
+    trial.conclude(asked, fits.min(wanted).clamp(ROUNDS[0], LAST_PAIR))
+}
 
 /// Further rounds for what can still be chosen, and for what that is held against, as long as they cost little beside the picture itself. Every trial is
 /// judged in the end.
@@ -43,12 +87,8 @@ pub fn run_rounds(
         let able = || trials.iter().flatten().filter(|trial| trial.can_be_chosen());
         let best = able().map(&cost).fold(f64::INFINITY, f64::min);
         let picture = able().map(predicted).fold(f64::INFINITY, f64::min);
-        let rounds: f64 = trials.iter().flatten().map(|trial| trial.all_seconds).sum();
-        let share = PILOT_SHARE * (picture + spent);
-        let allowed = match goal.time {
-            Some(_) => share - spent,
-            None => share.max(FREE_SECONDS) - rounds,
-        };
+        let rounds = seconds_of_rounds(trials);
+        let allowed = room(ROUNDS_SHARE, goal, picture, spent, rounds);
         let blind = goal.time.is_none() && trials.iter().flatten().all(|trial| !trial.lit);
         // All that can still be chosen, or else the best alone; and what they are held against.
         let affordable = [HOPELESS, 1.0].into_iter().find_map(|factor| {
@@ -72,13 +112,12 @@ pub fn run_rounds(
                     *on |= judged && trial.spp == last && trial.failure.is_empty() && trial.misses.is_empty();
                 }
             }
-            // A round has four times the samples of all before it.
             let next: f64 = trials
                 .iter()
                 .zip(&on)
                 .filter(|(_, on)| **on)
                 .filter_map(|(trial, _)| trial.as_ref())
-                .map(|t| t.round_seconds * 4.0)
+                .map(|t| t.pair_seconds(spp))
                 .sum();
             (next <= allowed || blind).then_some(on)
         });
@@ -88,11 +127,16 @@ pub fn run_rounds(
                 if !proceed() {
                     return update_judgements(trials, goal);
                 }
-                trial.go_on(spp, asked.pixels())?;
+                trial.go_on(asked, spp)?;
             }
         }
     }
     update_judgements(trials, goal)
+}
+
+/// Seconds that all rounds took.
+pub fn seconds_of_rounds(trials: &[Option<Trial<'_>>]) -> f64 {
+    trials.iter().flatten().map(|trial| trial.all_seconds).sum()
 }
 
 fn update_judgements(trials: &mut [Option<Trial<'_>>], goal: Goal) -> Result<()> {
@@ -104,4 +148,33 @@ fn update_judgements(trials: &mut [Option<Trial<'_>>], goal: Goal) -> Result<()>
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn pilots_keep_to_a_quarter_of_what_is_long() {
+        let free = Goal {
+            error: Some(0.1),
+            time: None,
+        };
+        // A picture of 30 s: ten of pilots make a quarter of all, six of them rounds.
+        assert!((room(1.0, free, 30.0, 0.0, 0.0) - 10.0).abs() < 1e-12);
+        assert!((room(ROUNDS_SHARE, free, 30.0, 4.0, 1.0) - 2.0).abs() < 1e-12);
+        // Just long: compilation and whatever else was spent counts.
+        assert!((room(1.0, free, 3.1, 0.5, 0.1) - (3.1 / 3.0 - 0.5)).abs() < 1e-12);
+        // Short: seconds of rounds alone.
+        assert!((room(1.0, free, 0.1, 5.0, 0.5) - 1.5).abs() < 1e-12);
+        let timed = Goal {
+            error: None,
+            time: Some(Duration::from_secs(8)),
+        };
+        assert!((room(1.0, timed, 6.0, 0.5, 0.1) - 1.5).abs() < 1e-12);
+        // Before any candidate has been tried nothing is late but a time.
+        assert!(!is_late(&[], free, 100.0) && is_late(&[], timed, 2.0));
+    }
 }

@@ -1,12 +1,13 @@
-//! A technique on trial: two small pilot pictures with independent seeds, refined round by round.
+//! A technique on trial: two small pilot pictures with independent seeds, and two others in each round.
 //!
+//! No round has a seed or a sample in common with another one: what was low by luck when a round was decided on is not part of what it finds.
 //! Seeds and rounds decide what they find, to the bit; what a sample costs, the clock.
 
 use std::time::{Duration, Instant};
 
 use super::judgement::Judgement;
 use super::model::{CostModel, ErrorModel};
-use super::noise::{Truth, noise_of_pair};
+use super::noise::{Pair, Truth, noise_of_pairs};
 use super::paths::same_picture;
 use super::{Candidate, Goal, Reference};
 use crate::film::Picture;
@@ -29,8 +30,10 @@ const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
 const SMALL: u32 = 4;
 /// Distance of the pilots' seeds from the picture's and from each other.
 const SEED_STEP: u32 = 0x9E37_79B9;
+/// Pairs of seeds of a candidate: for first samples, rounds and the last pair.
+const SEED_PAIRS: u32 = ROUNDS.len() as u32 + 2;
 
-/// The two pilots' pictures after a round.
+/// The two pilots' pictures of a round.
 pub struct Stage {
     pub spp: u32,
     pub pictures: [Picture; 2],
@@ -53,13 +56,18 @@ pub struct Trial<'a> {
     pub is_candidate: bool,
     /// Why its pilots could not go on; empty while they can.
     pub failure: String,
-    pilots: [Rendering; 2],
+    settings: Settings,
+    size: [u32; 2],
+    /// Which of all candidates, for seeds of its own.
+    index: u32,
+    /// Samples per pixel of the last pair, which nothing was decided by; 0 without.
+    last_spp: u32,
     pub error: ErrorModel,
     pub cost: CostModel,
     /// Share of a pilot sample's time that does not depend on the number of pixels.
     fixed: f64,
-    /// Seconds of its last round, and of all.
-    pub round_seconds: f64,
+    /// Seconds of both pilots' samples in its last round, but the first ones; of all rounds, with their beginnings.
+    round_seconds: f64,
     pub all_seconds: f64,
 }
 
@@ -85,8 +93,8 @@ fn pilot_size([width, height]: [u32; 2]) -> [u32; 2] {
 }
 
 impl<'a> Trial<'a> {
-    /// Begins pilots, and compiles their kernels with a first sample; `None`, with the reason, for what cannot be chosen. `index` keeps the
-    /// seeds of biased techniques apart from those that they are held against.
+    /// Begins pilots, and compiles their kernels with a first sample; `None`, with the reason, for what cannot be chosen. `index` keeps seeds apart
+    /// from those of other candidates.
     pub fn start(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate, index: usize) -> Result<Option<Self>> {
         match Self::begin(asked, card, candidate, index) {
             Ok(trial) => Ok(trial),
@@ -98,8 +106,13 @@ impl<'a> Trial<'a> {
     }
 
     /// Of an unbiased technique that is not a candidate, for others to be held against.
-    pub fn start_reference(asked: &Asked<'_>, card: &'a Card, candidate: &mut Candidate) -> Result<Option<Self>> {
-        let trial = Self::start(asked, card, candidate, 0)?;
+    pub fn start_reference(
+        asked: &Asked<'_>,
+        card: &'a Card,
+        candidate: &mut Candidate,
+        index: usize,
+    ) -> Result<Option<Self>> {
+        let trial = Self::start(asked, card, candidate, index)?;
         Ok(trial.map(|trial| Self {
             is_candidate: false,
             ..trial
@@ -126,40 +139,6 @@ impl<'a> Trial<'a> {
         let law = (card.foresight.law)(&admitted)?;
         let misses = (card.foresight.misses)(profile, renderer.lights(), &asked.paths)?;
         let size = pilot_size(options.size);
-        let first_seed = match card.bias {
-            Bias::Unbiased => 1,
-            Bias::Consistent(_) | Bias::Biased(_) => 2 * index as u32 + 3,
-        };
-        let begin = |seed_steps: u32, size: [u32; 2]| {
-            let pilot = RenderOptions {
-                technique: Some(card.id.into()),
-                settings: settings.clone(),
-                size,
-                spp: 1,
-                seed: options.seed.wrapping_add(seed_steps.wrapping_mul(SEED_STEP)),
-                aovs: false,
-                time_budget: None,
-                camera: options.camera.clone(),
-            };
-            renderer.start_technique(card, &pilot)
-        };
-        let mut first = begin(first_seed, size)?;
-        if !has_paths(&first.path_set()) {
-            return Ok(None);
-        }
-        run(&mut first)?;
-        // The second one finds its kernels compiled, as the picture itself will.
-        let from = Instant::now();
-        let mut second = begin(first_seed + 1, size)?;
-        run(&mut second)?;
-        let start = from.elapsed().as_secs_f64();
-        let small = size.map(|side| (side / SMALL).max(1));
-        let alike = card.bias == Bias::Unbiased || size == options.size;
-        let small_seconds = if alike {
-            None
-        } else {
-            Some(round_of_another_size(begin(first_seed, small)?)?)
-        };
         let mut trial = Self {
             card,
             misses: misses.unwrap_or_default(),
@@ -169,74 +148,179 @@ impl<'a> Trial<'a> {
             judgement: Judgement::default(),
             is_candidate: true,
             failure: String::new(),
-            pilots: [first, second],
+            settings,
+            size,
+            index: index as u32,
+            last_spp: 0,
             error: ErrorModel::falling(law.slope),
             law,
-            cost: CostModel { start, sample: 0.0 },
+            cost: CostModel::default(),
             fixed: 0.0,
             round_seconds: 0.0,
             all_seconds: 0.0,
         };
+        let mut first = trial.begin_pilot(asked, size, [0, 0])?;
+        if !has_paths(&first.path_set()) {
+            return Ok(None);
+        }
+        run(&mut first)?;
+        // The second one finds its kernels compiled, as the picture itself will.
+        let from = Instant::now();
+        let mut second = trial.begin_pilot(asked, size, [0, 1])?;
+        run(&mut second)?;
+        trial.cost.start = from.elapsed().as_secs_f64();
+        let small = size.map(|side| (side / SMALL).max(1));
+        let alike = card.bias == Bias::Unbiased || size == options.size;
+        let small_seconds = if alike {
+            None
+        } else {
+            Some(round_of_another_size(trial.begin_pilot(asked, small, [0, 0])?)?)
+        };
         // How far a picture moves as it goes on shows from the first sample.
         if matches!(card.bias, Bias::Consistent(_)) {
-            let pictures = trial.pictures()?;
+            let pictures = [first.picture()?, second.picture()?];
             trial.stages.push(Stage { spp: 1, pictures });
         }
-        trial.round(ROUNDS[0], asked.pixels())?;
+        drop((first, second));
+        trial.round(asked, ROUNDS[0])?;
         if let Some(small_seconds) = small_seconds {
             let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
             trial.fixed = fixed_share([area(small), small_seconds], [area(size), trial.round_seconds / 2.0]);
-            trial.cost.sample = trial.seconds_a_sample(ROUNDS[0] - 1, asked.pixels());
+            trial.cost.sample = trial.seconds_a_sample(ROUNDS[0], asked.pixels());
         }
         Ok(Some(trial))
     }
 
-    /// Refines both pilots to `spp` samples per pixel; what keeps them from it is [`failure`](Self::failure) from then on. `pixels` are those of the picture itself.
-    pub fn go_on(&mut self, spp: u32, pixels: f64) -> Result<()> {
-        if let Err(error) = self.round(spp, pixels) {
+    /// A pilot of one sample per pixel, with the seed of a pair's one or other picture.
+    fn begin_pilot(&self, asked: &Asked<'_>, size: [u32; 2], [pair, which]: [u32; 2]) -> Result<Rendering> {
+        // The picture itself has the seed at 0.
+        let steps = 2 * (self.index * SEED_PAIRS + pair) + which + 1;
+        let pilot = RenderOptions {
+            technique: Some(self.card.id.into()),
+            settings: self.settings.clone(),
+            size,
+            spp: 1,
+            seed: asked.options.seed.wrapping_add(steps.wrapping_mul(SEED_STEP)),
+            aovs: false,
+            time_budget: None,
+            camera: asked.options.camera.clone(),
+        };
+        asked.renderer.start_technique(self.card, &pilot)
+    }
+
+    /// Two pictures of `spp` samples per pixel with a pair's seeds. What beyond their first samples they take tells what a sample costs.
+    fn pair(&mut self, asked: &Asked<'_>, spp: u32, pair: u32) -> Result<[Picture; 2]> {
+        let from = Instant::now();
+        let mut seconds = 0.0;
+        let mut picture = |which: u32| -> Result<Picture> {
+            let mut pilot = self.begin_pilot(asked, self.size, [pair, which])?;
+            run(&mut pilot)?;
+            let begun = Instant::now();
+            pilot.set_spp(spp);
+            run(&mut pilot)?;
+            seconds += begun.elapsed().as_secs_f64();
+            pilot.picture()
+        };
+        let pictures = [picture(0)?, picture(1)?];
+        self.all_seconds += from.elapsed().as_secs_f64();
+        // The more samples, the better it is known.
+        if spp > self.spp {
+            self.round_seconds = seconds;
+            self.cost.sample = self.seconds_a_sample(spp, asked.pixels());
+        }
+        Ok(pictures)
+    }
+
+    /// A further round of two pictures of `spp` samples per pixel; what keeps them from it is [`failure`](Self::failure) from then on.
+    pub fn go_on(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
+        if let Err(error) = self.round(asked, spp) {
             self.failure = reason_of(error)?;
         }
         Ok(())
     }
 
-    /// A round of both pilots to `spp` samples per pixel; `pixels` are those of the picture itself.
-    fn round(&mut self, spp: u32, pixels: f64) -> Result<()> {
-        let from = Instant::now();
-        for pilot in &mut self.pilots {
-            pilot.set_spp(spp);
-            run(pilot)?;
-        }
-        self.round_seconds = from.elapsed().as_secs_f64();
-        self.all_seconds += self.round_seconds;
-        self.cost.sample = self.seconds_a_sample(spp - self.spp, pixels);
-        let pictures = self.pictures()?;
+    fn round(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
+        let round = ROUNDS.iter().take_while(|samples| **samples < spp).count() as u32;
+        let pictures = self.pair(asked, spp, 1 + round)?;
         for picture in &pictures {
             self.lit |= picture.main_layer()?.values().iter().any(|value| *value != 0.0);
         }
-        let truth = if self.law.shares_noise {
+        self.stages.push(Stage { spp, pictures });
+        self.spp = spp;
+        self.measure(None)
+    }
+
+    /// The last pair, of `spp` samples per pixel: from now on it alone says how large the error is. What keeps it from that is
+    /// [`failure`](Self::failure).
+    pub fn conclude(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
+        let concluded = self.pair(asked, spp, SEED_PAIRS - 1).and_then(|pictures| {
+            self.last_spp = spp;
+            self.measure(Some(&Stage { spp, pictures }))
+        });
+        if let Err(error) = concluded {
+            self.failure = reason_of(error)?;
+        }
+        Ok(())
+    }
+
+    /// The errors of all pairs, relative to what they show together.
+    fn measure(&mut self, last: Option<&Stage>) -> Result<()> {
+        let kind = if self.law.shares_noise {
             Truth::Pixel
         } else {
             Truth::Neighbourhood
         };
-        self.error.add(
-            spp,
-            noise_of_pair(&pictures[0], &pictures[1], RELATIVE_MSE_OFFSET, truth)?,
-        );
-        self.stages.push(Stage { spp, pictures });
-        self.spp = spp;
+        // First samples are there for the bias alone.
+        let stages: Vec<&Stage> = self.stages.iter().filter(|stage| stage.spp > 1).chain(last).collect();
+        let pairs: Vec<Pair<'_>> = stages
+            .iter()
+            .map(|stage| {
+                let [a, b] = &stage.pictures;
+                (stage.spp, [a, b])
+            })
+            .collect();
+        let found = noise_of_pairs(&pairs, RELATIVE_MSE_OFFSET, kind)?;
+        self.error.clear();
+        for (index, (stage, found)) in stages.iter().zip(&found).enumerate() {
+            if last.is_some() && index + 1 == stages.len() {
+                self.error.conclude(stage.spp, found.relative_mse, found.deviation);
+            } else {
+                self.error.add(stage.spp, found.relative_mse, found.deviation);
+            }
+        }
         Ok(())
     }
 
-    fn pictures(&mut self) -> Result<[Picture; 2]> {
-        let [a, b] = &mut self.pilots;
-        Ok([a.picture()?, b.picture()?])
+    /// Seconds for each sample per pixel of a picture of so many pixels, by a pair of so many samples.
+    fn seconds_a_sample(&self, spp: u32, pixels: f64) -> f64 {
+        let larger = pixels / self.pixels();
+        self.pilot_seconds_a_sample(spp) * (self.fixed + (1.0 - self.fixed) * larger)
     }
 
-    /// Seconds for each sample per pixel of a picture of so many pixels, by a round of so many samples.
-    fn seconds_a_sample(&self, samples: u32, pixels: f64) -> f64 {
-        let [width, height] = self.pilots[0].size();
-        let larger = pixels / (f64::from(width) * f64::from(height));
-        self.round_seconds / f64::from(2 * samples.max(1)) * (self.fixed + (1.0 - self.fixed) * larger)
+    /// Of one pilot, by a pair of so many samples.
+    fn pilot_seconds_a_sample(&self, spp: u32) -> f64 {
+        self.round_seconds / f64::from(2 * (spp - 1).max(1))
+    }
+
+    /// Pixels of a pilot.
+    fn pixels(&self) -> f64 {
+        f64::from(self.size[0]) * f64::from(self.size[1])
+    }
+
+    /// Seconds that a pair of so many samples per pixel takes.
+    pub fn pair_seconds(&self, spp: u32) -> f64 {
+        let each = self.pilot_seconds_a_sample(self.spp) * f64::from(spp.saturating_sub(1));
+        2.0 * (self.cost.start + each)
+    }
+
+    /// Most samples per pixel of a pair in so many seconds; 0 where not even the first ones fit.
+    pub fn pair_samples(&self, seconds: f64) -> u32 {
+        let left = seconds / 2.0 - self.cost.start;
+        if left < 0.0 {
+            return 0;
+        }
+        let each = self.pilot_seconds_a_sample(self.spp).max(1e-12);
+        (1.0 + left / each).min(f64::from(u32::MAX)) as u32
     }
 
     /// Samples per pixel for the goal, when the pilots have taken `spent` seconds.
@@ -285,8 +369,10 @@ impl<'a> Trial<'a> {
     }
 
     /// Writes what the pilots have found to the candidate.
-    pub fn predict(&self, candidate: &mut Candidate, goal: Goal, spent: f64) {
+    pub fn predict(&self, candidate: &mut Candidate, asked: &Asked<'_>, spent: f64) {
+        let (goal, asked_pixels) = (asked.goal, asked.pixels());
         candidate.pilot_spp = self.spp;
+        candidate.last_pilot_spp = self.last_spp;
         candidate.pilot_noise = self.relative_mse(self.spp).sqrt();
         candidate.slope = self.error.slope();
         candidate.seconds_a_sample = self.cost.sample;
@@ -301,6 +387,12 @@ impl<'a> Trial<'a> {
         candidate.bias = bias.map(|bias| bias.square(samples).sqrt());
         candidate.bias_at_most = bias.map(|bias| bias.upper(samples).sqrt());
         candidate.error = (noise + bias.map_or(0.0, |bias| bias.square(samples))).sqrt();
+        candidate.error_interval = bias.filter(|_| self.lit).map(|bias| {
+            let factor = self.error.factor(samples, asked_pixels / self.pixels());
+            let least = (candidate.noise / factor).hypot(bias.square(samples).sqrt());
+            let most = (candidate.noise * factor).hypot(bias.upper(samples).sqrt());
+            [least, most]
+        });
         candidate.seconds = self.cost.seconds(samples);
         if self.lit {
             let reaches = goal.error.is_none_or(|error| self.reach(error).is_some());

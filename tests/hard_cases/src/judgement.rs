@@ -1,6 +1,6 @@
 //! What was measured of a subject and how that compares with what is known.
 
-use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
+use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, Verdict, z_test};
 use clerestory::{Error, Result};
 
 use crate::Painted;
@@ -12,7 +12,7 @@ pub const FALSE_ALARM: f64 = 1e-6;
 pub(crate) const Z_MAX: f64 = 4.892;
 /// The same for a sum over pixels whose three channels may be one and the same: √3 times as much.
 const SUM_Z_MAX: f64 = 8.473;
-/// Share of a picture's values that its z-test may reject: 1 − [`ACCEPTED_FRACTION`](clerestory::film::z_test::ACCEPTED_FRACTION).
+/// Share of a picture's values that its z-test may reject where heavy tails explain it: 1 − [`ACCEPTED_FRACTION`](clerestory::film::z_test::ACCEPTED_FRACTION).
 const REJECTED_MAX: f64 = 1.0 - clerestory::film::z_test::ACCEPTED_FRACTION;
 
 /// One measured value with its bounds.
@@ -293,6 +293,11 @@ impl Judgement {
             format!("{what}: share of values that the z-test rejects"),
             1.0 - test.accepted_fraction,
             REJECTED_MAX,
+        );
+        self.at_most(
+            format!("{what}: pictures that the z-test finds different"),
+            f64::from(u8::from(test.verdict == Verdict::Different)),
+            0.0,
         );
         self.at_most(format!("{what}: z of all differences"), test.bias_z.abs(), SUM_Z_MAX);
         Ok(())

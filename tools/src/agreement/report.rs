@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use clerestory::film::z_test::ACCEPTED_FRACTION;
+use clerestory::film::z_test::Verdict;
 use clerestory::film::{ZTest, atomic};
 use clerestory::gpu::Caps;
 use clerestory::{Error, Result};
@@ -69,9 +69,23 @@ pub struct SceneAgreement {
 }
 
 impl SceneAgreement {
-    /// Whether enough single values were accepted.
+    /// What the z-tests say: that of values and that of blocks, of which the worse one counts.
+    fn tested(&self) -> Verdict {
+        let both = [self.values.verdict, self.blocks.verdict];
+        [Verdict::Different, Verdict::HeavyTails]
+            .into_iter()
+            .find(|verdict| both.contains(verdict))
+            .unwrap_or(Verdict::Same)
+    }
+
+    /// Whether neither values nor blocks differ, and every sample is finite. What heavy tails leave undecided is no difference, and no agreement either.
     pub fn passes(&self) -> bool {
-        self.values.passes() && self.non_finite == 0
+        self.tested() != Verdict::Different && self.non_finite == 0
+    }
+
+    /// Whether the z-tests show that both agree.
+    pub fn agrees(&self) -> bool {
+        self.tested() == Verdict::Same && self.non_finite == 0
     }
 
     /// Whether a finer look gives cause for another one: a block was rejected, which happens by chance in one picture of a hundred, or the whole picture's
@@ -82,10 +96,12 @@ impl SceneAgreement {
 
     /// In words.
     pub fn verdict(&self) -> &'static str {
-        match (self.passes(), self.is_suspicious()) {
-            (true, false) => "agrees",
-            (true, true) => "agrees, look again",
-            (false, _) => "**differs**",
+        match (self.passes(), self.agrees(), self.values.bias_z.abs() > BIAS_Z_MAX) {
+            (true, true, false) => "agrees",
+            (true, true, true) => "agrees, look again",
+            (true, false, false) => "undecided: heavy tails",
+            (true, false, true) => "undecided: heavy tails, look again",
+            (false, ..) => "**differs**",
         }
     }
 }
@@ -153,7 +169,22 @@ impl AgreementReport {
         report.map_or_else(Vec::new, |report| report.scenes)
     }
 
-    /// Whether every scene was compared and agrees.
+    /// How many scenes agree, of how many, and how many heavy tails leave undecided.
+    fn counted(&self) -> String {
+        let agreeing = self.scenes.iter().filter(|scene| scene.agrees()).count();
+        let undecided = self
+            .scenes
+            .iter()
+            .filter(|scene| scene.passes() && !scene.agrees())
+            .count();
+        let undecided = match undecided {
+            0 => String::new(),
+            count => format!(", and heavy tails leave {count} undecided"),
+        };
+        format!("{agreeing} of {} scenes agree{undecided}", self.scenes.len())
+    }
+
+    /// Whether every scene was compared and none differs.
     pub fn passes(&self) -> bool {
         self.uncompared.is_empty() && self.scenes.iter().all(SceneAgreement::passes)
     }
@@ -183,7 +214,6 @@ impl AgreementReport {
     /// Agreement and time to equal error, one row per scene, as a part of a page of results.
     pub fn to_results_block(&self) -> String {
         let (m, o) = (&self.machine, &self.options);
-        let agreeing = self.scenes.iter().filter(|scene| scene.passes()).count();
         let mut text = format!(
             "- Device: {}; driver: {}. Machine: {}, {} threads. Reference: {}.\n",
             m.device, m.driver, m.processor, m.threads, m.mitsuba
@@ -191,9 +221,9 @@ impl AgreementReport {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "- {agreeing} of {} scenes agree with Mitsuba in a z-test of every value: {1} × {1} pixels, {2} samples per pixel on both sides; bias is \
-             between these pictures.",
-            self.scenes.len(),
+            "- {} with Mitsuba in z-tests of every value and of blocks: {1} × {1} pixels, {2} samples per pixel on both sides; bias is between these \
+             pictures.",
+            self.counted(),
             o.size,
             o.passes * o.samples_per_pass
         );
@@ -242,8 +272,7 @@ impl AgreementReport {
     pub fn to_markdown(&self) -> String {
         let mut page = String::from("# Agreement with Mitsuba 3\n\n");
         let (m, o) = (&self.machine, &self.options);
-        let agreeing = self.scenes.iter().filter(|scene| scene.passes()).count();
-        let _ = writeln!(page, "{agreeing} of {} scenes agree.\n", self.scenes.len());
+        let _ = writeln!(page, "{}.\n", self.counted());
         for line in self.uncompared_lines() {
             let _ = writeln!(page, "- {line}");
         }
@@ -264,17 +293,15 @@ impl AgreementReport {
             let _ = writeln!(
                 page,
                 "- z-test of every value (pixel × channel), α = {} for the whole picture with Šidák's correction: a value is accepted with p ≥ {:.2e}. A picture \
-                 agrees when at least {} % of its values are accepted. The means of its blocks of 8 × 8 pixels are tested alike (p ≥ {:.2e}): they \
-                 show eight times smaller differences, and one picture in 100 has a rejected block by chance.",
-                first.values.alpha,
-                first.values.threshold,
-                ACCEPTED_FRACTION * 100.0,
-                first.blocks.threshold
+                 agrees when all of its values are, and the mean of z² is that of normal numbers; of pictures that are right, each fails once in 100. It \
+                 differs when more values are rejected than tails as heavy as its z² shows explain. In between heavy tails leave it undecided. The means \
+                 of its blocks of 8 × 8 pixels are tested alike (p ≥ {:.2e}): they show eight times smaller differences, and the worse verdict counts.",
+                first.values.alpha, first.values.threshold, first.blocks.threshold
             );
         }
         let _ = writeln!(
             page,
-            "- mean z² is 1 for pictures that differ by noise alone. Bias is that of the whole picture, with its z; values of one pixel are \
+            "- mean z² is 1 for pictures that differ by noise alone, and more where variances are under-estimated. Bias is that of the whole picture, with its z; values of one pixel are \
              not independent, so |z| up to about {BIAS_Z_MAX} is not evidence.\n\n## Agreement\n"
         );
         page.push_str(
@@ -452,9 +479,43 @@ pub(crate) mod tests {
         ] {
             assert_eq!(text.matches(contender).count(), 3, "{contender}");
         }
-        let thresholds = ["at least 99.75 % of its values", "|z| up to about 4.5 is"];
+        let thresholds = ["agrees when all of its values are", "|z| up to about 4.5 is"];
         assert!(thresholds.iter().all(|one| text.contains(one)), "{text}");
         assert!(text.contains("| 2.000 (4.000) | 3.800 (7.600) |"), "{text}");
+    }
+
+    #[test]
+    fn heavy_tails_agree_with_nothing_and_ten_wrong_pixels_differ() {
+        let values = 3 * 4096;
+        // Evenly spread between ±1.7, with the variance of normal numbers.
+        let even: Vec<f32> = (0..values).map(|i| ((i % 64) as f32 - 31.5) / 18.5).collect();
+        let (one, zero) = (vec![1.0; values], vec![0.0; values]);
+        let of = |z: &[f32]| z_test(z, &one, &zero, &zero, 0.01).unwrap();
+        let with = |count: usize, value: f32| {
+            let mut z = even.clone();
+            z[..count].fill(value);
+            z
+        };
+        let mut report = made_up();
+        let verdict = |report: &mut AgreementReport, values: ZTest| {
+            report.scenes[0].values = values;
+            (report.scenes[0].verdict(), report.passes())
+        };
+        assert_eq!(verdict(&mut report, of(&even)), ("agrees", true));
+        assert_eq!(verdict(&mut report, of(&with(30, -6.0))), ("**differs**", false));
+        // Three values of one pixel, as far off as chance rejects one in a hundred pictures.
+        assert_eq!(
+            verdict(&mut report, of(&with(3, -5.18))),
+            ("undecided: heavy tails", true)
+        );
+        let text = report.to_markdown();
+        assert!(
+            text.contains("1 of 2 scenes agree, and heavy tails leave 1 undecided."),
+            "{text}"
+        );
+        // The blocks alone.
+        report.scenes[0].blocks = of(&with(300, 9.0));
+        assert_eq!(verdict(&mut report, of(&even)), ("**differs**", false));
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //!
 //! [`film::metrics`]: clerestory::film::metrics
 
-use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
+use clerestory::film::metrics::{RELATIVE_MSE_OFFSET, relative_mse_epsilon, relative_square};
 
 /// The relative MSE of one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,14 +28,14 @@ pub(super) fn measure(pictures: &[Vec<f32>], reference: &[f32]) -> Option<Spread
         return None;
     }
     let count = pictures.len() as f64;
+    let epsilon = relative_mse_epsilon(reference.iter().copied(), RELATIVE_MSE_OFFSET);
     // Σ weight · (picture − mean)², one for each picture.
     let mut deviations = vec![0.0; pictures.len()];
     for (i, reference) in reference.iter().enumerate() {
         let values = || pictures.iter().map(|one| f64::from(one[i]));
         let mean = values().sum::<f64>() / count;
-        let weight = 1.0 / (f64::from(*reference).powi(2) + RELATIVE_MSE_OFFSET);
         for (sum, value) in deviations.iter_mut().zip(values()) {
-            *sum += weight * (value - mean).powi(2);
+            *sum += relative_square((value - mean).powi(2), f64::from(*reference), epsilon);
         }
     }
     deviations.iter_mut().for_each(|sum| *sum /= reference.len() as f64);
@@ -62,9 +62,10 @@ mod tests {
         // Variances 1 and 0 over references 1 and 0.
         let pictures = [vec![1.0, 5.0], vec![2.0, 5.0], vec![3.0, 5.0]];
         let spread = measure(&pictures, &[1.0, 0.0]).unwrap();
-        assert!((spread.relative_mse - 0.5 / 1.01).abs() < 1e-15, "{spread:?}");
+        // The reference's mean is ½.
+        assert!((spread.relative_mse - 0.5 / 1.0025).abs() < 1e-14, "{spread:?}");
         // Left out in turn: variances ½, 2, ½, their mean 1: (2/3) · 1.5 = 1.
-        assert!((spread.standard_error - 0.5 / 1.01).abs() < 1e-15, "{spread:?}");
+        assert!((spread.standard_error - 0.5 / 1.0025).abs() < 1e-14, "{spread:?}");
         assert_eq!(measure(&pictures[..2], &[1.0, 0.0]), None);
         assert_eq!(measure(&pictures, &[1.0]), None);
         assert_eq!(measure(&[vec![], vec![], vec![]], &[]), None);
@@ -76,9 +77,10 @@ mod tests {
         const ESTIMATES: usize = 2000;
         let mut random = Random(7);
         let reference: Vec<f32> = (0..32u8).map(|i| 1.0 + f32::from(i) / 32.0).collect();
+        let mean = reference.iter().map(|b| f64::from(*b)).sum::<f64>() / 32.0;
         let weights = reference
             .iter()
-            .map(|b| 1.0 / (f64::from(*b).powi(2) + RELATIVE_MSE_OFFSET));
+            .map(|b| 1.0 / (f64::from(*b).powi(2) + RELATIVE_MSE_OFFSET * mean * mean));
         let expected = weights.sum::<f64>() / 32.0 / 12.0;
         let estimates: Vec<Spread> = (0..ESTIMATES)
             .map(|_| {

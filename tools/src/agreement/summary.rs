@@ -19,7 +19,7 @@ impl AgreementReport {
         format!(
             "Time to equal error: every renderer takes turns with each of its samplers ({}), {} independent pictures each of {2} × {2} pixels × \
              {3} samples. Relative MSE is that of one such picture, by the variance between them over the squares of one converged picture + \
-             {RELATIVE_MSE_OFFSET}; paths per second are of wall clock, medians. A contender's seconds to an error are its seconds per picture × its \
+             {RELATIVE_MSE_OFFSET} of its squared mean; paths per second are of wall clock, medians. A contender's seconds to an error are its seconds per picture × its \
              relative MSE / that error, and the error to reach is that of our best picture. This takes the MSE to fall as 1/samples around \
              these pictures; where a stratified sampler's falls faster, it favours this engine if Mitsuba's picture has the larger error, and \
              Mitsuba if it has the smaller one. Compared are the samplers and variants of either side that are there first. Ratios are \

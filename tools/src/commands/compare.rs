@@ -20,9 +20,10 @@ Examples:
   clerestory compare picture.exr reference.exr --diff difference.png
   clerestory compare a.exr b.exr --threshold rmse=1e-3,flip=0.05     exit code 4 if either is exceeded
 
-Metrics are of linear radiance, FLIP of tone-mapped pictures. A metric that is not a number exceeds every threshold; so do pixels \
+Metrics are of linear radiance, FLIP of tone-mapped pictures. The relative MSE is the mean of (a - b)² / (b² + ε), where ε is a \
+hundredth of the square of the reference's mean: the same in every unit of radiance. A metric that is not a number exceeds every threshold; so do pixels \
 that are not finite, unless non_finite=COUNT allows them. Where both pictures have variance (render with --aov variance,samples) and \
-more than one sample per pixel, a z-test says whether they differ by more than noise.")]
+more than one sample per pixel, a z-test says whether they agree, differ by more than noise, or cannot be told apart from heavy tails.")]
 pub struct Arguments {
     /// The picture: EXR, Radiance HDR or PNG (taken as sRGB)
     picture: PathBuf,

@@ -75,7 +75,7 @@ pub struct Arguments {
     /// Camera by name; by default the scene's first
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
-    /// Chooses technique, settings and samples for this error: the root of the relative MSE, 0.02 is 2 %
+    /// Chooses technique, settings and samples for this error: the root of the relative MSE as `compare` has it, 0.02 is 2 %
     ///
     /// Small pilot pictures measure the noise and bias of every technique. One whose bias exceeds the error is refused with that figure, and so is the
     /// path tracer where it misses light that others find (light of sources without area by way of mirrors and smooth glass). --explain shows

@@ -3,7 +3,7 @@
 //! For a picture a and a reference b of the same expectation, drawn independently, E(a − b)² = var a + var b: subtracting an unbiased
 //! estimate of var b (the reference's variance layer) leaves an unbiased estimate of the picture's own MSE, so that errors fall as
 //! samples^(−½) however many there are. A single estimate may come out below 0 where it is far below the reference's noise.
-//! For the relative MSE the same weights 1 / (b² + ε) are applied to both terms.
+//! For the relative MSE the same weights 1 / (b² + ε) are applied to both terms, with the ε of [`clerestory::film::metrics`].
 //! What stays is the same for all pictures against one reference: its realised squared error is not its variance. By the central limit
 //! theorem its values are nearly normal, so that (b − E b)² has the variance 2 (var b)²; channels of a pixel count as fully correlated, which
 //! bounds the standard error of the mean from above.
@@ -11,7 +11,7 @@
 //! pixels a picture looks better than it is: every sweep is judged by that count first ([`super::sweep_criteria`]).
 
 use clerestory::film::Picture;
-use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
+use clerestory::film::metrics::{RELATIVE_MSE_OFFSET, relative_mse_epsilon, relative_square};
 use clerestory::film::picture::VARIANCE;
 use clerestory::{Error, Result};
 
@@ -63,6 +63,7 @@ pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
     let mut terms: [Vec<f64>; 4] = Default::default();
     let mut pixel_squares: [Vec<f64>; 2] = Default::default();
     let mut skipped = 0;
+    let epsilon = relative_mse_epsilon(b.values().iter().copied(), RELATIVE_MSE_OFFSET);
     for ((a, b), variance) in a.pixels().zip(b.pixels()).zip(variance.pixels()) {
         if a.iter().chain(&b).chain(&variance).any(|value| !value.is_finite()) {
             skipped += 1;
@@ -71,18 +72,18 @@ pub fn measure(test: &Picture, reference: &Picture) -> Result<UnbiasedError> {
         let mut of_pixel = [0.0; 2];
         for channel in 0..3 {
             let [a, b, variance] = [a, b, variance].map(|pixel| f64::from(pixel[channel]));
-            let (error, weight) = ((a - b) * (a - b), 1.0 / (b * b + RELATIVE_MSE_OFFSET));
+            let error = (a - b) * (a - b);
             let of = [
                 error - variance,
-                (error - variance) * weight,
+                relative_square(error - variance, b, epsilon),
                 variance,
-                variance * weight,
+                relative_square(variance, b, epsilon),
             ];
             for (terms, term) in terms.iter_mut().zip(of) {
                 terms.push(term);
             }
             of_pixel[0] += variance;
-            of_pixel[1] += variance * weight;
+            of_pixel[1] += of[3];
         }
         for (squares, variance) in pixel_squares.iter_mut().zip(of_pixel) {
             squares.push(2.0 * variance * variance);
@@ -146,11 +147,12 @@ mod tests {
         // Errors² 0, 1, 4; the second pixel is not finite.
         assert_eq!(error.mse, (5.0 - 1.0) / 3.0);
         assert_eq!(error.reference_mse, 1.0 / 3.0);
-        assert!((error.relative_mse - 4.0 / 1.01 / 3.0).abs() < 1e-15);
-        assert!((error.reference_relative_mse - 1.0 / 1.01 / 3.0).abs() < 1e-15);
+        // The reference's mean is ½, that of all of its finite pixels.
+        assert!((error.relative_mse - 4.0 / 1.0025 / 3.0).abs() < 1e-14);
+        assert!((error.reference_relative_mse - 1.0 / 1.0025 / 3.0).abs() < 1e-14);
         let by_reference = 2.0f64.sqrt() / 3.0;
         assert!((error.reference_error - by_reference).abs() < 1e-15);
-        assert!((error.reference_relative_error - by_reference / 1.01).abs() < 1e-15);
+        assert!((error.reference_relative_error - by_reference / 1.0025).abs() < 1e-14);
         assert_eq!(error.skipped, 1);
     }
 

@@ -1,7 +1,7 @@
 //! What an automatic choice says: prediction, candidates, and what came of it beside the prediction.
 
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
-use clerestory::plan::{Plan, relative_mse_by_variance};
+use clerestory::plan::{Candidate, Plan, relative_mse_by_variance};
 use clerestory::render::{RenderOptions, Rendered};
 
 use super::files::ErrorAgainst;
@@ -47,13 +47,22 @@ impl<'a> ChoiceReport<'a> {
             None => self.unmeasured.clone(),
         };
         format!(
-            "predicted: error {:.4}, {:.2} s; outcome: error {error}, {:.2} s, of which pilots {:.2} s",
+            "predicted: error {:.4}{}, {:.2} s; outcome: error {error}, {:.2} s, of which pilots {:.2} s ({:.0} %)",
             choice.error,
+            interval(choice),
             choice.seconds + self.plan.pilot_seconds,
             self.seconds,
-            self.plan.pilot_seconds
+            self.plan.pilot_seconds,
+            100.0 * self.plan.pilot_seconds / self.seconds
         )
     }
+}
+
+/// What the error lies between, in brackets.
+fn interval(choice: &Candidate) -> String {
+    choice.error_interval.map_or_else(String::new, |[low, high]| {
+        format!(" ({low:.4} to {high:.4} in 9 of 10 cases)")
+    })
 }
 
 /// Says what is going to be rendered, and returns its options.
@@ -70,8 +79,15 @@ pub fn announce(plan: &Plan, options: &RenderOptions, explain: bool) -> Outcome<
         _ => String::new(),
     };
     output::note(&format!(
-        "chosen: {}, {}, {} samples per pixel; predicted: error {:.4}{parts}, {:.2} s after {:.2} s of pilots",
-        choice.technique, choice.variant, choice.spp, choice.error, choice.seconds, plan.pilot_seconds
+        "chosen: {}, {}, {} samples per pixel; predicted: error {:.4}{}{parts}, {:.2} s after {:.2} s of pilots ({:.0} % of the time)",
+        choice.technique,
+        choice.variant,
+        choice.spp,
+        choice.error,
+        interval(choice),
+        choice.seconds,
+        plan.pilot_seconds,
+        100.0 * plan.pilot_share
     ));
     if !choice.judged_by.is_empty() {
         output::note(&format!("bias judged by {}", choice.judged_by));
@@ -117,7 +133,10 @@ fn candidates(plan: &Plan) -> String {
         table.row([
             candidate.technique.to_owned(),
             candidate.variant.to_owned(),
-            cell(candidate.pilot_spp.to_string()),
+            cell(match candidate.last_pilot_spp {
+                0 => candidate.pilot_spp.to_string(),
+                last => format!("{} + {last}", candidate.pilot_spp),
+            }),
             cell(format!("{:.4}", candidate.pilot_noise)),
             cell(format!("{:.2}", -candidate.slope / 2.0)),
             cell(format!("{:.4}", candidate.seconds_a_sample)),
@@ -131,7 +150,7 @@ fn candidates(plan: &Plan) -> String {
         ]);
     }
     let share = format!(
-        "pilots: {:.2} s, {:.0} % of all that is predicted; rounds after the first are kept to {:.0} %\n",
+        "pilots: {:.2} s, {:.0} % of all that is predicted; above 5 s those after the first rounds are kept to {:.0} %\n",
         plan.pilot_seconds,
         100.0 * plan.pilot_share,
         100.0 * plan.pilot_share_limit
