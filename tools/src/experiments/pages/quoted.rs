@@ -19,7 +19,7 @@ const END: &str = "<!-- end of results -->";
 /// A page with all of its blocks filled; `link` is the way from it to the results.
 ///
 /// # Errors
-/// [`Error::Setting`] where a block has no end or names no experiment; as [`list::line`].
+/// [`Error::Setting`] where a block has no end or names no experiment; as [`findings`](super::findings).
 pub fn fill(root: &Path, text: &str, link: &str) -> Result<String> {
     let mut filled = String::new();
     let mut rest = text;
