@@ -37,16 +37,16 @@ fn options() -> RenderOptions {
 #[test]
 fn predictions_come_true() {
     with_gpu(|gpu| {
-        // The furnace needs no reference: its body, which absorbs nothing, vanishes.
-        let vanished = Picture::from_radiance(48, 48, vec![1.0; 48 * 48 * 3]).unwrap();
-        for (address, truth) in [
-            ("builtin:cornell-box", None),
-            ("builtin:furnace-medium", Some(vanished)),
+        // The furnace needs no reference: its body, which absorbs nothing, vanishes. Nor is there anything bright beside its pixels.
+        let vanished = Picture::from_radiance(16, 16, vec![1.0; 16 * 16 * 3]).unwrap();
+        for (address, size, truth) in [
+            ("builtin:cornell-box", [48, 48], None),
+            ("builtin:furnace-medium", [16, 16], Some(vanished)),
         ] {
             let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
             let picture = |spp, seed| {
                 let options = RenderOptions {
-                    size: [48, 48],
+                    size,
                     spp,
                     seed,
                     settings: serde_json::json!({ "sampler": "pcg" }).into(),
@@ -62,8 +62,8 @@ fn predictions_come_true() {
                 model.add(spp, found, 0.05 * found);
             }
             let predicted = model.relative_mse(64.0).sqrt();
-            // Sixteen times the samples: the reference's own error adds 3 % to what is found.
-            let reference = truth.unwrap_or_else(|| picture(16 * 64, 3));
+            // Twelve times the samples: the reference's own error adds 4 % to what is found.
+            let reference = truth.unwrap_or_else(|| picture(12 * 64, 3));
             let last = picture(64, 4);
             let error = compare(&last, &reference, &CompareOptions::default()).unwrap();
             let error = error.relative_mse.sqrt();
