@@ -96,7 +96,7 @@ scene soup 'builtin:triangle-soup?n=300' 0 1 \
     cat <<END_OF_HEAD
 # Gallery: every technique on the same scenes
 
-Written by \`docs/gallery.sh\`, which renders everything anew. Every picture of $size × $size pixels had $time, after one that compiled the
+Written by \`docs/gallery.sh\`, which renders everything anew. Every picture of $size × $size pixels had $(printf '%s' "$time" | sed 's/s$/ s/'), after one that compiled the
 kernels, on $(words device "$work/lamp-path.json"), driver $(words driver "$work/lamp-path.json").
 
 - *difference*: signed, from the path tracer's picture of the same light paths: red too bright, blue too dark, white equal. *full colour* is the
