@@ -409,7 +409,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-DE-3",
         name: "nearest neighbours: one kernel about each point, up to its k-th photon",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Wrong where light changes within the width of the nearest photons, as at edges and contacts. Where photons lie too densely for a query's steps, the area searched is halved, and neighbours may be fewer than asked for.",
+        limits: "Wrong where light changes within the width of the nearest photons, as at edges and contacts; fewer neighbours than asked for where photons lie too densely for a query's steps.",
         sources: &[sources::JENSEN_2001.at("§7"), sources::FABIANOWSKI_2011.at("§3.4.2.1")],
         shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
         tests: &[

@@ -304,7 +304,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-DE-6",
         name: "dampening, clamp and discard of kernels",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Discarding loses the light of footprints that are too flat; widening them blurs instead. No kernel is flatter than 1/1024, whatever `flatness` is set to.",
+        limits: "Discarding loses the light of footprints that are too flat and widening blurs it; no kernel is flatter than 1/1024.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.2.2")],
         shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
         tests: &[

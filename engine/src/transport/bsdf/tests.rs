@@ -324,8 +324,8 @@ fn rough_metals_reflect_as_walks_among_their_microfacets() {
             ..WHITE
         });
         for cos_o in [1.0, 0.6] {
-            let [walked, error] = walked_albedo(cos_o, b.alpha, f0, 1 << 15);
-            let (found, noise) = albedo(&c, &b, direction(cos_o, 0.0), LOBE_ALL, 1 << 14);
+            let [walked, error] = walked_albedo(cos_o, b.alpha, f0, 1 << 17);
+            let (found, noise) = albedo(&c, &b, direction(cos_o, 0.0), LOBE_ALL, 1 << 16);
             let place = format!("roughness {roughness}, cos {cos_o}: {found}, walks {walked} ± {error}");
             println!("{place}");
             let bound = 5.0 * error + 4.0 * noise + WIDE_BOUND;

@@ -343,7 +343,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PD-7",
         name: "differentials of Russian roulette, and of the choice among specular lobes",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Right for many photons and not for each; the next diffuse reflection keeps only the area of the footprint, and derives new directions from its density. Not counted: the probability of a rough lobe in the area that a footprint keeps there, of labels of lobes with `final_gather`, and of being stopped by blended surfaces or not.",
+        limits: "Right for many photons and not for each: the next diffuse reflection keeps the area of the footprint alone, without the probabilities of rough lobes, labels and blended surfaces.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.1.4")],
         shaders: &["shaders/transport/differentials.glsl"],
         tests: &[
