@@ -4,7 +4,7 @@ use clerestory::Result;
 use clerestory::accel::RayIndex;
 use clerestory::accel::kd::{Heuristic, KdSettings, KdTree};
 
-use super::flights::{Case, TURNS, changes};
+use super::flights::{Case, TURNS};
 use super::published::{Changes, TREES, Trees, of_source};
 use crate::experiments::findings::{Bound, Criterion, Repeats, change, rows};
 use crate::experiments::measures::Context;
@@ -107,7 +107,7 @@ impl Grown {
             form: form.words.into(),
             heuristic: one.heuristic.name().into(),
             build: one.build.clone(),
-            build_change: changes(&one.build, &first.build),
+            build_change: one.build.change_from(&first.build),
             nodes: inner_nodes(&one.tree),
             nodes_change: change(inner_nodes(&one.tree) as f64, inner_nodes(&first.tree) as f64),
             references: one.tree.references().len() as u64,
