@@ -472,7 +472,7 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, f
         }
     }
     if let Some(choice) = &document.choice {
-        output::note(&choice.text());
+        output::note(&choice.text(document.report, picture));
     }
     let report = document.report;
     let said = matches!(arguments.stats, Statistics::Summary | Statistics::Table);

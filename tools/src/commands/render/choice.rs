@@ -1,8 +1,9 @@
 //! What an automatic choice says: prediction, candidates, and what came of it beside the prediction.
 
+use clerestory::film::Picture;
 use clerestory::film::metrics::RELATIVE_MSE_OFFSET;
 use clerestory::plan::{Candidate, Plan, relative_mse_by_variance};
-use clerestory::render::{RenderOptions, Rendered};
+use clerestory::render::{FrameReport, RenderOptions, Rendered};
 
 use super::files::ErrorAgainst;
 use super::summary;
@@ -20,9 +21,6 @@ pub struct ChoiceReport<'a> {
     /// Root of the relative MSE by noise alone that the picture's own spread stands for. Stratified samples have less, those that share a map of photons
     /// more; a bias does not show in it.
     noise_by_variance: f64,
-    /// The error in words, where there is no reference.
-    #[serde(skip)]
-    unmeasured: String,
     /// Root of the relative MSE against the reference, when there is one.
     error_against_reference: Option<f64>,
 }
@@ -34,17 +32,16 @@ impl<'a> ChoiceReport<'a> {
             plan,
             seconds: plan.pilot_seconds + rendered.report.render_seconds,
             noise_by_variance: relative_mse_by_variance(&rendered.picture, RELATIVE_MSE_OFFSET)?.sqrt(),
-            unmeasured: summary::error(None, &rendered.report, &rendered.picture),
             error_against_reference: error.map(|error| error.metrics.relative_mse.sqrt()),
         })
     }
 
-    /// One line.
-    pub fn text(&self) -> String {
+    /// One line, with what the picture says of its error where there is no reference.
+    pub fn text(&self, report: &FrameReport, picture: &Picture) -> String {
         let choice = self.plan.choice();
         let error = match self.error_against_reference {
             Some(error) => format!("{error:.4} against the reference"),
-            None => self.unmeasured.clone(),
+            None => summary::error(None, report, picture),
         };
         format!(
             "predicted: error {:.4}{}, {:.2} s; outcome: error {error}, {:.2} s, of which pilots {:.2} s ({:.0} %)",

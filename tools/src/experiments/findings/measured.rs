@@ -112,14 +112,22 @@ impl Repeats {
         Self(self.0.iter().zip(&other.0).map(|(a, b)| a / b).collect())
     }
 
+    /// What these change in others' values turn by turn, in %; of times the other way round, it is the change of speed.
+    #[must_use]
+    pub fn change_from(&self, first: &Self) -> Self {
+        self.0
+            .iter()
+            .zip(&first.0)
+            .map(|(value, first)| change(*value, *first))
+            .collect()
+    }
+
     /// All values times a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self(self.0.iter().map(|value| value * factor).collect())
     }
-}
 
-impl Repeats {
     /// Values of each part of a turn, from arrays of a turn.
     pub fn by_part<const N: usize>(turns: &[[f64; N]]) -> [Self; N] {
         std::array::from_fn(|part| turns.iter().map(|turn| turn[part]).collect())
@@ -215,6 +223,7 @@ mod tests {
     fn ratios_are_of_the_same_turn() {
         let (a, b) = (Repeats(vec![2.0, 8.0]), Repeats(vec![1.0, 2.0]));
         assert_eq!(a.over(&b).0, [2.0, 4.0]);
+        assert_eq!(a.change_from(&b).0, [100.0, 300.0]);
         assert_eq!(a.scaled(0.5).0, [1.0, 4.0]);
     }
 

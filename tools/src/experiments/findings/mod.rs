@@ -19,6 +19,7 @@ pub use sheet::{Column, Sheet};
 use clerestory::{Error, Result};
 
 use super::measures::Context;
+use super::measures::errors::greatest;
 use super::plot::Curve;
 use super::table::Table;
 
@@ -233,7 +234,7 @@ pub fn total<R>(rows: &[R], among: fn(&R) -> bool, of: fn(&R) -> u64) -> Option<
 
 /// The worst of some rows' numbers; `None` of no rows.
 pub fn largest<R>(rows: &[R], among: fn(&R) -> bool, of: fn(&R) -> f64) -> Option<Measured> {
-    let values = rows.iter().filter(|row| among(row)).map(of);
-    let worse = |a: f64, b: f64| if a.is_nan() || a > b { a } else { b };
-    values.reduce(worse).map(Measured::exact)
+    let mut values = rows.iter().filter(|row| among(row)).map(of).peekable();
+    values.peek()?;
+    Some(greatest(values).into())
 }

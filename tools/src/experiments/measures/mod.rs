@@ -4,7 +4,7 @@
 mod clock;
 mod context;
 mod device;
-mod errors;
+pub(super) mod errors;
 mod kd;
 mod maps;
 mod media;
@@ -21,6 +21,11 @@ use clerestory::{Error, Result};
 
 pub use self::context::Context;
 use super::findings::{self, Findings, Study};
+
+/// What criteria need: hits to the bit of the host's.
+const EXACT_DIVISION: &str = "a device with exact division, such as the software driver";
+/// What criteria need: times that are not those of the host's threads.
+const MEMORY_OF_ITS_OWN: &str = "a GPU with memory of its own";
 
 /// A measure by name.
 pub struct Measure {

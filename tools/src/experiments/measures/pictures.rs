@@ -61,6 +61,16 @@ impl Image {
         (of(&self.radiance) / pixels, of(&self.variance).sqrt() / pixels)
     }
 
+    /// Samples of all pixels together.
+    pub fn samples(&self) -> u64 {
+        self.report.size.map(u64::from).iter().product::<u64>() * u64::from(self.report.spp)
+    }
+
+    /// GPU time of a sample, ns.
+    pub fn nanoseconds_per_sample(&self) -> f64 {
+        self.report.gpu_seconds * 1e9 / self.samples() as f64
+    }
+
     /// This picture plus another one.
     pub fn add(&mut self, other: &Self) {
         let pairs = |a: &mut [f32], b: &[f32]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);

@@ -3,6 +3,7 @@
 use super::kd_caches::Row;
 use super::published::Caches;
 use crate::experiments::findings::{Bound, Criterion, Measured, rows};
+use crate::experiments::measures::MEMORY_OF_ITS_OWN;
 
 rows! {
     /// The caches of a scene, put in order.
@@ -28,7 +29,7 @@ pub const OF_ORDERS: &[Criterion<Order>] = &[
         |order: &Order| order.speed,
     )
     .among(|order| order.on_hardware)
-    .needs("a GPU with memory of its own")
+    .needs(MEMORY_OF_ITS_OWN)
     .because("as by bytes"),
 ];
 

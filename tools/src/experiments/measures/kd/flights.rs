@@ -18,7 +18,7 @@ use clerestory::scene::Camera;
 use clerestory::{Error, Result, scene};
 use glam::{DAffine3, DQuat, Vec3};
 
-use crate::experiments::findings::{Repeats, change};
+use crate::experiments::findings::Repeats;
 use crate::experiments::measures::Context;
 use crate::experiments::measures::photon_maps::photon_scenes::Surfaces;
 use crate::geometry;
@@ -300,13 +300,6 @@ pub fn different_of_both(hits: &[Vec<Hit>; 2], expected: &[Vec<Hit>; 2]) -> u64 
     let pairs = hits.iter().zip(expected);
     pairs.map(|(hits, expected)| different(hits, expected)).sum()
 }
-
-/// What rates change in the first's, in per cent, turn by turn.
-pub fn changes(rates: &Repeats, first: &Repeats) -> Repeats {
-    let ratios = rates.over(first).0;
-    ratios.into_iter().map(|ratio| change(ratio, 1.0)).collect()
-}
-
 /// Turns of a race.
 pub const TURNS: usize = 5;
 

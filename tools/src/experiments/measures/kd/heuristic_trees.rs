@@ -4,7 +4,7 @@ use clerestory::Result;
 use clerestory::accel::RayIndex;
 use clerestory::accel::kd::{Heuristic, KdSettings, KdTree};
 
-use super::flights::{Case, TURNS, changes};
+use super::flights::{Case, TURNS};
 use super::published::{Changes, TREES, Trees, of_source};
 use crate::experiments::findings::{Bound, Criterion, Repeats, change, rows};
 use crate::experiments::measures::Context;
@@ -114,7 +114,7 @@ impl Grown {
             form: form.words.into(),
             heuristic: one.heuristic.name().into(),
             build: one.build.clone(),
-            build_change: changes(&one.build, &first.build),
+            build_change: one.build.change_from(&first.build),
             nodes: statistics.nodes,
             nodes_change: change(statistics.nodes as f64, first.tree.statistics().nodes as f64),
             references: one.tree.references().len() as u64,

@@ -11,14 +11,13 @@ use clerestory::gpu::Gpu;
 
 use super::cache_ranking::{OF_ORDERS, orders};
 use super::flights::{
-    Case, Flight, SOURCE_LEAVES, TURNS, cases, changes, different_of_both, each_flight, on_hardware, race, source_tree,
-    trace,
+    Case, Flight, SOURCE_LEAVES, TURNS, cases, different_of_both, each_flight, on_hardware, race, source_tree, trace,
 };
 use super::published::{CACHES, Caches, of_source};
 use crate::experiments::findings::{
     Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows,
 };
-use crate::experiments::measures::Context;
+use crate::experiments::measures::{Context, EXACT_DIVISION, MEMORY_OF_ITS_OWN};
 
 /// The forms of [`KdCaches::COMPARED`].
 pub(super) const NAMES: [&str; 7] = [
@@ -79,7 +78,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.timed_different.into(),
     )
     .among(|row| !row.on_hardware)
-    .needs("a device with exact division, such as the software driver")
+    .needs(EXACT_DIVISION)
     .in_every_form(),
     Criterion::each(
         "changes of nodes, entries and bytes with another sign than the source's",
@@ -93,7 +92,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         Row::speed_to_its_side,
     )
     .among(|row| row.is_compared() && row.on_hardware)
-    .needs("a GPU with memory of its own"),
+    .needs(MEMORY_OF_ITS_OWN),
 ];
 
 impl Row {
@@ -223,7 +222,7 @@ fn forms(
             bytes_change: change(bytes, without[2]),
             all_nodes: flight.per_ray(work.nodes),
             rate: timed.rates[2].clone(),
-            speed: changes(&timed.rates[2], &raced[0].rates[2]),
+            speed: timed.rates[2].change_from(&raced[0].rates[2]),
             on_hardware: on_hardware(gpu),
         }
     });

@@ -8,7 +8,7 @@ use clerestory::accel::kd::{Heuristic, KdCaches, KdCounters, KdTree, Scheme};
 use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::{Ray, RayIndex};
 
-use super::flights::{Flight, TURNS, cases, changes, each_flight, fly, outside, race, trace};
+use super::flights::{Flight, TURNS, cases, each_flight, fly, outside, race, trace};
 use super::heuristic_trees::{FORMS, Grown, NEAREST, OF_TREES, grow, published, published_changes};
 use super::published::{Changes, Trees};
 use crate::experiments::findings::{
@@ -116,7 +116,7 @@ impl Study for Found {
                         tests_change: change(work.triangles as f64, works[0].triangles as f64),
                         leaves: flight.per_ray(work.leaves),
                         rate: timed.rates[2].clone(),
-                        speed: changes(&timed.rates[2], &raced[0].rates[2]),
+                        speed: timed.rates[2].change_from(&raced[0].rates[2]),
                     });
                     trees.push(Grown::of(case, form, one, &grown[0]));
                 }

@@ -10,15 +10,14 @@ use clerestory::accel::trace::TraceSettings;
 use clerestory::gpu::Gpu;
 
 use super::flights::{
-    Case, Flight, SOURCE_LEAVES, TURNS, cases, changes, different_of_both, each_flight, on_hardware, race, source_tree,
-    trace,
+    Case, Flight, SOURCE_LEAVES, TURNS, cases, different_of_both, each_flight, on_hardware, race, source_tree, trace,
 };
 use super::published::{WAYS, Ways, of_source};
 use super::restarts::{Restart, restarts};
 use crate::experiments::findings::{
     Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows,
 };
-use crate::experiments::measures::Context;
+use crate::experiments::measures::{Context, EXACT_DIVISION};
 
 /// Entries of the source's short stack.
 const SHORT_STACK: u32 = 4;
@@ -74,7 +73,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.timed_different.into(),
     )
     .among(|row| !row.on_hardware)
-    .needs("a device with exact division, such as the software driver")
+    .needs(EXACT_DIVISION)
     .in_every_form(),
     Criterion::all(
         "share of the trees in which visits fall from flags over push-down and the short stack to both",
@@ -228,7 +227,7 @@ fn schemes(
         bytes: flight.per_ray(work.bytes()),
         closest: timed.rates[0].clone(),
         any: timed.rates[1].clone(),
-        speed: changes(&timed.rates[2], &raced[0].rates[2]),
+        speed: timed.rates[2].change_from(&raced[0].rates[2]),
         on_hardware: on_hardware(gpu),
     });
     Ok(rows.collect())

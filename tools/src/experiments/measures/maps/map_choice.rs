@@ -11,7 +11,7 @@ use super::choice_plot::{self, Bars, Panel, Subject};
 use super::environment_look_ups::{Errors, MAPS, TURNS, errors, name, size, texels};
 use super::environments::{self, Environment, LIGHTS};
 use super::needs::need;
-use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::greatest;
 use crate::random::Random;
@@ -101,8 +101,9 @@ const CRITERIA: &[Criterion<Verdict>] = &[
     .because("a map within a tenth of the least at each of them, by all turns together and by each"),
 ];
 
-fn geometric_mean(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
+/// The geometric mean of needs; not a number of none.
+fn mean_need(needs: &[f64]) -> f64 {
+    geometric_mean(needs.iter().map(|need| (*need).into())).map_or(f64::NAN, |mean| mean.value)
 }
 
 /// A number of all turns, least … greatest of each; not a number where one of these is none.
@@ -155,8 +156,8 @@ fn needs(look_ups: &[LookUps]) -> Vec<Needed> {
                     turns.iter().map(|needs| needs[at]).collect(),
                 ));
             }
-            let means = turns.iter().map(|needs| geometric_mean(needs));
-            all.push(needed(TOGETHER, geometric_mean(&together), means.collect()));
+            let means = turns.iter().map(|needs| mean_need(needs));
+            all.push(needed(TOGETHER, mean_need(&together), means.collect()));
         }
     }
     all

@@ -83,7 +83,6 @@ impl Study for Found {
                 "all",
             )?;
             let (mean, deviation) = image.mean(0);
-            let samples = u64::from(size * size) * u64::from(spp);
             Ok(vec![Row {
                 index,
                 thickness: (*thickness).into(),
@@ -93,8 +92,8 @@ impl Study for Found {
                 error: mean / expected - 1.0,
                 deviation,
                 z: z_score(mean - expected, deviation, expected),
-                samples,
-                time: image.report.gpu_seconds * 1e9 / samples as f64,
+                samples: image.samples(),
+                time: image.nanoseconds_per_sample(),
             }])
         })
     }

@@ -8,7 +8,6 @@ use clerestory::accel::photon_map::compact_bvh::COMPACT_PAIR_BYTES;
 use clerestory::accel::photon_map::complete_bvh::COMPLETE_NODE_BYTES;
 use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
 
-use super::changes;
 use super::map_quality::SOURCE_SHARE;
 use super::photon_kernels::{Gather, Map, Prepared, Work, of_each_prepared};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, change, largest, rows};
@@ -158,8 +157,8 @@ impl Row {
             compact_entries: change(compact.tree.pushes, complete.tree.pushes),
             bytes: each(complete.tree.bytes),
             compact_bytes: change(compact.tree.bytes, complete.tree.bytes),
-            speed: changes(&times[0], &times[1]),
-            speed_of_tree: changes(&times[2], &times[3]),
+            speed: times[0].change_from(&times[1]),
+            speed_of_tree: times[2].change_from(&times[3]),
             time: times[0].clone(),
         })
     }

@@ -9,7 +9,6 @@ use clerestory::accel::photon_map::compact_bvh::{COMPACT_PAIR_BYTES, COMPACT_RAY
 use clerestory::accel::photon_map::complete_bvh::RAY_STACK_ENTRY_BYTES;
 use glam::Vec3;
 
-use super::changes;
 use super::photon_scenes::Surfaces;
 use super::ray_layouts::{LEAF_SIZE, SHADOW_ENTRY_SPARES, Trees, queries};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, change, largest, rows};
@@ -187,7 +186,7 @@ impl Row {
             bytes: each(complete.bytes),
             compact_bytes: change(compact.bytes, complete.bytes),
             compact_bytes_both_ways: change(both_ways, complete.bytes),
-            speed: changes(&times[0], &times[1]),
+            speed: times[0].change_from(&times[1]),
             time: times[0].clone(),
         })
     }

@@ -6,7 +6,6 @@ use clerestory::Result;
 use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
 use glam::Vec3;
 
-use super::changes;
 use super::photon_kernels::{Map, Prepared, SOURCE_SHAPE, Shape, of_each_prepared};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, change, rows};
 use crate::experiments::measures::Context;
@@ -196,7 +195,7 @@ impl Row {
             cost: trees[1].volume_cost() / trees[0].volume_cost(),
             linear_nodes_anywhere: more(work_anywhere.map(|work| work.tree.nodes)),
             linear_tests_anywhere: more(work_anywhere.map(|work| work.tests)),
-            linear_speed: changes(&times[0], &times[1]),
+            linear_speed: times[0].change_from(&times[1]),
             time: times[0].clone(),
         })
     }

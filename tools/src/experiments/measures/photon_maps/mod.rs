@@ -13,10 +13,3 @@ pub mod merge_example;
 pub mod photon_kernels;
 pub mod photon_scenes;
 pub mod ray_layouts;
-
-use crate::experiments::findings::{Repeats, change};
-
-/// What one contender changes in another's values, %, turn by turn; of times the other way round, it is the change of speed.
-pub fn changes(of: &Repeats, from: &Repeats) -> Repeats {
-    of.0.iter().zip(&from.0).map(|(of, from)| change(*of, *from)).collect()
-}

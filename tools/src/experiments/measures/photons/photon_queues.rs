@@ -10,7 +10,6 @@ use clerestory::{Result, scene};
 use super::cases::{mapper, settings};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::photon_maps::changes;
 use crate::experiments::reference::short_name;
 
 const SIZE: [u32; 2] = [128, 96];
@@ -187,8 +186,8 @@ fn scene_of_forms(
         form: form.name.into(),
         gather: gather.clone(),
         queue: queue.clone(),
-        over_first: changes(gather, &parts[0][0]),
-        over_single: (form.query == MapQuery::Packet).then(|| changes(gather, &parts[form.single][0])),
+        over_first: gather.change_from(&parts[0][0]),
+        over_single: (form.query == MapQuery::Packet).then(|| gather.change_from(&parts[form.single][0])),
     });
     Ok((row, times.collect()))
 }

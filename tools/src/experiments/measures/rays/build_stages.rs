@@ -8,7 +8,7 @@ use clerestory::scene;
 use glam::Vec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
-use crate::experiments::measures::Context;
+use crate::experiments::measures::{Context, MEMORY_OF_ITS_OWN};
 use crate::experiments::reference::short_name;
 use crate::geometry;
 use crate::timing::timed;
@@ -87,7 +87,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| (&row.speed).into(),
     )
     .among(|row| row.builder == ON_DEVICE && row.by_hardware)
-    .needs("a GPU with memory of its own"),
+    .needs(MEMORY_OF_ITS_OWN),
 ];
 
 impl Study for Found {

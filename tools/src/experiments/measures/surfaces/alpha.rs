@@ -93,7 +93,7 @@ impl Study for Found {
                 "all",
             )?;
             let (mean, deviation) = image.mean(0);
-            let samples = u64::from(size * size) * u64::from(spp);
+            let samples = image.samples();
             // Each sample is all or nothing: the variance of the mean is known as well.
             let binomial = f64::from(EMISSION).powi(2) * through * (1.0 - through) / samples as f64;
             let variance = if binomial > 0.0 {
@@ -112,7 +112,7 @@ impl Study for Found {
                 variance,
                 rays: image.count("rays") as f64 / samples as f64,
                 samples,
-                time: image.report.gpu_seconds * 1e9 / samples as f64,
+                time: image.nanoseconds_per_sample(),
             }])
         })
     }
