@@ -108,7 +108,7 @@ impl Gather {
                     tells_caustics: settings.final_gather,
                     profile: settings.profile as u32,
                     counts_bounces: ask.counts_bounces,
-                    compact_quota: if nearest { NEAREST_QUOTA } else { settings.query_quota },
+                    compact_quota: if nearest { settings.query_quota.min(NEAREST_QUOTA) } else { settings.query_quota },
                     nearest,
                     linear: $linear,
                     queue: $queue,

@@ -126,8 +126,8 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
-        /// Nodes and records after which a query of the map is given up and its place goes through all records instead. Changes the order of
-        /// sums only.
+        /// Nodes and records after which a query of the map is given up and its place goes through all records instead, which changes the order
+        /// of sums only; with neighbours the area that is searched is halved instead, and they may be fewer.
         pub query_quota: u32 = QUERY_QUOTA, in 1..=QUERY_QUOTA;
     }
     check PhotonSettings::sees_direct_light_once;
