@@ -20,6 +20,7 @@
 //! ([`DeviceTraversal::kind`]): every kernel that traverses any index traverses this one, too.
 
 mod aabb;
+pub mod box_test;
 pub mod box_tree;
 pub mod bvh2;
 mod device_traversal;
@@ -51,6 +52,9 @@ use bytemuck::{Pod, Zeroable};
 
 /// [`Hit::triangle`] of a ray that met nothing.
 pub const NO_HIT: u32 = constants::NO_HIT;
+
+/// What says of a traversal that can be stopped, in place of where it goes on, that it is done.
+pub const FINISHED: u32 = constants::INDEX_FINISHED;
 
 /// Smallest largest-component of a ray direction that is traced; shorter directions, zero among them, meet nothing.
 pub const MIN_DIRECTION: f32 = constants::MIN_DIRECTION;

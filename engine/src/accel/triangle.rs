@@ -14,7 +14,7 @@
 //!   that share vertices see the same sheared vertices; so a point that a mesh covers there is inside one of its triangles. No gap.
 //! - The weights are all of one sign: the point they name lies on the triangle. Its distance from the ray, seen along the dominant
 //!   axis, is at most 16uM, and the reported `t` is within 18uM/|d| of the point's, where M is the largest coordinate distance of a
-//!   vertex from the ray's origin and |d| the largest component of the direction (derivation at [`BOX_SLACK`](crate::accel::bvh2::BOX_SLACK)).
+//!   vertex from the ray's origin and |d| the largest component of the direction (derivation at [`BOX_SLACK`](crate::accel::box_test::BOX_SLACK)).
 //! - Two-sided. A triangle of which two vertices coincide, or that is seen exactly edge-on, is missed. NaN anywhere is a miss.
 
 pub mod wald;

@@ -4,6 +4,7 @@ use crate::catalogue::Row;
 
 /// Their rows.
 pub(super) const MODULES: &[&[Row]] = &[
+    crate::accel::box_test::ROWS,
     crate::accel::bvh2::ROWS,
     crate::accel::kd::build::ROWS,
     crate::accel::kd::cache::ROWS,

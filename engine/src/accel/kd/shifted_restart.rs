@@ -8,7 +8,7 @@
 use super::KdTree;
 use super::tree::KdKind;
 use crate::accel::Ray;
-use crate::accel::bvh2::traverse::BoxTest;
+use crate::accel::box_test::BoxTest;
 use crate::catalogue::{Role, Row, sources};
 
 /// What a restart takes for its interval.
