@@ -7,10 +7,10 @@ use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, SortedCod
 use clerestory::accel::photon_map::compact_bvh::CompactBvh;
 use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};
 use clerestory::accel::{Aabb, LeafRule, Ray, RayIndex};
-use clerestory::gpu::shaders::accel::{compact_points, compact_rays};
-use clerestory::gpu::shaders::types::{CompactRoot, CompactWork};
 use clerestory::gpu::{Category, DeviceKind, Gpu, transfer_to_compute};
 use clerestory_tests::random::Random;
+use clerestory_tests::shaders::types::{CompactRoot, CompactWork};
+use clerestory_tests::shaders::{compact_points, compact_rays};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 

@@ -6,8 +6,8 @@
 //! Stackless BVH Traversal", HPG 2010 (the order of children does not depend on the hit so far, so a place in it can be found again).
 //!
 //! Guarantees: the same bytes whatever the number of threads; depth at most [`MAX_DEPTH`]; every triangle that can be met lies in exactly
-//! one leaf, the others are counted; a hit that the triangle test reports is never culled (see [`BOX_SLACK`](super::box_test::BOX_SLACK)), so traversal returns
-//! exactly what trying all triangles in index order returns.
+//! one leaf, the others are counted; a hit that the triangle test reports is never culled (see
+//! [`BOX_SLACK`](super::box_test::BOX_SLACK)), so traversal returns exactly what trying all triangles in index order returns.
 
 pub(super) mod build;
 pub(super) mod layout;

@@ -17,7 +17,7 @@ mod counters;
 mod entries;
 mod kept;
 pub mod probability;
-pub mod shifted_restart;
+pub(crate) mod shifted_restart;
 pub(crate) mod traverse;
 mod tree;
 

@@ -5,6 +5,8 @@
 //! machine: the triangle test is shared ([`triangle`]), boxes are conservative for everything that test can report, and of candidates
 //! with equal distance the lowest triangle index wins.
 //!
+//! What is only measured, and what tests compare with, is in [`yardstick`].
+//!
 //! # How to add an index
 //!
 //! Beside its [`RayIndex`] it has an include `accel/<name>.glsl` with a function over the texel buffer of set 1
@@ -35,8 +37,10 @@ pub mod optimise;
 pub mod photon_map;
 pub mod sphere;
 mod stages;
+pub(crate) mod sweep;
 pub mod trace;
 pub mod triangle;
+pub mod yardstick;
 
 #[cfg(test)]
 mod test_support;

@@ -187,7 +187,7 @@ fn hits_agree_with_f64_up_to_their_stated_error() {
             let hit = bvh.closest_hit(&ray);
             let mut oracle: Option<(f64, usize)> = None;
             for (i, t) in triangles.iter().enumerate().filter(|(i, _)| usable[*i]) {
-                if let Some(c) = triangle::intersect_triangle_f64(&ray, t)
+                if let Some(c) = triangle::oracles::intersect_triangle_f64(&ray, t)
                     && oracle.is_none_or(|(t, _)| c.t < t)
                 {
                     oracle = Some((c.t, i));

@@ -119,6 +119,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/accel/kd/shifted_restart_tests.rs::restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not",
     ],
-    api: &["clerestory::accel::kd::shifted_restart::ShiftedRestart"],
+    api: &["clerestory::accel::yardstick::ShiftedRestart"],
     ..Row::of(file!())
 }];

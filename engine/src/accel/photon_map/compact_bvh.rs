@@ -286,7 +286,7 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("PM-SYS-1"),
         limits: "Visits the leaves whose boxes hold a point; what is in them is for the caller to test.",
         sources: &[sources::FABIANOWSKI_2011.at("§6.2.3")],
-        shaders: &["shaders/accel/compact_bvh.glsl", "shaders/accel/compact_points.comp"],
+        shaders: &["shaders/accel/compact_bvh.glsl"],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",
@@ -300,7 +300,7 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::Yardstick,
         limits: "No picture takes it: their rays go through the ray indexes.",
         sources: &[sources::FABIANOWSKI_2011.at("§6.2.2")],
-        shaders: &["shaders/accel/compact_bvh.glsl", "shaders/accel/compact_rays.comp"],
+        shaders: &["shaders/accel/compact_bvh.glsl"],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",

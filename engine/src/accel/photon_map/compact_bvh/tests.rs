@@ -3,7 +3,7 @@ use crate::accel::input::bounds_of;
 use crate::accel::lbvh::SortedCodes;
 use crate::accel::lbvh::hard_boxes;
 use crate::accel::lbvh::radix_tree::hierarchy;
-use crate::accel::photon_map::vvh::{Heuristic, sweep_tree};
+use crate::accel::sweep::{area_sweep_tree, volume_sweep_tree};
 use crate::accel::test_support::{Random, U, brute_force, ray};
 use crate::accel::triangle::{intersect_triangle, ray_shear};
 use crate::accel::{Hit, LeafRule};
@@ -16,7 +16,7 @@ fn trees() -> Vec<(String, Vec<Aabb>, CompleteBvh, CompactBvh)> {
         let kinds = [
             ("fine", hierarchy(&boxes, &sorted, LeafRule::Size(1), 64)),
             ("coarse", hierarchy(&boxes, &sorted, LeafRule::Size(5), 64)),
-            ("swept", sweep_tree(&boxes, 3, Heuristic::Volume)),
+            ("swept", volume_sweep_tree(&boxes, 3)),
         ];
         for (kind, tree) in kinds {
             let complete = CompleteBvh::new(&tree).expect("small");
@@ -230,7 +230,7 @@ fn no_layout_culls_what_the_triangle_test_reports() {
     let mut random = Random(55);
     let triangles = flat_triangles(&mut random, 60);
     let boxes: Vec<Aabb> = triangles.iter().map(bounds_of).collect();
-    let complete = CompleteBvh::new(&sweep_tree(&boxes, 1, Heuristic::Area)).expect("small");
+    let complete = CompleteBvh::new(&area_sweep_tree(&boxes, 1)).expect("small");
     let compact = CompactBvh::encode(&complete).expect("tight");
     let (mut met, mut early) = (0, 0);
     for i in 0..6000 {
