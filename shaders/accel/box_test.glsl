@@ -1,5 +1,5 @@
 // What boxes and planes are met by: origin, clamped reciprocal direction, and the slack by which boxes are grown. Twin of
-// clerestory::accel::bvh2::traverse::BoxTest; BOX_SLACK is derived beside its Rust name.
+// clerestory::accel::box_test::BoxTest; BOX_SLACK is derived beside its Rust name.
 #ifndef CLERESTORY_ACCEL_BOX_TEST_GLSL
 #define CLERESTORY_ACCEL_BOX_TEST_GLSL
 

@@ -16,10 +16,8 @@ const uint COMPACT_REFERENCE_MASK = (1u << COMPACT_MASK_SHIFT) - 1u;
 // Reference of a tree that holds nothing.
 const uint COMPACT_NOTHING = 0xFFFFFFFFu;
 const uint COMPACT_STACK_SIZE = 96u;
-const float COMPACT_PARALLEL_COMPONENT = 1.0e-20;
-const float COMPACT_NO_PLANE = 1.0e17;
-// Units in the last place: each of two distances is a rounded difference times a reciprocal of up to 2.5.
-const float COMPACT_SPAN_SLACK = 8.0 / 8388608.0;
+// 2^36: beyond MAX_COORDINATE, and finite times the largest reciprocal, 2^88.
+const float COMPACT_NO_PLANE = 68719476736.0;
 
 layout(constant_id = 110) const uint COMPACT_QUOTA = 32768u;
 
@@ -101,34 +99,21 @@ bool compact_point_query(CompactRoot root, vec3 point) {
 #endif
 
 #ifdef COMPACT_RAY
-// Entry and exit distance of a box within a span.
-vec2 compact_span(vec3 lower, vec3 upper, vec3 origin, vec3 inverse, bvec3 parallel, vec2 span) {
-    precise vec3 t0 = (lower - origin) * inverse;
-    precise vec3 t1 = (upper - origin) * inverse;
-    vec3 enter = min(t0, t1);
-    vec3 leave = max(t0, t1);
-    bool beside = false;
-    for (uint axis = 0u; axis < 3u; ++axis) {
-        if (parallel[axis]) {
-            beside = beside || !(lower[axis] <= origin[axis] && origin[axis] <= upper[axis]);
-        } else {
-            span = vec2(max(span.x, enter[axis]), min(span.y, leave[axis]));
-        }
-    }
-    return beside ? vec2(COMPACT_NO_PLANE, -COMPACT_NO_PLANE) : span;
+#include "accel/box_test.glsl"
+
+// The part of a span in which a ray is within a box.
+vec2 compact_span_within(BoxTest boxes, vec3 lower, vec3 upper, vec2 span) {
+    vec2 own = box_span(boxes, lower, upper);
+    return vec2(max(own.x, span.x), min(own.y, span.y));
 }
 
-bool compact_met(vec2 span) {
-    precise float end = span.y + abs(span.y) * COMPACT_SPAN_SLACK;
-    return span.x <= end;
-}
+bool compact_met(vec2 span) { return span.x <= span.y; }
 
-bool compact_ray_query(CompactRoot root, vec3 origin, vec3 direction, float t_min, float t_max) {
-    bvec3 parallel = lessThanEqual(abs(direction), vec3(COMPACT_PARALLEL_COMPONENT));
-    vec3 inverse = 1.0 / mix(direction, vec3(1.0), parallel);
-    t_max = min(t_max, COMPACT_NO_PLANE);
-    vec2 span = compact_span(root.lower, root.upper, origin, inverse, parallel, vec2(t_min, t_max));
-    uint next = compact_met(span) ? root.reference : COMPACT_NOTHING;
+bool compact_ray_query(CompactRoot root, Ray ray) {
+    BoxTest boxes = box_test(root.lower, root.upper, ray);
+    float t_max = ray.t_max;
+    vec2 span = compact_span_within(boxes, root.lower, root.upper, vec2(ray.t_min, t_max));
+    uint next = is_traceable(ray) && compact_met(span) ? root.reference : COMPACT_NOTHING;
     uint stack[COMPACT_STACK_SIZE];
     vec2 spans[COMPACT_STACK_SIZE];
     uint top = 0u;
@@ -145,8 +130,8 @@ bool compact_ray_query(CompactRoot root, vec3 origin, vec3 direction, float t_mi
             vec3 upper = uintBitsToFloat(high.xyz);
             vec3 none = vec3(COMPACT_NO_PLANE);
             vec2 carried = vec2(span.x, min(span.y, t_max));
-            vec2 left = compact_span(mix(-none, lower, lower_left), mix(none, upper, upper_left), origin, inverse, parallel, carried);
-            vec2 right = compact_span(mix(lower, -none, lower_left), mix(upper, none, upper_left), origin, inverse, parallel, carried);
+            vec2 left = compact_span_within(boxes, mix(-none, lower, lower_left), mix(none, upper, upper_left), carried);
+            vec2 right = compact_span_within(boxes, mix(lower, -none, lower_left), mix(upper, none, upper_left), carried);
             bool meets_left = compact_met(left);
             bool meets_right = compact_met(right);
             bool right_first = right.x < left.x;

@@ -44,8 +44,6 @@ const uint KD_MET_FAR = 1u;
 const uint KD_MET_BOTH = 2u;
 
 #define KD_CAPACITY (KD_FLAGS ? KD_SHORT_STACK : KD_MAX_DEPTH)
-// Entries that can be read; a stack forgets none.
-#define KD_SIZE (KD_FLAGS ? size : top)
 // Whether a stack must find flags of what is left, and go back by them.
 const bool KD_STACK_STOPS = !KD_FLAGS && INDEX_QUOTA != INDEX_NEVER_STOPS;
 #define KD_STACK_RESUMES (KD_STACK_STOPS && INDEX_RESUMES)
@@ -131,78 +129,174 @@ void kd_descend(inout KdDescent at, KdTurn turn, bool far_is_left, float t_min) 
     at.bit >>= 1;
 }
 
-#define KD_COUNT_NODE \
-    ++iterations; \
-    INDEX_COUNT_ONE(nodes) \
-    if (at.node < KD_CACHED_NODES && KD_CACHE_LEVELS > 0u) { \
-        INDEX_COUNT_ONE(cached_nodes) \
+// What stays the same on a ray's way.
+struct KdRay {
+    BoxTest boxes;
+    float largest_slack;
+    float t_min;
+    float t_max;
+};
+
+// The way of a ray through the leaves, twin of Walk and its Entries.
+struct KdWalk {
+    KdDescent at;
+    // Where restarts begin.
+    KdDescent restart;
+    bool can_push_down;
+    uint flags;
+    // Place of the next entry, and how many can be read of a ring.
+    uint top;
+    uint size;
+    // Of caches: the last entry; the last cached nodes, four bytes per word, the older word first.
+    uvec2 head;
+    uvec2 bytes;
+    // Nothing is left.
+    bool is_end;
+    // At a far child that begins beyond the hit.
+    bool is_beyond;
+    uint iterations;
+};
+
+// Node and axis of the plane above it, and the end of its span: two arrays, since software drivers store vectors far more slowly. The bit of
+// its level is told by the flags. Not in KdWalk, since a struct is copied into each call.
+uint kd_entry_nodes[KD_MAX_DEPTH];
+uint kd_entry_ends[KD_MAX_DEPTH];
+
+void kd_count_node(inout KdWalk walk) {
+    ++walk.iterations;
+    INDEX_COUNT_ONE(nodes)
+    if (walk.at.node < KD_CACHED_NODES && KD_CACHE_LEVELS > 0u) {
+        INDEX_COUNT_ONE(cached_nodes)
     }
+}
 
 // Leaves the far child of a turn for later.
-#define KD_PUSH(turn) \
-    { \
-        uvec2 entry = uvec2(turn.far << KD_KIND_BITS | turn.axis, floatBitsToUint(at.span.y)); \
-        bool to_stack = KD_CAPACITY > 0u; \
-        if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD) { \
-            uvec2 spilled = head; \
-            head = entry; \
-            entry = spilled; \
-            to_stack = spilled.x != 0u; \
-            INDEX_COUNT_ONE(register_pushes) \
-        } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && turn.far < KD_CACHED_NODES) { \
-            bool has_room = bytes.x < 1u << 24; \
-            bytes = has_room ? uvec2(bytes.x << 8 | turn.far, bytes.y) : uvec2(bytes.x, bytes.y << 8 | turn.far); \
-            to_stack = false; \
-            INDEX_COUNT_ONE(register_pushes) \
-        } \
-        if (to_stack) { \
-            uint slot = KD_FLAGS ? top % KD_CAPACITY : top; \
-            entry_nodes[slot] = entry.x; \
-            entry_ends[slot] = entry.y; \
-            ++top; \
-            size = min(size + 1u, KD_CAPACITY); \
-            INDEX_COUNT_ONE(pushes) \
-        } \
+void kd_push(inout KdWalk walk, KdTurn turn) {
+    uvec2 entry = uvec2(turn.far << KD_KIND_BITS | turn.axis, floatBitsToUint(walk.at.span.y));
+    bool to_stack = KD_CAPACITY > 0u;
+    if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD) {
+        uvec2 spilled = walk.head;
+        walk.head = entry;
+        entry = spilled;
+        to_stack = spilled.x != 0u;
+        INDEX_COUNT_ONE(register_pushes)
+    } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && turn.far < KD_CACHED_NODES) {
+        uvec2 bytes = walk.bytes;
+        bool has_room = bytes.x < 1u << 24;
+        walk.bytes = has_room ? uvec2(bytes.x << 8 | turn.far, bytes.y) : uvec2(bytes.x, bytes.y << 8 | turn.far);
+        to_stack = false;
+        INDEX_COUNT_ONE(register_pushes)
     }
+    if (to_stack) {
+        uint slot = KD_FLAGS ? walk.top % KD_CAPACITY : walk.top;
+        kd_entry_nodes[slot] = entry.x;
+        kd_entry_ends[slot] = entry.y;
+        ++walk.top;
+        walk.size = min(walk.size + 1u, KD_CAPACITY);
+        INDEX_COUNT_ONE(pushes)
+    }
+}
 
 // On to what is left: sets is_end where that is nothing, or is_beyond where it begins beyond the hit.
-#define KD_POP \
-    { \
-        flags += KD_FLAGS ? at.parent : 0u; \
-        bool empty = (KD_CAPACITY == 0u || KD_SIZE == 0u) && head.x == 0u && bytes.x == 0u; \
-        if ((KD_FLAGS ? flags == 0u : empty) || ends_beyond(largest_slack, at.span.y, hit.t)) { \
-            is_end = true; \
-        } else if (empty) { \
-            at = restart; \
-            can_push_down = KD_PUSH_DOWN; \
-            INDEX_COUNT_ONE(restarts) \
-        } else { \
-            uvec2 entry; \
-            if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD && head.x != 0u) { \
-                entry = head; \
-                head.x = 0u; \
-                INDEX_COUNT_ONE(register_pops) \
-            } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && top == 0u) { \
-                entry = kd_cached_entry(boxes, (bytes.y != 0u ? bytes.y : bytes.x) & 0xFFu, ray.t_max); \
-                bytes = bytes.y != 0u ? uvec2(bytes.x, bytes.y >> 8) : uvec2(bytes.x >> 8, 0u); \
-                INDEX_COUNT_ONE(register_pops) \
-            } else { \
-                --top; \
-                --size; \
-                uint slot = KD_FLAGS ? top % KD_CAPACITY : top; \
-                entry = uvec2(entry_nodes[slot], entry_ends[slot]); \
-                INDEX_COUNT_ONE(pops) \
-            } \
-            uint axis = entry.x & KD_LEAF; \
-            float begins = far_begins(along_axis(boxes.slack, axis), at.span.y, ray.t_min); \
-            /* The carry has set the bit of the node above. */ \
-            uint parent = flags & -flags; \
-            at = KdDescent(entry.x >> KD_KIND_BITS, vec2(begins, uintBitsToFloat(entry.y)), parent >> 1, parent); \
-            is_beyond = begins > hit.t; \
-            iterations += is_beyond ? 1u : 0u; \
-            can_push_down = false; \
-        } \
+void kd_pop(inout KdWalk walk, KdRay ray, float hit) {
+    walk.flags += KD_FLAGS ? walk.at.parent : 0u;
+    uvec2 head = walk.head;
+    uvec2 bytes = walk.bytes;
+    // A stack forgets none of its entries.
+    uint size = KD_FLAGS ? walk.size : walk.top;
+    bool empty = (KD_CAPACITY == 0u || size == 0u) && head.x == 0u && bytes.x == 0u;
+    if ((KD_FLAGS ? walk.flags == 0u : empty) || ends_beyond(ray.largest_slack, walk.at.span.y, hit)) {
+        walk.is_end = true;
+    } else if (empty) {
+        walk.at = walk.restart;
+        walk.can_push_down = KD_PUSH_DOWN;
+        INDEX_COUNT_ONE(restarts)
+    } else {
+        uvec2 entry;
+        if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD && head.x != 0u) {
+            entry = head;
+            walk.head.x = 0u;
+            INDEX_COUNT_ONE(register_pops)
+        } else if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && walk.top == 0u) {
+            entry = kd_cached_entry(ray.boxes, (bytes.y != 0u ? bytes.y : bytes.x) & 0xFFu, ray.t_max);
+            walk.bytes = bytes.y != 0u ? uvec2(bytes.x, bytes.y >> 8) : uvec2(bytes.x >> 8, 0u);
+            INDEX_COUNT_ONE(register_pops)
+        } else {
+            --walk.top;
+            --walk.size;
+            uint slot = KD_FLAGS ? walk.top % KD_CAPACITY : walk.top;
+            entry = uvec2(kd_entry_nodes[slot], kd_entry_ends[slot]);
+            INDEX_COUNT_ONE(pops)
+        }
+        uint axis = entry.x & KD_LEAF;
+        float begins = far_begins(along_axis(ray.boxes.slack, axis), walk.at.span.y, ray.t_min);
+        // The carry has set the bit of the node above.
+        uint parent = walk.flags & -walk.flags;
+        walk.at = KdDescent(entry.x >> KD_KIND_BITS, vec2(begins, uintBitsToFloat(entry.y)), parent >> 1, parent);
+        walk.is_beyond = begins > hit;
+        walk.iterations += walk.is_beyond ? 1u : 0u;
+        walk.can_push_down = false;
     }
+}
+
+// Back to where a stack has stopped, by the flags of what was left.
+void kd_resume(inout KdWalk walk, KdRay ray, uint resume, float hit) {
+    do {
+        kd_count_node(walk);
+        KdTurn turn = kd_turn(kd_node(walk.at.node), ray.boxes, walk.at.span);
+        bool far_is_left = turn.both && (resume & walk.at.bit) != 0u;
+        if (turn.both && !far_is_left) {
+            kd_push(walk, turn);
+        }
+        kd_descend(walk.at, turn, far_is_left, ray.t_min);
+        walk.is_beyond = far_is_left && walk.at.span.x > hit;
+    } while (!walk.is_beyond && walk.at.bit != 0u && (resume & (2u * walk.at.bit - 1u)) != 0u);
+}
+
+// Down from an inner node to a leaf, or to a far child that begins beyond the hit; whether it is a leaf.
+bool kd_go_down(inout KdWalk walk, inout uvec2 node, KdRay ray, float hit) {
+    bool reached;
+    do {
+        kd_count_node(walk);
+        KdTurn turn = kd_turn(node, ray.boxes, walk.at.span);
+        bool far_is_left = KD_FLAGS && turn.both && (walk.flags & walk.at.bit) != 0u;
+        if (turn.both && !far_is_left) {
+            if (KD_PUSH_DOWN && walk.can_push_down) {
+                walk.restart = walk.at;
+                walk.can_push_down = false;
+            }
+            kd_push(walk, turn);
+        }
+        walk.flags |= KD_FLAGS && !turn.both ? walk.at.bit : 0u;
+        kd_descend(walk.at, turn, far_is_left, ray.t_min);
+        reached = !(far_is_left && walk.at.span.x > hit);
+        node = kd_node(walk.at.node);
+    } while (reached && !kd_is_leaf(node));
+    return reached;
+}
+
+// The flags of what a stack has left. From the root again: a far child that is an entry, the oldest first, is left; any other has been gone to.
+uint kd_flags_of_stack(inout KdWalk walk, KdDescent root, KdRay ray) {
+    if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD && walk.head.x != 0u) {
+        kd_entry_nodes[walk.top++] = walk.head.x;
+    }
+    uint flags = 0u;
+    uint oldest = 0u;
+    KdDescent way = root;
+    do {
+        KdTurn turn = kd_turn(kd_node(way.node), ray.boxes, way.span);
+        bool is_entry = oldest < walk.top && kd_entry_nodes[oldest] >> KD_KIND_BITS == turn.far;
+        if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && turn.far < KD_CACHED_NODES) {
+            is_entry = kd_oldest_byte(walk.bytes) == turn.far;
+            walk.bytes = is_entry ? kd_without_oldest_byte(walk.bytes) : walk.bytes;
+        } else {
+            oldest += is_entry ? 1u : 0u;
+        }
+        flags |= is_entry ? 0u : way.bit;
+        kd_descend(way, turn, !is_entry, ray.t_min);
+    } while (way.node != walk.at.node);
+    return flags;
+}
 
 // Traverses from `resume` on (INDEX_START at first), improving `hit` (no_hit(ray.t_max) at first). Returns INDEX_FINISHED or where to go on.
 uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
@@ -221,95 +315,56 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         return INDEX_FINISHED;
     }
     RayShear shear = ray_shear(ray.origin, ray.direction);
-    float largest_slack = largest_component(boxes.slack);
-    KdDescent at = root;
-    KdDescent restart = root;
-    bool can_push_down = KD_PUSH_DOWN;
-    uint flags = INDEX_RESUMES ? resume : 0u;
-    // Node and axis of the plane above it, and the end of its span: two arrays, since software drivers store vectors far more slowly. The bit of
-    // its level is told by the flags.
-    uint entry_nodes[KD_MAX_DEPTH];
-    uint entry_ends[KD_MAX_DEPTH];
-    uint top = 0u;
-    uint size = 0u;
+    KdRay along = KdRay(boxes, largest_component(boxes.slack), ray.t_min, ray.t_max);
+    KdWalk walk = KdWalk(root, root, KD_PUSH_DOWN, INDEX_RESUMES ? resume : 0u, 0u, 0u, uvec2(0u), uvec2(0u), false, false, 0u);
     uint reference = 0u;
     uint reference_end = 0u;
-    // Of caches: the last entry; the last cached nodes, four bytes per word, the older word first; a leaf that waits, its references and their end.
-    uvec2 head = uvec2(0u);
-    uvec2 bytes = uvec2(0u);
+    // A leaf that waits: its references and their end.
     uvec2 postponed = uvec2(0u);
     bool waits = false;
     bool ends_waiting = false;
-    uint iterations = 0u;
-    // At a far child that begins beyond the hit.
-    bool is_beyond = false;
     if (KD_STACK_RESUMES && resume != INDEX_START) {
-        do {
-            KD_COUNT_NODE
-            KdTurn turn = kd_turn(kd_node(at.node), boxes, at.span);
-            bool far_is_left = turn.both && (resume & at.bit) != 0u;
-            if (turn.both && !far_is_left) {
-                KD_PUSH(turn)
-            }
-            kd_descend(at, turn, far_is_left, ray.t_min);
-            is_beyond = far_is_left && at.span.x > hit.t;
-        } while (!is_beyond && at.bit != 0u && (resume & (2u * at.bit - 1u)) != 0u);
+        kd_resume(walk, along, resume, hit.t);
     }
-    uvec2 node = kd_node(at.node);
-    bool is_end = false;
+    uvec2 node = kd_node(walk.at.node);
     bool done = false;
     bool stops = false;
     do {
-        iterations += KD_POSTPONES ? KD_PAIR_ITERATIONS : KD_ROUND_ITERATIONS;
+        walk.iterations += KD_POSTPONES ? KD_PAIR_ITERATIONS : KD_ROUND_ITERATIONS;
 #ifdef KD_VOTES
         // Until each lane of the subgroup holds a leaf or has seen them all. Those that hold one go on behind it meanwhile, up to the next.
         do {
-            bool at_leaf = !is_beyond && kd_is_leaf(node);
-            if (!is_end && !(at_leaf && waits)) {
-                if (at_leaf || is_beyond) {
+            bool at_leaf = !walk.is_beyond && kd_is_leaf(node);
+            if (!walk.is_end && !(at_leaf && waits)) {
+                if (at_leaf || walk.is_beyond) {
                     if (at_leaf) {
                         postponed = uvec2(node.y >> KD_KIND_BITS, (node.y >> KD_KIND_BITS) + node.x);
                         waits = true;
                         INDEX_COUNT_ONE(leaves)
                     }
-                    ++iterations;
-                    is_beyond = false;
-                    KD_POP
+                    ++walk.iterations;
+                    walk.is_beyond = false;
+                    kd_pop(walk, along, hit.t);
                 } else {
-                    KD_COUNT_NODE
-                    KdTurn turn = kd_turn(node, boxes, at.span);
+                    kd_count_node(walk);
+                    KdTurn turn = kd_turn(node, boxes, walk.at.span);
                     if (turn.both) {
-                        KD_PUSH(turn)
+                        kd_push(walk, turn);
                     }
-                    kd_descend(at, turn, false, ray.t_min);
+                    kd_descend(walk.at, turn, false, ray.t_min);
                 }
-                node = kd_node(at.node);
+                node = kd_node(walk.at.node);
             }
-        } while (!subgroupAll(waits || is_end));
+        } while (!subgroupAll(waits || walk.is_end));
         reference = postponed.x;
         reference_end = waits ? postponed.y : postponed.x;
         waits = false;
 #else
         // Down to a leaf, or to a far child that begins beyond the hit; unless a candidate has interrupted a leaf.
-        bool reached = reference == reference_end && !ends_waiting && !is_beyond;
-        is_beyond = false;
+        bool reached = !walk.is_beyond && reference == reference_end && !ends_waiting;
+        walk.is_beyond = false;
         if (reached && !kd_is_leaf(node)) {
-            do {
-                KD_COUNT_NODE
-                KdTurn turn = kd_turn(node, boxes, at.span);
-                bool far_is_left = KD_FLAGS && turn.both && (flags & at.bit) != 0u;
-                if (turn.both && !far_is_left) {
-                    if (KD_PUSH_DOWN && can_push_down) {
-                        restart = at;
-                        can_push_down = false;
-                    }
-                    KD_PUSH(turn)
-                }
-                flags |= KD_FLAGS && !turn.both ? at.bit : 0u;
-                kd_descend(at, turn, far_is_left, ray.t_min);
-                reached = !(far_is_left && at.span.x > hit.t);
-                node = kd_node(at.node);
-            } while (reached && !kd_is_leaf(node));
+            reached = kd_go_down(walk, node, along, hit.t);
         }
         if (reached) {
             reference = node.y >> KD_KIND_BITS;
@@ -336,7 +391,7 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             if (reference != reference_end && !done) {
                 bool more;
                 do {
-                    ++iterations;
+                    ++walk.iterations;
                     INDEX_COUNT_ONE(triangles)
                     uint texel = header0.w + KD_TRIANGLE_TEXELS * reference;
                     vec4 q0 = uintBitsToFloat(index_texel(texel));
@@ -365,7 +420,7 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             }
             if (KD_POSTPONES && leaf == 0u && !done) {
                 reference = second.x;
-                reference_end = at.span.x <= hit.t ? second.y : second.x;
+                reference_end = walk.at.span.x <= hit.t ? second.y : second.x;
             }
         }
 #ifdef CLERESTORY_CANDIDATE_FILTER
@@ -376,56 +431,39 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         }
 #endif
 #ifdef KD_VOTES
-        done = done || is_end;
-        is_beyond = is_beyond || at.span.x > hit.t;
+        done = done || walk.is_end;
+        walk.is_beyond = walk.is_beyond || walk.at.span.x > hit.t;
 #else
         // On to what is left, skipping what begins beyond the hit.
         bool leaves = !done && reference == reference_end && !ends_waiting;
         done = done || ends_waiting;
         if (leaves) {
             do {
-                is_beyond = false;
-                KD_POP
-            } while (is_beyond);
-            if (is_end) {
+                walk.is_beyond = false;
+                kd_pop(walk, along, hit.t);
+            } while (walk.is_beyond);
+            if (walk.is_end) {
                 ends_waiting = KD_POSTPONES && waits;
                 done = !ends_waiting;
                 reference = postponed.x;
                 reference_end = ends_waiting ? postponed.y : postponed.x;
             }
-            node = kd_node(at.node);
+            node = kd_node(walk.at.node);
         }
 #endif
         // One leaf that is left is not worth stopping at; nor could flags say so of one at the lowest level, where they read as the end.
-        bool one_leaf = KD_FLAGS ? flags == INDEX_FINISHED : kd_is_leaf(node) && top == 0u && head.x == 0u && bytes.x == 0u;
+        bool one_leaf = KD_FLAGS ? walk.flags == INDEX_FINISHED
+                                 : kd_is_leaf(node) && walk.top == 0u && walk.head.x == 0u && walk.bytes.x == 0u;
         // Neither does a ray stop while a leaf waits, or within one.
-        stops = INDEX_QUOTA != INDEX_NEVER_STOPS && iterations >= INDEX_QUOTA && !one_leaf && !waits && reference == reference_end;
+        stops = INDEX_QUOTA != INDEX_NEVER_STOPS && walk.iterations >= INDEX_QUOTA && !one_leaf && !waits && reference == reference_end;
     } while (!done && !stops);
     if (KD_STACK_STOPS && stops && !done) {
-        if (KD_STACK_CACHE == KD_STACK_CACHE_HEAD && head.x != 0u) {
-            entry_nodes[top++] = head.x;
-        }
-        // From the root again: a far child that is an entry, the oldest first, is left; any other has been gone to.
-        flags = 0u;
-        uint oldest = 0u;
-        KdDescent way = root;
-        do {
-            KdTurn turn = kd_turn(kd_node(way.node), boxes, way.span);
-            bool is_entry = oldest < top && entry_nodes[oldest] >> KD_KIND_BITS == turn.far;
-            if (KD_STACK_CACHE == KD_STACK_CACHE_BYTES && turn.far < KD_CACHED_NODES) {
-                is_entry = kd_oldest_byte(bytes) == turn.far;
-                bytes = is_entry ? kd_without_oldest_byte(bytes) : bytes;
-            } else {
-                oldest += is_entry ? 1u : 0u;
-            }
-            flags |= is_entry ? 0u : way.bit;
-            kd_descend(way, turn, !is_entry, ray.t_min);
-        } while (way.node != at.node);
+        walk.flags = kd_flags_of_stack(walk, root, along);
     }
     if (INDEX_COUNT) {
-        index_counters.iterations += iterations;
+        index_counters.iterations += walk.iterations;
     }
-    return done ? INDEX_FINISHED : flags;
+    return done ? INDEX_FINISHED : walk.flags;
 }
 
 #endif

@@ -4,10 +4,9 @@
 //! f64 test.
 
 use clerestory::Error;
-use clerestory::accel::bvh2::FINISHED;
 use clerestory::accel::kd::{KdCaches, KdCounters, KdNode, KdSettings, KdTraversal, KdTree, MAX_BYTE_LEVELS, Scheme};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
-use clerestory::accel::{Hit, Ray, RayIndex};
+use clerestory::accel::{FINISHED, Hit, Ray, RayIndex};
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::constants::{KD_HEAP_LEVELS, KD_LEAF, KD_STACK_CACHE_BYTES, KD_STACK_CACHE_NONE};
 use clerestory::gpu::{Category, DeviceKind, Gpu};

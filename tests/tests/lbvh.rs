@@ -5,12 +5,12 @@ use clerestory::accel::bvh2::MAX_DEPTH;
 use clerestory::accel::lbvh::radix_tree::hierarchy;
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, SortedCodes, build, refit};
 use clerestory::accel::photon_map::compact_bvh::CompactBvh;
-use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
+use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};
 use clerestory::accel::{Aabb, LeafRule, Ray, RayIndex};
-use clerestory::gpu::shaders::accel::{compact_points, compact_rays};
-use clerestory::gpu::shaders::types::{CompactRoot, CompactWork};
 use clerestory::gpu::{Category, DeviceKind, Gpu, transfer_to_compute};
 use clerestory_tests::random::Random;
+use clerestory_tests::shaders::types::{CompactRoot, CompactWork};
+use clerestory_tests::shaders::{compact_points, compact_rays};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
@@ -373,9 +373,8 @@ fn compact_queries_are_the_twins() {
                 let traced = measure!(compact_rays, gpu, &compact, &rays, leaf_end);
                 let mut differ = 0;
                 for (ray, got) in rays.iter().zip(&traced) {
-                    let slab = SlabRay::new(ray.origin.into(), ray.direction.into(), ray.t_min, ray.t_max);
                     let twin = work(|counters, visit| {
-                        compact.ray_query(&slab, counters, |leaf, t_max| {
+                        compact.ray_query(ray, counters, |leaf, t_max| {
                             visit(leaf);
                             *t_max = t_max.min(leaf_end);
                         });

@@ -6,9 +6,9 @@
 
 use clerestory::Error;
 use clerestory::accel::RayIndex;
-use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
+use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, Traversal};
 use clerestory::accel::trace::{Execution, PersistentThreads, RayTracer, TraceSettings, Traced};
-use clerestory::accel::{Hit, Ray, TraversalCounters, lbvh};
+use clerestory::accel::{FINISHED, Hit, Ray, TraversalCounters, lbvh};
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::accel::trace_queue;
 use clerestory::gpu::shaders::sets::IndexSet;

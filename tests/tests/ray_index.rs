@@ -3,8 +3,8 @@
 //! Equality of bits is asked of software devices: Vulkan lets others divide with an error of 2.5 ULP, so there the hits are held to the
 //! f64 test alone.
 
-use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, FINISHED, Traversal};
-use clerestory::accel::{Hit, Ray, RayIndex, TraversalCounters};
+use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, Traversal};
+use clerestory::accel::{FINISHED, Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::shaders::accel::trace_rays;
 use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{

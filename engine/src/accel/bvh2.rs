@@ -6,15 +6,15 @@
 //! Stackless BVH Traversal", HPG 2010 (the order of children does not depend on the hit so far, so a place in it can be found again).
 //!
 //! Guarantees: the same bytes whatever the number of threads; depth at most [`MAX_DEPTH`]; every triangle that can be met lies in exactly
-//! one leaf, the others are counted; a hit that the triangle test reports is never culled (see [`BOX_SLACK`]), so traversal returns
-//! exactly what trying all triangles in index order returns.
+//! one leaf, the others are counted; a hit that the triangle test reports is never culled (see
+//! [`BOX_SLACK`](super::box_test::BOX_SLACK)), so traversal returns exactly what trying all triangles in index order returns.
 
 pub(super) mod build;
 pub(super) mod layout;
-pub(super) mod traverse;
+mod traverse;
 
 pub use build::Bvh2Settings;
-pub use traverse::{FINISHED, Step, Traversal};
+pub use traverse::{Step, Traversal};
 
 use super::{
     Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
@@ -40,25 +40,6 @@ pub const COUNT_MASK: u32 = constants::BVH2_COUNT_MASK;
 
 /// Most triangles that child words can address.
 pub const MAX_TRIANGLES: usize = 1 << (32 - COUNT_BITS - 1);
-
-/// Share of the scene's size by which boxes are grown in the ray test, 2⁻¹⁸ = 64u with u = 2⁻²⁴.
-///
-/// Let M be the largest component distance from the ray's origin to a corner of the root box, and |d| the largest direction component.
-/// Divisions err by 2.5 ULP at most (Vulkan), that is 5u; first order in u:
-///
-/// - sheared vertex: difference uM, shear factor and product 7uM, subtraction 2uM: 10uM;
-/// - weights, relative error 2u each plus their use: the point q that they name is sheared to within 6uM of what exact weights give,
-///   which is the origin: so q lies on the triangle, within 16uM of the ray along the two sheared axes;
-/// - reported t: projection 7u, products and sum 3u, determinant 2u, division 6u: within 18uM/|d| of q's. The ray at t is thus within
-///   18uM of q along the dominant axis and 34uM along the others;
-/// - slab distances: difference u, reciprocal 5u, product u: 7uM; subtracting the slack: uM.
-///
-/// Altogether under 44uM: with slabs grown by 64uM the reported t lies between entry and exit of each box that holds the triangle. A
-/// relative widening of the exit distance (T. Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013) would cover the last item only.
-pub const BOX_SLACK: f32 = constants::BOX_SLACK;
-
-/// Smallest direction component, relative to the largest, that the box test takes as it is; the slack covers the difference (2⁻⁶⁰).
-pub const MIN_RELATIVE_COMPONENT: f32 = constants::MIN_RELATIVE_COMPONENT;
 
 /// Quarters of a node, the unit in which kernels read.
 pub(super) const NODE_QUARTERS: usize = size_of::<Bvh2Node>() / size_of::<[u32; 4]>();

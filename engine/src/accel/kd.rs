@@ -7,7 +7,7 @@
 //! Guarantees: the same tree whatever the number of threads; at most [`MAX_DEPTH`] inner nodes on a way from the root; hits are those of
 //! trying all triangles in index order, bit for bit, whatever the traversal. The last needs more than the source's rule that a hit within
 //! its leaf is final: planes are met a little later and left a little earlier than their distance says, by the bound that
-//! [`BOX_SLACK`](super::bvh2::BOX_SLACK) derives for slabs, and leaves are gone through until they begin beyond the best hit.
+//! [`BOX_SLACK`](super::box_test::BOX_SLACK) derives for slabs, and leaves are gone through until they begin beyond the best hit.
 
 pub mod bounds;
 pub(crate) mod build;
@@ -17,7 +17,7 @@ mod counters;
 mod entries;
 mod kept;
 pub mod probability;
-pub mod shifted_restart;
+pub(crate) mod shifted_restart;
 pub(crate) mod traverse;
 mod tree;
 

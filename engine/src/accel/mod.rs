@@ -5,6 +5,8 @@
 //! machine: the triangle test is shared ([`triangle`]), boxes are conservative for everything that test can report, and of candidates
 //! with equal distance the lowest triangle index wins.
 //!
+//! What is only measured, and what tests compare with, is in [`yardstick`].
+//!
 //! # How to add an index
 //!
 //! Beside its [`RayIndex`] it has an include `accel/<name>.glsl` with a function over the texel buffer of set 1
@@ -20,6 +22,7 @@
 //! ([`DeviceTraversal::kind`]): every kernel that traverses any index traverses this one, too.
 
 mod aabb;
+pub mod box_test;
 pub mod box_tree;
 pub mod bvh2;
 mod device_traversal;
@@ -34,8 +37,10 @@ pub mod optimise;
 pub mod photon_map;
 pub mod sphere;
 mod stages;
+pub(crate) mod sweep;
 pub mod trace;
 pub mod triangle;
+pub mod yardstick;
 
 #[cfg(test)]
 mod test_support;
@@ -51,6 +56,9 @@ use bytemuck::{Pod, Zeroable};
 
 /// [`Hit::triangle`] of a ray that met nothing.
 pub const NO_HIT: u32 = constants::NO_HIT;
+
+/// What says of a traversal that can be stopped, in place of where it goes on, that it is done.
+pub const FINISHED: u32 = constants::INDEX_FINISHED;
 
 /// Smallest largest-component of a ray direction that is traced; shorter directions, zero among them, meet nothing.
 pub const MIN_DIRECTION: f32 = constants::MIN_DIRECTION;

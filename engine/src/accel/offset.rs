@@ -4,7 +4,7 @@
 //! Error"), with the error of the triangle test added. GLSL functions of the same names are in `accel/offset.glsl`.
 //!
 //! With u = 2⁻²⁴ and M the largest component distance from the point to a vertex of the scene (its *reach*): a hit that the triangle test
-//! reports at t lies within 34uM, by component, of a point of the triangle (see [`BOX_SLACK`](super::bvh2::BOX_SLACK)), hence within
+//! reports at t lies within 34uM, by component, of a point of the triangle (see [`BOX_SLACK`](super::box_test::BOX_SLACK)), hence within
 //! 34uM‖n‖₁ of its plane. A ray that starts farther than that from the plane and does not approach it cannot report it. Offsets are
 //! 128uM‖n‖₁ plus the rounding of the position; what is beyond 34uM pays for a direction that is parallel to the plane only up to rounding,
 //! for an error of the normal up to 0.3 rad, for a fold of that size at the nearest edge, and for the rounding of the offset position.

@@ -1,9 +1,8 @@
-//! Ray/triangle tests: the watertight one that the kernels run, its oracle in f64, and Möller–Trumbore.
+//! The ray/triangle test of all indexes and kernels, which is watertight.
 //!
 //! Sources: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013; the difference of two products as in
 //! Cornea, Harrison and Tang, with exact product errors by Dekker's and Veltkamp's splitting ("A floating-point technique for extending
-//! the available precision", Numerische Mathematik 18, 1971); T. Möller and B. Trumbore, "Fast, Minimum Storage Ray/Triangle
-//! Intersection", JGT 2(1), 1997.
+//! the available precision", Numerische Mathematik 18, 1971).
 //!
 //! The paper falls back to double precision when an edge value is zero. Here every edge value is the difference of two products with
 //! both rounding errors added back, in f32 only. Guarantees, with u = 2⁻²⁴ and barring underflow (edge products under 2⁻¹⁰⁰ m²):
@@ -14,15 +13,15 @@
 //!   that share vertices see the same sheared vertices; so a point that a mesh covers there is inside one of its triangles. No gap.
 //! - The weights are all of one sign: the point they name lies on the triangle. Its distance from the ray, seen along the dominant
 //!   axis, is at most 16uM, and the reported `t` is within 18uM/|d| of the point's, where M is the largest coordinate distance of a
-//!   vertex from the ray's origin and |d| the largest component of the direction (derivation at [`BOX_SLACK`](crate::accel::bvh2::BOX_SLACK)).
+//!   vertex from the ray's origin and |d| the largest component of the direction (derivation at [`BOX_SLACK`](crate::accel::box_test::BOX_SLACK)).
 //! - Two-sided. A triangle of which two vertices coincide, or that is seen exactly edge-on, is missed. NaN anywhere is a miss.
 
-pub mod wald;
+pub(crate) mod oracles;
+pub(crate) mod wald;
 
-use super::Ray;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 /// Veltkamp's splitting factor for 24-bit significands, 2¹² + 1.
 const SPLITTER: f32 = constants::SPLITTER;
@@ -119,88 +118,27 @@ pub fn intersect_triangle(ray: &RayShear, vertices: &[Vec3; 3], t_min: f32, t_ma
     })
 }
 
-/// The same test in f64: the oracle. Differences and products of f32 input are exact or nearly so.
-pub fn intersect_triangle_f64(ray: &Ray, vertices: &[Vec3; 3]) -> Option<TriangleHit<f64>> {
-    let o = Vec3::from(ray.origin).as_dvec3();
-    let direction = Vec3::from(ray.direction).as_dvec3();
-    let axis = direction.abs().max_position();
-    let cyclic = |v: DVec3| match axis {
-        0 => DVec3::new(v.y, v.z, v.x),
-        1 => DVec3::new(v.z, v.x, v.y),
-        _ => v,
-    };
-    let d = cyclic(direction);
-    let project = |vertex: Vec3| {
-        let a = cyclic(vertex.as_dvec3() - o);
-        DVec3::new(a.x - d.x / d.z * a.z, a.y - d.y / d.z * a.z, a.z / d.z)
-    };
-    let (a, b, c) = (project(vertices[0]), project(vertices[1]), project(vertices[2]));
-    let u = c.x * b.y - c.y * b.x;
-    let v = a.x * c.y - a.y * c.x;
-    let w = b.x * a.y - b.y * a.x;
-    let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-    let det = u + v + w;
-    if !inside || det == 0.0 {
-        return None;
-    }
-    let t = (u * a.z + v * b.z + w * c.z) / det;
-    (t >= f64::from(ray.t_min) && t <= f64::from(ray.t_max)).then_some(TriangleHit {
-        t,
-        u: v / det,
-        v: w / det,
-    })
-}
-
-/// Möller and Trumbore's test in f64, two-sided; the second oracle. Where the determinant is zero the triangle is missed.
-pub fn moller_trumbore(ray: &Ray, vertices: &[Vec3; 3]) -> Option<TriangleHit<f64>> {
-    let [v0, v1, v2] = vertices.map(|v| v.as_dvec3());
-    let direction = Vec3::from(ray.direction).as_dvec3();
-    let (e1, e2) = (v1 - v0, v2 - v0);
-    let delta = Vec3::from(ray.origin).as_dvec3() - v0;
-    let p = direction.cross(e2);
-    let q = delta.cross(e1);
-    let det = e1.dot(p);
-    if det == 0.0 {
-        return None;
-    }
-    let (t, u, v) = (e2.dot(q) / det, delta.dot(p) / det, direction.dot(q) / det);
-    let hit = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= f64::from(ray.t_min) && t <= f64::from(ray.t_max);
-    hit.then_some(TriangleHit { t, u, v })
-}
-
 /// Rows of the catalogue.
-pub(crate) const ROWS: &[Row] = &[
-    Row {
-        id: "PM-I-2",
-        name: "Möller–Trumbore triangle test (oracle in f64)",
-        role: Role::Yardstick,
-        limits: "Not watertight: rays can pass between triangles that share an edge.",
-        sources: &[sources::MOLLER_TRUMBORE_1997.whole()],
-        tests: &["engine/src/accel/triangle/tests.rs::oracles_agree_with_each_other"],
-        api: &["clerestory::accel::triangle::moller_trumbore"],
-        ..Row::of(file!())
-    },
-    Row {
-        id: "CL-TRIANGLE",
-        name: "watertight triangle test",
-        role: Role::Kernel,
-        limits: "Misses triangles with two equal corners or seen exactly edge-on; rays at outer edges, with no neighbour behind them, may pass; its bounds hold for edge products above 2⁻¹⁰⁰ m².",
-        sources: &[sources::WOOP_2013.whole()],
-        shaders: &["shaders/accel/triangle.glsl"],
-        tests: &[
-            "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
-            "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
-            "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
-            "tests/tests/seams.rs::no_ray_is_lost_at_seams_in_any_index",
-            "tests/tests/seams.rs::kernels_lose_no_ray_at_seams_in_any_index",
-        ],
-        api: &[
-            "clerestory::accel::triangle::intersect_triangle",
-            "clerestory::accel::triangle::ray_shear",
-        ],
-        ..Row::of(file!())
-    },
-];
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-TRIANGLE",
+    name: "watertight triangle test",
+    role: Role::Kernel,
+    limits: "Misses triangles with two equal corners or seen exactly edge-on; rays at outer edges, with no neighbour behind them, may pass; its bounds hold for edge products above 2⁻¹⁰⁰ m².",
+    sources: &[sources::WOOP_2013.whole()],
+    shaders: &["shaders/accel/triangle.glsl"],
+    tests: &[
+        "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
+        "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
+        "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
+        "tests/tests/seams.rs::no_ray_is_lost_at_seams_in_any_index",
+        "tests/tests/seams.rs::kernels_lose_no_ray_at_seams_in_any_index",
+    ],
+    api: &[
+        "clerestory::accel::triangle::intersect_triangle",
+        "clerestory::accel::triangle::ray_shear",
+    ],
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@ use crate::catalogue::Row;
 
 /// Their rows.
 pub(super) const MODULES: &[&[Row]] = &[
+    crate::accel::box_test::ROWS,
     crate::accel::bvh2::ROWS,
     crate::accel::kd::build::ROWS,
     crate::accel::kd::cache::ROWS,
@@ -20,10 +21,11 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::photon_map::leaf_threshold::ROWS,
     crate::accel::photon_map::merge::ROWS,
     crate::accel::photon_map::split_lists::ROWS,
-    crate::accel::photon_map::vvh::ROWS,
     crate::accel::sphere::ROWS,
+    crate::accel::sweep::ROWS,
     crate::accel::trace::ROWS,
     crate::accel::triangle::ROWS,
+    crate::accel::triangle::oracles::ROWS,
     crate::accel::triangle::wald::ROWS,
     crate::film::accumulate::ROWS,
     crate::film::exr::ROWS,

@@ -280,6 +280,72 @@ fn what_hosts_call_and_set_is_there() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// Rows of yardsticks over indexes that are called elsewhere: counters and queries of the trees that photon mapping builds.
+const YARDSTICKS_ELSEWHERE: [&str; 3] = ["PM-MAP-10", "PM-MAP-7", "PM-X-3"];
+
+#[test]
+fn yardsticks_of_indexes_are_called_by_their_own_module_and_nothing_else_is() {
+    let mut elsewhere = Vec::new();
+    let mut seen = 0;
+    for row in all().iter().filter(|row| row.module.starts_with("engine/src/accel/")) {
+        let of_them = row
+            .api
+            .iter()
+            .filter(|path| path.starts_with("clerestory::accel::yardstick::"));
+        let named = of_them.count();
+        if row.role != Role::Yardstick {
+            assert_eq!(named, 0, "{} is no yardstick", row.id);
+        } else if named == row.api.len() {
+            seen += 1;
+        } else {
+            elsewhere.push(row.id);
+        }
+    }
+    elsewhere.sort_unstable();
+    assert_eq!(elsewhere, YARDSTICKS_ELSEWHERE);
+    assert!(seen > 5, "{seen}");
+}
+
+/// What the engine's code, without its tests, calls of the yardsticks by name, with the files.
+fn uses_of_yardsticks() -> Vec<String> {
+    let accel = repository().join("engine/src/accel");
+    let list = std::fs::read_to_string(accel.join("yardstick.rs")).expect("yardsticks");
+    let (mut names, mut homes) = (Vec::new(), Vec::new());
+    for used in list.lines().filter_map(|line| line.strip_prefix("pub use super::")) {
+        let (module, items) = used.rsplit_once("::").expect("a path");
+        homes.push(accel.join(format!("{}.rs", module.replace("::", "/"))));
+        let words = items.split(|c: char| !(c.is_alphanumeric() || c == '_'));
+        names.extend(words.filter(|word| !word.is_empty()).map(str::to_owned));
+    }
+    assert!(
+        names.len() > 10 && homes.iter().all(|home| home.is_file()),
+        "{names:?} of {homes:?}"
+    );
+    homes.push(accel.join("yardstick.rs"));
+    let engine = repository().join("engine/src");
+    let mut found = Vec::new();
+    for path in rust_files().into_iter().filter(|path| path.starts_with(&engine)) {
+        let is_test = path
+            .file_stem()
+            .is_some_and(|stem| stem.to_string_lossy().ends_with("tests"));
+        if is_test || homes.contains(&path) {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).expect("source");
+        let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let words = code.flat_map(|line| line.split(|c: char| !(c.is_alphanumeric() || c == '_')));
+        let named = words.filter(|word| names.iter().any(|name| name == word));
+        found.extend(named.map(|name| format!("{}: {name}", path.display())));
+    }
+    found
+}
+
+#[test]
+fn the_engine_does_not_use_its_yardsticks() {
+    let found = uses_of_yardsticks();
+    assert!(found.is_empty(), "{found:#?}");
+}
+
 /// Every kernel of a card is among the shaders, which name files and folders, of its row, of parts, or of what hosts can call alone.
 #[test]
 fn rows_of_techniques_have_the_kernels_of_their_cards() {

@@ -4,7 +4,8 @@ use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::kd::{KdSettings, KdTree};
 use clerestory::accel::lbvh::{self, LbvhSettings};
-use clerestory::accel::triangle::{intersect_triangle, moller_trumbore, ray_shear};
+use clerestory::accel::triangle::{intersect_triangle, ray_shear};
+use clerestory::accel::yardstick::moller_trumbore;
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
 use glam::{DVec3, Vec3};
 

@@ -6,14 +6,11 @@
 //! sibling that comes after the walk in the order, which rebuilds the stack, less what the hit so far has culled. Nothing is lost, and nothing
 //! is tested twice.
 
-use super::{BOX_SLACK, Bvh2, Bvh2Triangle, COUNT_BITS, COUNT_MASK, MAX_DEPTH, MIN_RELATIVE_COMPONENT};
+use super::{Bvh2, Bvh2Triangle, COUNT_BITS, COUNT_MASK, MAX_DEPTH};
+use crate::accel::box_test::BoxTest;
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
-use crate::accel::{Aabb, CandidateFilter, Hit, Ray, TraversalCounters};
-use crate::gpu::shaders::constants;
+use crate::accel::{CandidateFilter, FINISHED, Hit, Ray, TraversalCounters};
 use glam::Vec3;
-
-/// [`Traversal::resume`] of a traversal that is done.
-pub const FINISHED: u32 = constants::INDEX_FINISHED;
 
 /// A traversal between two runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,42 +29,6 @@ pub enum Step {
     Node,
     /// Tests a triangle.
     Triangle,
-}
-
-/// Origin, clamped reciprocal direction and slack of the box test.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::accel) struct BoxTest {
-    pub(in crate::accel) origin: Vec3,
-    pub(in crate::accel) inverse: Vec3,
-    pub(in crate::accel) slack: Vec3,
-}
-
-impl BoxTest {
-    /// For boxes within `root`.
-    pub(in crate::accel) fn new(root: &Aabb, ray: &Ray) -> Self {
-        let origin = Vec3::from(ray.origin);
-        let direction = Vec3::from(ray.direction);
-        let least = direction.abs().max_element() * MIN_RELATIVE_COMPONENT;
-        let inverse = Vec3::from_array(ray.direction.map(|d| {
-            let size = if d.abs() > least { d.abs() } else { least };
-            (if d < 0.0 { -1.0 } else { 1.0 }) / size
-        }));
-        let reach = (root.lower - origin).abs().max((root.upper - origin).abs());
-        Self {
-            origin,
-            inverse,
-            slack: (BOX_SLACK * reach.max_element()) * inverse.abs(),
-        }
-    }
-
-    /// Entry and exit distance of a box.
-    pub(in crate::accel) fn span(&self, lower: Vec3, upper: Vec3) -> (f32, f32) {
-        let t0 = (lower - self.origin) * self.inverse;
-        let t1 = (upper - self.origin) * self.inverse;
-        let near = t0.min(t1) - self.slack;
-        let far = t0.max(t1) + self.slack;
-        (near.max_element(), far.min_element())
-    }
 }
 
 impl Traversal {

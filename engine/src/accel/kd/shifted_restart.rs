@@ -8,7 +8,7 @@
 use super::KdTree;
 use super::tree::KdKind;
 use crate::accel::Ray;
-use crate::accel::bvh2::traverse::BoxTest;
+use crate::accel::box_test::BoxTest;
 use crate::catalogue::{Role, Row, sources};
 
 /// What a restart takes for its interval.
@@ -119,6 +119,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/accel/kd/shifted_restart_tests.rs::restarts_behind_a_leaf_fail_in_all_three_forms_and_flags_do_not",
     ],
-    api: &["clerestory::accel::kd::shifted_restart::ShiftedRestart"],
+    api: &["clerestory::accel::yardstick::ShiftedRestart"],
     ..Row::of(file!())
 }];

@@ -1,8 +1,8 @@
 use super::tree::KdKind;
 use super::*;
-use crate::accel::bvh2::FINISHED;
+use crate::accel::FINISHED;
+use crate::accel::box_test::BoxTest;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
-use crate::accel::bvh2::traverse::BoxTest;
 use crate::accel::test_support::{Random, brute_force, ray};
 
 const SCHEMES: [Scheme; 7] = [

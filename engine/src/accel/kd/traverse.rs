@@ -12,10 +12,9 @@
 use super::entries::{Entries, Entry};
 use super::tree::KdKind;
 use super::{KdCaches, KdCounters, KdTree, MAX_DEPTH};
-use crate::accel::bvh2::FINISHED;
-use crate::accel::bvh2::traverse::BoxTest;
+use crate::accel::box_test::BoxTest;
 use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
-use crate::accel::{CandidateFilter, Hit, Ray};
+use crate::accel::{CandidateFilter, FINISHED, Hit, Ray};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
 use glam::Vec3;
@@ -127,7 +126,7 @@ impl Descent {
 pub struct KdTraversal {
     /// Best hit so far.
     pub hit: Hit,
-    /// Flags of what is left, 0 at the start, or [`FINISHED`](crate::accel::bvh2::FINISHED).
+    /// Flags of what is left, 0 at the start, or [`FINISHED`].
     pub resume: u32,
     any: bool,
     scheme: Scheme,

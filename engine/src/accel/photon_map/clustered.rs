@@ -169,6 +169,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/photon_map/tests.rs::sorting_by_clusters_is_the_stable_sort",
         "engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition",
     ],
-    api: &["clerestory::accel::photon_map::clustered::clustered_hierarchy"],
+    api: &["clerestory::accel::yardstick::clustered_hierarchy"],
     ..Row::of(file!())
 }];

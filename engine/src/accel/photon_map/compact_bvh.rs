@@ -10,10 +10,11 @@
 
 use super::complete_bvh::{
     CompleteBvh, INDEX_BITS, LEAF_BIT, NO_PLANE, POINT_STACK_ENTRY_BYTES, QueryCounters, RayPair, RootDescriptor,
-    STACK_SIZE, SlabRay, holds_inside, met,
+    STACK_SIZE, holds_inside, met, span_within,
 };
-use crate::accel::Aabb;
+use crate::accel::box_test::BoxTest;
 use crate::accel::box_tree::TreeFault;
+use crate::accel::{Aabb, Ray};
 use crate::catalogue::{Role, Row, sources};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -185,10 +186,14 @@ impl CompactBvh {
 
     /// Visits the leaves that a ray meets, nearer child first; `visit` gets a leaf's first record and may draw the ray's end nearer. Spans
     /// are carried down and kept on the stack, since a pair does not have the planes it inherits.
-    pub fn ray_query(&self, ray: &SlabRay, counters: &mut QueryCounters, mut visit: impl FnMut(u32, &mut f32)) {
-        let [t_min, mut t_max] = ray.ends();
-        let span = ray.span(&self.root.bounds, [t_min, t_max]);
-        let mut next = self.root.reference.filter(|_| met(span)).map(|root| (root, span));
+    pub fn ray_query(&self, ray: &Ray, counters: &mut QueryCounters, mut visit: impl FnMut(u32, &mut f32)) {
+        let Some(root) = self.root.reference.filter(|_| ray.is_traceable()) else {
+            return;
+        };
+        let boxes = BoxTest::new(&self.root.bounds, ray);
+        let mut t_max = ray.t_max;
+        let span = span_within(&boxes, &self.root.bounds, [ray.t_min, t_max]);
+        let mut next = met(span).then_some((root, span));
         let mut stack = [(0, [0.0; 2]); STACK_SIZE];
         let mut top = 0;
         let everywhere = Aabb {
@@ -205,7 +210,7 @@ impl CompactBvh {
                 counters.nodes += 2;
                 counters.bytes += COMPACT_PAIR_BYTES;
                 let children = pair.children(&everywhere);
-                let spans = children.map(|b| ray.span(&b, [enter, leave.min(t_max)]));
+                let spans = children.map(|b| span_within(&boxes, &b, [enter, leave.min(t_max)]));
                 let references = pair.references();
                 let near = usize::from(spans[1][0] < spans[0][0]);
                 for side in [1 - near, near] {
@@ -281,7 +286,7 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("PM-SYS-1"),
         limits: "Visits the leaves whose boxes hold a point; what is in them is for the caller to test.",
         sources: &[sources::FABIANOWSKI_2011.at("§6.2.3")],
-        shaders: &["shaders/accel/compact_bvh.glsl", "shaders/accel/compact_points.comp"],
+        shaders: &["shaders/accel/compact_bvh.glsl"],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",
@@ -295,7 +300,7 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::Yardstick,
         limits: "No picture takes it: their rays go through the ray indexes.",
         sources: &[sources::FABIANOWSKI_2011.at("§6.2.2")],
-        shaders: &["shaders/accel/compact_bvh.glsl", "shaders/accel/compact_rays.comp"],
+        shaders: &["shaders/accel/compact_bvh.glsl"],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
             "tests/tests/lbvh.rs::compact_queries_are_the_twins",

@@ -144,6 +144,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Makes chains of nodes with one child, which are taken out later; boxes need a pass of their own.",
     sources: &[sources::LAUTERBACH_2009.whole()],
     tests: &["engine/src/accel/photon_map/tests.rs::merging_split_lists_and_clusters_make_the_tree_of_the_definition"],
-    api: &["clerestory::accel::photon_map::split_lists::split_list_hierarchy"],
+    api: &["clerestory::accel::yardstick::split_list_hierarchy"],
     ..Row::of(file!())
 }];

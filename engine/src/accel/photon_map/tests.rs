@@ -3,13 +3,13 @@
 use super::clustered::{ClusterCounts, clustered_hierarchy, sort_by_clusters};
 use super::merge::{MergePoint, merge_points, merged_hierarchy};
 use super::split_lists::split_list_hierarchy;
-use super::vvh::{Heuristic, MAX_SWEEP_DEPTH, sweep_tree};
 use crate::accel::Aabb;
 use crate::accel::LeafRule;
 use crate::accel::box_tree::{BoxTree, Child};
 use crate::accel::lbvh::SortedCodes;
 use crate::accel::lbvh::radix_tree::hierarchy;
 use crate::accel::lbvh::{hard_boxes, valid};
+use crate::accel::sweep::{MAX_SWEEP_DEPTH, area_sweep_tree, volume_sweep_tree};
 use crate::test_random::Random;
 use glam::Vec3;
 
@@ -203,8 +203,8 @@ fn every_split_of_a_sweep_has_the_least_cost_by_its_own_measure() {
             })
             .collect();
         let [volume, area]: [fn(&Aabb) -> f64; 2] = [Aabb::volume, Aabb::half_area];
-        let by_volume = sweep_tree(&boxes, 1, Heuristic::Volume);
-        let by_area = sweep_tree(&boxes, 1, Heuristic::Area);
+        let by_volume = volume_sweep_tree(&boxes, 1);
+        let by_area = area_sweep_tree(&boxes, 1);
         assert_eq!((by_volume.nodes.len(), by_area.nodes.len()), (79, 79));
         assert_eq!(dearer_splits(&by_volume, &boxes, volume), 0);
         assert_eq!(dearer_splits(&by_area, &boxes, area), 0);
@@ -217,8 +217,8 @@ fn every_split_of_a_sweep_has_the_least_cost_by_its_own_measure() {
 #[test]
 fn sweeps_are_valid_and_beat_the_linear_tree() {
     for (name, boxes) in hard_boxes() {
-        for heuristic in [Heuristic::Volume, Heuristic::Area] {
-            let tree = sweep_tree(&boxes, 5, heuristic);
+        for build in [volume_sweep_tree, area_sweep_tree] {
+            let tree = build(&boxes, 5);
             let shape = valid(name, &tree, &boxes);
             assert!(
                 shape.max_depth <= MAX_SWEEP_DEPTH && shape.largest_leaf <= 5,
@@ -240,9 +240,9 @@ fn sweeps_are_valid_and_beat_the_linear_tree() {
         .collect();
     let sorted = SortedCodes::of_boxes(&kernels, 10);
     let linear = merged_hierarchy(&kernels, &sorted, 5, |_| {});
-    let ratio = linear.volume_cost() / sweep_tree(&kernels, 5, Heuristic::Volume).volume_cost();
+    let ratio = linear.volume_cost() / volume_sweep_tree(&kernels, 5).volume_cost();
     assert!(ratio > 1.0 && ratio < 1.35, "{ratio}");
     let linear = hierarchy(&kernels, &sorted, LeafRule::Size(5), 64);
-    let ratio = linear.area_cost() / sweep_tree(&kernels, 5, Heuristic::Area).area_cost();
+    let ratio = linear.area_cost() / area_sweep_tree(&kernels, 5).area_cost();
     assert!(ratio > 1.0, "{ratio}");
 }

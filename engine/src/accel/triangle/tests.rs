@@ -1,4 +1,6 @@
+use super::oracles::{intersect_triangle_f64, moller_trumbore};
 use super::*;
+use crate::accel::Ray;
 use crate::accel::test_support::{Random, Sheared, U, ray};
 
 fn test(ray: &Ray, triangle: &[Vec3; 3]) -> Option<TriangleHit> {

@@ -84,7 +84,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Not watertight, and weights lose digits where a triangle is far smaller than its distance from the origin of coordinates.",
     sources: &[sources::WALD_2004.at("7.1")],
     tests: &["engine/src/accel/triangle/wald.rs::hits_differ_from_the_oracle_only_near_edges"],
-    api: &["clerestory::accel::triangle::wald::WaldTriangle"],
+    api: &["clerestory::accel::yardstick::WaldTriangle"],
     ..Row::of(file!())
 }];
 
@@ -92,7 +92,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
 mod tests {
     use super::*;
     use crate::accel::test_support::{Random, ray};
-    use crate::accel::triangle::moller_trumbore;
+    use crate::accel::triangle::oracles::moller_trumbore;
 
     /// Where a ray's line meets a triangle's plane, inside or not, in f64.
     fn in_plane(ray: &Ray, vertices: &[Vec3; 3]) -> TriangleHit<f64> {

@@ -17,7 +17,8 @@ pub use files::{markdown, write};
 use std::path::Path;
 use std::process::ExitCode;
 
-use clerestory::accel::bvh2::{BOX_SLACK, Bvh2};
+use clerestory::accel::box_test::BOX_SLACK;
+use clerestory::accel::bvh2::Bvh2;
 use clerestory::accel::{NO_HIT, Ray, RayIndex};
 use clerestory::gpu::Gpu;
 use clerestory::transport::random::{pcg3d, unit_float};

@@ -6,7 +6,8 @@
 //! the point's. So the parameter is within 18uM/|d| + 16uM·s of where the ray meets the triangle's plane, where s is the sum of the sizes of
 //! both slopes of the plane's parameter.
 
-use clerestory::accel::triangle::{intersect_triangle, intersect_triangle_f64, ray_shear};
+use clerestory::accel::triangle::{intersect_triangle, ray_shear};
+use clerestory::accel::yardstick::intersect_triangle_f64;
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray};
 use glam::{DVec3, Vec3};
 

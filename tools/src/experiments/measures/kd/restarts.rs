@@ -2,7 +2,7 @@
 
 use clerestory::accel::Ray;
 use clerestory::accel::kd::KdTree;
-use clerestory::accel::kd::shifted_restart::{ShiftedRestart, leaves_by_stack};
+use clerestory::accel::yardstick::{ShiftedRestart, leaves_by_stack};
 
 use super::flights::{Case, Flight};
 use crate::experiments::findings::rows;

@@ -7,10 +7,9 @@ use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::BoxTree;
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, SortedCodes};
 use clerestory::accel::morton::MORTON_30_AXIS_BITS;
-use clerestory::accel::photon_map::clustered::{ClusterCounts, clustered_hierarchy};
 use clerestory::accel::photon_map::leaf_threshold::automatic_leaf_size;
 use clerestory::accel::photon_map::merge::merged_hierarchy;
-use clerestory::accel::photon_map::split_lists::split_list_hierarchy;
+use clerestory::accel::yardstick::{ClusterCounts, clustered_hierarchy, split_list_hierarchy};
 use clerestory::{Error, Result};
 
 use super::construction_stages::{

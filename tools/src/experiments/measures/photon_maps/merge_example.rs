@@ -7,7 +7,7 @@ use clerestory::accel::Aabb;
 use clerestory::accel::box_tree::{BoxTree, Child};
 use clerestory::accel::lbvh::SortedCodes;
 use clerestory::accel::photon_map::merge::{merge_points, merged_hierarchy};
-use clerestory::accel::photon_map::split_lists::split_list_hierarchy;
+use clerestory::accel::yardstick::split_list_hierarchy;
 use clerestory::{Error, Result};
 use glam::Vec3;
 

@@ -16,7 +16,7 @@ use clerestory::accel::morton::MORTON_30_AXIS_BITS;
 use clerestory::accel::photon_map::compact_bvh::CompactBvh;
 use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};
 use clerestory::accel::photon_map::merge::merged_hierarchy;
-use clerestory::accel::photon_map::vvh::{Heuristic, sweep_tree};
+use clerestory::accel::yardstick::volume_sweep_tree;
 use clerestory::{Error, Result};
 use glam::{Vec3, Vec4};
 
@@ -177,7 +177,7 @@ impl Kernels {
 
     /// The tree of the voxel volume heuristic.
     pub fn by_volume(&self, leaf_size: u32) -> BoxTree {
-        sweep_tree(&self.boxes, leaf_size, Heuristic::Volume)
+        volume_sweep_tree(&self.boxes, leaf_size)
     }
 
     /// The linear hierarchy by merging.

@@ -2,11 +2,11 @@
 //!
 //! Guarantee: deterministic.
 
-use clerestory::accel::Aabb;
 use clerestory::accel::photon_map::compact_bvh::CompactBvh;
-use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters, SlabRay};
-use clerestory::accel::photon_map::vvh::{Heuristic, sweep_tree};
+use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
+use clerestory::accel::yardstick::area_sweep_tree;
+use clerestory::accel::{Aabb, Ray};
 use clerestory::{Error, Result};
 use glam::Vec3;
 
@@ -64,7 +64,7 @@ impl Trees {
     pub fn new(triangles: &[[Vec3; 3]]) -> Result<Self> {
         let corners = |t: &[Vec3; 3]| t.iter().fold(Aabb::EMPTY, |bounds, corner| bounds.with_point(*corner));
         let boxes: Vec<Aabb> = triangles.iter().map(corners).collect();
-        let complete = CompleteBvh::new(&sweep_tree(&boxes, LEAF_SIZE, Heuristic::Area))?;
+        let complete = CompleteBvh::new(&area_sweep_tree(&boxes, LEAF_SIZE))?;
         let compact = CompactBvh::encode(&complete)
             .map_err(|fault| Error::setting("tree", "compact", format!("is not tight: {fault:?}")))?;
         Ok(Self {
@@ -110,7 +110,12 @@ impl Trees {
                 }
             }
         };
-        let ray = SlabRay::new(query.origin, query.direction, 0.0, query.t_max);
+        let ray = Ray {
+            origin: query.origin.into(),
+            t_min: 0.0,
+            direction: query.direction.into(),
+            t_max: query.t_max,
+        };
         if is_compact {
             self.compact.ray_query(&ray, &mut answer.tree, leaf);
         } else {

@@ -1,10 +1,8 @@
 //! Ways to test rays against triangles, their oracle, and rays and triangles to test.
 
 use clerestory::accel::Ray;
-use clerestory::accel::triangle::wald::WaldTriangle;
-use clerestory::accel::triangle::{
-    TriangleHit, intersect_triangle, intersect_triangle_f64, moller_trumbore, ray_shear,
-};
+use clerestory::accel::triangle::{TriangleHit, intersect_triangle, ray_shear};
+use clerestory::accel::yardstick::{WaldTriangle, intersect_triangle_f64, moller_trumbore};
 use glam::{DVec3, Vec3};
 
 use crate::experiments::measures::errors::greatest;

@@ -4,7 +4,7 @@
 
 use clerestory::Result;
 use clerestory::accel::Ray;
-use clerestory::accel::triangle::wald::WaldTriangle;
+use clerestory::accel::yardstick::WaldTriangle;
 
 use super::triangle_forms::{
     CASES, Case, FORMS, Form, Input, KERNELS, Seam, WALD, exact_in_plane, is_inside_of_outer_edges, rays,

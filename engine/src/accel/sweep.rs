@@ -1,4 +1,5 @@
-//! A tree by full sweeps of the voxel volume heuristic or the surface area heuristic: the yardstick of quality, built at leisure.
+//! Trees by full sweeps, one builder for each measure of a visit: volumes for queries by points, surface areas for rays. Yardsticks of quality,
+//! built at leisure.
 //!
 //! Sources: the voxel volume heuristic for bounding volume hierarchies of photon maps, B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis,
 //! Trinity College Dublin, 2011, §6.1.1: a point query visits the nodes that contain it, so a node's share is that of its volume; for
@@ -16,38 +17,31 @@ use crate::catalogue::{Role, Row, sources};
 /// Most inner nodes on a way from the root.
 pub const MAX_SWEEP_DEPTH: u32 = 64;
 
-/// What a node's probability of a visit goes by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Heuristic {
-    /// Volume: queries by points.
-    Volume,
-    /// Surface area: queries by rays.
-    Area,
-}
-
-impl Heuristic {
-    fn measure(self, bounds: &Aabb) -> f64 {
-        match self {
-            Self::Volume => bounds.volume(),
-            Self::Area => bounds.half_area(),
-        }
-    }
-}
-
 struct Sweep<'a> {
     boxes: &'a [Aabb],
     leaf_size: usize,
-    heuristic: Heuristic,
+    /// What a node's probability of a visit goes by.
+    measure: fn(&Aabb) -> f64,
     nodes: Vec<PairNode>,
 }
 
-/// The tree over boxes, with leaves of at most `leaf_size` primitives unless the depth ends first.
-pub fn sweep_tree(boxes: &[Aabb], leaf_size: u32, heuristic: Heuristic) -> BoxTree {
+/// The tree of the voxel volume heuristic, for queries by points: over boxes, with leaves of at most `leaf_size` primitives unless the depth,
+/// [`MAX_SWEEP_DEPTH`], ends first.
+pub fn volume_sweep_tree(boxes: &[Aabb], leaf_size: u32) -> BoxTree {
+    sweep_tree(boxes, leaf_size, Aabb::volume)
+}
+
+/// The same by the surface area heuristic, for rays.
+pub fn area_sweep_tree(boxes: &[Aabb], leaf_size: u32) -> BoxTree {
+    sweep_tree(boxes, leaf_size, Aabb::half_area)
+}
+
+fn sweep_tree(boxes: &[Aabb], leaf_size: u32, measure: fn(&Aabb) -> f64) -> BoxTree {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut sweep = Sweep {
         boxes,
         leaf_size: leaf_size.max(1) as usize,
-        heuristic,
+        measure,
         nodes: Vec::new(),
     };
     let (bounds, root) = sweep.build(&mut order, 0, MAX_SWEEP_DEPTH);
@@ -95,7 +89,7 @@ impl Sweep<'_> {
             let mut bounds = Aabb::EMPTY;
             for i in (1..count).rev() {
                 bounds = bounds.union(self.boxes[order[i] as usize]);
-                right_costs[i] = self.heuristic.measure(&bounds) * (count - i) as f64;
+                right_costs[i] = (self.measure)(&bounds) * (count - i) as f64;
             }
             bounds = Aabb::EMPTY;
             let centre = |i: usize| doubled_centre(&self.boxes[order[i] as usize])[axis];
@@ -104,7 +98,7 @@ impl Sweep<'_> {
             }
             for i in 1..count {
                 bounds = bounds.union(self.boxes[order[i - 1] as usize]);
-                let cost = self.heuristic.measure(&bounds) * i as f64 + right_costs[i];
+                let cost = (self.measure)(&bounds) * i as f64 + right_costs[i];
                 // Nearest to the median among equals: boxes without volume all cost nothing.
                 let nearer = i.abs_diff(count / 2) < best.2.abs_diff(count / 2);
                 if cost < best.0 || (cost == best.0 && nearer) {
@@ -133,6 +127,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/photon_map/tests.rs::every_split_of_a_sweep_has_the_least_cost_by_its_own_measure",
         "engine/src/accel/photon_map/tests.rs::sweeps_are_valid_and_beat_the_linear_tree",
     ],
-    api: &["clerestory::accel::photon_map::vvh::sweep_tree"],
+    api: &["clerestory::accel::yardstick::volume_sweep_tree"],
     ..Row::of(file!())
 }];

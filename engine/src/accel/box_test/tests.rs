@@ -1,10 +1,7 @@
 //! Slabs at every face, edge and corner of boxes, against f64.
 
 use super::*;
-use crate::test_random::Random;
-
-/// Unit roundoff of f32.
-const U: f64 = 1.0 / 16_777_216.0;
+use crate::accel::test_support::{Random, U, ray};
 
 /// A cube, boxes without extent along one, two and three axes, one of odd numbers, one away from the origin.
 fn boxes() -> [Aabb; 6] {
@@ -31,9 +28,25 @@ fn places(bounds: &Aabb) -> Vec<(Vec3, [usize; 3])> {
         .collect()
 }
 
-fn span(bounds: &Aabb, origin: Vec3, direction: Vec3) -> [f32; 2] {
-    let ray = SlabRay::new(origin, direction, 0.0, f32::INFINITY);
-    ray.span(bounds, ray.ends())
+/// The test of a ray for a box alone, and the box's span behind the ray's begin.
+fn span(bounds: &Aabb, origin: Vec3, direction: Vec3) -> (BoxTest, [f32; 2]) {
+    let test = BoxTest::new(bounds, &ray(origin, direction));
+    let (enter, leave) = test.span(bounds.lower, bounds.upper);
+    (test, [enter.max(0.0), leave])
+}
+
+fn met([enter, leave]: [f32; 2]) -> bool {
+    enter <= leave
+}
+
+/// By how much more than nothing, as a share of the reach, planes are met too early or too late at most: the slack, and what a difference, a
+/// reciprocal, a product and the slack itself are rounded by.
+const MOST: f64 = BOX_SLACK as f64 + 8.0 * U;
+
+/// Largest component distance from a point to a corner of a box.
+fn reach(bounds: &Aabb, origin: Vec3) -> f64 {
+    let away = |corner: Vec3| (corner.as_dvec3() - origin.as_dvec3()).abs().max_element();
+    away(bounds.lower).max(away(bounds.upper))
 }
 
 #[test]
@@ -53,26 +66,25 @@ fn rays_along_axes_meet_boxes_at_every_face_edge_and_corner_and_not_beside_them(
                     };
                     let mut origin = place;
                     origin[axis] = near - 2.0 * sign;
-                    let found = span(&bounds, origin, direction);
+                    let (_, found) = span(&bounds, origin, direction);
                     assert!(met(found), "{bounds:?} {origin} {direction}");
-                    for (found, plane) in found.into_iter().zip([near, far]) {
-                        // One difference, rounded.
+                    let grown = MOST * reach(&bounds, origin);
+                    for (found, plane, sign_of_slack) in [(found[0], near, -1.0), (found[1], far, 1.0)] {
                         let exact = (f64::from(plane) - f64::from(origin[axis])) * f64::from(sign);
-                        assert!(
-                            (f64::from(found) - exact).abs() <= U * exact,
-                            "{bounds:?} {origin} {direction}"
-                        );
+                        let by = sign_of_slack * (f64::from(found) - exact);
+                        assert!((0.0..=grown).contains(&by), "{bounds:?} {origin} {direction}: {by}");
                     }
                     for other in across(axis) {
-                        let outside = match steps[other] {
-                            0 => bounds.lower[other].next_down(),
-                            2 => bounds.upper[other].next_up(),
+                        let outward = match steps[other] {
+                            0 => -1.0,
+                            2 => 1.0,
                             _ => continue,
                         };
+                        // Boxes are met this far beside them, and no further.
                         let mut origin = origin;
-                        origin[other] = outside;
+                        origin[other] += outward * 2.0 * grown as f32;
                         assert!(
-                            !met(span(&bounds, origin, direction)),
+                            !met(span(&bounds, origin, direction).1),
                             "{bounds:?} {origin} {direction}"
                         );
                         beside += 1;
@@ -110,17 +122,20 @@ fn spans_of_rays_at_faces_edges_and_corners_are_those_of_f64() {
                     _ => random.vector() * random.magnitude(-24, -4),
                 };
                 let origin = place + beside - 3.0 * away;
-                let (found, [enter, leave]) = (span(&bounds, origin, away), span_f64(&bounds, origin, away));
+                let ((test, found), [enter, leave]) = (span(&bounds, origin, away), span_f64(&bounds, origin, away));
                 let what = format!("{bounds:?} {origin} {away}: {found:?}, {enter} to {leave}");
-                let slack = f64::from(SPAN_SLACK) * leave.abs();
+                // Of the axis along which planes err most.
+                let grown = MOST * reach(&bounds, origin) * f64::from(test.inverse.abs().max_element());
                 if enter <= leave {
                     hits += 1;
                     assert!(met(found), "{what}");
-                    // A difference, a reciprocal and a product, each rounded.
-                    for (found, exact) in found.into_iter().zip([enter, leave]) {
-                        assert!((f64::from(found) - exact).abs() <= 4.0 * U * exact.abs(), "{what}");
-                    }
-                } else if enter - leave > 2.0 * slack {
+                    let early = enter - f64::from(found[0]);
+                    let late = f64::from(found[1]) - leave;
+                    assert!(
+                        (0.0..=grown).contains(&early) && (0.0..=grown).contains(&late),
+                        "{what}"
+                    );
+                } else if enter - leave > 2.0 * grown {
                     misses += 1;
                     assert!(!met(found), "{what}");
                 }
@@ -128,4 +143,44 @@ fn spans_of_rays_at_faces_edges_and_corners_are_those_of_f64() {
         }
     }
     assert!(hits > 3000 && misses > 3000, "{hits} hits, {misses} misses");
+}
+
+#[test]
+fn boxes_are_met_up_to_their_slack_and_no_further() {
+    let mut random = Random(17);
+    let root = Aabb {
+        lower: Vec3::splat(-4.0),
+        upper: Vec3::splat(4.0),
+    };
+    let (mut met, mut missed) = (0, 0);
+    for flat in [1.0, 0.0] {
+        let upper = Vec3::new(0.5, 0.75, 0.625 * flat);
+        // Faces, edges, corners and the middle.
+        for place in (0..27u16).map(|i| upper * Vec3::from_array([i % 3, i / 3 % 3, i / 9].map(|i| f32::from(i) - 1.0)))
+        {
+            for i in 0..200 {
+                let beside = if i % 2 == 0 { 0.0 } else { random.magnitude(-20, 0) };
+                let target = place + random.vector() * beside;
+                let mut direction = random.direction();
+                if i % 5 == 0 {
+                    direction[random.below(3)] = 0.0;
+                }
+                let ray = ray(target - 3.0 * direction, direction);
+                let test = BoxTest::new(&root, &ray);
+                let (enter, leave) = test.span(-upper, upper);
+                // The same planes in f64, and how far apart the ends are at most by which boxes are grown.
+                let (o, inverse) = (test.origin.as_dvec3(), test.inverse.as_dvec3());
+                let (a, b) = ((-upper.as_dvec3() - o) * inverse, (upper.as_dvec3() - o) * inverse);
+                let gap = a.min(b).max_element() - a.max(b).min_element();
+                if gap <= 0.0 {
+                    met += 1;
+                    assert!(enter <= leave, "{upper} {ray:?}");
+                } else if gap > 4.0 * f64::from(test.slack.max_element()) {
+                    missed += 1;
+                    assert!(enter > leave, "{upper} {ray:?}");
+                }
+            }
+        }
+    }
+    assert!(met > 2000 && missed > 500, "{met} met, {missed} missed");
 }

@@ -1,6 +1,6 @@
 // What the kernels that measure queries on compact pairs share: queries in, work out.
-#ifndef CLERESTORY_ACCEL_COMPACT_QUERY_GLSL
-#define CLERESTORY_ACCEL_COMPACT_QUERY_GLSL
+#ifndef CLERESTORY_TESTS_COMPACT_QUERY_GLSL
+#define CLERESTORY_TESTS_COMPACT_QUERY_GLSL
 
 #include "accel/ray.glsl"
 

@@ -4,12 +4,11 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #define COMPACT_RAY
-#include "accel/compact_query.glsl"
+#include "compact_query.glsl"
 
 void main() {
     uint query = gl_GlobalInvocationID.x;
     if (query < compact_push.count) {
-        Ray ray = compact_queries[query];
-        compact_finish(query, compact_ray_query(compact_push.root, ray.origin, ray.direction, ray.t_min, ray.t_max));
+        compact_finish(query, compact_ray_query(compact_push.root, compact_queries[query]));
     }
 }

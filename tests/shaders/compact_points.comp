@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #define COMPACT_POINT
-#include "accel/compact_query.glsl"
+#include "compact_query.glsl"
 
 void main() {
     uint query = gl_GlobalInvocationID.x;
