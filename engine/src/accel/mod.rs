@@ -36,6 +36,7 @@ pub mod sphere;
 mod stages;
 pub mod trace;
 pub mod triangle;
+pub mod yardstick;
 
 #[cfg(test)]
 mod test_support;
