@@ -10,8 +10,15 @@
 //! | [`volume_sweep_tree`]: how good such a tree can be for points | the same |
 //! | [`area_sweep_tree`]: how good a tree can be for rays | [`Bvh2`](super::bvh2::Bvh2) |
 //!
+//! Trees over points stand beside the compact map's queries by points: [`left_balanced`] and [`voxel_volume`], with what they share in
+//! [`point_tree`].
+//!
 //! Two more are methods of what photon mapping uses: queries by rays of [`CompactBvh`](super::photon_map::compact_bvh::CompactBvh), and all
 //! queries of [`CompleteBvh`](super::photon_map::complete_bvh::CompleteBvh), of which compact pairs are made.
+
+pub mod left_balanced;
+pub mod point_tree;
+pub mod voxel_volume;
 
 pub use super::kd::shifted_restart::{LeafSequence, ShiftedRestart, leaves_by_stack};
 pub use super::photon_map::clustered::{ClusterCounts, clustered_hierarchy, sort_by_clusters};

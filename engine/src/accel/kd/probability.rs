@@ -354,6 +354,19 @@ pub(crate) const ROWS: &[Row] = &[
         settings: &["clerestory::accel::kd::KdSettings"],
         ..Row::of(file!())
     },
+    Row {
+        id: "PM-KD-5",
+        name: "SIROH beside the surface area heuristic in other tracers: a queue with caches, and rays with a short stack",
+        role: Role::PartOf("PM-KD-1"),
+        limits: "Tracers of the engine alone, which share the test of triangles: the source's RT² and Radius-CUDA are not at hand.",
+        sources: &[sources::FABIANOWSKI_2011.at("§4.1.4")],
+        tests: &[
+            "tools/src/experiments/measures/kd/kd_hosts.rs::siroh_visits_fewer_nodes_from_inside_a_scene_in_every_tracer",
+        ],
+        api: &["clerestory::accel::kd::Heuristic"],
+        settings: &["clerestory::accel::kd::KdSettings"],
+        ..Row::of(file!())
+    },
 ];
 
 #[cfg(test)]

@@ -115,6 +115,7 @@ sources! {
     VEACH_1997 = "veach-1997": "E. Veach", "Robust Monte Carlo Methods for Light Transport Simulation", "PhD thesis, Stanford University", 1997;
     WALD_2004 = "wald-2004": "I. Wald", "Realtime Ray Tracing and Interactive Global Illumination", "PhD thesis, Saarland University", 2004;
     WALD_2007 = "wald-2007": "I. Wald", "On fast Construction of SAH-based Bounding Volume Hierarchies", "IEEE RT", 2007;
+    WALD_GUENTHER_2004 = "wald-guenther-2004": "I. Wald, J. Günther, P. Slusallek", "Balancing Considered Harmful: Faster Photon Mapping using the Voxel Volume Heuristic", "Eurographics", 2004;
     WALD_HAVRAN_2006 = "wald-havran-2006": "I. Wald, V. Havran", "On building fast kd-Trees for Ray Tracing, and on doing that in O(N log N)", "IEEE RT", 2006;
     WALTER_2007 = "walter-2007": "B. Walter, S. Marschner, H. Li, K. Torrance", "Microfacet Models for Refraction through Rough Surfaces", "EGSR", 2007;
     WARD_1991 = "ward-1991": "G. Ward", "Real Pixels", "Graphics Gems II", 1991;

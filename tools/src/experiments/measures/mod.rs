@@ -104,6 +104,8 @@ measures! {
     on_host "free-flight" media::free_flight;
     on_device "kd-caches" kd::kd_caches.of_any_scenes();
     on_device "kd-heuristics" kd::kd_heuristics.of_any_scenes();
+    on_device "kd-hosts" kd::kd_hosts.of_any_scenes();
+    on_host "kd-maps" photon_maps::kd_maps;
     on_device "kd-or-bvh" kd::kd_or_bvh.of_any_scenes();
     on_host "kd-probability" kd::kd_probability;
     on_device "kd-rays" kd::kd_rays.of_any_scenes();

@@ -18,7 +18,7 @@ const BY_RAY: &str = "ray per thread";
 const QUEUE: &str = "queue";
 
 /// The best of the source's caches: nodes and the last entry of the stack.
-const BEST_CACHES: KdCaches = KdCaches::COMPARED[4];
+pub(super) const BEST_CACHES: KdCaches = KdCaches::COMPARED[4];
 
 rows! {
     /// A form of execution in a scene.
@@ -86,7 +86,10 @@ fn forms(gpu: &Gpu) -> Vec<(&'static str, TraceSettings)> {
 }
 
 /// The settings with the number of workgroups that traces these rays fastest.
-fn tuned(gpu: &Gpu, tree: &KdTree, settings: TraceSettings, flight: &Flight) -> Result<TraceSettings> {
+///
+/// # Errors
+/// Those of kernels and of submissions.
+pub(super) fn tuned(gpu: &Gpu, tree: &KdTree, settings: TraceSettings, flight: &Flight) -> Result<TraceSettings> {
     let fitted = settings.fitted(gpu.caps(), tree.device_traversal());
     let mut tracer = RayTracer::new(gpu, tree, &fitted)?;
     tracer.tune(&flight.closest())?;

@@ -7,6 +7,7 @@ mod heuristic_trees;
 pub mod hit_errors;
 pub mod kd_caches;
 pub mod kd_heuristics;
+pub mod kd_hosts;
 pub mod kd_or_bvh;
 pub mod kd_probability;
 pub mod kd_rays;
@@ -53,6 +54,7 @@ mod tests {
             (findings::<kd_caches::Found>, 2),
             (findings::<kd_threads::Found>, 1),
             (findings::<kd_or_bvh::Found>, 1),
+            (findings::<kd_hosts::Found>, 1),
         ] {
             for scenes in [&[][..], &scenes] {
                 context.scenes = scenes;

@@ -228,3 +228,15 @@ pub static THREADS: Table<f64> = [
     ("Fairy", 144.1 / 75.9),
     ("Conference", 171.0 / 71.9),
 ];
+
+/// What SIROH changes in frames a second of other tracers: the source's code base II (table 4.1), and RT² (table 4.2 (a)).
+pub static OTHER_TRACERS: Table<[f64; 2]> = [
+    ("Scene 6", [14.9, 8.5]),
+    ("Sponza", [-0.8, -3.9]),
+    ("Sibenik", [2.7, 4.2]),
+    ("Fairy", [3.4, 0.4]),
+    ("Conference", [0.5, 5.1]),
+];
+
+/// And of Radius-CUDA, of the one scene that it renders: with the light inside, and outside (table 4.2 (b)).
+pub const RADIUS: (&str, [f64; 2]) = ("Fairy", [1.7, -3.8]);

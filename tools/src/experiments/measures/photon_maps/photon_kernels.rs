@@ -66,11 +66,55 @@ struct Ellipsoid {
     inverse: [Vec3; 3],
 }
 
+impl Ellipsoid {
+    fn holds(&self, point: Vec3) -> bool {
+        let way = point - self.centre;
+        let [a, b, c] = self.inverse.map(|axis| axis.dot(way));
+        a * a + b * b + c * c < 1.0
+    }
+
+    /// The longest semi-axis, metres.
+    fn reach(&self) -> f32 {
+        let least = self
+            .inverse
+            .iter()
+            .map(|axis| axis.length())
+            .fold(f32::INFINITY, f32::min);
+        1.0 / least
+    }
+}
+
+fn sphere_holds(sphere: &Vec4, point: Vec3) -> bool {
+    (sphere.truncate() - point).length_squared() < sphere.w * sphere.w
+}
+
+/// What queries test.
 #[derive(Debug, Clone)]
-enum Records {
+pub struct Records(Form);
+
+#[derive(Debug, Clone)]
+enum Form {
     /// Centre and radius.
     Spheres(Vec<Vec4>),
     Ellipsoids(Vec<Ellipsoid>),
+}
+
+impl Records {
+    /// The same in another order.
+    fn in_order(&self, order: impl Iterator<Item = usize>) -> Self {
+        Self(match &self.0 {
+            Form::Spheres(all) => Form::Spheres(order.map(|i| all[i]).collect()),
+            Form::Ellipsoids(all) => Form::Ellipsoids(order.map(|i| all[i]).collect()),
+        })
+    }
+
+    /// Whether one of them holds a point.
+    pub fn holds(&self, record: usize, point: Vec3) -> bool {
+        match &self.0 {
+            Form::Spheres(all) => sphere_holds(&all[record], point),
+            Form::Ellipsoids(all) => all[record].holds(point),
+        }
+    }
 }
 
 /// Kernels about hits of photons.
@@ -136,7 +180,7 @@ impl Kernels {
                     boxes: spheres.iter().map(|s| around(s.truncate(), Vec3::splat(s.w))).collect(),
                     areas: spheres.iter().map(|s| disc(f64::from(s.w))).collect(),
                     stretches: vec![1.0; spheres.len()],
-                    records: Records::Spheres(spheres),
+                    records: Records(Form::Spheres(spheres)),
                 }
             }
             Shape::Ellipsoids => {
@@ -154,7 +198,7 @@ impl Kernels {
                         .collect(),
                     areas: hits.iter().map(|hit| disc(radius(hit))).collect(),
                     stretches: hits.iter().map(Deposit::stretch).collect(),
-                    records: Records::Ellipsoids(pairs.map(record).collect()),
+                    records: Records(Form::Ellipsoids(pairs.map(record).collect())),
                 }
             }
         }
@@ -173,6 +217,29 @@ impl Kernels {
     /// Mean ratio of their semi-axes on the surface.
     pub fn mean_stretch(&self) -> f64 {
         self.stretches.iter().sum::<f64>() / self.stretches.len().max(1) as f64
+    }
+
+    /// Their centres.
+    pub fn centres(&self) -> Vec<Vec3> {
+        match &self.records.0 {
+            Form::Spheres(all) => all.iter().map(|sphere| sphere.truncate()).collect(),
+            Form::Ellipsoids(all) => all.iter().map(|ellipsoid| ellipsoid.centre).collect(),
+        }
+    }
+
+    /// No point that a kernel holds is farther from its centre, metres.
+    pub fn reach(&self) -> f32 {
+        let widest = match &self.records.0 {
+            Form::Spheres(all) => all.iter().map(|sphere| sphere.w).fold(0.0, f32::max),
+            Form::Ellipsoids(all) => all.iter().map(Ellipsoid::reach).fold(0.0, f32::max),
+        };
+        // Room for some thousand roundings: those of the kernel's test, and of its axes, which are perpendicular only up to theirs.
+        widest * (1.0 + 1e-4)
+    }
+
+    /// What queries test, in an order of the kernels.
+    pub fn in_order(&self, order: impl Iterator<Item = usize>) -> Records {
+        self.records.in_order(order)
     }
 
     /// The tree of the voxel volume heuristic.
@@ -247,28 +314,17 @@ impl Map {
         let complete = CompleteBvh::new(tree)?;
         let compact = CompactBvh::encode(&complete)
             .map_err(|fault| Error::setting("tree", "compact", format!("is not tight: {fault:?}")))?;
-        let order = || complete.order.iter().map(|i| *i as usize);
-        let records = match &kernels.records {
-            Records::Spheres(all) => Records::Spheres(order().map(|i| all[i]).collect()),
-            Records::Ellipsoids(all) => Records::Ellipsoids(order().map(|i| all[i]).collect()),
-        };
         Ok(Self {
-            records,
+            records: kernels.in_order(complete.order.iter().map(|i| *i as usize)),
             complete,
             compact,
         })
     }
 
     fn leaf(&self, point: Vec3, first: u32, work: &mut Work) {
-        match &self.records {
-            Records::Spheres(all) => self.test(all, first, work, |sphere| {
-                (sphere.truncate() - point).length_squared() < sphere.w * sphere.w
-            }),
-            Records::Ellipsoids(all) => self.test(all, first, work, |ellipsoid| {
-                let way = point - ellipsoid.centre;
-                let [a, b, c] = ellipsoid.inverse.map(|axis| axis.dot(way));
-                a * a + b * b + c * c < 1.0
-            }),
+        match &self.records.0 {
+            Form::Spheres(all) => self.test(all, first, work, |sphere| sphere_holds(sphere, point)),
+            Form::Ellipsoids(all) => self.test(all, first, work, |ellipsoid| ellipsoid.holds(point)),
         }
     }
 
