@@ -124,6 +124,7 @@ measures! {
     on_host "merge-example" photon_maps::merge_example;
     on_device "mitsuba" rendering::mitsuba;
     on_host "multiple-scattering" surfaces::multiple_scattering;
+    on_device "parallel-blocks" device::parallel_blocks;
     on_device "path-sets" rendering::path_sets;
     on_device "persistent-threads" rays::persistent_threads;
     on_host "phase-functions" media::phase_functions;
