@@ -56,7 +56,8 @@ pub struct Experiment {
     pub about: String,
     /// Ids of the catalogue's rows that it measures.
     pub systems: Vec<String>,
-    /// What shows each of them, by its id: the name of a criterion, a column, what stands in one; of a sweep a criterion, a variant, a technique or a scene.
+    /// What shows each of them, by its id: the name of a criterion, a column, what stands in one; of a sweep a criterion, a variant, a technique
+    /// or a scene.
     #[serde(default)]
     pub shows: BTreeMap<String, String>,
     /// Other names that it is found by: its numbers in the document that the comparison comes from.

@@ -27,7 +27,7 @@ pub fn tuned(context: &Context<'_>, gpu: &Gpu) -> Result<Vec<TraceSettings>> {
     let rays = fly(context, &case, &surfaces, case.light(&surfaces))?.closest();
     let tree = source_tree(&surfaces, TUNED_LEAVES)?;
     let tuned = context.pick(KdCaches::COMPARED.len(), 1);
-    let tune = |(form, caches)| {
+    let tune = |(form, caches): (usize, KdCaches)| {
         let mut settings = TraceSettings {
             caches,
             ..TraceSettings::persistent(gpu.caps())
