@@ -158,8 +158,10 @@ pub(crate) const ROWS: &[Row] = &[
             "shaders/kernels/partition.comp",
             "shaders/kernels/partition_subgroup.comp",
         ],
-        tests: &["tests/tests/kernels/blocks.rs::partitions_are_as_their_twins"],
-        experiment: "clerestory bench --sort",
+        tests: &[
+            "tests/tests/kernels/blocks.rs::partitions_are_as_their_twins",
+            "tests/tests/kernels/blocks.rs::more_elements_than_the_capacity_are_reported_and_left",
+        ],
         api: &["clerestory::kernels::Partition", "clerestory::kernels::compact"],
         settings: &["clerestory::kernels::PartitionOptions"],
         ..Row::of(file!())
@@ -176,9 +178,10 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         tests: &[
             "tests/tests/kernels/blocks.rs::partitions_are_as_their_twins",
+            "tests/tests/kernels/blocks.rs::a_million_words_and_three_are_as_by_the_twins",
+            "tests/tests/kernels/blocks.rs::more_elements_than_the_capacity_are_reported_and_left",
             "tests/tests/kernels/blocks.rs::splits_by_bits_sort",
         ],
-        experiment: "clerestory bench --sort",
         api: &["clerestory::kernels::Partition", "clerestory::kernels::split"],
         settings: &["clerestory::kernels::PartitionOptions"],
         ..Row::of(file!())

@@ -274,11 +274,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
     ],
     tests: &[
         "tests/tests/kernels/blocks.rs::scans_are_as_their_twin",
+        "tests/tests/kernels/blocks.rs::a_million_words_and_three_are_as_by_the_twins",
+        "tests/tests/kernels/blocks.rs::more_elements_than_the_capacity_are_reported_and_left",
         "tests/tests/kernels/blocks.rs::reductions_of_words_are_as_their_twin",
         "tests/tests/kernels/blocks.rs::boxes_are_exact_and_leave_nans_out",
         "engine/src/kernels/stream.rs::every_element_is_in_one_block",
     ],
-    experiment: "clerestory bench --sort",
     api: &[
         "clerestory::kernels::Scan",
         "clerestory::kernels::ReduceWords",

@@ -4,8 +4,8 @@ use clerestory::Error;
 use clerestory::gpu::{Buffer, Gpu, transfer_to_compute};
 use clerestory::kernels::{
     BoxElements, Count, Direction, Histogram, Keep, MAX_BINS, Operation, Partition, PartitionBuffers, PartitionOptions,
-    Permute, PermuteBuffers, ReduceBox, ReduceWords, Scan, ScanBuffers, ScanOptions, compact, gather, histogram,
-    ordered_float, reduce_box, reduce_words, scan, scatter, split,
+    Permute, PermuteBuffers, ReduceBox, ReduceWords, Scan, ScanBuffers, ScanOptions, StreamStatus, compact, gather,
+    histogram, ordered_float, reduce_box, reduce_words, scan, scatter, split,
 };
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
@@ -105,7 +105,12 @@ fn partitions_are_as_their_twins() {
     with_gpu(|gpu| {
         let mut random = Random(52);
         for form in FORMS {
-            for (keep, numbers) in [(Keep::Flagged, false), (Keep::Flagged, true), (Keep::Split, false)] {
+            for (keep, numbers) in [
+                (Keep::Flagged, false),
+                (Keep::Flagged, true),
+                (Keep::Split, false),
+                (Keep::Split, true),
+            ] {
                 let options = PartitionOptions { keep, numbers, form };
                 let kernel = Partition::new(gpu, options).unwrap();
                 for (turn, size) in SIZES.into_iter().enumerate() {
@@ -145,17 +150,141 @@ fn partitions_are_as_their_twins() {
     });
 }
 
-/// Radix sort by one split a bit is what the split is for; both must agree with the standard library.
+/// What the split is for: one a bit, from the lowest up, is a sort.
 #[test]
 fn splits_by_bits_sort() {
-    let mut keys = Pattern::Random.words(&mut Random(53), 1000);
-    let mut expected = keys.clone();
-    expected.sort();
-    for bit in 0..32 {
-        let flags: Vec<u32> = keys.iter().map(|key| key >> bit & 1).collect();
-        keys = split(&flags, &keys);
-    }
-    assert_eq!(keys, expected);
+    with_gpu(|gpu| {
+        const COUNT: u32 = 4099;
+        let keys = Pattern::Random.words(&mut Random(53), COUNT);
+        let mut expected = keys.clone();
+        expected.sort();
+        for form in FORMS {
+            let options = PartitionOptions {
+                keep: Keep::Split,
+                numbers: false,
+                form,
+            };
+            let kernel = Partition::new(gpu, options).unwrap();
+            let sides = [words(gpu, "keys", &keys), words(gpu, "other keys", &keys)];
+            let flagged = empty(gpu, "flagged", 4);
+            let scratch = empty(gpu, "scratch", kernel.scratch_bytes(COUNT));
+            for bit in 0..u32::BITS {
+                let (from, to) = (&sides[bit as usize % 2], &sides[(bit as usize + 1) % 2]);
+                let of_bit: Vec<u32> = read(gpu, from, COUNT as usize)
+                    .iter()
+                    .map(|key| key >> bit & 1)
+                    .collect();
+                let flags = words(gpu, "flags", &of_bit);
+                let bound = PartitionBuffers {
+                    flags: flags.view(),
+                    input: Some(from.view()),
+                    output: to.view(),
+                    flagged: flagged.view(),
+                };
+                run(gpu, |pass| kernel.record(pass, &bound, Count::Host(COUNT), &scratch));
+            }
+            assert!(read(gpu, &sides[0], COUNT as usize) == expected, "{form:?}");
+        }
+    });
+}
+
+/// Many blocks, the last of three elements.
+#[test]
+fn a_million_words_and_three_are_as_by_the_twins() {
+    with_gpu(|gpu| {
+        const COUNT: u32 = (1 << 20) + 3;
+        let mut random = Random(58);
+        let values = Pattern::Random.words(&mut random, COUNT);
+        let flags = flags(&mut random, COUNT, 2);
+        let (prefixes, total) = scan(&values, None, Operation::Sum, false);
+        let parted = split(&flags, &values);
+        let [input, flag_words] = [words(gpu, "input", &values), words(gpu, "flags", &flags)];
+        for form in FORMS {
+            let output = words(gpu, "output", &values);
+            let kernel = Scan::new(
+                gpu,
+                ScanOptions {
+                    form,
+                    ..ScanOptions::default()
+                },
+            )
+            .unwrap();
+            let scratch = empty(gpu, "scratch", kernel.scratch_bytes(COUNT));
+            let buffers = ScanBuffers {
+                input: input.view(),
+                heads: None,
+                output: output.view(),
+            };
+            run(gpu, |pass| kernel.record(pass, &buffers, Count::Host(COUNT), &scratch));
+            assert!(read(gpu, &output, COUNT as usize) == prefixes, "{form:?}");
+            assert_eq!(gpu.read::<u32>(kernel.total(&scratch), 1).unwrap(), [total]);
+            let keep = Keep::Split;
+            let numbers = false;
+            let kernel = Partition::new(gpu, PartitionOptions { keep, numbers, form }).unwrap();
+            let scratch = empty(gpu, "scratch", kernel.scratch_bytes(COUNT));
+            let flagged = empty(gpu, "flagged", 4);
+            let bound = PartitionBuffers {
+                flags: flag_words.view(),
+                input: Some(input.view()),
+                output: output.view(),
+                flagged: flagged.view(),
+            };
+            run(gpu, |pass| kernel.record(pass, &bound, Count::Host(COUNT), &scratch));
+            assert!(read(gpu, &output, COUNT as usize) == parted, "{form:?}");
+        }
+    });
+}
+
+#[test]
+fn more_elements_than_the_capacity_are_reported_and_left() {
+    with_gpu(|gpu| {
+        const CAPACITY: u32 = 100;
+        let untouched = vec![0xABCD_EF01; CAPACITY as usize];
+        let [ones, output] = [vec![1; CAPACITY as usize], untouched.clone()].map(|data| words(gpu, "words", &data));
+        let counts = words(gpu, "count", &[CAPACITY + 1]);
+        let count = Count::Device {
+            view: counts.view(),
+            capacity: CAPACITY,
+        };
+        for form in FORMS {
+            let kernel = Scan::new(
+                gpu,
+                ScanOptions {
+                    form,
+                    ..ScanOptions::default()
+                },
+            )
+            .unwrap();
+            let of_scan = empty(gpu, "scratch", kernel.scratch_bytes(CAPACITY));
+            let buffers = ScanBuffers {
+                input: ones.view(),
+                heads: None,
+                output: output.view(),
+            };
+            run(gpu, |pass| kernel.record(pass, &buffers, count, &of_scan));
+            assert_eq!(gpu.read::<u32>(kernel.total(&of_scan), 1).unwrap(), [0], "{form:?}");
+            for keep in [Keep::Flagged, Keep::Split] {
+                let numbers = true;
+                let kernel = Partition::new(gpu, PartitionOptions { keep, numbers, form }).unwrap();
+                let of_partition = empty(gpu, "scratch", kernel.scratch_bytes(CAPACITY));
+                let flagged = words(gpu, "flagged", &[7]);
+                let bound = PartitionBuffers {
+                    flags: ones.view(),
+                    input: None,
+                    output: output.view(),
+                    flagged: flagged.view(),
+                };
+                run(gpu, |pass| kernel.record(pass, &bound, count, &of_partition));
+                assert_eq!(read(gpu, &flagged, 1), [0], "{form:?}");
+                for scratch in [&of_scan, &of_partition] {
+                    let status = StreamStatus::read(gpu, scratch).unwrap();
+                    assert_eq!((status.count, status.wanted), (0, CAPACITY + 1), "{form:?}");
+                    assert!(status.check("block", CAPACITY).is_err());
+                }
+            }
+            assert!(read(gpu, &output, CAPACITY as usize) == untouched, "{form:?}");
+        }
+    });
 }
 
 #[test]

@@ -32,6 +32,7 @@ pub mod unbiased;
 pub mod watch;
 pub mod web_page;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use clerestory::{Error, Result};
@@ -55,6 +56,10 @@ pub struct Experiment {
     pub about: String,
     /// Ids of the catalogue's rows that it measures.
     pub systems: Vec<String>,
+    /// What shows each of them, by its id: the name of a criterion, a column, what stands in one; of a sweep a criterion, a variant, a technique
+    /// or a scene.
+    #[serde(default)]
+    pub shows: BTreeMap<String, String>,
     /// Other names that it is found by: its numbers in the document that the comparison comes from.
     #[serde(default)]
     pub aliases: Vec<String>,
@@ -171,6 +176,8 @@ fn parse(name: &str, text: &str) -> Result<Experiment> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
@@ -199,6 +206,31 @@ mod tests {
                 .to_string()
                 .contains("is not known")
         );
+    }
+
+    /// Of measures the tests of their quick forms look at what is there.
+    #[test]
+    fn each_row_is_shown_by_something() {
+        for experiment in names().map(|name| find(name).unwrap()) {
+            let name = &experiment.name;
+            let shown: BTreeSet<&String> = experiment.shows.keys().collect();
+            let named: BTreeSet<&String> = experiment.systems.iter().collect();
+            assert_eq!(shown, named, "{name}");
+            assert_eq!(named.len(), experiment.systems.len(), "{name} names a row twice");
+            let Kind::Sweep(sweep) = experiment.kind().unwrap() else {
+                continue;
+            };
+            for (id, words) in &experiment.shows {
+                let by_variant = |variant: &sweep::Variant| variant.name == *words || variant.technique == *words;
+                let by_criterion = |criterion: &SweepCriterion| criterion.name == *words;
+                assert!(
+                    sweep.variants.iter().any(by_variant)
+                        || sweep.scenes.contains(words)
+                        || experiment.criteria.iter().any(by_criterion),
+                    "{name}: nothing is called \"{words}\", which is to show {id}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -38,6 +38,9 @@
 //! name = "the same mean"
 //! is.bias = { of = ["default", "from bounce 3"], within = 0.01 }
 //!
+//! [shows]                         # what shows each of the rows: a variant, a technique, a scene or a criterion
+//! MET-B8 = "from bounce 3"
+//!
 //! [headline]                      # optional: one number for a list of experiments
 //! words = "time of the default over that from bounce 3, at equal error"
 //! is.speed_up = { of = "from bounce 3", over = "default" }

@@ -253,6 +253,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/footprint_tests.rs::lights_with_area_and_beams_share_their_surface",
             "tests/tests/twins/photons.rs::emissions_agree_with_their_twins",
         ],
+        experiment: "tools/test",
         api: &[
             "clerestory::transport::differentials::emission_differentials",
             "clerestory::transport::differentials::area_light_differentials",
@@ -272,6 +273,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/footprint_tests.rs::grazing_transfers_stay_finite_and_in_the_plane",
             "tests/tests/twins/photons.rs::events_agree_with_their_twins",
         ],
+        experiment: "tools/test",
         api: &["clerestory::transport::differentials::transfer_differentials"],
         ..Row::of(file!())
     },
@@ -289,6 +291,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/footprint_tests.rs::mirrors_and_flat_glass_have_the_areas_of_unfolded_paths",
             "tests/tests/photon/footprints.rs::footprints_behind_mirrors_and_coats_are_those_of_finite_differences",
         ],
+        experiment: "tools/test",
         api: &["clerestory::transport::differentials::reflect_differentials"],
         ..Row::of(file!())
     },
@@ -303,6 +306,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/chain_tests.rs::derivatives_of_normals_agree_with_finite_differences",
             "tests/tests/twins/photons.rs::derivatives_of_normals_agree_with_their_twins",
         ],
+        experiment: "tools/test",
         api: &["clerestory::transport::differentials::normal_derivatives"],
         ..Row::of(file!())
     },
@@ -333,6 +337,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/kernel/room_tests.rs::footprints_after_a_diffuse_bounce_follow_the_density_of_photons",
             "engine/src/transport/differentials/path_differentials.rs::reemission_stands_between_its_two_parameters_and_all_four",
         ],
+        experiment: "tools/test",
         api: &[
             "clerestory::transport::differentials::diffuse_reemission",
             "clerestory::transport::differentials::reemission_differentials",
@@ -353,6 +358,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/footprints.rs::footprints_behind_glass_are_those_of_finite_differences",
             "tests/tests/photon/footprints.rs::footprints_behind_mirrors_and_coats_are_those_of_finite_differences",
         ],
+        experiment: "tools/test",
         api: &["clerestory::transport::differentials::roulette_differentials"],
         ..Row::of(file!())
     },

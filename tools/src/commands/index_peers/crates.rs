@@ -22,6 +22,7 @@ use obvhs::ray::{Ray as PeerRay, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
+use super::verdicts::SAME_HEURISTIC;
 use super::{BASE, Contender, Intersection, built_in, in_parallel};
 
 /// Rays of both kinds as obvhs has them.
@@ -174,7 +175,7 @@ pub fn of_bvh<'a>(
         pairs.map(|(ray, peer)| (boxed(ray), *peer)).collect::<Vec<_>>()
     });
     Ok(Contender {
-        name: "bvh, SAH".into(),
+        name: SAME_HEURISTIC.into(),
         build,
         sah_cost: Some(cost_of_bvh(&tree)),
         trace: Box::new(move |kind| {

@@ -6,6 +6,7 @@ use clerestory_tools::experiments::bars::{self, Bar, Group, Row};
 use clerestory_tools::experiments::table::Table;
 use clerestory_tools::page::Block;
 
+use super::verdicts::verdicts;
 use super::work::Work;
 use super::{BASE, Found, KINDS, Measured, Settings};
 use crate::failure::Outcome;
@@ -45,7 +46,7 @@ pub fn write(found: &Found, settings: &Settings<'_>) -> Outcome {
     Ok(())
 }
 
-/// Facts and tables.
+/// Facts, verdicts and tables.
 pub fn markdown(found: &Found) -> String {
     let mut text = output::one_line(&format!(
         "- Device of our kernels: {}; driver: {}.",
@@ -61,6 +62,10 @@ pub fn markdown(found: &Found) -> String {
     );
     for absent in &found.absent {
         text += &format!("- Absent: {absent}.\n");
+    }
+    text += "\nVerdicts, over the scenes; an index of ours counts once, whichever is best:\n\n";
+    for judged in verdicts(found) {
+        text += &format!("- {judged}\n");
     }
     format!("{text}\n{}\n{}", rates(found).markdown(), work(found).markdown())
 }

@@ -10,6 +10,7 @@ mod crates;
 mod embree;
 mod files;
 mod ours;
+mod verdicts;
 mod work;
 
 pub use files::{markdown, write};
@@ -136,6 +137,8 @@ impl std::fmt::Display for Disagreement {
 pub struct Measured {
     scene: String,
     index: String,
+    /// Whether it is one of the engine's.
+    is_ours: bool,
     triangles: usize,
     /// Seconds.
     build: Spread,
@@ -280,6 +283,7 @@ fn one_scene(
         found.indexes.push(Measured {
             scene: address.to_owned(),
             index: contender.name.clone(),
+            is_ours: i < built.len(),
             triangles: triangles.len(),
             build: contender.build,
             sah_cost: contender.sah_cost,

@@ -21,7 +21,7 @@ use clerestory::{Error, Result};
 use super::measures::Context;
 use super::measures::errors::greatest;
 use super::plot::Curve;
-use super::table::Table;
+use super::table::{Cell, Table};
 
 /// An experiment of rows.
 pub trait Study: Default + serde::Serialize + serde::de::DeserializeOwned {
@@ -182,6 +182,18 @@ impl Findings {
         self
     }
 
+    /// Whether a criterion, a column or a cell of words is called so.
+    pub fn has(&self, words: &str) -> bool {
+        let cell = Cell::from(words);
+        // Heads of several values for each key name both.
+        let is_head = |head: &String| head == words || head.rsplit_once(": ").is_some_and(|(_, key)| key == words);
+        let in_table = |table: &Table| {
+            let mut cells = table.rows.iter().flatten();
+            table.heads.iter().any(is_head) || cells.any(|other| *other == cell)
+        };
+        self.verdicts.iter().any(|judged| judged.name == words) || self.tables.iter().any(in_table)
+    }
+
     /// A line for each verdict, and one for the headline, as Markdown; empty without any.
     pub fn summary(&self) -> String {
         let mut text: String = self.verdicts.iter().map(|judged| format!("- {judged}\n")).collect();
@@ -189,7 +201,7 @@ impl Findings {
             if !text.is_empty() {
                 text.push('\n');
             }
-            text += &format!("In one number: {words}: {}.\n", super::table::Cell::from(*found));
+            text += &format!("In one number: {words}: {}.\n", Cell::from(*found));
         }
         text
     }

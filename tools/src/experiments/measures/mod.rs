@@ -127,6 +127,7 @@ measures! {
     on_host "merge-example" photon_maps::merge_example;
     on_device "mitsuba" rendering::mitsuba;
     on_host "multiple-scattering" surfaces::multiple_scattering;
+    on_device "parallel-blocks" device::parallel_blocks;
     on_device "path-sets" rendering::path_sets;
     on_device "persistent-threads" rays::persistent_threads;
     on_host "phase-functions" media::phase_functions;
@@ -183,6 +184,7 @@ mod tests {
         };
         let rows = (measure.run)(&context).unwrap_or_else(|error| panic!("{name}: {error}"));
         let findings = (measure.read)(&rows).unwrap().of_smoke_run();
+        check_what_shows_rows(name, &findings);
         assert!(!findings.tables.is_empty(), "{name}");
         for table in findings.tables {
             assert_eq!(table.fault(), None, "{name}: {}", table.title);
@@ -194,6 +196,25 @@ mod tests {
                 _ => judged.verdict == Verdict::SmokeForm && !judged.in_every_form,
             };
             assert!(sound, "{name}: {judged}");
+        }
+    }
+
+    /// What the experiment says to show a row of the catalogue must be there, and a row that a table names must be one that it measures.
+    fn check_what_shows_rows(name: &str, findings: &Findings) {
+        let experiment = crate::experiments::find(name).unwrap();
+        for (id, words) in &experiment.shows {
+            assert!(
+                findings.has(words),
+                "{name}: nothing is called \"{words}\", which is to show {id}"
+            );
+        }
+        let measured = |id: &str| experiment.systems.iter().any(|system| system == id);
+        for row in clerestory::catalogue::all() {
+            assert!(
+                !findings.has(row.id) || measured(row.id),
+                "{name} measures {} and does not say so",
+                row.id
+            );
         }
     }
 

@@ -24,8 +24,8 @@ experiment and writes its page; `clerestory report --pages` writes all pages ane
 
 /// The list's end: pages that other commands write.
 const TAIL: &str = "
-Beside them, without verdicts: the [agreement with Mitsuba 3](agreement.md) scene by scene, [ray indexes](index.md) and [radix sorts](sort.md) beside \
-those of others.
+Beside them, not in this list: the [agreement with Mitsuba 3](agreement.md) scene by scene, [ray indexes](index.md), with verdicts of their own, and \
+[radix sorts](sort.md) beside those of others.
 ";
 
 /// The verdict on all criteria in some words; of an experiment that was not run, even what needs another machine is only that.

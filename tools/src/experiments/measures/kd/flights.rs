@@ -309,6 +309,8 @@ pub struct Raced {
     pub rates: [Repeats; 3],
     /// What the last of the timed turns found, closest hits and any hits.
     pub hits: [Vec<Hit>; 2],
+    /// Workgroups that both kinds of rays together took in it, all dispatches; 0 without a queue.
+    pub workgroups: u64,
 }
 
 /// Tracers of closest and of any hits with these settings but for the query; an index that takes part with several is on the device once.
@@ -352,27 +354,35 @@ pub fn race<'a>(
 ) -> Result<Vec<Raced>> {
     let tracers = tracers(gpu, indexes)?;
     let mut hits = vec![[Vec::new(), Vec::new()]; tracers.len()];
+    let mut workgroups = vec![[0; 2]; tracers.len()];
     let rays = [&flight.closest(), &flight.shadow];
     let seconds = context.in_turns(turns, tracers.len(), |contender| {
         let mut seconds = [0.0; 2];
         for (query, rays) in rays.into_iter().enumerate() {
-            let (traced, wall) = timed(|| tracers[contender][query].trace(rays));
+            let tracer = &tracers[contender][query];
+            let (traced, wall) = timed(|| tracer.trace(rays));
             let traced = traced?;
             let on_device = traced.seconds();
+            workgroups[contender][query] = u64::from(traced.dispatches) * u64::from(tracer.groups().unwrap_or(0));
             seconds[query] = if on_device > 0.0 { on_device } else { wall };
             hits[contender][query] = traced.hits;
         }
         Ok(seconds)
     })?;
     let [closest, any] = rays.map(|rays| 1e-6 * rays.len() as f64);
-    let raced = seconds.into_iter().zip(hits).map(|(turns, hits)| {
+    let found = hits.into_iter().zip(workgroups);
+    let raced = seconds.into_iter().zip(found).map(|(turns, (hits, workgroups))| {
         let rate = |of: &dyn Fn([f64; 2]) -> f64| -> Repeats { turns.iter().copied().map(of).collect() };
         let rates = [
             rate(&|[of_closest, _]| closest / of_closest),
             rate(&|[_, of_any]| any / of_any),
             rate(&|[of_closest, of_any]| (closest + any) / (of_closest + of_any)),
         ];
-        Raced { rates, hits }
+        Raced {
+            rates,
+            hits,
+            workgroups: workgroups.iter().sum(),
+        }
     });
     Ok(raced.collect())
 }

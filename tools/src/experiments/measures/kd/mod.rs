@@ -1,6 +1,7 @@
 //! kd-trees: probabilities of their nodes, what the heuristics and the traversals cost rays, whether all find the same hits, and where they
 //! beat bounding volumes.
 
+mod cache_costs;
 mod cache_ranking;
 pub mod flights;
 mod heuristic_trees;
