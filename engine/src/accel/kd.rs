@@ -47,7 +47,8 @@ pub const MAX_LEAF_SIZE: u32 = 64;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KdSettings {
-    /// What children are weighed by. Default SIROH.
+    /// What children are weighed by. Default SIROH, by which rays visit fewer inner nodes than by surface area, but test more triangles in most
+    /// scenes.
     pub heuristic: Heuristic,
     /// Cost of visiting an inner node. Default 1.
     pub traversal_cost: f64,

@@ -136,7 +136,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-LIGHTS",
     name: "choice of lights by power, limited for distant ones",
     role: Role::PartOf("BG-3"),
-    limits: "Blind to shadows and to where a light is from the point that it lights. Distant lights keep half of the choices at most where there are others, so that what each light adds has at most twice the second moment that it has by power alone.",
+    limits: "Blind to shadows and to where a light is from the point that it lights; distant lights keep half of the choices at most where there are others, so that what each light adds has at most twice the second moment that it has by power alone.",
     sources: &[sources::SHIRLEY_1996.at("inversion of the cumulative distribution")],
     shaders: &["shaders/transport/distribution.glsl"],
     bias: Some(Bias::Unbiased),

@@ -102,7 +102,7 @@ pub struct EquiAngular {
     pub range: f64,
 }
 
-/// The place of `light` by a segment of length `t_max` ([`FAR_AWAY`]: endless).
+/// The place of `light` by a segment of length `t_max` ([`FAR_AWAY`]: endless). The path tracer samples so in homogeneous media alone.
 pub fn equi_angular(start: DVec3, direction: DVec3, t_max: f64, light: DVec3) -> EquiAngular {
     let to = light - start;
     let along = to.dot(direction);
@@ -186,7 +186,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "BG-4",
         name: "free flight and transmittance: analytic, delta and ratio tracking, equi-angular",
         role: Role::PartOf("BG-3"),
-        limits: "The looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
+        limits: "Equi-angular sampling is for homogeneous media alone; in grids the looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
         sources: &[
             sources::WOODCOCK_1965.whole(),
             sources::KULLA_FAJARDO_2012.whole(),

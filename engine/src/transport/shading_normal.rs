@@ -37,7 +37,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-NORMALS",
     name: "shading normals and normal maps under which no more light is seen than arrives",
     role: Role::PartOf("BG-3"),
-    limits: "Loses light where the two normals disagree, and reciprocity with every shading normal: the guarantee is for what is seen. A beam may scatter more energy than it brings, 1.9 times as much 60 degrees off a white surface whose normal is tilted by 45, and without bound towards grazing.",
+    limits: "Loses light where the two normals disagree, and reciprocity with every shading normal; what is seen never gains energy, but a beam may scatter more than it brings, 1.9 times as much 60 degrees off a white surface whose normal is tilted by 45, and without bound towards grazing.",
     sources: &[sources::VEACH_1997.at("5.3 for the problem; the bend towards the viewer is the engine's own")],
     shaders: &["shaders/transport/shading_normal.glsl"],
     tests: &[

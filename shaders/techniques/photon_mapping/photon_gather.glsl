@@ -47,6 +47,8 @@ const uint NEAREST_ROUNDS = 5u;
 const uint NEAREST_HALVINGS = 6u;
 // Units in the last place of coordinates by which boxes stay wider than what is searched.
 const float NEAREST_SLACK = 4.0 / 8388608.0;
+// By how much a span's end is widened: places in bins and their limits are rounded apart, and who is last must not lie beyond.
+const float NEAREST_WIDENED = 1.0 + 4.0 / 8388608.0;
 // Least part of the squared distance that is told apart.
 const float NEAREST_PRECISION = 1e-4;
 uint nearest_bins[NEAREST_BINS];
@@ -167,7 +169,8 @@ bool find_nearest(float radius) {
             break;
         }
         nearest_all = true;
-        search_nearest(vec2(nearest_span.x + float(bin) * width, nearest_span.x + float(bin + 1u) * width), radius);
+        float limit = (nearest_span.x + float(bin + 1u) * width) * NEAREST_WIDENED;
+        search_nearest(vec2(nearest_span.x + float(bin) * width, min(limit, nearest_span.y)), radius);
     }
     nearest_counts = false;
     return true;

@@ -341,7 +341,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-KD-4",
         name: "probability of a visit from inside the scene by overlapping slabs (SIROH), incrementally",
         role: Role::PartOf("PM-KD-1"),
-        limits: "Solid angles are ratios of areas over overlapping slabs, which can exceed the surface area heuristic.",
+        limits: "Rays visit fewer inner nodes than in trees by surface area and test more triangles in most scenes; solid angles are ratios of areas over overlapping slabs, which can exceed the surface area heuristic.",
         sources: &[sources::FABIANOWSKI_2011.at("§4.1.3")],
         tests: &[
             "engine/src/accel/kd/probability/tests.rs::parts_handed_down_are_those_of_the_children",

@@ -26,6 +26,8 @@ crate::settings! {
         /// Uncorrelated instead of height-correlated Smith masking of microfacets; changes the picture.
         pub separable_masking: bool = false;
         /// Also samples light of points and spots in homogeneous media by the angle under which they see the ray; changes the noise only.
+        ///
+        /// Grids of densities have no such samples: light close to a lamp in them is as noisy with it as without.
         pub equiangular: bool = true;
         /// 0 chooses by the kind of device; never changes the picture.
         pub paths_in_flight: u32 = 0, in 0..=SLOTS_MAX, unit "paths";

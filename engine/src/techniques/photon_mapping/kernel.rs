@@ -13,7 +13,7 @@ mod room_tests;
 #[cfg(test)]
 mod tests;
 
-use crate::catalogue::{Role, Row, sources};
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{
     KERNEL_CONE, KERNEL_EPANECHNIKOV, KERNEL_FIXED, KERNEL_ISOTROPIC, KERNEL_PRINCIPAL, KERNEL_SKEWED, KERNEL_UNIFORM,
     PHOTON_BOUNCE_SHIFT, PHOTON_DIFFUSED_BIT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
@@ -288,6 +288,9 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Flat in the tangent plane, so curved surfaces are misjudged; the printed way to recover the normal does not hold and is not used.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.2.1")],
         shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
+        bias: Some(Bias::Biased(
+            "blur and light lost at edges and on curved surfaces, as far as footprints",
+        )),
         tests: &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::weights_are_those_of_the_inverse_matrix",
             "engine/src/techniques/photon_mapping/kernel/tests.rs::kernels_integrate_to_one_over_the_tangent_plane",
@@ -307,6 +310,9 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Discarding loses the light of footprints that are too flat and widening blurs it; no kernel is flatter than 1/1024.",
         sources: &[sources::FABIANOWSKI_2011.at("§5.2.2")],
         shaders: &["shaders/techniques/photon_mapping/kernel.glsl"],
+        bias: Some(Bias::Biased(
+            "light of flat footprints is spread wider than it fell, or left out without `widen_flat`",
+        )),
         tests: &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::flat_footprints_are_widened_where_asked_for",
             "engine/src/techniques/photon_mapping/kernel/tests.rs::records_keep_the_area_of_the_flattest_kernels",

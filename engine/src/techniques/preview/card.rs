@@ -15,8 +15,8 @@ use crate::transport::PathSet;
 
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Biased(
-    "shadow maps err at borders of shadows and directional lights have none; an environment's light is not occluded, and its reflections are \
-     filtered by round lobes",
+    "shadow maps err at borders of shadows, and as a whole where things are no larger than texels; directional lights have none; an \
+     environment's light is not occluded, and its reflections are filtered by round lobes",
 );
 
 /// Clip distances cut the octants of shadow maps, as the default layout has them.

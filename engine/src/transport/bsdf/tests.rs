@@ -273,29 +273,47 @@ fn white_furnace() {
     }
 }
 
-/// What Smith's microfacets reflect of light that may meet them again and again, and its standard error: walks over the heights of the
-/// surface, with Schlick's factor at each facet (Heitz, Hanika, d'Eon and Dachsbacher, "Multiple-Scattering Microfacet BSDFs with the
-/// Smith Model", ACM TOG 35(4), 2016, §4 to §6).
+/// A walk of light over the heights of Smith's microfacets (Heitz, Hanika, d'Eon and Dachsbacher, "Multiple-Scattering Microfacet BSDFs
+/// with the Smith Model", ACM TOG 35(4), 2016, §4 to §6): it knows of masking only how steep a way leaves the surface, and of G2 nothing.
+struct Walk {
+    /// Where light goes.
+    w: DVec3,
+    /// Share of the surface that lies lower than the light.
+    lower: f64,
+}
+
+impl Walk {
+    /// Light that comes from a direction.
+    fn from(wo: DVec3) -> Self {
+        Self { w: -wo, lower: 1.0 }
+    }
+
+    /// Reflects at the next facet: the cosine there; `None` where the light leaves the surface.
+    fn meet(&mut self, alpha: f64, random: &mut Random) -> Option<f64> {
+        let mut unit = || f64::from(random.unit());
+        let u = unit();
+        // Smith's Λ, at most −1 on the way down.
+        let lambda = 0.5 * (ggx_stretched_cos(self.w.z, alpha) / self.w.z - 1.0);
+        if self.w.z > 0.0 && u >= 1.0 - self.lower.powf(lambda) {
+            return None;
+        }
+        self.lower = (self.lower / (1.0 - u).powf(1.0 / lambda)).min(1.0);
+        let h = ggx_sample_visible(-self.w, alpha, DVec2::new(unit(), unit()));
+        let cos_h = (-self.w.dot(h)).max(0.0);
+        self.w += 2.0 * cos_h * h;
+        Some(cos_h)
+    }
+}
+
+/// What Smith's microfacets reflect of light that may meet them again and again, and its standard error, by walks with Schlick's factor at
+/// each facet.
 fn walked_albedo(cos_o: f64, alpha: f64, f0: DVec3, walks: u32) -> [DVec3; 2] {
     let mut random = Random(41);
     let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
     for _ in 0..walks {
-        let mut unit = || f64::from(random.unit());
-        let (mut w, mut weight) = (-direction(cos_o, 0.0), DVec3::ONE);
-        // Share of the surface that lies lower than the light.
-        let mut lower = 1.0f64;
-        loop {
-            let u = unit();
-            // Smith's Λ, at most −1 on the way down.
-            let lambda = 0.5 * (ggx_stretched_cos(w.z, alpha) / w.z - 1.0);
-            if w.z > 0.0 && u >= 1.0 - lower.powf(lambda) {
-                break;
-            }
-            lower = (lower / (1.0 - u).powf(1.0 / lambda)).min(1.0);
-            let h = ggx_sample_visible(-w, alpha, DVec2::new(unit(), unit()));
-            let cos_h = (-w.dot(h)).max(0.0);
+        let (mut walk, mut weight) = (Walk::from(direction(cos_o, 0.0)), DVec3::ONE);
+        while let Some(cos_h) = walk.meet(alpha, &mut random) {
             weight *= fresnel_schlick(cos_h, f0);
-            w += 2.0 * cos_h * h;
         }
         sum += weight;
         squares += weight * weight;
@@ -307,6 +325,49 @@ fn walked_albedo(cos_o: f64, alpha: f64, f0: DVec3, walks: u32) -> [DVec3; 2] {
         mean,
         DVec3::new(variance.x.sqrt(), variance.y.sqrt(), variance.z.sqrt()),
     ]
+}
+
+/// Where light goes that leaves after one facet, as the lobe with its default masking says, and as no other masking would.
+#[test]
+fn light_of_one_reflection_leaves_as_walks_over_heights_do() {
+    let metal = GltfFactors { metallic: 1.0, ..WHITE };
+    let single = BsdfFeatures {
+        multiple_scattering: false,
+        ..BsdfFeatures::ALL
+    };
+    let separable = BsdfFeatures {
+        separable_masking: true,
+        ..single
+    };
+    let wo = direction(0.2, 0.4);
+    for (seed, roughness) in [(51, 0.5), (52, 0.8), (53, 1.0)] {
+        let b = bsdf_gltf(&GltfFactors { roughness, ..metal });
+        let value = |features: BsdfFeatures, wi: DVec3| bsdf_eval(&context(features), &b, wo, wi, LOBE_ALL).x;
+        let agrees = |pdf: &dyn Fn(DVec3) -> f64| {
+            let random = std::cell::RefCell::new(Random(seed));
+            let walked = |_: DVec3| {
+                let mut random = random.borrow_mut();
+                let mut walk = Walk::from(wo);
+                walk.meet(b.alpha, &mut random)?;
+                let wi = walk.w;
+                walk.meet(b.alpha, &mut random).is_none().then_some(wi)
+            };
+            sphere_test(40_000, 0, 16, walked, pdf)
+        };
+        let p = agrees(&|wi: DVec3| value(single, wi));
+        assert!(p > SIGNIFICANCE, "roughness {roughness}: p = {p}");
+        let p = agrees(&|wi: DVec3| value(separable, wi));
+        assert!(p < SIGNIFICANCE, "roughness {roughness}, G1 G1': p = {p}");
+        // As if a facet that one direction sees were seen from the other wherever more of all are.
+        let p = agrees(&|wi: DVec3| {
+            if wi.z <= 0.0 {
+                return 0.0;
+            }
+            let least = ggx_g1(wo.z, b.alpha).min(ggx_g1(wi.z, b.alpha));
+            value(single, wi) * least / ggx_g2(wo.z, wi.z, b.alpha, false)
+        });
+        assert!(p < SIGNIFICANCE, "roughness {roughness}, min(G1, G1'): p = {p}");
+    }
 }
 
 /// Colours tell how often light has met facets: n times leave the n-th power of the reflectance.

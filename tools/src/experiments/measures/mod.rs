@@ -110,6 +110,7 @@ measures! {
     on_device "kd-threads" kd::kd_threads.of_any_scenes();
     on_device "kd-traversal" kd::kd_traversal.of_any_scenes();
     on_host "leaf-sizes" photon_maps::leaf_sizes;
+    on_host "light-choice" rendering::light_choice;
     on_device "live-map-pictures" preview::live_map_pictures;
     on_device "live-maps" preview::live_maps.of_any_scenes();
     on_host "map-borders" maps::map_borders;

@@ -10,7 +10,7 @@ use super::choice::{ALIKE, best, sign};
 use super::choice_plot::{self, Bars, Panel, Subject};
 use super::environment_look_ups::{Errors, MAPS, TURNS, errors, name, size, texels};
 use super::environments::{self, Environment, LIGHTS};
-use super::needs::need;
+use super::needs::{need, spread};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::greatest;
@@ -100,6 +100,21 @@ const CRITERIA: &[Criterion<Verdict>] = &[
     .among(|row| row.question == ONE_RECTANGLE)
     .because("a map within a tenth of the least at each of them, by all turns together and by each"),
 ];
+
+const OF_NEEDS: &[Criterion<Need>] = &[Criterion::each(
+    "the octahedron needs as many texels as the cube in every environment and at every budget: times the cube's",
+    Bound::Between(1.0 / ALIKE, ALIKE),
+    |row: &Need| row.need,
+)
+.among(Need::is_of_the_octahedron)
+.because("a tenth more or less counts as one; intervals are least … greatest of the turns")];
+
+impl Need {
+    /// Whether it is the square octahedron's in one environment.
+    fn is_of_the_octahedron(&self) -> bool {
+        self.map == name(Parametrization::OctahedronQuadratic) && self.environment != TOGETHER
+    }
+}
 
 /// The geometric mean of needs; not a number of none.
 fn mean_need(needs: &[f64]) -> f64 {
@@ -313,15 +328,14 @@ impl Study for Found {
 
     fn findings(&self) -> Findings {
         let needs = needs(&self.look_ups);
-        let octahedron = name(Parametrization::OctahedronQuadratic);
         let rows: Vec<Need> = needs.iter().map(|need| need.row.clone()).collect();
-        let octahedron = rows
-            .iter()
-            .rfind(|row| row.map == octahedron && row.environment == TOGETHER);
+        let octahedron = rows.iter().filter(|row| row.is_of_the_octahedron());
+        let octahedron: Vec<f64> = octahedron.map(|row| row.need.value).collect();
         let lights = LIGHTS.map(|(name, about)| format!("{name}: {about}")).join("; ");
         let found = Findings::of(&verdicts(&self.maps, &needs), CRITERIA).headline(
-            "texels of the octahedron map for the cube's error, over the cube's, at the largest budget (least … greatest of the turns)",
-            octahedron.map(|row| row.need),
+            "texels of the octahedron map for the cube's error, over the cube's: geometric mean of all environments and budgets (least … greatest \
+             of them)",
+            (!octahedron.is_empty()).then(|| spread(&octahedron)),
         );
         let found = match plot(&self.maps, &self.look_ups) {
             Some(svg) => found.drawing("choice.svg", "Storage, density and error of all maps", svg),
@@ -332,7 +346,7 @@ impl Study for Found {
                 "Maps within a factor of {ALIKE} of the least count as one. Answers hold at every budget; those to the choice of cube or octahedron and of one \
                  rectangle hold by each turn too. Nusselt's map, of a hemisphere, is no choice for the sphere."
             ))
-            .and(Findings::pivoted(&rows, "environment", &[]))
+            .and(Findings::pivoted(&rows, "environment", OF_NEEDS))
             .note(format!(
                 "Times as many texels in all, unused ones included, as the cube map has at a budget, for its error; from the errors there and the \
                  cube's slope from the budget before. Intervals are least … greatest of {TURNS} turns. Environments ({lights}), each in {TURNS} turns, \

@@ -9,7 +9,7 @@ use glam::{DVec3, UVec2};
 use std::f64::consts::PI;
 
 use super::light_fields::{CONCENTRATIONS, LOBES, LobeField, deviation, errors_of_irradiance, held, irradiance_of_sky};
-use super::needs::need;
+use super::needs::{need, spread};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Study, curves, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::greatest;
@@ -47,7 +47,7 @@ rows! {
     struct Fall = "Fall of the error with texels" by [map] {
         map: String = "map",
         exponent: f64 = "power of texels by which the error grows",
-        need: f64 = "texels for the cube's error, over the cube's",
+        need: Measured = "texels for the cube's error, over the cube's",
     }
 }
 
@@ -99,6 +99,15 @@ impl Fall {
     }
 }
 
+/// What a map needs at each of the last budgets.
+fn need_by_budget(curve: &[(f64, f64)], other: &[(f64, f64)]) -> Measured {
+    let first = (curve.len() + 1).saturating_sub(LARGEST).max(2);
+    let needs: Vec<f64> = (first..=curve.len())
+        .map(|end| need(&curve[..end], &other[..end.min(other.len())]))
+        .collect();
+    spread(&needs)
+}
+
 /// How errors fall, by the last budgets of each map.
 fn falls(look_ups: &[LookUps]) -> Vec<Fall> {
     let curve = |map: &Parametrization| -> Vec<(f64, f64)> {
@@ -115,7 +124,7 @@ fn falls(look_ups: &[LookUps]) -> Vec<Fall> {
             Fall {
                 map: map.to_string(),
                 exponent: least_squares(&logarithms).unwrap_or(f64::NAN),
-                need: need(&curve, &of_first),
+                need: need_by_budget(&curve, &of_first),
             }
         })
         .collect()
@@ -167,8 +176,9 @@ impl Study for Found {
         let widths = CONCENTRATIONS.map(|k| format!("{:.2}", 1.0 / k.sqrt())).join(", ");
         Findings::of(&falls, CRITERIA)
             .headline(
-                "texels of the octahedron map for the cube's error, over the cube's",
-                need.map(Measured::exact),
+                "texels of the octahedron map for the cube's error, over the cube's, in this one field: geometric mean of the largest budgets \
+                 (least … greatest)",
+                need,
             )
             .curves(
                 "error",
@@ -181,7 +191,8 @@ impl Study for Found {
                 ),
             )
             .note(format!(
-                "Exponents by the {LARGEST} largest budgets; texels for the cube's error by its slope at the largest."
+                "Exponents by the {LARGEST} largest budgets; texels for the cube's error at each of these by its slope there: geometric mean, least … \
+                 greatest. They are those of this field; `map-choice` has others."
             ))
             .and(Findings::of(&self.look_ups, &[]))
             .note(format!(

@@ -58,6 +58,8 @@ rows! {
         scene: String = "scene",
         layout: String = "layout",
         exponent: Measured = "power of texels along a side by which errors grow",
+        coarsest: f64 = "wrong places, coarsest map (%)",
+        finest: f64 = "wrong places, finest map (%)",
     }
 }
 
@@ -73,12 +75,20 @@ rows! {
 /// What was found.
 pub type Found = Vec<Row>;
 
-const OF_RATES: &[Criterion<Rate>] = &[Criterion::each(
-    "errors fall as one over the texels along a side: their exponent",
-    Bound::Between(-1.1, -0.9),
-    |row: &Rate| row.exponent,
-)
-.because("a tenth is four standard errors of 200,000 places")];
+const OF_RATES: &[Criterion<Rate>] = &[
+    Criterion::each(
+        "errors fall as one over the texels along a side: their exponent",
+        Bound::Between(-1.1, -0.9),
+        |row: &Rate| row.exponent,
+    )
+    .because("a tenth is four standard errors of 200,000 places"),
+    Criterion::each(
+        "the finest maps are wrong at borders of shadows alone: wrong places (%)",
+        Bound::AtMost(1.0),
+        |row: &Rate| row.finest.into(),
+    )
+    .because("of 1024 texels along a side, borders ten sides long, a texel wide"),
+];
 const OF_PAIRS: &[Criterion<Pair>] = &[Criterion::each(
     "an octahedron's error is within a fifth of the cube's: their ratio",
     Bound::Between(0.8, 1.2),
@@ -108,10 +118,14 @@ fn rates(rows: &[Row]) -> Vec<Rate> {
         let same = rows
             .iter()
             .filter(|other| (&other.scene, &other.layout) == (&row.scene, &row.layout));
+        let same: Vec<&Row> = same.collect();
+        let wrong = |row: Option<&&Row>| row.map_or(f64::NAN, |row| 1e2 * row.wrong);
         rates.push(Rate {
             scene: row.scene.clone(),
             layout: row.layout.clone(),
-            exponent: exponent(&same.collect::<Vec<_>>()),
+            exponent: exponent(&same),
+            coarsest: wrong(same.first()),
+            finest: wrong(same.last()),
         });
     }
     rates

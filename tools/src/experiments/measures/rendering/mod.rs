@@ -1,6 +1,8 @@
-//! Whole pictures: whether they are what was asked for, what they cost, their sums and files, and agreement with Mitsuba 3.
+//! Whole pictures: whether they are what was asked for, how their lights are chosen, what they cost, their sums and files, and agreement with
+//! Mitsuba 3.
 
 pub mod automatic_choice;
+pub mod light_choice;
 pub mod mitsuba;
 pub mod path_sets;
 pub mod picture_formats;
