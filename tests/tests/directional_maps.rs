@@ -6,6 +6,7 @@ use clerestory::maps::directional_map::DirectionalMap;
 use clerestory::maps::irradiance::IrradianceSource;
 use clerestory::maps::prefilter::{PrefilterGgx, prefilter_ggx};
 use clerestory::maps::spherical_sat::{SatImage, SatNumbers, SatRange, SphericalSat, box_mean, sat_half_width};
+use clerestory::maps::to_lat_long::{MAX_SAMPLES, ToLatLong, to_lat_long};
 use clerestory::maps::{MapImage, Parametrization};
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
@@ -453,6 +454,67 @@ fn constant_radiance_stays_constant() {
                 }
             }
         }
+    });
+}
+
+/// Latitude–longitude maps of maps of every kind are their twins, and the border is left alone.
+#[test]
+fn latitude_longitude_maps_of_others_are_their_twins() {
+    with_gpu(|gpu| {
+        let rows = 12;
+        let size = UVec2::new(2 * rows, rows);
+        for (map, border) in [
+            (Parametrization::OctahedronQuadratic, 1),
+            (Parametrization::OctahedronRectangular, 0),
+            (Parametrization::EqualArea, 2),
+            (Parametrization::LatLong, 1),
+            (Parametrization::Cube, 0),
+        ] {
+            let image = noise(map, 16);
+            let source = filled(gpu, &image, 1, border);
+            let target = DirectionalMap::new(gpu, Parametrization::LatLong, size, 1, 3).unwrap();
+            for samples in [1, 3] {
+                let convert = ToLatLong::new(gpu, &source, &target, samples).unwrap();
+                let mut recorder = gpu.recorder("latitude and longitude").unwrap();
+                recorder
+                    .pass("latitude and longitude", |pass| {
+                        pass.barrier(&[transfer_to_compute(target.texels())]);
+                        convert.record(pass, &source, &target)?;
+                        pass.barrier(&[compute_to_transfer(target.texels())]);
+                        Ok(())
+                    })
+                    .unwrap();
+                recorder.submit().unwrap().wait().unwrap();
+                let found = target.read(0).unwrap();
+                let twin = to_lat_long(&image, size, samples).unwrap();
+                let (mut worst, mut spread) = (0.0f64, 0.0f64);
+                for (found, expected) in found.texels().iter().zip(twin.texels()) {
+                    worst = worst.max(f64::from((*found - *expected).abs().max_element()));
+                    spread = spread.max(f64::from((*expected - 0.5).abs().max_element()));
+                }
+                println!("{map}, {samples}²: off by {worst:.1e}");
+                // Places are off by 10⁻⁶ of 16 or 32 texels, and radiance changes by up to 1 per texel along each axis; near the cube's corners, where
+                // three texels share the weight of four, by some times as much.
+                let allowed = if map == Parametrization::Cube { 2e-3 } else { 1e-4 };
+                assert!(worst < allowed, "{map}, {samples}: {worst}");
+                // Noise is still there.
+                assert!(spread > 0.2, "{map}, {samples}: {spread}");
+            }
+            let (extent, tile) = target.read_tile(0).unwrap();
+            let top = (3 * extent.x) as usize;
+            assert!(tile[..top].iter().all(|texel| *texel == Vec3::ZERO), "{map}");
+            assert!(ToLatLong::new(gpu, &source, &target, 0).is_err());
+            assert!(ToLatLong::new(gpu, &source, &target, MAX_SAMPLES + 1).is_err());
+        }
+        let octahedron = Parametrization::OctahedronQuadratic;
+        let [one, other] =
+            [1, 2].map(|border| DirectionalMap::new(gpu, octahedron, UVec2::splat(8), 1, border).unwrap());
+        assert!(ToLatLong::new(gpu, &one, &other, 2).is_err());
+        let target = DirectionalMap::new(gpu, Parametrization::LatLong, size, 1, 1).unwrap();
+        let convert = ToLatLong::new(gpu, &one, &target, 2).unwrap();
+        let mut recorder = gpu.recorder("others").unwrap();
+        let refused = recorder.pass("others", |pass| convert.record(pass, &other, &target));
+        assert!(refused.is_err());
     });
 }
 

@@ -47,6 +47,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("maps/directional_border.comp", "SpecConstantOp"),
     ("maps/directional_coarser.comp", "SpecConstantOp"),
     ("maps/directional_look_up.comp", "SpecConstantOp"),
+    ("maps/lat_long_of_map.comp", "SpecConstantOp"),
     ("maps/prefilter_ggx.comp", "SpecConstantOp"),
     ("maps/sat_columns.comp", "SpecConstantOp"),
     ("maps/sat_lobe.comp", "SpecConstantOp"),

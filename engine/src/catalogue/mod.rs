@@ -21,7 +21,7 @@ pub use row::{Cite, Role, Row, Source, sources};
 pub const PREFIXES: [(&str, &str); 6] = [
     (
         "BG-",
-        "background (transport, path tracing, shadow maps, ray indexes) of T. Engelhardt's thesis on visibility from a point, 2013",
+        "background (transport, path tracing, photon mapping, shadow maps, ray indexes) of T. Engelhardt's thesis on visibility from a point, 2013",
     ),
     (
         "DP-",

@@ -8,6 +8,7 @@
 //! - [`topology`]: which texel a border texel repeats; [`taps`]: weights of seamless look-ups and of mips; [`level`]: the level of detail;
 //! - [`MapImage`]: radiance in the texels of a map; [`resample`]: from one map to another; [`statistics`]: how even a map is;
 //! - [`directional_map`]: levels with borders on the device; [`spherical_sat`], [`box_lobe`] and [`prefilter`]: glossy look-ups;
+//! - [`to_lat_long`]: a latitude–longitude map of one that was drawn;
 //! - [`irradiance`]: what a surface receives;
 //! - [`packed_direction`]: directions in a word; [`turn`]: the angles that maps take.
 //!
@@ -48,6 +49,7 @@ pub mod spherical_sat;
 pub mod statistics;
 mod strip;
 pub mod taps;
+pub mod to_lat_long;
 pub mod topology;
 pub mod turn;
 

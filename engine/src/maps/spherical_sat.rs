@@ -191,6 +191,11 @@ impl SphericalSat {
         self.numbers.constant()
     }
 
+    /// Bytes of its sums.
+    pub fn bytes(&self) -> u64 {
+        self.sums.bytes()
+    }
+
     /// The set that `maps/spherical_sat.glsl` reads.
     pub fn set(&self) -> SphericalSatSet<'_> {
         SphericalSatSet {

@@ -3,7 +3,7 @@
 use super::*;
 use clerestory::techniques::photon_mapping::MappedPhoton;
 use clerestory_tests::render::{builtin, lamp};
-use clerestory_tests::statistics::expect_counts;
+use clerestory_tests::statistics::{expect_counts, expect_mean_of};
 use clerestory_tests::with_gpu;
 
 const PHOTONS: u32 = 1 << 14;
@@ -64,6 +64,36 @@ fn closed_rooms_keep_every_photon_and_lose_flux_by_reflection_alone() {
                     expect_mean(&what, sum, variance.max(one * one), expected, 0.0);
                 }
             }
+        }
+    });
+}
+
+#[test]
+fn what_surfaces_absorb_is_what_lights_send() {
+    with_gpu(|gpu| {
+        let (power, rho) = (Vec3::new(3.0, 2.0, 1.0), Vec3::new(0.8, 0.4, 0.1));
+        let mut scene = room(rho);
+        add_point(&mut scene, Vec3::new(0.3, 0.2, -0.4), power);
+        let settings = PhotonSettings {
+            photons: 1 << 12,
+            direct_photons: true,
+            ..settings("all")
+        };
+        let mut mapper = mapper(gpu, &scene, &settings);
+        // Each photon that lands leaves 1 − ρ of its flux, whether it goes on or not; passes are independent.
+        let absorbed: Vec<[f64; 3]> = (0..16)
+            .map(|pass| {
+                let photons = mapper.photons(pass).unwrap_or_else(|error| panic!("{error}"));
+                [0, 1, 2].map(|channel| {
+                    let landed: f64 = photons.iter().map(|p| f64::from(p.record.flux[channel])).sum();
+                    (1.0 - f64::from(rho[channel])) * landed
+                })
+            })
+            .collect();
+        for channel in 0..3 {
+            let values: Vec<f64> = absorbed.iter().map(|pass| pass[channel]).collect();
+            let what = format!("absorbed, channel {channel}");
+            expect_mean_of(&what, &values, f64::from(power[channel]), 0.0, 0.0);
         }
     });
 }

@@ -10,6 +10,7 @@ mod convergence;
 mod determinism;
 mod flux;
 mod footprints;
+mod furnace;
 mod lights;
 mod maps;
 mod materials;

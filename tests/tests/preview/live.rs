@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3, Vec4};
 use crate::subject::Subject;
 
 /// A closed room [-1, 1]³ of six black faces, each with a radiance of its own.
-fn room() -> (Scene, [Vec3; 6]) {
+pub fn room() -> (Scene, [Vec3; 6]) {
     let colors = [
         Vec3::new(1.0, 0.2, 0.1),
         Vec3::new(0.2, 0.9, 0.3),
@@ -52,7 +52,7 @@ fn room() -> (Scene, [Vec3; 6]) {
 }
 
 /// The face that a ray from inside meets: that of the nearest plane.
-fn face(from: DVec3, direction: DVec3) -> (usize, f64) {
+pub fn face(from: DVec3, direction: DVec3) -> (usize, f64) {
     let (mut nearest, mut found) = (f64::INFINITY, 0);
     for axis in 0..3 {
         let side = if direction[axis] < 0.0 { -1.0 } else { 1.0 };
@@ -65,7 +65,7 @@ fn face(from: DVec3, direction: DVec3) -> (usize, f64) {
 }
 
 /// Whether another face begins within the texels that a look-up in a map of that side takes: they are no wider than 4.3 / side either way.
-fn is_at_edge(from: DVec3, direction: DVec3, side: u32) -> bool {
+pub fn is_at_edge(from: DVec3, direction: DVec3, side: u32) -> bool {
     let reach = 2.0 * 4.3 / f64::from(side);
     let (x, y) = direction.any_orthonormal_pair();
     (0..16).any(|i| {

@@ -59,6 +59,7 @@ sources! {
     IGEHY_1999 = "igehy-1999": "H. Igehy", "Tracing Ray Differentials", "SIGGRAPH", 1999;
     IZE_2013 = "ize-2013": "T. Ize", "Robust BVH Ray Traversal", "JCGT 2(2)", 2013;
     JARZYNSKI_OLANO_2020 = "jarzynski-olano-2020": "M. Jarzynski, M. Olano", "Hash Functions for GPU Rendering", "JCGT 9(3)", 2020;
+    JENSEN_1996 = "jensen-1996": "H. W. Jensen", "Global Illumination using Photon Maps", "EGWR", 1996;
     JENSEN_2001 = "jensen-2001": "H. W. Jensen", "Realistic Image Synthesis Using Photon Mapping", "A K Peters", 2001;
     JENSEN_CHRISTENSEN_1998 = "jensen-christensen-1998": "H. W. Jensen, P. Christensen", "Efficient Simulation of Light Transport in Scenes with Participating Media Using Photon Maps", "SIGGRAPH", 1998;
     JOHNSON_CHRISTY_1972 = "johnson-christy-1972": "P. B. Johnson, R. W. Christy", "Optical Constants of the Noble Metals", "Phys. Rev. B 6", 1972;

@@ -191,3 +191,61 @@ fn constant_radiance_is_constant_in_look_ups() {
         }
     }
 }
+
+/// The mean over the cap about a direction that holds a solid angle, of rings of equal area.
+fn cap_mean(d: DVec3, solid_angle: f64, light: impl Fn(DVec3) -> f64) -> f64 {
+    const STEPS: u32 = 24;
+    let (x, y) = d.any_orthonormal_pair();
+    let of = |i: u32| {
+        let share = (f64::from(i / STEPS) + 0.5) / f64::from(STEPS);
+        let cos = 1.0 - share * solid_angle / TAU;
+        let sin = (1.0 - cos * cos).sqrt();
+        let phi = TAU * (f64::from(i % STEPS) + 0.5) / f64::from(STEPS);
+        light(cos * d + sin * (phi.cos() * x + phi.sin() * y))
+    };
+    (0..STEPS * STEPS).map(of).sum::<f64>() / f64::from(STEPS * STEPS)
+}
+
+/// Boxes stand for caps: within 15° of the poles those of the latitude–longitude map, wedges there, are several times as wrong as those of an octahedron of
+/// as many texels.
+#[test]
+fn boxes_near_the_poles_of_the_latitude_longitude_map_are_no_caps() {
+    let mut random = Random(25);
+    let mut direction = || random.direction().as_dvec3().normalize();
+    let lobes: Vec<DVec3> = (0..24).map(|_| direction()).collect();
+    let light = |d: DVec3| {
+        0.2 + lobes
+            .iter()
+            .map(|lobe| (12.0 * (d.dot(*lobe) - 1.0)).exp())
+            .sum::<f64>()
+    };
+    let near_poles: Vec<DVec3> = std::iter::repeat_with(direction)
+        .filter(|d| d.z.abs() > 15f64.to_radians().cos())
+        .take(60)
+        .collect();
+    let errors = [
+        (Parametrization::OctahedronQuadratic, UVec2::splat(128)),
+        (Parametrization::LatLong, UVec2::new(180, 90)),
+    ]
+    .map(|(map, size)| {
+        let image = MapImage::from_fn(map, size, |texel| {
+            DVec3::splat(light(map.texel_direction(size, texel).unwrap()))
+        })
+        .unwrap();
+        let table = SatImage::new(&image, 64).unwrap();
+        [0.01, 0.05].map(|solid_angle| {
+            let square = |d: &DVec3| {
+                let half = sat_half_width(map, size, *d, solid_angle).unwrap();
+                let found = table.sat_mean(map.encode(*d).unwrap().uv, half).x;
+                (found - cap_mean(*d, solid_angle, light)).powi(2)
+            };
+            (near_poles.iter().map(square).sum::<f64>() / near_poles.len() as f64).sqrt()
+        })
+    });
+    let [of_octahedron, of_lat_long] = errors;
+    for (octahedron, lat_long) in of_octahedron.into_iter().zip(of_lat_long) {
+        let ratio = lat_long / octahedron;
+        println!("near poles: {lat_long:.4} instead of {octahedron:.4}, {ratio:.1} times");
+        assert!((3.0..14.0).contains(&ratio), "{lat_long}, {octahedron}");
+    }
+}

@@ -159,3 +159,30 @@ fn derivatives_are_those_of_the_direction() {
         }
     }
 }
+
+/// What the rasterizer draws straight is straight within an octant of the octahedron, and bent in the latitude–longitude map: by a texel in the mean of edges
+/// between random places of an octant, and by a quarter of that where they are half as long.
+#[test]
+fn edges_are_straight_in_octants_and_bent_in_the_latitude_longitude_map() {
+    let mut random = Random(26);
+    let mut corner = || DVec3::new(random.unit().into(), random.unit().into(), random.unit().into());
+    let edges: Vec<[DVec3; 2]> = (0..4000).map(|_| [corner(), corner()]).collect();
+    // How far the image of an edge's middle is from the line between those of its ends, texels; of the middle part of each edge.
+    let off = |map: Parametrization, size: UVec2, part: f64| {
+        let image = |p: DVec3| map.encode(p).unwrap().uv * size.as_dvec2();
+        let of = |[a, b]: &[DVec3; 2]| {
+            let (middle, half) = (0.5 * (*a + *b), 0.5 * part * (*b - *a));
+            let [from, to, at] = [middle - half, middle + half, middle].map(image);
+            (at - from).perp_dot((to - from).normalize()).abs()
+        };
+        edges.iter().map(of).sum::<f64>() / edges.len() as f64
+    };
+    let straight = off(Parametrization::OctahedronQuadratic, UVec2::splat(128), 1.0);
+    assert!(straight < 1e-9, "{straight}");
+    let bent = [1.0, 0.5, 0.25].map(|part| off(Parametrization::LatLong, UVec2::new(182, 91), part));
+    println!("off the line in the mean: {bent:?} texels");
+    assert!((0.8..1.3).contains(&bent[0]), "{bent:?}");
+    for pair in bent.windows(2) {
+        assert!((3.5..4.5).contains(&(pair[0] / pair[1])), "{bent:?}");
+    }
+}

@@ -390,6 +390,28 @@ fn gathering_states(settings: &PhotonSettings, eye: &PathSet) -> (u32, u32) {
 /// Rows of the catalogue.
 pub(crate) const ROWS: &[Row] = &[
     Row {
+        id: "BG-5",
+        name: "photon mapping as first published: a map of photons, seen directly or behind a final gather",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "A map seen directly is blurred, and lacks half of its light at edges and three quarters in corners of right angles, as far as kernels reach; behind a final gather, of one ray per eye path, a part of that is missing everywhere, and pictures take hundreds of paths to be smooth.",
+        sources: &[
+            sources::JENSEN_1996.whole(),
+            sources::JENSEN_2001.whole(),
+            sources::ENGELHARDT_2013.at("4.4"),
+        ],
+        shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
+        bias: Some(Bias::Consistent(
+            "kernels blur what they gather, and lose light at edges, until they have shrunk",
+        )),
+        tests: &[
+            "tests/tests/photon/furnace.rs::maps_are_dark_at_edges_by_what_kernels_lose_and_a_gather_evens_it_out",
+            "tests/tests/photon/flux.rs::what_surfaces_absorb_is_what_lights_send",
+            "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
+        ],
+        settings: &["final_gather", "direct_photons", "photons", "radius"],
+        ..Row::of(file!())
+    },
+    Row {
         id: "PM-DE-1",
         name: "density estimation with kernels of one radius",
         role: Role::PartOf("PM-SYS-1"),

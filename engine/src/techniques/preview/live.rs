@@ -15,89 +15,64 @@ use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use super::{Preview, PreviewLights};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::{Area, Gpu, Recorder};
+use crate::maps::directional_map::DirectionalMap;
 use crate::maps::octahedron::OctahedronLayout;
 use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Surfaces, View};
 use crate::transport::GpuScene;
 use crate::{Error, Result};
 
-/// A light probe of a scene, drawn on the device.
+/// What draws a scene around a place into an octahedron map.
 #[derive(Debug)]
-pub struct LiveProbe {
-    probe: LightProbe,
+pub(super) struct LiveDrawing {
     gbuffer: GBuffer,
     shade: Shade,
 }
 
-impl LiveProbe {
-    /// Allocates a probe and what draws it; its surfaces are lit as those of the preview, and by probes where `has_probes` says so.
-    ///
-    /// # Errors
-    /// As [`LightProbe::new`]; [`Error::MissingFeature`] where clip distances are missing.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, preview: &Preview, desc: LightProbeDesc, has_probes: bool) -> Result<Self> {
-        Self::lit_by(gpu, scene, preview.lights(), desc, has_probes)
-    }
-
-    fn lit_by(
-        gpu: &Gpu,
-        scene: &GpuScene,
-        lights: &PreviewLights,
-        desc: LightProbeDesc,
-        has_probes: bool,
-    ) -> Result<Self> {
-        let probe = LightProbe::new(gpu, desc)?;
+impl LiveDrawing {
+    /// For a map of so many texels along a side; its surfaces are lit as those of the preview, and by probes where `has_probes` says so.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, lights: &PreviewLights, side: u32, has_probes: bool) -> Result<Self> {
         let gbuffer = GBuffer::new(
             gpu,
             &scene.surfaces(),
             &GBufferDesc {
-                size: [desc.side; 2],
+                size: [side; 2],
                 layering: Layering::Octants(OctantCut::default()),
                 outputs: &OUTPUTS,
             },
         )?;
         Ok(Self {
-            probe,
             gbuffer,
             shade: Shade::new(gpu, scene, lights, true, has_probes)?,
         })
     }
 
-    /// The probe.
-    pub fn probe(&self) -> &LightProbe {
-        &self.probe
-    }
-
-    /// Bytes of its maps and pictures.
     pub fn bytes(&self) -> u64 {
-        self.probe.bytes() + self.gbuffer.bytes()
+        self.gbuffer.bytes()
     }
 
-    /// Records five passes: what of `surfaces` is seen from a place (metres), its shading by the preview's lights and by probes, levels and
-    /// borders, and the filter. Probes may be this one itself, as it was before. Afterwards it is visible to compute shaders.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] for a place that is not finite, a preview with other shadow maps or a scene with other features than those that it was made
-    /// for, or probes where it was made for none; [`Error::MissingBarrier`] in debug builds.
+    /// Records two passes: what of `surfaces` is seen from a place (metres), and its shading by the preview's lights and by a probe, into level 0 of a
+    /// map, which is visible to compute shaders afterwards.
     pub fn record(
         &self,
         recorder: &mut Recorder,
         scene: &GpuScene,
         surfaces: &Surfaces<'_>,
         preview: &Preview,
-        place: Vec3,
-        by: Option<&LightProbe>,
+        (place, by): (Vec3, Option<&LightProbe>),
+        map: &DirectionalMap,
     ) -> Result<()> {
         if !place.is_finite() {
             return Err(Error::setting("place", place, "is not finite"));
         }
+        let side = self.gbuffer.size()[0];
         let near = View::near_plane(place, surfaces);
-        let area = Area::whole([self.probe.desc().side; 2]);
+        let area = Area::whole([side; 2]);
         let views = View::of_octants(place, OctahedronLayout::Quadratic, near, area)?;
         self.gbuffer.record(recorder, surfaces, &views)?;
         recorder.pass("preview: shade live map", |pass| {
-            let map = self.probe.map();
             let level = map.level(0)?;
             let border = map.border();
-            let stride = self.probe.desc().side + 2 * border;
+            let stride = side + 2 * border;
             let target = Target {
                 buffer: map.texels(),
                 first: level.first + border * (stride + 1),
@@ -116,7 +91,57 @@ impl LiveProbe {
                 target,
             };
             self.shade.record(pass, &seen, &[part])
-        })?;
+        })
+    }
+}
+
+/// A light probe of a scene, drawn on the device.
+#[derive(Debug)]
+pub struct LiveProbe {
+    probe: LightProbe,
+    drawing: LiveDrawing,
+}
+
+impl LiveProbe {
+    /// Allocates a probe and what draws it; its surfaces are lit as those of the preview, and by probes where `has_probes` says so.
+    ///
+    /// # Errors
+    /// As [`LightProbe::new`]; [`Error::MissingFeature`] where clip distances are missing.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, preview: &Preview, desc: LightProbeDesc, has_probes: bool) -> Result<Self> {
+        Ok(Self {
+            probe: LightProbe::new(gpu, desc)?,
+            drawing: LiveDrawing::new(gpu, scene, preview.lights(), desc.side, has_probes)?,
+        })
+    }
+
+    /// The probe.
+    pub fn probe(&self) -> &LightProbe {
+        &self.probe
+    }
+
+    /// Bytes of its maps and pictures.
+    pub fn bytes(&self) -> u64 {
+        self.probe.bytes() + self.drawing.bytes()
+    }
+
+    /// Records five passes: what of `surfaces` is seen from a place (metres), its shading by the preview's lights and by probes, levels and
+    /// borders, and the filter. Probes may be this one itself, as it was before. Afterwards it is visible to compute shaders.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a place that is not finite, a preview with other shadow maps or a scene with other features than those that it was made
+    /// for, or probes where it was made for none; [`Error::MissingBarrier`] in debug builds.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        scene: &GpuScene,
+        surfaces: &Surfaces<'_>,
+        preview: &Preview,
+        place: Vec3,
+        by: Option<&LightProbe>,
+    ) -> Result<()> {
+        let map = self.probe.map();
+        self.drawing
+            .record(recorder, scene, surfaces, preview, (place, by), map)?;
         self.probe.record(recorder)
     }
 }

@@ -6,7 +6,8 @@
 //!
 //! What it shows: emission; point, spot and directional lights, through shadow maps where they have a place; light of a [`LightProbe`] by two
 //! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact
-//! albedo. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them.
+//! albedo. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them;
+//! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table.
 //!
 //! Bias, all of it:
 //!
@@ -30,6 +31,7 @@ mod lights;
 mod live;
 mod method;
 pub mod probe;
+mod reflection;
 mod shade;
 
 pub(super) use card::CARD;
@@ -37,6 +39,7 @@ pub use lights::{PreviewLights, PreviewShadows};
 pub use live::LiveProbe;
 pub use method::{PreviewMethod, PreviewSettings};
 pub use probe::{LightProbe, LightProbeDesc};
+pub use reflection::{ReflectionMap, ReflectionMapDesc};
 pub use shade::{PARTS_MAX, PreviewPart};
 
 use self::drawing::Drawing;

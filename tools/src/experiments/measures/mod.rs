@@ -137,6 +137,7 @@ measures! {
     on_device "photon-statistics" photons::photon_statistics;
     on_host "picture-formats" rendering::picture_formats;
     on_host "ray-offsets" rays::ray_offsets;
+    on_device "reflection-maps" preview::reflection_maps;
     on_host "sample-sums" rendering::sample_sums;
     on_device "scene-profile" rendering::scene_profile;
     on_device "shadow-maps" preview::shadow_maps.of_any_scenes();

@@ -1,12 +1,14 @@
 //! Live maps of a place in a scene, milliseconds of their parts, and errors of look-ups in them.
 
-use clerestory::gpu::Gpu;
+use clerestory::gpu::{Gpu, Timings};
 use clerestory::maps::MapImage;
 use clerestory::maps::prefilter::{ggx_mean, weighted_texels};
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{LightKind, Scene};
 use clerestory::techniques::preview::probe::probe_level;
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewShadows};
+use clerestory::techniques::preview::{
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewShadows, ReflectionMap, ReflectionMapDesc,
+};
 use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
 use glam::{DVec3, Vec3, Vec4};
@@ -95,6 +97,11 @@ impl<'a> Stage<'a> {
         })
     }
 
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        self.gpu
+    }
+
     /// A map of the size, drawn once.
     ///
     /// # Errors
@@ -117,6 +124,27 @@ impl<'a> Stage<'a> {
         let [draw, shade, levels, copy, filter] = PARTS.map(|part| 1e3 * timings.seconds_of(part));
         Ok([draw, shade, levels, copy, filter, draw + shade + levels + copy + filter])
     }
+
+    /// A reflection map, drawn once.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn reflection(&self, desc: ReflectionMapDesc) -> Result<ReflectionMap> {
+        let reflection = ReflectionMap::new(self.gpu, &self.scene, &self.preview, desc, false)?;
+        self.draw_reflection(&reflection)?;
+        Ok(reflection)
+    }
+
+    /// Draws a reflection map.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn draw_reflection(&self, reflection: &ReflectionMap) -> Result<Timings> {
+        let mut recorder = self.gpu.recorder("reflection map")?;
+        let surfaces = self.scene.surfaces();
+        reflection.record(&mut recorder, &self.scene, &surfaces, &self.preview, self.place, None)?;
+        recorder.submit()?.wait()
+    }
 }
 
 fn truth(map: &MapImage, directions: &[DVec3], alpha: f64) -> Vec<DVec3> {
@@ -125,7 +153,7 @@ fn truth(map: &MapImage, directions: &[DVec3], alpha: f64) -> Vec<DVec3> {
 }
 
 /// RMS of differences over the mean.
-fn error(values: &[Vec3], truth: &[DVec3]) -> f64 {
+pub fn error(values: &[Vec3], truth: &[DVec3]) -> f64 {
     let mean = truth.iter().sum::<DVec3>().element_sum() / (3 * truth.len()) as f64;
     let squares: f64 = values
         .iter()

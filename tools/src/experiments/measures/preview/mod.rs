@@ -4,5 +4,7 @@ pub mod live_map_pictures;
 pub mod live_maps;
 mod live_stages;
 mod previewed;
+pub mod reflection_maps;
+mod reflection_stages;
 pub mod shadow_maps;
 mod shadow_places;
