@@ -78,6 +78,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::transport::phase::ROWS,
     crate::transport::phong::ROWS,
     crate::transport::random::ROWS,
+    crate::transport::random_table::ROWS,
     crate::transport::shading_normal::ROWS,
     crate::transport::warp::ROWS,
 ];

@@ -132,6 +132,7 @@ measures! {
     on_device "photon-queues" photons::photon_queues;
     on_device "photon-statistics" photons::photon_statistics;
     on_host "picture-formats" rendering::picture_formats;
+    on_host "random-numbers" photons::random_numbers;
     on_host "ray-offsets" rays::ray_offsets;
     on_host "sample-sums" rendering::sample_sums;
     on_device "scene-profile" rendering::scene_profile;

@@ -7,3 +7,4 @@ pub mod photon_frame;
 pub mod photon_peers;
 pub mod photon_queues;
 pub mod photon_statistics;
+pub mod random_numbers;
