@@ -97,6 +97,7 @@ measures! {
     on_device "automatic-choice" rendering::automatic_choice;
     on_device "barriers" device::barriers;
     on_device "build-stages" rays::build_stages;
+    on_host "camera-footprints" rays::camera_footprints;
     on_host "compact-map" photon_maps::compact_map;
     on_host "compact-rays" photon_maps::compact_rays;
     on_host "coupled-reflection" surfaces::coupled_reflection;
@@ -124,6 +125,7 @@ measures! {
     on_host "merge-example" photon_maps::merge_example;
     on_device "mitsuba" rendering::mitsuba;
     on_host "multiple-scattering" surfaces::multiple_scattering;
+    on_host "path-differentials" photons::path_differentials;
     on_device "path-sets" rendering::path_sets;
     on_device "persistent-threads" rays::persistent_threads;
     on_host "phase-functions" media::phase_functions;

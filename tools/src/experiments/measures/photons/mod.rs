@@ -3,6 +3,7 @@
 mod cases;
 mod kernel_statistics;
 pub mod map_builds;
+pub mod path_differentials;
 pub mod photon_frame;
 pub mod photon_peers;
 pub mod photon_queues;

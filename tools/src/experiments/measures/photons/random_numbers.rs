@@ -124,7 +124,7 @@ fn cell(place: DVec3) -> usize {
 }
 
 /// Counts in cells at each meeting.
-fn counts(numbers: &Numbers, photons: u32) -> Vec<Vec<u32>> {
+fn counts(numbers: &dyn Fn(u32, u32) -> DVec2, photons: u32) -> Vec<Vec<u32>> {
     let mut counts = vec![vec![0; CELLS[0] * CELLS[1]]; MEETINGS as usize];
     for photon in 0..photons {
         let mut place = square_to_sphere(numbers(photon, 0));
@@ -146,7 +146,10 @@ fn of(source: &str, photons: u32, runs: u32) -> Result<Vec<Row>> {
     let expected = f64::from(photons) / cells as f64;
     let mut squares = [0.0; MEETINGS as usize];
     for run in 0..runs {
-        for (square, counts) in squares.iter_mut().zip(counts(&numbers(source, photons, run)?, photons)) {
+        for (square, counts) in squares
+            .iter_mut()
+            .zip(counts(&*numbers(source, photons, run)?, photons))
+        {
             let off = |count: &u32| (f64::from(*count) - expected).powi(2) / expected;
             *square += counts.iter().map(off).sum::<f64>();
         }
