@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use clerestory::Error;
-use clerestory::scene::{self, EnvironmentUse, MediaUse, Phase, PhaseUse, Projection, Scene, SceneProfile};
+use clerestory::scene::{self, EnvironmentUse, Material, MediaUse, Phase, PhaseUse, Projection, Scene, SceneProfile};
+use clerestory::transport::phong::phong_exponent;
 use glam::{DVec3, Vec3};
 
 const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl ring\nf 1 2 3\n";
@@ -90,14 +91,59 @@ fn the_sidecar_of_the_reference_is_understood() {
         .and_then(|rest| rest.split("```").next());
     let folder = folder(block.expect("a TOML block"));
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("file");
-    write("m.obj", &format!("{OBJ}usemtl bowl\nf 1 3 2\n"));
-    write("m.mtl", &format!("{MTL}newmtl bowl\nKd 0.5 0.5 0.5\n"));
+    write("m.obj", &format!("{OBJ}usemtl bowl\nf 1 3 2\nusemtl floor\nf 2 3 1\n"));
+    write(
+        "m.mtl",
+        &format!("{MTL}newmtl bowl\nKd 0.5 0.5 0.5\nnewmtl floor\nKd 0.5 0.5 0.5\n"),
+    );
     exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, |_, _| (1.0, 1.0, 1.0)).expect("EXR");
     let scene = load(folder.path(), "m.obj").expect("scene");
     assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
+    assert!(scene.materials[2].phong && scene.materials[2].metallic == 0.4);
     assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
     assert!(scene.notes.is_empty(), "{:?}", scene.notes);
     assert!(SceneProfile::of(&scene).media.surrounding);
+}
+
+#[test]
+fn modified_phong_surfaces_are_loaded_and_checked() {
+    let folder = folder("[phong]\nring = { exponent = 20, share = 0.25 }\n");
+    let scene = load(folder.path(), "m.obj").expect("scene");
+    let ring = &scene.materials[0];
+    let built = Material::phong("ring", Vec3::splat(0.5), 0.25, 20.0);
+    assert!(ring.phong && ring.specular == 0.0);
+    assert_eq!((ring.metallic, ring.roughness), (built.metallic, built.roughness));
+    let exponent = phong_exponent(f64::from(ring.roughness).powi(2));
+    assert!((exponent - 20.0).abs() < 1e-4, "{exponent}");
+    let profile = SceneProfile::of(&scene);
+    assert!(profile.has_phong && profile.has_metal && !profile.has_rough_dielectric_spec);
+    // All of it is the lobe where nothing else is said.
+    let whole = load(self::folder("[phong]\nring = { exponent = 0.0 }\n").path(), "m.obj").expect("scene");
+    assert_eq!((whole.materials[0].metallic, whole.materials[0].roughness), (1.0, 1.0));
+    for (text, words) in [
+        ("[phong]\nring = { exponent = -1.0 }\n", "phong.ring"),
+        ("[phong]\nring = { exponent = nan }\n", "0 to 100000"),
+        ("[phong]\nring = { exponent = 5.0, share = 1.5 }\n", "share from 0 to 1"),
+        ("[phong]\nring = 5.0\n", "line 2"),
+        ("[phong]\nwing = { exponent = 5.0 }\n", "ring"),
+        (
+            "[metals]\nring = \"gold\"\n[phong]\nring = { exponent = 5.0 }\n",
+            "conductor",
+        ),
+    ] {
+        let message = refusal(text);
+        assert!(message.contains(words), "{text}: {message}");
+    }
+    let changes: [(fn(&mut Material), &str); 2] = [
+        (|m| m.transmission = 0.5, "transmission"),
+        (|m| m.specular = 0.5, "specular"),
+    ];
+    for (change, field) in changes {
+        let mut scene = scene.clone();
+        change(&mut scene.materials[0]);
+        let message = scene.check().expect_err(field).to_string();
+        assert!(message.contains(field) && message.contains("Phong"), "{message}");
+    }
 }
 
 #[test]

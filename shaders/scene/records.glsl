@@ -11,6 +11,7 @@ const uint MATERIAL_CONDUCTOR = 4u;
 const uint MATERIAL_MASK = 8u;
 const uint MATERIAL_BLEND = 16u;
 const uint MATERIAL_BOUNDARY = 32u;  // not there but for the medium that it bounds
+const uint MATERIAL_PHONG = 64u;     // its metal is a modified Phong lobe
 
 const uint LIGHT_TRIANGLE = 0u;
 const uint LIGHT_POINT = 1u;

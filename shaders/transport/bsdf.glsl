@@ -1,17 +1,18 @@
-// The surface scattering function: glTF 2.0 metallic-roughness with transmission, and exact conductors.
+// The surface scattering function: glTF 2.0 metallic-roughness with transmission, exact conductors, and the modified Phong model.
 //
 // f = m f_metal + (1 - m) (f_layer + (1 - t) f_diffuse + t f_transmission), m = metallic, t = transmission.
 //   f_layer         GGX reflection under the exact dielectric Fresnel factor, tinted as KHR_materials_specular asks
 //   f_diffuse       base colour (1 - E(wo)) (1 - E(wi)) / (pi (1 - E_avg)), E the albedo of f_layer: reciprocal, and a white base
 //                   gives back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997)
 //   f_transmission  Walter et al. (2007) through solids, with radiance scaled by 1/eta^2; mirrored GGX lobe through thin walls
-//   f_metal         GGX with Schlick's or the exact conductor's Fresnel factor, plus the lobe of Kulla and Conty (2017)
+//   f_metal         GGX with Schlick's or the exact conductor's Fresnel factor, plus the lobe of Kulla and Conty (2017); or base colour times the
+//                  modified Phong lobe, for surfaces without layer and transmission
 // Guarantees: never gains energy beyond the interpolation error of the albedo table (stated in bsdf.rs's tests); reflection is
 // reciprocal, transmission up to eta^2; specular 0 without transmission and metal is exactly Lambert. From inside a solid
 // (wo.z < 0) the diffuse base is black: what glTF calls its opaque part absorbs.
 // Frame: z is the shading normal; of a solid it points out of the body. Opaque and thin surfaces scatter alike on both sides.
-// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_SPECULAR_LAYER, HAS_TRANSMISSION,
-// HAS_MULTIPLE_SCATTERING, SEPARABLE_MASKING; `float albedo_table(uint)`, read only if HAS_SPECULAR_LAYER or
+// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_PHONG, HAS_SPECULAR_LAYER,
+// HAS_TRANSMISSION, HAS_MULTIPLE_SCATTERING, SEPARABLE_MASKING; `float albedo_table(uint)`, read only if HAS_SPECULAR_LAYER or
 // HAS_MULTIPLE_SCATTERING.
 #ifndef CLERESTORY_TRANSPORT_BSDF_GLSL
 #define CLERESTORY_TRANSPORT_BSDF_GLSL
@@ -19,6 +20,7 @@
 #include "transport/albedo.glsl"
 #include "transport/fresnel.glsl"
 #include "transport/ggx.glsl"
+#include "transport/phong.glsl"
 #include "transport/warp.glsl"
 
 // Sets of lobes, a bit each. A lobe is what a class and a side have in common: LOBE_GLOSSY & LOBE_REFLECTION. BsdfSample.flags holds
@@ -33,6 +35,7 @@ const uint LOBE_ALL = 63u;
 const uint BSDF_THIN = 1u;        // transmission goes straight through a thin wall
 const uint BSDF_CONDUCTOR = 2u;   // the metal is conductor_eta + i conductor_k, not base_color
 const uint BSDF_IMPORTANCE = 4u;  // wo is where particles come from: no 1/eta^2
+const uint BSDF_PHONG = 8u;       // the metal is a modified Phong lobe of reflectance base_color
 
 // A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
 const float ETA_MATCHED = 1.001;
@@ -45,7 +48,7 @@ struct Bsdf {
     vec3 specular_f0;      // normal reflectance of the layer: min(F0(eta) specular_color, 1)
     float specular;
     vec3 conductor_eta;
-    float alpha;           // GGX width; a mirror below ALPHA_MIN
+    float alpha;           // GGX width, which stands for a Phong exponent too; a mirror below ALPHA_MIN
     vec3 conductor_k;
     float transmission;
     vec3 conductor_average;  // fresnel_conductor_average of the two above
@@ -64,6 +67,7 @@ struct BsdfSample {
 float mean3(vec3 v) { return (v.x + v.y + v.z) * (1.0 / 3.0); }
 bool lobe_allowed(uint mask, uint lobe) { return (mask & lobe) != 0u; }
 bool bsdf_is_delta(Bsdf b) { return b.alpha < ALPHA_MIN; }
+bool bsdf_is_phong(Bsdf b) { return HAS_PHONG && (b.flags & BSDF_PHONG) != 0u; }
 float bsdf_metallic(Bsdf b) { return HAS_METAL ? b.metallic : 0.0; }
 float bsdf_transmission(Bsdf b) { return HAS_TRANSMISSION ? b.transmission : 0.0; }
 
@@ -107,6 +111,9 @@ vec3 layer_fresnel(Bsdf b, float cos_h, float eta) {
 }
 
 vec3 metal_fresnel(Bsdf b, float cos_h) {
+    if (bsdf_is_phong(b)) {
+        return b.base_color;
+    }
     if (HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u) {
         return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
     }
@@ -175,7 +182,7 @@ CosineLobes cosine_lobes(Bsdf b, float cos_o, bool inside, uint mask) {
         lobes.diffuse = opaque * b.base_color * layer_loss(b, cos_o);
     }
     lobes.seen = lobes.diffuse;
-    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && !bsdf_is_delta(b) && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION)) {
+    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && !bsdf_is_delta(b) && !bsdf_is_phong(b) && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION)) {
         float e_average = albedo_average(0u, b.alpha);
         float loss = 1.0 - e_average;
         if (loss > LOSS_MIN) {
@@ -224,6 +231,14 @@ vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi
     }
     if (reflected) {
         result = vec4(cosine_lobes_eval(b, lobes, cos_i) * cos_i, p_cosine * cosine_hemisphere_pdf(cos_i));
+    }
+    if (bsdf_is_phong(b) && !bsdf_is_delta(b)) {
+        if (reflected) {
+            float exponent = phong_exponent(b.alpha);
+            float m = lobe_allowed(part, LOBE_GLOSSY & LOBE_REFLECTION) ? bsdf_metallic(b) : 0.0;
+            result += vec4(phong_eval(m * b.base_color, exponent, wo, wi), (1.0 - p_cosine) * phong_pdf(exponent, wo, wi));
+        }
+        return result;
     }
     bool microfacets = HAS_METAL || HAS_SPECULAR_LAYER || HAS_TRANSMISSION;
     if (!microfacets || bsdf_is_delta(b) || !(reflected || bsdf_transmission(b) > 0.0)) {
@@ -297,6 +312,9 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
     if (u.z < p_cosine) {
         wi = square_to_cosine_hemisphere(u.xy);
         flags = LOBE_DIFFUSE & LOBE_REFLECTION;
+    } else if (bsdf_is_phong(b) && !bsdf_is_delta(b)) {
+        wi = phong_sample(phong_exponent(b.alpha), wo, u.xy);
+        flags = LOBE_GLOSSY & LOBE_REFLECTION;
     } else {
         bool delta = bsdf_is_delta(b);
         vec3 h = delta ? vec3(0.0, 0.0, 1.0) : ggx_sample_visible(wo, b.alpha, u.xy);

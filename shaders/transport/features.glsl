@@ -23,6 +23,8 @@ layout(constant_id = 17) const bool HAS_ALPHA = true;                  // surfac
 layout(constant_id = 24) const bool HAS_PATH_AUTOMATON = false;        // the path set is more than a range of bounces and lobes
 layout(constant_id = 25) const bool HAS_LOBE_LABELS = false;           // and tells lobes apart that share directions
 
+layout(constant_id = 26) const bool HAS_PHONG = true;                  // modified Phong lobes
+
 layout(constant_id = 19) const bool HAS_MEDIA = true;                  // paths know which medium they are in
 
 #define CLERESTORY_SAMPLER SAMPLER_KIND

@@ -2,31 +2,55 @@
 //
 // f = reflectance (n + 2) / (2 pi) cos^n, measured from the mirror direction: Lafortune and Willems (1994). Guarantees: reciprocal;
 // albedo = reflectance at normal incidence, less at other angles, where the horizon cuts the lobe. The lobe ends a right angle from
-// the mirror direction, so that n = 0 is Lambert at normal incidence only. Frame: z is the normal; wo.z > 0.
+// the mirror direction, so that n = 0 is Lambert at normal incidence only. cos^n comes from the distance to the mirror direction, so that
+// narrow lobes keep their digits. Frame: z is the normal; wo.z > 0.
 #ifndef CLERESTORY_TRANSPORT_PHONG_GLSL
 #define CLERESTORY_TRANSPORT_PHONG_GLSL
 
 #include "transport/warp.glsl"
 
+// Below it series are exact to the last digits.
+const float PHONG_SERIES_MAX = 0.25;
+
+// The exponent whose lobe is about as wide as the GGX lobe of width alpha in (0, 1] (Walter et al. 2007, 5.2); 0 for 1.
+float phong_exponent(float alpha) { return 0.5 * (1.0 / (alpha * alpha) - 1.0); }
+
+// ln(1 - x) for x in [0, 1), exact near 0: twice the series of the inverse hyperbolic tangent.
+float log_below_one(float x) {
+    float y = x / (2.0 - x);
+    float s = y * y;
+    return x < PHONG_SERIES_MAX ? -2.0 * y * (1.0 + s * (1.0 / 3.0 + s * (0.2 + s * (1.0 / 7.0)))) : log(1.0 - x);
+}
+
+// 1 - exp(-x) for x >= 0, exact near 0.
+float exp_below_one(float x) {
+    float series = x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0)))));
+    return x < PHONG_SERIES_MAX ? series : 1.0 - exp(-x);
+}
+
+// cos^n of the angle from the mirror direction; 0 from a right angle on.
+float phong_power(float exponent, vec3 wo, vec3 wi) {
+    vec3 from_mirror = wi - vec3(-wo.xy, wo.z);
+    float below_one = 0.5 * dot(from_mirror, from_mirror);
+    return below_one < 1.0 ? exp(exponent * log_below_one(below_one)) : 0.0;
+}
+
 // f cos.
 vec3 phong_eval(vec3 reflectance, float exponent, vec3 wo, vec3 wi) {
-    float c = dot(vec3(-wo.xy, wo.z), wi);
-    if (wi.z <= 0.0 || c <= 0.0) {
+    if (wi.z <= 0.0) {
         return vec3(0.0);
     }
-    return reflectance * ((exponent + 2.0) * (0.5 * INV_PI) * pow(c, exponent) * wi.z);
+    return reflectance * ((exponent + 2.0) * (0.5 * INV_PI) * phong_power(exponent, wo, wi) * wi.z);
 }
 
 // Density of phong_sample over the whole sphere.
 float phong_pdf(float exponent, vec3 wo, vec3 wi) {
-    float c = dot(vec3(-wo.xy, wo.z), wi);
-    return c > 0.0 ? (exponent + 1.0) * (0.5 * INV_PI) * pow(c, exponent) : 0.0;
+    return (exponent + 1.0) * (0.5 * INV_PI) * phong_power(exponent, wo, wi);
 }
 
 // A direction about the mirror direction; it may lie below the surface, where phong_eval is zero.
 vec3 phong_sample(float exponent, vec3 wo, vec2 u) {
-    float c = pow(1.0 - u.y, 1.0 / (exponent + 1.0));
-    vec3 w = direction_below_pole(1.0 - c, u.x);
+    vec3 w = direction_below_pole(exp_below_one(-log_below_one(u.y) / (exponent + 1.0)), u.x);
     vec3 mirror = vec3(-wo.xy, wo.z);
     vec3 t;
     vec3 b;

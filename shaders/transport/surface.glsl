@@ -104,6 +104,9 @@ Bsdf surface_bsdf(SceneMaterial m, Surface s) {
         b.conductor_average = m.conductor_average;
         b.flags |= BSDF_CONDUCTOR;
     }
+    if (HAS_PHONG && (m.flags & MATERIAL_PHONG) != 0u) {
+        b.flags |= BSDF_PHONG;
+    }
     return b;
 }
 

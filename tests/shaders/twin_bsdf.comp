@@ -7,6 +7,7 @@
 
 const bool HAS_METAL = true;
 const bool HAS_CONDUCTOR = true;
+const bool HAS_PHONG = true;
 const bool HAS_SPECULAR_LAYER = true;
 const bool HAS_TRANSMISSION = true;
 const bool HAS_MULTIPLE_SCATTERING = true;

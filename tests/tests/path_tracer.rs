@@ -9,13 +9,16 @@ use clerestory::scene::{Environment, LightKind, Material, Mesh, Scene};
 use clerestory::techniques::PathTracerSettings;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, LOBE_ALL, bsdf_sample};
+use clerestory::transport::phong::phong_eval;
+use clerestory::transport::warp::square_to_cosine_hemisphere;
+use clerestory_hard_cases::scenes::orthographic;
 use clerestory_tests::random::Random;
 use clerestory_tests::render::{
     builtin, camera_down, cuboid, finish, floor, independent, paths, pixel_averages, point_triangle, render, tracer,
 };
 use clerestory_tests::statistics::expect_mean;
 use clerestory_tests::with_gpu;
-use glam::{DVec3, Quat, Vec3};
+use glam::{DVec2, DVec3, Quat, Vec3};
 
 const SMALL: [u32; 2] = [16, 16];
 
@@ -436,6 +439,43 @@ fn smooth_slabs_transmit_and_reflect_in_closed_form() {
             let mut scene = slab_before_lamp(wall, 0.0, behind);
             point_triangle(&mut scene, solid.clone(), Vec3::ZERO);
             render(gpu, &scene, SMALL, 1024, &settings).expect_uniform(what, lamp.map(|l| l * share), 0.0);
+        }
+    });
+}
+
+/// A flat floor meets the light of a uniform sky once: its picture is the albedo, as quadrature of the published lobe has it.
+#[test]
+fn phong_floors_under_a_sky_have_their_albedo() {
+    with_gpu(|gpu| {
+        let (share, exponent) = (0.7f32, 3.0f32);
+        for cosine in [1.0f64, 0.25] {
+            let mut scene = lambert_floor();
+            scene.materials[0] = Material::phong("floor", FLOOR, share, exponent);
+            scene.environment = Some(Environment::uniform(Vec3::ONE));
+            let sine = (1.0 - cosine * cosine).sqrt();
+            let wo = DVec3::new(sine, 0.0, cosine);
+            scene.cameras[0] = orthographic(10.0 * DVec3::new(sine, cosine, 0.0), DVec3::ZERO, DVec3::Z, 0.5);
+            let (n, mut lobe) = (256u32, 0.0);
+            for i in 0..n * n {
+                let u = (DVec2::new(f64::from(i % n), f64::from(i / n)) + 0.5) / f64::from(n);
+                let wi = square_to_cosine_hemisphere(u);
+                lobe += phong_eval(DVec3::ONE, f64::from(exponent), wo, wi).x * PI / wi.z;
+            }
+            let lobe = lobe / f64::from(n * n);
+            // All light from above; at a quarter of the cosine the floor's edge cuts off much of the lobe.
+            assert!(
+                if cosine == 1.0 {
+                    (lobe - 1.0).abs() < 1e-3
+                } else {
+                    lobe < 0.8
+                },
+                "{lobe}"
+            );
+            let albedo = FLOOR
+                .to_array()
+                .map(|rho| f64::from(rho) * (f64::from(share) * lobe + 1.0 - f64::from(share)));
+            let picture = render(gpu, &scene, SMALL, 512, &independent());
+            picture.expect_uniform(&format!("cosine {cosine}"), albedo, 0.0);
         }
     });
 }

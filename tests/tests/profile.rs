@@ -85,6 +85,8 @@ fn features_are_those_of_the_scene() {
         glass.materials[0] = Material::glass("glass", 1.5);
         let mut glossy = bare();
         glossy.materials[0].specular = 1.0;
+        let mut phong = bare();
+        phong.materials[0] = Material::phong("phong", Vec3::splat(0.5), 0.5, 20.0);
         let mut lamp = bare();
         lamp.materials[0].emission = Vec3::ONE;
         let mut sun = bare();
@@ -112,6 +114,7 @@ fn features_are_those_of_the_scene() {
             ("metal", metal, &["has_metal", "has_multiple_scattering"]),
             ("glass", glass, &["has_specular_layer", "has_transmission"]),
             ("glossy", glossy, &["has_specular_layer"]),
+            ("phong", phong, &["has_metal", "has_phong"]),
             ("lamp", lamp, &["has_area_lights"]),
             ("sun", sun, &["has_punctual_lights"]),
             ("sky", sky, &["has_environment"]),
@@ -262,6 +265,7 @@ fn with_everything(mut scene: Scene) -> Scene {
         ..Material::default()
     };
     point_triangle(&mut scene, everything, place);
+    point_triangle(&mut scene, Material::phong("phong", Vec3::splat(0.5), 0.5, 20.0), place);
     point_triangle(
         &mut scene,
         Material {
@@ -297,6 +301,7 @@ fn features_that_are_compiled_in_without_need_change_no_bit() {
             for feature in [
                 "has_metal",
                 "has_conductor",
+                "has_phong",
                 "has_specular_layer",
                 "has_transmission",
                 "has_multiple_scattering",

@@ -82,6 +82,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::transport::phase::ROWS,
     crate::transport::phong::ROWS,
     crate::transport::random::ROWS,
+    crate::transport::random_table::ROWS,
     crate::transport::shading_normal::ROWS,
     crate::transport::warp::ROWS,
 ];

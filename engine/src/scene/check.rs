@@ -227,6 +227,19 @@ fn check_material(material: &Material, images: usize) -> Result<(), Fault> {
             return Err(("conductor.eta".into(), "must be above 0".into()));
         }
     }
+    if material.phong {
+        let others = [
+            ("transmission", material.transmission > 0.0),
+            ("specular", material.specular > 0.0),
+            ("conductor", material.conductor.is_some()),
+        ];
+        if let Some((name, _)) = others.iter().find(|(_, there)| *there) {
+            return Err((
+                (*name).into(),
+                "must not be there on a surface of the modified Phong model".into(),
+            ));
+        }
+    }
     let sound = (material.ior == 0.0 || material.ior >= 1.0)
         && material.ior.is_finite()
         && material.thickness >= 0.0

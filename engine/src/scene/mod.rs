@@ -190,7 +190,7 @@ pub struct ConductorIor {
     pub k: Vec3,
 }
 
-/// A surface material: glTF 2.0 metallic-roughness with its `KHR_materials_*` extensions, and measured metals.
+/// A surface material: glTF 2.0 metallic-roughness with its `KHR_materials_*` extensions, measured metals, and the modified Phong model.
 #[derive(Debug, Clone)]
 pub struct Material {
     /// Name from the file.
@@ -241,6 +241,10 @@ pub struct Material {
     pub boundary: bool,
     /// Exact conductor that replaces the metallic lobe's Schlick Fresnel (sidecar only).
     pub conductor: Option<ConductorIor>,
+    /// The metal is a modified Phong lobe of reflectance `base_color` (sidecar only): base colour · (metallic · Phong + (1 − metallic) ·
+    /// Lambert). Its exponent is (1/α² − 1)/2 with α = roughness², that of a lobe about as wide as GGX's of this α. Only without
+    /// transmission, conductor and specular layer: each of them is an error.
+    pub phong: bool,
     /// Alpha mode.
     pub alpha_mode: AlphaMode,
     /// Emits from both sides; surfaces scatter on both sides either way.
@@ -275,6 +279,7 @@ impl Default for Material {
             interior: None,
             boundary: false,
             conductor: None,
+            phong: false,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             unlit: false,
@@ -309,6 +314,16 @@ impl Material {
         }
     }
 
+    /// A surface of one colour that reflects by the modified Phong model: `share` by the lobe of this exponent, the rest by Lambert's law.
+    pub fn phong(name: impl Into<String>, reflectance: Vec3, share: f32, exponent: f32) -> Self {
+        Self {
+            metallic: share,
+            roughness: phong_roughness(exponent),
+            phong: true,
+            ..Self::lambert(name, reflectance)
+        }
+    }
+
     /// An ideally diffuse, one-coloured material: Lambert reflectance `reflectance`, no specular coat.
     pub fn lambert(name: impl Into<String>, reflectance: Vec3) -> Self {
         Self {
@@ -320,6 +335,11 @@ impl Material {
             ..Self::default()
         }
     }
+}
+
+/// The perceptual roughness that stands for an exponent of the modified Phong model ([`Material::phong()`]): 1 for 0.
+pub fn phong_roughness(exponent: f32) -> f32 {
+    (2.0 * exponent + 1.0).powf(-0.25)
 }
 
 /// A use of an image by a material.

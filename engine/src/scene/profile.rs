@@ -142,6 +142,8 @@ pub struct SceneProfile {
     pub has_metal: bool,
     /// Some metal has an exact complex index of refraction.
     pub has_conductor: bool,
+    /// Some metal is a modified Phong lobe.
+    pub has_phong: bool,
     /// Some non-metal reflects specularly.
     pub has_rough_dielectric_spec: bool,
     /// Specular transmission.
@@ -202,6 +204,7 @@ impl SceneProfile {
             environment: environment_use(scene),
             has_metal: false,
             has_conductor: false,
+            has_phong: false,
             has_rough_dielectric_spec: false,
             transmission: TransmissionUse {
                 solid: false,
@@ -294,6 +297,7 @@ impl SceneProfile {
         self.has_normal_maps |= material.normal_texture.is_some();
         self.has_metal |= metallic[1] > 0.0;
         self.has_conductor |= metallic[1] > 0.0 && material.conductor.is_some();
+        self.has_phong |= metallic[1] > 0.0 && material.phong;
         self.has_rough_dielectric_spec |= reflects;
         if transmits {
             let solid = material.thickness > 0.0;
@@ -409,6 +413,7 @@ impl fmt::Display for SceneProfile {
             ("shading normals", self.has_shading_normals),
             ("metal", self.has_metal),
             ("measured metal", self.has_conductor),
+            ("modified Phong", self.has_phong),
             ("dielectric reflection", self.has_rough_dielectric_spec),
             ("solid transmission", self.transmission.solid),
             ("thin transmission", self.transmission.thin),

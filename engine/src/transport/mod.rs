@@ -16,6 +16,7 @@ pub mod path_set;
 pub mod phase;
 pub mod phong;
 pub mod random;
+pub mod random_table;
 pub mod shading_normal;
 mod surface_spec;
 pub mod warp;

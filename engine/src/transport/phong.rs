@@ -3,7 +3,8 @@
 //! f = reflectance · (n + 2)/(2π) · cosⁿ α, α measured from the mirror direction: Lafortune and Willems, "Using the Modified Phong
 //! Reflectance Model for Physically Based Rendering" (1994). Guarantees: reciprocal; albedo = reflectance at normal incidence, less
 //! at other angles, where the horizon cuts the lobe. The lobe ends a right angle from the mirror direction, so that n = 0 is Lambert at
-//! normal incidence only. Frame: z is the normal; `wo.z` > 0. Twin of `transport/phong.glsl`.
+//! normal incidence only. cosⁿ α comes from the distance to the mirror direction, so that narrow lobes keep their digits in f32. Materials
+//! give an exponent by the width of a GGX lobe ([`phong_exponent`]). Frame: z is the normal; `wo.z` > 0. Twin of `transport/phong.glsl`.
 
 use super::warp::{direction_below_pole, orthonormal_basis};
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -14,29 +15,42 @@ fn mirror(wo: DVec3) -> DVec3 {
     DVec3::new(-wo.x, -wo.y, wo.z)
 }
 
-/// f cos θi, sr⁻¹.
-pub fn phong_eval(reflectance: DVec3, exponent: f64, wo: DVec3, wi: DVec3) -> DVec3 {
-    let c = mirror(wo).dot(wi);
-    if wi.z <= 0.0 || c <= 0.0 {
-        return DVec3::ZERO;
-    }
-    reflectance * ((exponent + 2.0) * (0.5 * FRAC_1_PI) * c.powf(exponent) * wi.z)
+/// The exponent whose lobe is about as wide as the GGX lobe of width `alpha` in (0, 1]: 0 for 1.
+///
+/// About the half vector an exponent m is as wide as α² = 2/(m + 2) (Walter et al. 2007, §5.2), and the half vector turns by half the angle
+/// of the mirror direction: m = 4n.
+pub fn phong_exponent(alpha: f64) -> f64 {
+    0.5 * (1.0 / (alpha * alpha) - 1.0)
 }
 
-/// Density of [`phong_sample`] over the whole sphere, sr⁻¹.
-pub fn phong_pdf(exponent: f64, wo: DVec3, wi: DVec3) -> f64 {
-    let c = mirror(wo).dot(wi);
-    if c > 0.0 {
-        (exponent + 1.0) * (0.5 * FRAC_1_PI) * c.powf(exponent)
+/// cosⁿ of the angle from the mirror direction; 0 from a right angle on.
+fn phong_power(exponent: f64, wo: DVec3, wi: DVec3) -> f64 {
+    let below_one = 0.5 * (wi - mirror(wo)).length_squared();
+    if below_one < 1.0 {
+        (exponent * (-below_one).ln_1p()).exp()
     } else {
         0.0
     }
 }
 
+/// f cos θi, sr⁻¹.
+pub fn phong_eval(reflectance: DVec3, exponent: f64, wo: DVec3, wi: DVec3) -> DVec3 {
+    if wi.z <= 0.0 {
+        return DVec3::ZERO;
+    }
+    reflectance * ((exponent + 2.0) * (0.5 * FRAC_1_PI) * phong_power(exponent, wo, wi) * wi.z)
+}
+
+/// Density of [`phong_sample`] over the whole sphere, sr⁻¹.
+pub fn phong_pdf(exponent: f64, wo: DVec3, wi: DVec3) -> f64 {
+    (exponent + 1.0) * (0.5 * FRAC_1_PI) * phong_power(exponent, wo, wi)
+}
+
 /// A direction about the mirror direction; it may lie below the surface, where [`phong_eval`] is zero.
 pub fn phong_sample(exponent: f64, wo: DVec3, u: DVec2) -> DVec3 {
-    let c = (1.0 - u.y).powf(1.0 / (exponent + 1.0));
-    let w = direction_below_pole(1.0 - c, u.x);
+    // One minus the cosine (1 − u)^(1/(n + 1)).
+    let below_one = -((-u.y).ln_1p() / (exponent + 1.0)).exp_m1();
+    let w = direction_below_pole(below_one, u.x);
     let axis = mirror(wo);
     let (t, b) = orthonormal_basis(axis);
     t * w.x + b * w.y + axis * w.z
@@ -45,9 +59,9 @@ pub fn phong_sample(exponent: f64, wo: DVec3, u: DVec2) -> DVec3 {
 /// Rows of the catalogue.
 pub(crate) const ROWS: &[Row] = &[Row {
     id: "PM-F-2",
-    name: "surface models: Lambert, mirror, refraction (path tracer); modified Phong (function)",
+    name: "surface models: Lambert, mirror, refraction, modified Phong",
     role: Role::PartOf("BG-3"),
-    limits: "The modified Phong lobe is only a function: no material of a scene has it.",
+    limits: "A modified Phong lobe stands in place of a metal's, on a base without coat or transmission; the preview refuses it.",
     sources: &[sources::LAFORTUNE_WILLEMS_1994.whole(), sources::WALTER_2007.whole()],
     shaders: &["shaders/transport/phong.glsl"],
     bias: Some(Bias::Unbiased),
@@ -55,12 +69,19 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/phong.rs::white_furnace",
         "engine/src/transport/phong.rs::reciprocal",
         "engine/src/transport/phong.rs::samples_follow_their_density",
+        "engine/src/transport/bsdf/tests.rs::phong_surfaces_are_their_two_lobes",
         "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
         "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
+        "engine/tests/scene_load.rs::modified_phong_surfaces_are_loaded_and_checked",
+        "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
+        "tests/tests/path_tracer.rs::phong_floors_under_a_sky_have_their_albedo",
         "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
+        "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
+        "tests/tests/preview/technique.rs::scenes_whose_light_it_would_leave_out_are_refused",
     ],
     experiment: "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
     api: &["clerestory::transport::phong"],
+    settings: &["clerestory::scene::Material"],
     ..Row::of(file!())
 }];
 
@@ -102,6 +123,29 @@ mod tests {
             reflectivity(without_cosine) > 1.9 * k,
             "without the cosine a Lambert surface seems to give twice"
         );
+    }
+
+    /// Of Beckmann's normals of width α, 1 − e⁻¹ lie within the angle whose tangent is α, and turn light by less than twice as much at normal
+    /// incidence; as much of the Phong lobe lies there.
+    #[test]
+    fn exponents_are_those_of_widths() {
+        assert_eq!(phong_exponent(1.0), 0.0);
+        for alpha in [0.003f64, 0.01, 0.03] {
+            let within = 1.0 - (2.0 * alpha.atan()).cos().powf(phong_exponent(alpha) + 1.0);
+            assert!((within - (1.0 - (-1.0f64).exp())).abs() < alpha, "{alpha}: {within}");
+        }
+    }
+
+    /// Where f32 would lose all digits of a cosine that is nearly one.
+    #[test]
+    fn narrow_lobes_are_those_of_the_power() {
+        let (wo, exponent) = (direction(0.7), 5e5);
+        for angle in [0.0, 1e-4, 1e-3, 3e-3] {
+            let wi = DVec3::new(-wo.x * f64::cos(angle), wo.x * f64::sin(angle), wo.z);
+            let c = mirror(wo).dot(wi);
+            let (found, power) = (phong_power(exponent, wo, wi), c.powf(exponent));
+            assert!((found - power).abs() <= 1e-9 * power, "{angle}: {found} {power}");
+        }
     }
 
     #[test]

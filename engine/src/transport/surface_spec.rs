@@ -13,6 +13,7 @@ macro_rules! surface_spec {
         $shader::Spec {
             has_metal: bsdf.metal,
             has_conductor: bsdf.conductor,
+            has_phong: bsdf.phong,
             has_specular_layer: bsdf.specular_layer,
             has_transmission: bsdf.transmission,
             has_textures: profile.has_textures,
@@ -29,7 +30,7 @@ pub use surface_spec;
 
 /// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
 /// is off where nothing else is known.
-pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 19] = [
+pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 20] = [
     ("has_metal", METAL_LOBES, "no material is metal"),
     (
         "has_conductor",
@@ -41,6 +42,7 @@ pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 19] = [
         "dielectric reflection",
         "no material reflects specularly",
     ),
+    ("has_phong", "modified Phong lobes", "no material has one"),
     ("has_transmission", "transmission", "no material transmits"),
     ("has_multiple_scattering", COMPENSATION, "no material is metal"),
     ("has_textures", "texture look-ups", "no material has a texture"),

@@ -47,6 +47,10 @@ fn rough_metal() -> Material {
     }
 }
 
+fn phong() -> Material {
+    Material::phong("phong", Vec3::new(0.9, 0.7, 0.4), 0.6, 20.0)
+}
+
 fn plastic() -> Material {
     Material {
         base_color: Vec4::new(0.7, 0.5, 0.4, 1.0),
@@ -96,6 +100,7 @@ fn fixture(name: &str, floor_material: Material, wall: Material) -> Scene {
     };
     for material in [
         rough_metal(),
+        phong(),
         plastic(),
         ink(),
         thin(),
@@ -128,6 +133,7 @@ fn walls_of_all_kinds_light_the_floor() {
             ("lambert wall", plain("wall")),
             ("mirror", mirror.clone()),
             ("rough metal", rough_metal()),
+            ("phong wall", phong()),
             ("plastic wall", plastic()),
         ] {
             expect_material(gpu, &fixture(name, plain("floor"), wall), 1 << 12);

@@ -175,6 +175,7 @@ fn scenes_whose_light_it_would_leave_out_are_refused() {
         for (address, word) in [
             ("builtin:cornell-box", "surfaces shine"),
             ("builtin:slab", "transmit"),
+            ("builtin:cornell-box?sphere=phong&source=point", "modified Phong"),
             ("builtin:point-in-fog", "media"),
         ] {
             let renderer = Renderer::new(gpu, &builtin(address)).unwrap();

@@ -2,7 +2,8 @@
 
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{
-    BSDF_CONDUCTOR, Bsdf, BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf, bsdf_sample,
+    BSDF_CONDUCTOR, BSDF_PHONG, Bsdf, BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf,
+    bsdf_sample,
 };
 use clerestory::transport::fresnel::fresnel_conductor_average;
 use clerestory_tests::random::Random;
@@ -47,7 +48,7 @@ fn the_scattering_function_agrees_with_its_twin() {
                 all.extend(metal.0.as_vec3().to_array());
                 all.extend(metal.1.as_vec3().to_array());
                 all.extend(average.to_array());
-                all.push(f32::from_bits(r.choose(&[0, BSDF_CONDUCTOR])));
+                all.push(f32::from_bits(r.choose(&[0, BSDF_CONDUCTOR, BSDF_PHONG])));
                 let wo = Vec3::new(r.range(-0.9, 0.9), r.range(-0.4, 0.4), 0.0);
                 let wo = (wo + Vec3::Z * r.choose(&[1.0, -1.0]) * r.range(0.02, 1.0)).normalize();
                 let mut wi = r.direction();

@@ -64,6 +64,9 @@ fn refuse_common(material: &Material) -> Result<(), String> {
     if !named.is_empty() {
         return Err(format!("textures are filtered differently ({})", named.join(", ")));
     }
+    if material.phong {
+        return Err("the modified Phong model has no counterpart".into());
+    }
     if material.unlit {
         return Err("unlit surfaces have no counterpart".into());
     }

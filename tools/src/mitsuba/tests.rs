@@ -139,12 +139,13 @@ fn refusals_name_the_material_and_the_reason() {
         edit(&mut scene.materials[0]);
         reasons(&scene)
     };
-    let cases: [(Edit, &str); 8] = [
+    let cases: [(Edit, &str); 9] = [
         (|m| m.specular = 1.0, "dielectric layer"),
         (|m| m.metallic = 0.5, "mixes"),
         (|m| m.metallic = 1.0, "Schlick"),
         (|m| m.transmission = 1.0, "thin wall"),
         (|m| m.emission = Vec3::ONE, "both sides"),
+        (|m| m.phong = true, "Phong"),
         (|m| m.unlit = true, "unlit"),
         (|m| m.base_color = Vec4::splat(2.0), "[0, 1]"),
         (

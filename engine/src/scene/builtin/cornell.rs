@@ -42,7 +42,7 @@ pub(super) const BOXES: Parameter = Parameter::choice(
 pub(super) const SPHERE: Parameter = Parameter::choice(
     "sphere",
     "none",
-    &["none", "glass", "mirror", "gold", "diffuse"],
+    &["none", "glass", "mirror", "gold", "phong", "diffuse"],
     "a sphere of radius 0.08 m above the place of the short block",
 );
 
@@ -202,6 +202,7 @@ pub(super) fn build(values: &Values) -> Result<Scene> {
             roughness: 0.2,
             ..Material::mirror("gold", Vec3::ONE)
         }),
+        "phong" => Some(Material::phong("phong", Vec3::splat(0.8), 0.5, 50.0)),
         "diffuse" => Some(Material::lambert("diffuse", Vec3::splat(0.5))),
         _ => None,
     };
@@ -308,7 +309,7 @@ mod tests {
     #[test]
     fn every_choice_builds() {
         for source in ["area", "point", "spot"] {
-            for sphere in ["none", "glass", "mirror", "gold", "diffuse"] {
+            for sphere in ["none", "glass", "mirror", "gold", "phong", "diffuse"] {
                 generate(&format!(
                     "builtin:cornell-box?source={source}&sphere={sphere}&boxes=tall"
                 ))

@@ -15,6 +15,9 @@
 //! ring = "gold"                 # gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt
 //! bowl = { eta = [1.4, 0.9, 0.7], k = [7.6, 6.4, 5.6] }
 //!
+//! [phong]                       # by material name: the modified Phong model in place of metal and coat; no transmission
+//! floor = { exponent = 50.0, share = 0.4 }    # of the reflectance, the base colour; the rest is Lambert's
+//!
 //! [[cameras]]                   # changes the camera of that name, or adds one
 //! name = "main"
 //! eye = [0.0, 1.0, 4.0]         # metres
@@ -38,12 +41,14 @@ use serde::Deserialize;
 
 use medium::MediumTable;
 
-use super::{Camera, ConductorIor, Environment, Note, Projection, Scene, builtin, metals};
+use super::{Camera, ConductorIor, Environment, Material, Note, Projection, Scene, builtin, metals, phong_roughness};
 use crate::catalogue::{Role, Row};
 use crate::{Error, Result};
 
 /// Greatest number of texels of an environment map.
 const MAX_TEXELS: u64 = 1 << 27;
+/// Greatest exponent of a Phong lobe; narrower ones are mirrors.
+const PHONG_EXPONENT_MAX: f32 = 1e5;
 
 /// A sidecar that was read, before it changes a scene.
 #[derive(Debug)]
@@ -62,6 +67,8 @@ struct Content {
     environment: Option<EnvironmentTable>,
     #[serde(default)]
     metals: BTreeMap<String, Metal>,
+    #[serde(default)]
+    phong: BTreeMap<String, PhongTable>,
     #[serde(default)]
     cameras: Vec<CameraTable>,
     #[serde(default, deserialize_with = "medium::one_or_many")]
@@ -89,6 +96,13 @@ enum Metal {
 struct MeasuredMetal {
     eta: [f32; 3],
     k: [f32; 3],
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, expecting = "a table with exponent and share")]
+struct PhongTable {
+    exponent: f32,
+    share: Option<f32>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -189,6 +203,9 @@ impl Sidecar {
         for (name, metal) in &content.metals {
             self.metal(scene, name, metal)?;
         }
+        for (name, table) in &content.phong {
+            self.phong(scene, name, table)?;
+        }
         for table in &content.cameras {
             self.camera(scene, table)?;
         }
@@ -262,16 +279,44 @@ impl Sidecar {
                 }
             }
         };
-        let mut found = false;
-        for material in scene.materials.iter_mut().filter(|m| m.name == name) {
+        self.change_materials(scene, &key, name, |material| {
             material.conductor = Some(conductor);
             material.metallic = 1.0;
+        })
+    }
+
+    fn phong(&self, scene: &mut Scene, name: &str, table: &PhongTable) -> Result<()> {
+        let key = format!("phong.{name}");
+        let &PhongTable { exponent, share } = table;
+        self.require(
+            (0.0..=PHONG_EXPONENT_MAX).contains(&exponent),
+            &key,
+            "needs an exponent from 0 to 100000",
+        )?;
+        let share = share.unwrap_or(1.0);
+        self.require((0.0..=1.0).contains(&share), &key, "needs a share from 0 to 1")?;
+        self.change_materials(scene, &key, name, |material| {
+            *material = Material {
+                metallic: share,
+                roughness: phong_roughness(exponent),
+                specular: 0.0,
+                phong: true,
+                ..material.clone()
+            };
+        })
+    }
+
+    /// Changes all materials of a name, of which there must be one.
+    fn change_materials(&self, scene: &mut Scene, key: &str, name: &str, change: impl Fn(&mut Material)) -> Result<()> {
+        let mut found = false;
+        for material in scene.materials.iter_mut().filter(|m| m.name == name) {
+            change(material);
             found = true;
         }
         if found {
             Ok(())
         } else {
-            Err(self.unknown_material(scene, &key))
+            Err(self.unknown_material(scene, key))
         }
     }
 
@@ -423,11 +468,12 @@ fn read_hdr(path: &Path) -> Result<Texels, String> {
 /// Rows of the catalogue.
 pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-SIDECAR",
-    name: "sidecar of a model: environment, metals, cameras, exposure, technique, participating media with grids of densities",
+    name: "sidecar of a model: environment, metals, modified Phong surfaces, cameras, exposure, technique, participating media with grids of densities",
     role: Role::Service,
     limits: "Says what glTF cannot; geometry and textures stay in the model.",
     tests: &[
         "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
+        "engine/tests/scene_load.rs::modified_phong_surfaces_are_loaded_and_checked",
         "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
     ],
     experiment: "tools/models",

@@ -410,7 +410,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PH-2",
         name: "random numbers of photons: Owen-scrambled Sobol' points, or independent",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Sobol' points are even in pairs of dimensions, so their gain fades with the bounces.",
+        limits: "Sobol' points are even in pairs of dimensions, so their gain fades with the bounces; the source's table of random numbers is a yardstick beside them.",
         sources: &[sources::OWEN_1995.whole(), sources::FABIANOWSKI_2011.at("§3.3.3")],
         shaders: &["shaders/transport/random.glsl"],
         tests: &[

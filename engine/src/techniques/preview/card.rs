@@ -35,6 +35,8 @@ const KERNELS: [&ShaderInfo; 7] = [
 
 /// Why there is nothing of a scene with media.
 pub(super) const NO_MEDIA: &str = "participating media are not shown";
+/// Why there is nothing of a scene with modified Phong surfaces.
+pub(super) const NO_PHONG: &str = "its probes are not filtered by modified Phong lobes";
 
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
@@ -68,6 +70,7 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
             profile.has_transmission(),
             "nothing is seen through materials that transmit".into(),
         ),
+        (profile.has_phong, NO_PHONG.into()),
         (profile.alpha.blend, "partial alpha is drawn opaque".into()),
         (profile.media.any(), NO_MEDIA.into()),
         (
@@ -90,7 +93,7 @@ const ROWS: &[Row] = &[Row {
     id: "CL-PREVIEW",
     name: "technique `preview`: deferred shading with shadow maps and light probes, frame by frame, and the same for hosts' own frames",
     role: Role::Technique,
-    limits: "Light of surfaces on others is left out, except for what a host's probe holds; directional lights cast no shadows, and nothing is seen through glass.",
+    limits: "Light of surfaces on others is left out, except for what a host's probe holds; directional lights cast no shadows, nothing is seen through glass, and modified Phong surfaces are refused.",
     sources: &[
         sources::DEERING_1988.whole(),
         sources::SAITO_TAKAHASHI_1990.whole(),

@@ -1,6 +1,6 @@
 //! What draws a picture of a scene: a G-buffer, lights, and the kernel that shades what is seen.
 
-use super::card::NO_MEDIA;
+use super::card::{NO_MEDIA, NO_PHONG};
 use super::lights::{LightRoom, PreviewLights, PreviewShadows};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use crate::gpu::{Area, Gpu, PipelineInfo, Recorder};
@@ -37,6 +37,12 @@ impl Drawing {
             return Err(Error::Unsupported {
                 technique: "preview".into(),
                 reasons: vec![NO_MEDIA.into()],
+            });
+        }
+        if has_probes && scene.profile().has_phong {
+            return Err(Error::Unsupported {
+                technique: "preview".into(),
+                reasons: vec![NO_PHONG.into()],
             });
         }
         let surfaces = scene.surfaces();

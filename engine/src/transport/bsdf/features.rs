@@ -13,6 +13,8 @@ pub struct BsdfFeatures {
     pub metal: bool,
     /// Some metal is an exact conductor.
     pub conductor: bool,
+    /// Some metal is a modified Phong lobe.
+    pub phong: bool,
     /// Some dielectric has `specular` > 0.
     pub specular_layer: bool,
     /// Some `transmission` > 0.
@@ -28,6 +30,7 @@ impl BsdfFeatures {
     pub const ALL: Self = Self {
         metal: true,
         conductor: true,
+        phong: true,
         specular_layer: true,
         transmission: true,
         multiple_scattering: true,
@@ -37,6 +40,7 @@ impl BsdfFeatures {
     pub const NONE: Self = Self {
         metal: false,
         conductor: false,
+        phong: false,
         specular_layer: false,
         transmission: false,
         multiple_scattering: false,
@@ -51,11 +55,12 @@ impl BsdfFeatures {
             .fold(Self::NONE, |f, m| Self {
                 metal: f.metal || m.metallic > 0.0,
                 conductor: f.conductor || (m.metallic > 0.0 && m.conductor.is_some()),
+                phong: f.phong || (m.metallic > 0.0 && m.phong),
                 specular_layer: f.specular_layer
                     || (m.specular > 0.0 && m.metallic < 1.0)
                     || (m.specular > 0.0 && m.metallic_roughness_texture.is_some()),
                 transmission: f.transmission || m.transmission > 0.0,
-                multiple_scattering: f.multiple_scattering || m.metallic > 0.0,
+                multiple_scattering: f.multiple_scattering || (m.metallic > 0.0 && !m.phong),
                 separable_masking: false,
             })
     }

@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::{
-    BSDF_CONDUCTOR, BSDF_IMPORTANCE, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR,
-    LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
+    BSDF_CONDUCTOR, BSDF_IMPORTANCE, BSDF_PHONG, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
+    LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
 };
 use crate::transport::albedo::{albedo_average, albedo_layer, albedo_lookup};
 use crate::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_f0, fresnel_schlick};
@@ -32,6 +32,11 @@ impl BsdfContext<'_> {
         }
     }
 
+    /// Whether its metal is a modified Phong lobe.
+    pub(super) fn is_phong(&self, b: &Bsdf) -> bool {
+        self.features.phong && b.flags & BSDF_PHONG != 0
+    }
+
     /// Reflectance of the dielectric layer; `eta` is that beyond over that on the side of ωo.
     pub fn layer_fresnel(&self, b: &Bsdf, cos_h: f64, eta: f64) -> DVec3 {
         if b.eta <= 0.0 {
@@ -55,6 +60,9 @@ impl BsdfContext<'_> {
 
     /// Reflectance of the metal.
     pub fn metal_fresnel(&self, b: &Bsdf, cos_h: f64) -> DVec3 {
+        if self.is_phong(b) {
+            return b.base_color;
+        }
         if self.features.conductor && b.flags & BSDF_CONDUCTOR != 0 {
             return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
         }
@@ -109,7 +117,8 @@ impl BsdfContext<'_> {
             diffuse = opaque * b.base_color * self.layer_loss(b, cos_o);
         }
         let mut metal = DVec3::ZERO;
-        let compensated = self.features.metal && self.features.multiple_scattering && !b.is_delta();
+        let compensated =
+            self.features.metal && self.features.multiple_scattering && !b.is_delta() && !self.is_phong(b);
         if compensated && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION) {
             let e_average = albedo_average(self.table, 0, b.alpha);
             let loss = 1.0 - e_average;

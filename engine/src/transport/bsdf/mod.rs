@@ -1,4 +1,4 @@
-//! The surface scattering function: glTF 2.0 metallic-roughness with transmission, and exact conductors.
+//! The surface scattering function: glTF 2.0 metallic-roughness with transmission, exact conductors, and the modified Phong model.
 //!
 //! f = m f_metal + (1 − m)(f_layer + (1 − t) f_diffuse + t f_transmission), m = metallic, t = transmission:
 //! - f_layer: GGX reflection under the exact dielectric Fresnel factor, tinted as `KHR_materials_specular` asks;
@@ -6,7 +6,9 @@
 //!   back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997);
 //! - f_transmission: Walter et al. (EGSR 2007) through solids, with radiance scaled by 1/η²; a mirrored GGX lobe through thin walls
 //!   (`KHR_materials_transmission`);
-//! - f_metal: GGX with Schlick's or the exact conductor's Fresnel factor, plus the multiple-scattering lobe of Kulla and Conty (2017).
+//! - f_metal: GGX with Schlick's or the exact conductor's Fresnel factor, plus the multiple-scattering lobe of Kulla and Conty (2017); or
+//!   base colour · the modified Phong lobe ([`phong`](super::phong)), meant for surfaces without layer and transmission, which are then
+//!   base colour · (m Phong + (1 − m) Lambert).
 //!
 //! Guarantees: never gains energy beyond the interpolation error of the albedo table (stated by the tests); reflection is reciprocal,
 //! transmission up to η²; `specular` 0 without transmission and metal is exactly Lambert. Rough transmission is single scattering:
@@ -26,6 +28,7 @@ pub use self::label::bsdf_label;
 use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
+use super::phong::{phong_eval, phong_exponent, phong_pdf, phong_sample};
 use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants;
@@ -49,6 +52,9 @@ pub const BSDF_THIN: u32 = constants::BSDF_THIN;
 pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
 /// ωo is where particles come from: refraction is not scaled by 1/η².
 pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
+/// The metal is a modified Phong lobe of constant reflectance `base_color`, of the exponent that `alpha` stands for
+/// ([`phong_exponent`](super::phong::phong_exponent)).
+pub const BSDF_PHONG: u32 = constants::BSDF_PHONG;
 
 /// A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
 pub const ETA_MATCHED: f64 = constants::ETA_MATCHED as f64;
@@ -131,6 +137,16 @@ impl BsdfContext<'_> {
             value = self.cosine_lobes_eval(b, &upper.lobes, cos_i) * cos_i;
             pdf = p_cosine * cosine_hemisphere_pdf(cos_i);
         }
+        if self.is_phong(b) && !b.is_delta() {
+            if reflected {
+                let exponent = phong_exponent(b.alpha);
+                let shown = lobe_allowed(part, LOBE_GLOSSY & LOBE_REFLECTION);
+                let m = if shown { self.metallic(b) } else { 0.0 };
+                value += phong_eval(m * b.base_color, exponent, wo, wi);
+                pdf += (1.0 - p_cosine) * phong_pdf(exponent, wo, wi);
+            }
+            return (value, pdf);
+        }
         let f = &self.features;
         let microfacets = f.metal || f.specular_layer || f.transmission;
         if !microfacets || b.is_delta() || !(reflected || self.transmission(b) > 0.0) {
@@ -200,7 +216,8 @@ pub fn bsdf_pdf(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32
 /// A direction in proportion to the allowed lobes: `u.xy` choose the direction, `u.z` the lobe.
 ///
 /// Strategies: the cosine for the diffuse base and the metal's multiple scattering, visible normals for all microfacet lobes, with
-/// reflection and transmission told apart by the Fresnel factor of the sampled facet; all balance-weighted (one-sample MIS).
+/// reflection and transmission told apart by the Fresnel factor of the sampled facet, or the power of the cosine for a Phong lobe; all
+/// balance-weighted (one-sample MIS).
 pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u32) -> BsdfSample {
     let upper = context.upper(b, wo, mask);
     let &Upper {
@@ -215,6 +232,9 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
     if u.z < p_cosine {
         wi = square_to_cosine_hemisphere(uv);
         flags = LOBE_DIFFUSE & LOBE_REFLECTION;
+    } else if context.is_phong(b) && !b.is_delta() {
+        wi = phong_sample(phong_exponent(b.alpha), wo, uv);
+        flags = LOBE_GLOSSY & LOBE_REFLECTION;
     } else {
         let delta = b.is_delta();
         let h = if delta {

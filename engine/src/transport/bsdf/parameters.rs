@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{BSDF_CONDUCTOR, BSDF_THIN, ETA_MATCHED};
+use super::{BSDF_CONDUCTOR, BSDF_PHONG, BSDF_THIN, ETA_MATCHED};
 use crate::scene::{ConductorIor, Material};
 use crate::transport::fresnel::{fresnel_conductor_average, fresnel_f0};
 use crate::transport::ggx::ALPHA_MIN;
@@ -20,7 +20,7 @@ pub struct Bsdf {
     pub specular: f64,
     /// Real part of the conductor's index.
     pub conductor_eta: DVec3,
-    /// GGX width; a mirror below [`ALPHA_MIN`].
+    /// GGX width, which stands for the exponent of a Phong lobe too; a mirror below [`ALPHA_MIN`].
     pub alpha: f64,
     /// Imaginary part of the conductor's index.
     pub conductor_k: DVec3,
@@ -95,7 +95,16 @@ impl Bsdf {
             specular_color: m.specular_color.as_dvec3(),
             thickness: m.thickness.into(),
         });
-        m.conductor.map_or(base, |c| base.with_conductor(&c))
+        let base = m.conductor.map_or(base, |c| base.with_conductor(&c));
+        if m.phong { base.with_phong() } else { base }
+    }
+
+    /// The same with a modified Phong lobe as its metal.
+    pub fn with_phong(self) -> Self {
+        Self {
+            flags: self.flags | BSDF_PHONG,
+            ..self
+        }
     }
 
     /// The same with an exact conductor as its metal.

@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use super::*;
-use crate::scene::{ConductorIor, Material};
+use crate::scene::{ConductorIor, Material, phong_roughness};
 use crate::test_random::Random;
 use crate::transport::albedo::{AlbedoTable, albedo_lookup, integrate_albedos};
 use crate::transport::fresnel::{fresnel_dielectric, fresnel_schlick};
@@ -89,6 +89,14 @@ fn zoo() -> Vec<(&'static str, Bsdf)> {
         };
         all.push(("unit Fresnel solid", bsdf_gltf(&opaque_solid)));
         all.push(("metal", bsdf_gltf(&metal)));
+        let bare = GltfFactors { specular: 0.0, ..metal };
+        all.push(("phong", bsdf_gltf(&bare).with_phong()));
+        let half = GltfFactors {
+            base_color: DVec3::new(0.9, 0.5, 0.1),
+            metallic: 0.4,
+            ..bare
+        };
+        all.push(("phong on lambert", bsdf_gltf(&half).with_phong()));
         all.push(("gold", bsdf_gltf(&metal).with_conductor(&gold)));
         all.push(("thin", bsdf_gltf(&clear)));
         all.push((
@@ -159,6 +167,70 @@ fn specular_zero_is_exactly_lambert() {
             assert!((s.weight - b.base_color).abs().max_element() < 1e-15);
             assert_eq!(s.flags, LOBE_DIFFUSE & LOBE_REFLECTION);
         }
+    }
+}
+
+/// The model as it was published: base colour · (share · Phong + (1 − share)/π).
+#[test]
+fn phong_surfaces_are_their_two_lobes() {
+    let c = context(BsdfFeatures::ALL);
+    let base = DVec3::new(0.9, 0.5, 0.1);
+    for exponent in [0.0, 1.0, 20.0, 500.0] {
+        for share in [0.0, 0.3, 1.0] {
+            let material = Material::phong("phong", base.as_vec3(), share as f32, exponent as f32);
+            let b = Bsdf::from_material(&material);
+            let (base, m) = (b.base_color, b.metallic);
+            let n = phong_exponent(b.alpha);
+            assert!((n - exponent).abs() <= 1e-5 * (1.0 + exponent), "{n} {exponent}");
+            let some = context(BsdfFeatures::of_materials([&material]));
+            assert!(!some.features.multiple_scattering && some.features.phong == (share > 0.0));
+            for i in 0..200 {
+                let wo = square_to_sphere(random3(i, 21).truncate());
+                let wi = square_to_sphere(random3(i, 22).truncate());
+                let same_side = wo.z * wi.z > 0.0;
+                let c_mirror = wo.z * wi.z - wo.x * wi.x - wo.y * wi.y;
+                let lobe =
+                    (n + 2.0) * 0.5 * FRAC_1_PI * c_mirror.max(0.0).powf(n) * f64::from(u8::from(c_mirror > 0.0));
+                let parts = [m * lobe, (1.0 - m) * FRAC_1_PI]
+                    .map(|f| if same_side { base * f * wi.z.abs() } else { DVec3::ZERO });
+                for (part, expected) in [
+                    (LOBE_ALL, parts[0] + parts[1]),
+                    (LOBE_GLOSSY & LOBE_REFLECTION, parts[0]),
+                    (LOBE_DIFFUSE & LOBE_REFLECTION, parts[1]),
+                ] {
+                    let (found, pdf) = bsdf_eval_part(&c, &b, wo, wi, LOBE_ALL, part);
+                    let off = (found - expected).abs().max_element();
+                    assert!(
+                        off <= 1e-9 * (1.0 + expected.max_element()),
+                        "{exponent}: {found} {expected}"
+                    );
+                    let own = bsdf_eval_part(&some, &b, wo, wi, LOBE_ALL, part);
+                    assert_eq!(own, (found, pdf));
+                }
+                let s = bsdf_sample(&c, &b, wo, random3(i, 23), LOBE_ALL);
+                // A share's own strategy is chosen as often as the share says, so that no weight exceeds its largest quotient.
+                assert!(
+                    s.weight.max_element() <= 2.0 * base.max_element() + 1e-9,
+                    "{}",
+                    s.weight
+                );
+            }
+        }
+        // All light at normal incidence, at most about half of it at grazing incidence, where the surface cuts the lobe.
+        let white = bsdf_gltf(&GltfFactors {
+            metallic: 1.0,
+            specular: 0.0,
+            roughness: phong_roughness(exponent as f32).into(),
+            ..WHITE
+        })
+        .with_phong();
+        let [(above, error), (aslant, _)] =
+            [1.0, 0.05].map(|cos_o| albedo(&c, &white, direction(cos_o, 0.3), LOBE_ALL, 1 << 14));
+        assert!(
+            (above - 1.0).abs().max_element() < 4.0 * error + 1e-3,
+            "{exponent}: {above}"
+        );
+        assert!(aslant.max_element() < 0.7, "{exponent}: {aslant}");
     }
 }
 

@@ -373,7 +373,6 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/footprint_tests.rs::camera_footprints_are_pixels",
             "tests/tests/twins/photons.rs::emissions_agree_with_their_twins",
         ],
-        experiment: "tools/test",
         api: &["clerestory::transport::differentials::camera_differentials"],
         ..Row::of(file!())
     },

@@ -116,7 +116,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/differentials/path_differentials.rs::parallelograms_fill_the_footprint",
         "engine/src/transport/differentials/path_differentials.rs::scattering_derivatives_agree_with_finite_differences",
     ],
-    experiment: "tools/test",
     api: &["clerestory::transport::differentials::path_differentials::PathDifferentials"],
     ..Row::of(file!())
 }];

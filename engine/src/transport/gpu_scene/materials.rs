@@ -2,7 +2,8 @@
 
 use super::textures::Textures;
 use crate::gpu::shaders::constants::{
-    MATERIAL_BLEND, MATERIAL_BOUNDARY, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_UNLIT,
+    MATERIAL_BLEND, MATERIAL_BOUNDARY, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_PHONG,
+    MATERIAL_UNLIT,
 };
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::scene::{AlphaMode, Material, Scene};
@@ -58,6 +59,7 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         flags: flag(m.double_sided, MATERIAL_DOUBLE_SIDED)
             | flag(m.unlit, MATERIAL_UNLIT)
             | flag(conductor.is_some(), MATERIAL_CONDUCTOR)
+            | flag(m.phong, MATERIAL_PHONG)
             | flag(m.boundary, MATERIAL_BOUNDARY)
             | alpha_flag,
         base_color_texture: textures.record(scene, m.base_color_texture, true),

@@ -97,6 +97,7 @@ measures! {
     on_device "automatic-choice" rendering::automatic_choice;
     on_device "barriers" device::barriers;
     on_device "build-stages" rays::build_stages;
+    on_host "camera-footprints" rays::camera_footprints;
     on_host "compact-map" photon_maps::compact_map;
     on_host "compact-rays" photon_maps::compact_rays;
     on_host "coupled-reflection" surfaces::coupled_reflection;
@@ -128,6 +129,7 @@ measures! {
     on_device "mitsuba" rendering::mitsuba;
     on_host "multiple-scattering" surfaces::multiple_scattering;
     on_device "parallel-blocks" device::parallel_blocks;
+    on_host "path-differentials" photons::path_differentials;
     on_device "path-sets" rendering::path_sets;
     on_device "persistent-threads" rays::persistent_threads;
     on_host "phase-functions" media::phase_functions;
@@ -136,6 +138,7 @@ measures! {
     on_device "photon-queues" photons::photon_queues;
     on_device "photon-statistics" photons::photon_statistics;
     on_host "picture-formats" rendering::picture_formats;
+    on_host "random-numbers" photons::random_numbers;
     on_host "ray-offsets" rays::ray_offsets;
     on_device "reflection-maps" preview::reflection_maps;
     on_host "sample-sums" rendering::sample_sums;

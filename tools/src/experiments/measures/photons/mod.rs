@@ -3,7 +3,9 @@
 mod cases;
 mod kernel_statistics;
 pub mod map_builds;
+pub mod path_differentials;
 pub mod photon_frame;
 pub mod photon_peers;
 pub mod photon_queues;
 pub mod photon_statistics;
+pub mod random_numbers;

@@ -1,6 +1,7 @@
 //! Rays: tests against primitives, origins, trees and models of execution.
 
 pub mod build_stages;
+pub mod camera_footprints;
 pub mod persistent_threads;
 pub mod ray_offsets;
 mod sphere_forms;
