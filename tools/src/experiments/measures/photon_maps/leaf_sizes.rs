@@ -11,8 +11,8 @@ use super::photon_kernels::{Kernels, Map, Prepared, SOURCE_SHAPE, Work, of_each_
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Repeats, Study, curves, rows};
 use crate::experiments::measures::Context;
 
-/// The share that the source's own leaf sizes need.
-const SMALL_SHARE: f64 = 1.0 / 16.0;
+/// Twice the share that is shipped, [`LEAF_SHARE`], which the source's own leaf sizes need.
+const LARGE_SHARE: f64 = 2.0 * LEAF_SHARE;
 /// What chose a size.
 const SWEEP: &str = "sweep";
 const LARGE: &str = "share 1/8";
@@ -107,7 +107,7 @@ const CRITERIA: &[Criterion<Automatic>] = &[
 
 impl Automatic {
     fn is_the_default(&self) -> bool {
-        self.share == LARGE
+        self.share == SMALL
     }
 }
 
@@ -171,7 +171,7 @@ impl Found {
         let swept = context.first(&SIZES, 3);
         let sizes = swept.len();
         let mut wanted: Vec<(u32, &str)> = swept.iter().map(|size| (*size, SWEEP)).collect();
-        wanted.extend([(automatic(LEAF_SHARE), LARGE), (automatic(SMALL_SHARE), SMALL)]);
+        wanted.extend([(automatic(LARGE_SHARE), LARGE), (automatic(LEAF_SHARE), SMALL)]);
         let maps = wanted.iter().map(|(size, _)| Map::new(kernels, &build(kernels, *size)));
         let maps: Vec<Map> = maps.collect::<Result<_>>()?;
         let [works, works_anywhere] = [points, anywhere].map(|points| {
