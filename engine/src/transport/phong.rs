@@ -58,6 +58,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/bsdf/tests.rs::specular_zero_is_exactly_lambert",
         "engine/src/transport/bsdf/tests.rs::clear_solid_is_the_smooth_dielectric",
         "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
+        "tests/tests/twins/reflection.rs::phong_agrees_with_its_twin",
     ],
     experiment: "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
     api: &["clerestory::transport::phong"],
