@@ -1,6 +1,6 @@
 """What tools/mutants does once the machine has what it needs; see there.
 
-Faults are declared in tools/mutations/*.toml: a file, the row whose tests must find them, and pairs of old and new text. All of them are built at once.
+Faults are declared in tools/mutations/*.toml: a file, the row whose tests must find them, and pairs of old and new text. All are built at once.
 In Rust, the old expression becomes `(if crate::mutant(N) { new } else { old })`; of shaders, every entry file that includes the mutated one is
 compiled once more, and the engine takes that module in place of its own. The environment says which fault a test program has. That rewriting
 happens in the worktree below out/mutants/ alone.
@@ -424,17 +424,20 @@ def durations(programs, wanted, stamp):
             die(f"tests fail without faults: see {WORK}/sound.log")
         for _, time, program, name in TEST_LINE.findall(output):
             seconds[f"{program} {name.rsplit('::', 1)[-1]}"] = float(time)
-        absent = [test for test in missing if " ".join(test) not in seconds]
-        if absent:
-            die(f"no such tests, or none that ran: {absent}")
+        for test in missing:
+            if " ".join(test) not in seconds:
+                say(f"{' '.join(test)}: is left out, since it did not run: it is no test, or ignored")
         file.write_text(json.dumps(known, indent=1))
     return seconds
 
 
 def quick(tests, seconds, limit):
     """The quickest tests, as many as take a share of the limit; one at least."""
+    running = [test for test in tests if " ".join(test) in seconds]
+    if not running:
+        die(f"{tests}: none of these tests runs")
     chosen, sum_of = [], 0.0
-    for test in sorted(tests, key=lambda test: seconds[" ".join(test)]):
+    for test in sorted(running, key=lambda test: seconds[" ".join(test)]):
         sum_of += seconds[" ".join(test)]
         if chosen and sum_of > SHARE_OF_LIMIT * limit:
             break
