@@ -127,6 +127,7 @@ measures! {
     on_device "path-sets" rendering::path_sets;
     on_device "persistent-threads" rays::persistent_threads;
     on_host "phase-functions" media::phase_functions;
+    on_device "photon-defaults" photons::photon_defaults;
     on_device "photon-frame" photons::photon_frame;
     on_device "photon-peers" photons::photon_peers;
     on_device "photon-queues" photons::photon_queues;
