@@ -97,7 +97,7 @@ measures! {
     on_device "automatic-choice" rendering::automatic_choice;
     on_device "barriers" device::barriers;
     on_device "build-stages" rays::build_stages;
-    on_host "compact-map" photon_maps::compact_map;
+    on_device "compact-map" photon_maps::compact_map;
     on_host "compact-rays" photon_maps::compact_rays;
     on_host "coupled-reflection" surfaces::coupled_reflection;
     on_device "device-model" device::device_model;
@@ -109,7 +109,7 @@ measures! {
     on_device "kd-rays" kd::kd_rays.of_any_scenes();
     on_device "kd-threads" kd::kd_threads.of_any_scenes();
     on_device "kd-traversal" kd::kd_traversal.of_any_scenes();
-    on_host "leaf-sizes" photon_maps::leaf_sizes;
+    on_device "leaf-sizes" photon_maps::leaf_sizes;
     on_device "live-map-pictures" preview::live_map_pictures;
     on_device "live-maps" preview::live_maps.of_any_scenes();
     on_host "map-borders" maps::map_borders;
@@ -119,7 +119,7 @@ measures! {
     on_host "map-error" maps::map_error;
     on_device "map-glossiness" maps::map_glossiness;
     on_host "map-levels" maps::map_levels;
-    on_host "map-quality" photon_maps::map_quality;
+    on_device "map-quality" photon_maps::map_quality;
     on_device "map-rendering" maps::map_rendering;
     on_host "merge-example" photon_maps::merge_example;
     on_device "mitsuba" rendering::mitsuba;

@@ -1,6 +1,6 @@
 //! Photon mapping on surfaces as a whole: what photons and kernels come to, and what a frame costs; pictures are compared by sweeps.
 
-mod cases;
+pub mod cases;
 mod kernel_contest;
 mod kernel_statistics;
 pub mod map_builds;
