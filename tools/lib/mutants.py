@@ -397,7 +397,7 @@ class Programs:
 
 def ended(child):
     """Ends a run with all its tests, each of which leads a group of its own, and gives what it had said."""
-    child.send_signal(signal.SIGTERM)
+    os.killpg(child.pid, signal.SIGTERM)
     try:
         return child.communicate(timeout=20)[0]
     except subprocess.TimeoutExpired:
