@@ -88,6 +88,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/accel/offset/tests.rs::position_lies_within_its_rounding_bound",
         "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
+        "tests/tests/twins/geometry.rs::surface_points_and_ray_starts_agree_with_their_twins",
     ],
     api: &["clerestory::accel::offset"],
     ..Row::of(file!())

@@ -132,6 +132,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
         "tests/tests/seams.rs::no_ray_is_lost_at_seams_in_any_index",
         "tests/tests/seams.rs::kernels_lose_no_ray_at_seams_in_any_index",
+        "tests/tests/twins/geometry.rs::triangles_agree_with_their_twins",
     ],
     api: &[
         "clerestory::accel::triangle::intersect_triangle",

@@ -169,6 +169,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
         "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
+        "tests/tests/twins/sums.rs::sums_in_pairs_are_equal_bit_for_bit",
     ],
     api: &["clerestory::film::Accumulator"],
     ..Row::of(file!())

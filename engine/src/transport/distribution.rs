@@ -145,6 +145,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/distribution.rs::cells_follow_their_probability",
         "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
         "engine/src/transport/gpu_scene/lights.rs::no_light_loses_more_than_half_of_its_choices",
+        "tests/tests/twins/tables.rs::distributions_agree_with_their_twins",
     ],
     api: &["clerestory::transport::distribution"],
     ..Row::of(file!())

@@ -118,6 +118,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/samplers.rs::environments_are_sampled_by_their_texels_and_evenly_within",
         "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
         "tests/tests/preview/technique.rs::the_environment_is_read_back_as_it_was",
+        "tests/tests/twins/tables.rs::environments_agree_with_their_twins",
     ],
     experiment: "clerestory agreement --scene box-city-sky",
     api: &["clerestory::transport::environment"],

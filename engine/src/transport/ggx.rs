@@ -77,6 +77,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/bsdf/tests.rs::light_of_one_reflection_leaves_as_walks_over_heights_do",
         "tests/tests/samplers.rs::visible_normals_follow_their_density",
         "tests/tests/path_tracer.rs::rough_glass_loses_what_the_f64_twin_says",
+        "tests/tests/twins/reflection.rs::ggx_agrees_with_its_twin",
     ],
     experiment: "clerestory agreement --scene cornell-frosted,ring-rough",
     api: &["clerestory::transport::ggx"],

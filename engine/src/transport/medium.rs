@@ -178,6 +178,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/media/furnace.rs::lossless_media_vanish",
             "tests/tests/media/homogeneous.rs::rays_past_a_source_have_the_exact_multiple_scattering",
             "tests/tests/media/mechanics.rs::parts_of_everything_sum_to_the_whole",
+            "tests/tests/twins/media.rs::free_flight_agrees_with_its_twin",
         ],
         api: &["clerestory::transport::medium"],
         ..Row::of(file!())
@@ -245,6 +246,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/medium.rs::free_flights_are_unbiased_in_every_band",
             "engine/src/transport/medium.rs::extremes_stay_finite",
             "tests/tests/media/homogeneous.rs::fluence_about_a_source_is_the_exact_one",
+            "tests/tests/twins/media.rs::equi_angular_samples_and_null_collisions_agree_with_their_twins",
         ],
         api: &["clerestory::transport::medium"],
         ..Row::of(file!())
@@ -262,6 +264,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
             "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
             "tests/tests/media/heterogeneous.rs::emptiness_and_loose_majorants_cost_noise_only",
+            "tests/tests/twins/media.rs::equi_angular_samples_and_null_collisions_agree_with_their_twins",
         ],
         api: &["clerestory::transport::medium"],
         ..Row::of(file!())

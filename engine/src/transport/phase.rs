@@ -113,6 +113,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/transport/phase.rs::normalised_with_their_mean_cosines",
         "engine/src/transport/phase.rs::samples_follow_their_density",
+        "tests/tests/twins/lights.rs::phase_functions_agree_with_their_twins",
+        "tests/tests/twins/lights.rs::phase_functions_near_their_peaks_agree_with_their_twins",
     ],
     api: &["clerestory::transport::phase"],
     ..Row::of(file!())

@@ -78,6 +78,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/path_tracer.rs::smooth_slabs_transmit_and_reflect_in_closed_form",
         "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
         "tests/tests/preview/technique.rs::scenes_whose_light_it_would_leave_out_are_refused",
+        "tests/tests/twins/reflection.rs::phong_agrees_with_its_twin",
     ],
     experiment: "clerestory agreement --scene cornell-box,cornell-mirror,cornell-glass",
     api: &["clerestory::transport::phong"],

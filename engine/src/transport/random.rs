@@ -158,6 +158,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/random.rs::sobol_pairs_are_stratified_plain_and_scrambled",
             "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
             "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
+            "tests/tests/twins/random.rs::random_numbers_are_equal_bit_for_bit",
         ],
         settings: &["sampler"],
         api: &["clerestory::transport::random"],
@@ -174,6 +175,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/transport/random.rs::pcg_avalanche_and_means",
             "engine/src/transport/random.rs::floats_stay_below_one",
+            "tests/tests/twins/random.rs::random_numbers_are_equal_bit_for_bit",
         ],
         experiment: "clerestory agreement",
         settings: &["sampler"],

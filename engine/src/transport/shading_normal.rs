@@ -44,6 +44,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_show_no_more_light_than_arrives",
         "engine/src/transport/shading_normal.rs::beams_scatter_more_energy_than_they_bring",
         "engine/src/scene/normal_map.rs::flat_maps_keep_the_normal",
+        "tests/tests/twins/reflection.rs::shading_normals_agree_with_their_twins",
     ],
     api: &["clerestory::transport::shading_normal"],
     ..Row::of(file!())

@@ -90,6 +90,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/bsdf/tests.rs::weight_is_value_over_density_and_density_integrates",
         "tests/tests/samplers.rs::warps_keep_areas",
         "tests/tests/samplers.rs::pairs_fill_the_square_evenly",
+        "engine/src/transport/warp.rs::disk_and_triangle_are_uniform",
+        "tests/tests/twins/directions.rs::warps_cones_and_bases_agree_with_their_twins",
     ],
     api: &["clerestory::transport::warp"],
     ..Row::of(file!())

@@ -71,6 +71,9 @@ crate::settings! {
         /// More give less noise, and less bias with kernels that follow footprints.
         pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons per pass";
         /// Kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials.
+        ///
+        /// Footprints are worth their time only where no one radius suits the whole picture: elsewhere fixed kernels reach the same error 1.5 to 6 times
+        /// sooner with the defaults below, and the experiment photon-defaults measures both.
         pub shape: KernelShape = KernelShape::Fixed;
         /// Gathers so many of the photons nearest to each point under one kernel that reaches to the last of them, fewer as passes go on, down
         /// to 2; with 0 photons have kernels of their own.

@@ -308,6 +308,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::white_furnace",
             "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
             "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
+            "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
         ],
         experiment: "clerestory agreement --scene furnace-metal,furnace-glass",
         settings: &["separable_masking"],

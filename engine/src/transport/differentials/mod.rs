@@ -290,6 +290,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/footprint_tests.rs::a_concave_mirror_about_the_light_focuses_to_nothing",
             "engine/src/transport/differentials/footprint_tests.rs::mirrors_and_flat_glass_have_the_areas_of_unfolded_paths",
             "tests/tests/photon/footprints.rs::footprints_behind_mirrors_and_coats_are_those_of_finite_differences",
+            "tests/tests/twins/photons.rs::events_agree_with_their_twins",
         ],
         experiment: "tools/test",
         api: &["clerestory::transport::differentials::reflect_differentials"],
@@ -321,6 +322,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/differentials/chain_tests.rs::each_event_agrees_with_finite_differences",
             "engine/src/transport/differentials/footprint_tests.rs::mirrors_and_flat_glass_have_the_areas_of_unfolded_paths",
             "tests/tests/photon/footprints.rs::footprints_behind_glass_are_those_of_finite_differences",
+            "tests/tests/twins/photons.rs::events_agree_with_their_twins",
         ],
         api: &["clerestory::transport::differentials::refract_differentials"],
         ..Row::of(file!())
@@ -357,6 +359,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
             "tests/tests/photon/footprints.rs::footprints_behind_glass_are_those_of_finite_differences",
             "tests/tests/photon/footprints.rs::footprints_behind_mirrors_and_coats_are_those_of_finite_differences",
+            "tests/tests/twins/photons.rs::events_agree_with_their_twins",
         ],
         experiment: "tools/test",
         api: &["clerestory::transport::differentials::roulette_differentials"],

@@ -98,7 +98,7 @@ measures! {
     on_device "barriers" device::barriers;
     on_device "build-stages" rays::build_stages;
     on_host "camera-footprints" rays::camera_footprints;
-    on_host "compact-map" photon_maps::compact_map;
+    on_device "compact-map" photon_maps::compact_map;
     on_host "compact-rays" photon_maps::compact_rays;
     on_host "coupled-reflection" surfaces::coupled_reflection;
     on_device "device-model" device::device_model;
@@ -112,7 +112,7 @@ measures! {
     on_device "kd-rays" kd::kd_rays.of_any_scenes();
     on_device "kd-threads" kd::kd_threads.of_any_scenes();
     on_device "kd-traversal" kd::kd_traversal.of_any_scenes();
-    on_host "leaf-sizes" photon_maps::leaf_sizes;
+    on_device "leaf-sizes" photon_maps::leaf_sizes;
     on_host "light-choice" rendering::light_choice;
     on_device "live-map-pictures" preview::live_map_pictures;
     on_device "live-maps" preview::live_maps.of_any_scenes();
@@ -123,7 +123,7 @@ measures! {
     on_host "map-error" maps::map_error;
     on_device "map-glossiness" maps::map_glossiness;
     on_host "map-levels" maps::map_levels;
-    on_host "map-quality" photon_maps::map_quality;
+    on_device "map-quality" photon_maps::map_quality;
     on_device "map-rendering" maps::map_rendering;
     on_host "merge-example" photon_maps::merge_example;
     on_device "mitsuba" rendering::mitsuba;
@@ -133,6 +133,7 @@ measures! {
     on_device "path-sets" rendering::path_sets;
     on_device "persistent-threads" rays::persistent_threads;
     on_host "phase-functions" media::phase_functions;
+    on_device "photon-defaults" photons::photon_defaults;
     on_device "photon-frame" photons::photon_frame;
     on_device "photon-peers" photons::photon_peers;
     on_device "photon-queues" photons::photon_queues;

@@ -176,8 +176,9 @@ impl Study for Found {
                 largest(self, |_| true, |row| row.compact_bytes),
             )
             .note(
-                "Linear hierarchy over synthetic kernels about the second and third hits of 2¹⁷ photons (2⁹ in a smoke run), as many about a \
-                 point as in the source's Table 5.1: spheres, and ellipsoids stretched by the incidence. Counts are exact and the same on every \
+                "Linear hierarchy over kernels of 2¹⁷ photons (2⁹ in a smoke run), about as many about a point as in the source's Table 5.1: \
+                 footprints by the photon tracer with the source's settings, and stand-ins about second and third hits, spheres and ellipsoids \
+                 stretched by the incidence. Counts are exact and the same on every \
                  machine; bytes are of nodes and stack, not of kernels. The source's byte changes are what its own counts give: it prints \
                  −71.4 % for one scene, which is that scene's stack column. Anywhere: as many points evenly on all surfaces.",
             )

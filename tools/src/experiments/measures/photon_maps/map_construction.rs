@@ -16,7 +16,7 @@ use super::construction_stages::{
     Growth, ON_DEVICE, ON_HOST, Stage, TURNS, on_device, price_of_a_page, stages, triangles_in, whole,
 };
 use super::map_quality::SOURCE_SHARE;
-use super::photon_kernels::{Kernels, SOURCE_SHAPE};
+use super::photon_kernels::{Kernels, Shape};
 use super::photon_scenes::{CASES, Case, Surfaces};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, change, curves, rows};
 use crate::experiments::measures::Context;
@@ -170,7 +170,7 @@ fn codes_before(sorted: &SortedCodes) -> Vec<u64> {
 /// Kernels of so many photons in a scene, and the leaf size for them.
 fn kernels(case: &Case, size: u32) -> Result<(Kernels, u32)> {
     let surfaces = Surfaces::load(case.scene)?;
-    let kernels = Kernels::trace(&surfaces, case.light, 1 << size, case.cover, SOURCE_SHAPE);
+    let kernels = Kernels::trace(&surfaces, case.light, 1 << size, case.cover, Shape::Ellipsoids);
     let leaf_size = automatic_leaf_size(kernels.areas(), surfaces.area, SOURCE_SHARE);
     Ok((kernels, leaf_size))
 }

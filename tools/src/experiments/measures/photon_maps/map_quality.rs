@@ -215,7 +215,8 @@ impl Study for Found {
                 of_source.map(|mean| mean.speed),
             )
             .note(
-                "The source's means are over its nine scenes, of frames a second. Its kernels come from photon differentials in its own scenes.",
+                "The source's means are over its nine scenes, of frames a second. Its kernels come from photon differentials, as footprints do, in \
+                 its own scenes.",
             )
             .bars(
                 "nodes",
@@ -226,9 +227,10 @@ impl Study for Found {
             )
             .and(Findings::of(self, &[]))
             .note(
-                "Synthetic kernels about the second and third hits of 2¹⁷ photons (2⁹ in a smoke run) in scenes of the source's sizes, as many \
-                 about a point as in its Table 5.1: spheres, and ellipsoids of the same area that are stretched as the footprint of a beam is \
-                 by its incidence, at most 20 times as long as wide, the source's bound. Counts are exact: nodes fetched, two per pair; times \
+                "Footprints: kernels of 2¹⁷ photons (2⁹ in a smoke run) by the photon tracer, with the source's settings, about as many about a \
+                 point as in its Table 5.1; criteria are of these. Spheres and ellipsoids: stand-ins about the second and third hits, the latter \
+                 stretched as the footprint of a beam is by its incidence, at most 20 times as long as wide, the source's bound. \
+                 Counts are exact: nodes fetched, two per pair; times \
                  on one thread, complete nodes. Anywhere: as many points evenly on all surfaces.",
             )
     }

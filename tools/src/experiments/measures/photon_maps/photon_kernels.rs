@@ -1,7 +1,7 @@
-//! Stand-ins for photon maps: kernels about the second and third hits of photons that walk through a scene, and the surface points that
-//! cameras see.
+//! Kernels of photon maps and the surface points that cameras see: the footprints that the photon tracer makes, and stand-ins about the second and
+//! third hits of photons that walk through a scene.
 //!
-//! Source of what they stand for: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6. Photons
+//! Source of what stand-ins stand for: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §5.2 and §6. Photons
 //! leave a point evenly, surfaces but mirrors scatter them by the cosine with probability [`SURVIVAL`], and hits two and three are kept.
 //! Radii go by the fourth root of the photon's way, the source's dampening; their scale is set so that a point of the scene's surfaces
 //! lies in a given number of kernels on average. The source's kernels are ellipsoids that lie on the surface; [`Shape`] has them stretched as
@@ -17,12 +17,15 @@ use clerestory::accel::photon_map::compact_bvh::CompactBvh;
 use clerestory::accel::photon_map::complete_bvh::{CompleteBvh, QueryCounters};
 use clerestory::accel::photon_map::merge::merged_hierarchy;
 use clerestory::accel::yardstick::volume_sweep_tree;
-use clerestory::{Error, Result};
+use clerestory::gpu::Gpu;
+use clerestory::techniques::photon_mapping::kernel::{PhotonKernel, PhotonRecord, kernel_area, kernel_extent};
+use clerestory::{Error, Result, scene};
 use glam::{Vec3, Vec4};
 
 use super::photon_scenes::{CASES, Case, Surfaces};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::clock::nanoseconds_once;
+use crate::experiments::measures::photons::cases::{mapper, settings};
 use crate::random::Random;
 
 /// Probability that a diffuse surface scatters a photon.
@@ -38,23 +41,29 @@ pub enum Shape {
     /// Ellipsoids whose semi-axes on the surface are in the ratio of one to the cosine of incidence, at most [`MOST_STRETCHED`], and have the
     /// product that the sphere's have; as thick as wide.
     Ellipsoids,
+    /// Kernels of photons that the photon tracer has followed by their differentials, with the source's settings.
+    Footprints,
 }
 
 impl Shape {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Spheres, Self::Ellipsoids];
+    /// All.
+    pub const ALL: [Self; 3] = [Self::Spheres, Self::Ellipsoids, Self::Footprints];
 
     /// For a table's cell.
     pub fn word(self) -> &'static str {
         match self {
             Self::Spheres => "spheres",
             Self::Ellipsoids => "ellipsoids",
+            Self::Footprints => "footprints",
         }
     }
 }
 
-/// The shape that is nearest to the source's.
-pub const SOURCE_SHAPE: Shape = Shape::Ellipsoids;
+/// The source's shape.
+pub const SOURCE_SHAPE: Shape = Shape::Footprints;
+
+/// A spread that says how many kernels lie about a point.
+const FIRST_SPREAD: f64 = 20.0;
 
 /// The source's bound on the ratio of a kernel's semi-axes.
 const MOST_STRETCHED: f64 = 20.0;
@@ -88,6 +97,26 @@ fn sphere_holds(sphere: &Vec4, point: Vec3) -> bool {
     (sphere.truncate() - point).length_squared() < sphere.w * sphere.w
 }
 
+/// A kernel of a record: as [`kernel_weight`](clerestory::techniques::photon_mapping::kernel::kernel_weight) reads it.
+#[derive(Debug, Clone, Copy)]
+struct Footprint {
+    centre: Vec3,
+    along: Vec3,
+    /// Over the product of the axes.
+    across: Vec3,
+    /// One over the square of the shorter axis.
+    inverse: f32,
+}
+
+impl Footprint {
+    fn holds(&self, point: Vec3) -> bool {
+        let way = point - self.centre;
+        let q = self.across.dot(way);
+        let rest = way - q * self.along;
+        q * q + rest.length_squared() * self.inverse < 1.0
+    }
+}
+
 /// What queries test.
 #[derive(Debug, Clone)]
 pub struct Records(Form);
@@ -97,6 +126,7 @@ enum Form {
     /// Centre and radius.
     Spheres(Vec<Vec4>),
     Ellipsoids(Vec<Ellipsoid>),
+    Footprints(Vec<Footprint>),
 }
 
 impl Records {
@@ -105,6 +135,7 @@ impl Records {
         Self(match &self.0 {
             Form::Spheres(all) => Form::Spheres(order.map(|i| all[i]).collect()),
             Form::Ellipsoids(all) => Form::Ellipsoids(order.map(|i| all[i]).collect()),
+            Form::Footprints(all) => Form::Footprints(order.map(|i| all[i]).collect()),
         })
     }
 
@@ -113,6 +144,7 @@ impl Records {
         match &self.0 {
             Form::Spheres(all) => sphere_holds(&all[record], point),
             Form::Ellipsoids(all) => all[record].holds(point),
+            Form::Footprints(all) => all[record].holds(point),
         }
     }
 }
@@ -157,7 +189,38 @@ impl Deposit {
 }
 
 impl Kernels {
-    /// The kernels of `photons` photons, of which `cover` lie about a surface point on average.
+    /// Those of records.
+    pub fn of_records(photons: &[PhotonRecord]) -> Self {
+        let kernels: Vec<PhotonKernel> = photons.iter().map(PhotonRecord::kernel).collect();
+        let pairs = || photons.iter().zip(&kernels);
+        let bounds = |(photon, kernel): (&PhotonRecord, &PhotonKernel)| {
+            let extent = kernel_extent(kernel).as_vec3();
+            Aabb {
+                lower: photon.position - extent,
+                upper: photon.position + extent,
+            }
+        };
+        let record = |(photon, kernel): (&PhotonRecord, &PhotonKernel)| Footprint {
+            centre: photon.position,
+            along: photon.along,
+            across: photon.across / kernel_area(kernel) as f32,
+            inverse: 1.0 / photon.across.length_squared(),
+        };
+        Self {
+            boxes: pairs().map(bounds).collect(),
+            areas: kernels
+                .iter()
+                .map(|kernel| std::f64::consts::PI * kernel_area(kernel))
+                .collect(),
+            stretches: kernels
+                .iter()
+                .map(|kernel| kernel.along.length() / kernel.across.length())
+                .collect(),
+            records: Records(Form::Footprints(pairs().map(record).collect())),
+        }
+    }
+
+    /// Stand-ins of `photons` photons, of which `cover` lie about a surface point on average: spheres, else ellipsoids.
     pub fn trace(surfaces: &Surfaces, light: Vec3, photons: u32, cover: f64, shape: Shape) -> Self {
         let mut random = Random::new(12);
         let mut hits = Vec::new();
@@ -183,7 +246,7 @@ impl Kernels {
                     records: Records(Form::Spheres(spheres)),
                 }
             }
-            Shape::Ellipsoids => {
+            Shape::Ellipsoids | Shape::Footprints => {
                 let axes: Vec<[Vec3; 3]> = hits.iter().map(|hit| hit.axes(radius(hit))).collect();
                 let extent = |axes: &[Vec3; 3]| axes.iter().map(|axis| axis * axis).sum::<Vec3>().map(f32::sqrt);
                 let record = |(hit, axes): (&Deposit, &[Vec3; 3])| Ellipsoid {
@@ -224,6 +287,7 @@ impl Kernels {
         match &self.records.0 {
             Form::Spheres(all) => all.iter().map(|sphere| sphere.truncate()).collect(),
             Form::Ellipsoids(all) => all.iter().map(|ellipsoid| ellipsoid.centre).collect(),
+            Form::Footprints(all) => all.iter().map(|footprint| footprint.centre).collect(),
         }
     }
 
@@ -232,6 +296,7 @@ impl Kernels {
         let widest = match &self.records.0 {
             Form::Spheres(all) => all.iter().map(|sphere| sphere.w).fold(0.0, f32::max),
             Form::Ellipsoids(all) => all.iter().map(Ellipsoid::reach).fold(0.0, f32::max),
+            Form::Footprints(all) => all.iter().map(|footprint| footprint.along.length()).fold(0.0, f32::max),
         };
         // Room for some thousand roundings: those of the kernel's test, and of its axes, which are perpendicular only up to theirs.
         widest * (1.0 + 1e-4)
@@ -325,6 +390,7 @@ impl Map {
         match &self.records.0 {
             Form::Spheres(all) => self.test(all, first, work, |sphere| sphere_holds(sphere, point)),
             Form::Ellipsoids(all) => self.test(all, first, work, |ellipsoid| ellipsoid.holds(point)),
+            Form::Footprints(all) => self.test(all, first, work, |footprint| footprint.holds(point)),
         }
     }
 
@@ -397,6 +463,20 @@ pub struct Prepared {
     pub anywhere: Vec<Vec3>,
 }
 
+/// Footprints of so many photons by the photon tracer, with the source's settings, spread so that about as many lie about a surface point as in its
+/// table.
+fn traced_footprints(gpu: &Gpu, case: &Case, surfaces: &Surfaces, photons: u32) -> Result<Kernels> {
+    let scene = scene::load(case.scene)?;
+    let traced = |spread: f64| -> Result<Kernels> {
+        let mut mapper = mapper(gpu, &scene, [1; 2], settings(photons, spread as f32, false)?)?;
+        let records: Vec<PhotonRecord> = mapper.photons(0)?.iter().map(|photon| photon.record).collect();
+        Ok(Kernels::of_records(&records))
+    };
+    let cover = traced(FIRST_SPREAD)?.areas().sum::<f64>() / surfaces.area;
+    // Areas go by the square of the spread; those that their greatest length bounds stay behind.
+    traced(FIRST_SPREAD * (case.cover / cover).sqrt())
+}
+
 /// Rows of each case in each shape, each made when its turn comes, until the measure is stopped.
 ///
 /// # Errors
@@ -408,13 +488,18 @@ pub fn of_each_prepared<R>(context: &Context<'_>, mut rows: impl FnMut(&Prepared
     let cases = context.first(cases, 1).iter();
     let all: Vec<(&'static Case, Shape)> = cases.flat_map(|case| Shape::ALL.map(|shape| (case, shape))).collect();
     let name = |(case, shape): &(&Case, Shape)| format!("{}, {}", case.name(), shape.word());
+    let gpu = (context.gpu)()?;
     context.each(&all, name, |(case, shape)| {
         let surfaces = Surfaces::load(case.scene)?;
         let points = surfaces.seen(side)?;
+        let kernels = match shape {
+            Shape::Footprints => traced_footprints(&gpu, case, &surfaces, photons)?,
+            stand_ins => Kernels::trace(&surfaces, case.light, photons, case.cover, *stand_ins),
+        };
         rows(&Prepared {
             case,
             shape: *shape,
-            kernels: Kernels::trace(&surfaces, case.light, photons, case.cover, *shape),
+            kernels,
             anywhere: surfaces.anywhere(points.len()),
             points,
             surfaces,
@@ -424,6 +509,8 @@ pub fn of_each_prepared<R>(context: &Context<'_>, mut rows: impl FnMut(&Prepared
 
 #[cfg(test)]
 mod tests {
+    use clerestory::techniques::photon_mapping::kernel::{KernelProfile, kernel_weight};
+
     use super::*;
 
     #[test]
@@ -432,7 +519,7 @@ mod tests {
         let surfaces = Surfaces::load(case.scene).unwrap();
         let seen = surfaces.seen(16).unwrap();
         assert_eq!(seen.len(), 256);
-        for shape in Shape::ALL {
+        for shape in [Shape::Spheres, Shape::Ellipsoids] {
             let kernels = Kernels::trace(&surfaces, case.light, 2000, 50.0, shape);
             let cover = kernels.areas().sum::<f64>() / surfaces.area;
             // Radii of spheres are rounded to f32.
@@ -453,6 +540,48 @@ mod tests {
             assert_eq!(complete.tests, compact.tests);
             assert!(found[0] > 0 && compact.tree.bytes < complete.tree.bytes);
         }
+    }
+
+    #[test]
+    fn footprints_hold_the_points_that_the_engines_kernels_weigh() {
+        let mut random = Random::new(14);
+        let mut some = || 0.3 * random.direction().as_vec3();
+        let records: Vec<PhotonRecord> = (0..200)
+            .map(|_| {
+                let normal = some().normalize();
+                let along = some().reject_from(normal);
+                let across = (0.5 * along + 0.7 * normal.cross(along)).reject_from(normal);
+                PhotonRecord {
+                    position: some(),
+                    normal,
+                    direction: -normal,
+                    flux: Vec3::ONE,
+                    along,
+                    across,
+                }
+            })
+            .collect();
+        let kernels = Kernels::of_records(&records);
+        let map = Map::new(&kernels, &kernels.linear(4)).unwrap();
+        let mut held = 0;
+        for _ in 0..300 {
+            let point = some();
+            let mut work = Work::default();
+            map.gather_compact(point, &mut work);
+            let weighs = |record: &&PhotonRecord| {
+                let way = (point - record.position).as_dvec3();
+                kernel_weight(KernelProfile::Uniform, &record.kernel(), way) > 0.0
+            };
+            let expected = records.iter().filter(weighs).count() as u64;
+            // A point on a rim may fall to either side.
+            assert!(
+                work.contributions.abs_diff(expected) <= 1,
+                "{} {expected}",
+                work.contributions
+            );
+            held += expected;
+        }
+        assert!(held > 100, "{held}");
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Photon mapping on surfaces as a whole: what photons and kernels come to, and what a frame costs; pictures are compared by sweeps.
 
-mod cases;
+pub mod cases;
+mod kernel_contest;
 mod kernel_statistics;
 pub mod map_builds;
 pub mod path_differentials;
+pub mod photon_defaults;
 pub mod photon_frame;
 pub mod photon_peers;
 pub mod photon_queues;

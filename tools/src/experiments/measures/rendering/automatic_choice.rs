@@ -334,8 +334,11 @@ impl Study for Found {
     }
 }
 
-/// `None` when it was stopped.
-fn render(renderer: &Renderer, options: &RenderOptions, watch: &dyn Watch) -> Result<Option<Rendered>> {
+/// A picture; `None` when it was stopped.
+///
+/// # Errors
+/// Those of techniques.
+pub fn render(renderer: &Renderer, options: &RenderOptions, watch: &dyn Watch) -> Result<Option<Rendered>> {
     let mut rendering = renderer.start(options)?;
     while let Some(progress) = rendering.step()? {
         watch.step(progress);
