@@ -23,7 +23,7 @@ fn folder(below: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(below)
 }
 
-/// The unoptimized module of a kernel for Vulkan 1.0. Where specialization constants set the size of the workgroup, all of them become plain
+/// The unoptimized module of a kernel for Vulkan 1.0. Where specialization constants set the size of the workgroup or of caches, all of them become plain
 /// constants, since spirv-reflect cannot read modules whose arrays have such sizes. `None` for kernels with subgroup operations, which came with
 /// Vulkan 1.1.
 fn compiled_for_1_0(file: &Path) -> Result<Option<Vec<u8>>, String> {
@@ -32,7 +32,10 @@ fn compiled_for_1_0(file: &Path) -> Result<Option<Vec<u8>>, String> {
         return Ok(None);
     }
     let environment = "--target-env=vulkan1.0";
-    if !source.contains("local_size_x_id") {
+    if !["local_size_x_id", "#define KD_CACHES"]
+        .iter()
+        .any(|sized| source.contains(sized))
+    {
         return compiled(file, &[environment]).map(Some);
     }
     let flat = String::from_utf8(compiled(file, &[environment, "-E"])?).map_err(|error| error.to_string())?;

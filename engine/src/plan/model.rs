@@ -10,8 +10,11 @@ const SLOPE_SPREAD: f64 = 0.2;
 const SLOPE_DRIFT: f64 = 0.2;
 /// Least slope: an error that does not fall is not believed.
 const LEAST_SLOPE: f64 = 0.1;
-/// Relative standard error of a measurement, at the least: rounding and the truth that errors are relative to.
+/// Relative standard error of a measurement, at the least: rounding.
 const LEAST_DEVIATION: f64 = 0.02;
+/// Relative standard error of all measurements in common, by the truth that they are relative to: of pilots of 32² to 96² pixels in four scenes, each
+/// with four pairs or more, roots of relative MSEs were 0.88 to 1.05 times those against a reference.
+const TRUTH_DEVIATION: f64 = 0.14;
 /// Standard deviations that a normal number keeps within in 9 of 10 cases.
 const NINE_OF_TEN: f64 = 1.645;
 
@@ -153,14 +156,15 @@ impl ErrorModel {
         anchor.relative_mse * (samples / anchor.samples).powf(-self.slope())
     }
 
-    /// Factor that the root of the relative MSE keeps within to either side in 9 of 10 cases, by how well level and slope are known and by the spread of
+    /// Factor that the root of the relative MSE keeps within to either side in 9 of 10 cases, by how well level, truth and slope are known and by the spread of
     /// the picture itself, which has `pixels` times as many pixels as what was measured.
     pub fn factor(&self, samples: f64, pixels: f64) -> f64 {
         let Some(anchor) = self.anchor() else {
             return f64::INFINITY;
         };
         let by_slope = self.slope_and_deviation().1 * (samples / anchor.samples).ln();
-        let variance = anchor.deviation.powi(2) * (1.0 + 1.0 / pixels.max(1.0)) + by_slope * by_slope;
+        let by_level = anchor.deviation.powi(2) * (1.0 + 1.0 / pixels.max(1.0)) + TRUTH_DEVIATION * TRUTH_DEVIATION;
+        let variance = by_level + by_slope * by_slope;
         (NINE_OF_TEN * 0.5 * variance.sqrt()).exp()
     }
 

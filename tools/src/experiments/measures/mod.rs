@@ -173,6 +173,10 @@ mod tests {
     use super::super::watch::Unwatched;
     use super::*;
 
+    /// Criteria for rows that no smoke run has, since they take too long.
+    const OF_LONG_RUNS: [&str; 1] =
+        ["pilots take at most a quarter of the time where it is above five seconds: their share"];
+
     /// Takes a measure with few inputs; one of functions alone must not open the device.
     pub(super) fn check_quick_form(name: &str) {
         let measure = find(name).unwrap();
@@ -198,6 +202,7 @@ mod tests {
             let sound = match judged.verdict {
                 Verdict::Needs(_) => true,
                 Verdict::Holds => judged.in_every_form,
+                Verdict::NotRun => OF_LONG_RUNS.contains(&judged.name.as_str()),
                 _ => judged.verdict == Verdict::SmokeForm && !judged.in_every_form,
             };
             assert!(sound, "{name}: {judged}");
