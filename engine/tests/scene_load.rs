@@ -134,7 +134,8 @@ fn modified_phong_surfaces_are_loaded_and_checked() {
         let message = refusal(text);
         assert!(message.contains(words), "{text}: {message}");
     }
-    let changes: [(fn(&mut Material), &str); 2] = [
+    type Change = fn(&mut Material);
+    let changes: [(Change, &str); 2] = [
         (|m| m.transmission = 0.5, "transmission"),
         (|m| m.specular = 0.5, "specular"),
     ];

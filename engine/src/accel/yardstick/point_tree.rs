@@ -234,7 +234,7 @@ pub(super) fn order_on(axis: usize, points: &[Vec3]) -> impl Fn(&u32, &u32) -> s
 
 /// A node's word.
 pub(super) fn word(point: u32, flag: bool, axis: usize) -> u32 {
-    point << INDEX_SHIFT | u32::from(flag) * FLAG | axis as u32
+    (point << INDEX_SHIFT) | (u32::from(flag) * FLAG) | axis as u32
 }
 
 /// What a node's word holds: point, flag, axis.

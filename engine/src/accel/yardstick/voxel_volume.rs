@@ -234,9 +234,10 @@ mod tests {
         };
         let mut least = f64::INFINITY;
         for axis in 0..3 {
+            let at = |point: &u32| points[*point as usize][axis];
             for point in &all {
-                let plane = points[*point as usize][axis];
-                let before = |other: &&u32| (points[**other as usize][axis], **other) < (plane, *point);
+                let plane = at(point);
+                let before = |other: &&u32| (at(other), **other) < (plane, *point);
                 let below = all.iter().filter(before).count();
                 least = least.min(cost(axis, plane, [below, all.len() - 1 - below]));
             }

@@ -75,8 +75,8 @@ pub fn leaves_that_wait(tree: &KdTree, caches: KdCaches, [closest, any]: [&[Ray]
     if !caches.postpone {
         return Ok(0);
     }
-    let starts: [(fn(Scheme, &Ray) -> KdTraversal, &[Ray]); 2] =
-        [(KdTraversal::closest, closest), (KdTraversal::any, any)];
+    type Start = fn(Scheme, &Ray) -> KdTraversal;
+    let starts: [(Start, &[Ray]); 2] = [(KdTraversal::closest, closest), (KdTraversal::any, any)];
     let mut waited = 0;
     for (start, rays) in starts {
         for ray in rays {

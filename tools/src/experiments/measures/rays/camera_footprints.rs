@@ -47,7 +47,7 @@ impl Ray {
         self.by = transfer_differentials(&self.by, t, self.direction, normal);
     }
 
-    fn to_plane(mut self, point: DVec3, normal: DVec3) -> Option<Self> {
+    fn at_plane(mut self, point: DVec3, normal: DVec3) -> Option<Self> {
         let t = (point - self.place).dot(normal) / self.direction.dot(normal);
         (t > 0.0 && t <= FAR).then(|| {
             self.go(t, normal);
@@ -56,7 +56,7 @@ impl Ray {
     }
 
     /// To the ball from outside: its normal there, the derivatives of which are those of the place.
-    fn to_ball(&mut self) -> Option<DVec3> {
+    fn meet_ball(&mut self) -> Option<DVec3> {
         let from = self.place - BALL;
         let b = from.dot(self.direction);
         let squared = b * b - from.length_squared() + 1.0;
@@ -83,22 +83,22 @@ type Way = fn(Ray) -> Option<Ray>;
 
 const WALL: &str = "wall that faces the camera";
 const WAYS: [(&str, Way); 4] = [
-    (WALL, |ray| ray.to_plane(-2.0 * DVec3::Z, DVec3::Z)),
-    ("floor", |ray| ray.to_plane(DVec3::ZERO, DVec3::Y)),
+    (WALL, |ray| ray.at_plane(-2.0 * DVec3::Z, DVec3::Z)),
+    ("floor", |ray| ray.at_plane(DVec3::ZERO, DVec3::Y)),
     ("floor in a mirror ball", |mut ray| {
-        let (normal, w) = (ray.to_ball()?, ray.direction);
+        let (normal, w) = (ray.meet_ball()?, ray.direction);
         ray.by = reflect_differentials(&ray.by, w, normal, [ray.by.z1, ray.by.z2]);
         ray.direction = w - 2.0 * w.dot(normal) * normal;
-        ray.to_plane(DVec3::ZERO, DVec3::Y)
+        ray.at_plane(DVec3::ZERO, DVec3::Y)
     }),
     ("wall behind a glass ball", |mut ray| {
-        let normal = ray.to_ball()?;
+        let normal = ray.meet_ball()?;
         ray.refract(normal, 1.0 / ETA, 1.0);
         let t = -2.0 * ray.direction.dot(normal);
         let normal = normal + t * ray.direction;
         ray.go(t, normal);
         ray.refract(-normal, ETA, -1.0);
-        ray.to_plane(-3.0 * DVec3::Z, DVec3::Z)
+        ray.at_plane(-3.0 * DVec3::Z, DVec3::Z)
     }),
 ];
 
