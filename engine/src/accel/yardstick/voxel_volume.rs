@@ -233,7 +233,7 @@ mod tests {
             probability(bounds, whole, reach) + below * counts[0] as f64 + above * counts[1] as f64
         };
         let mut least = f64::INFINITY;
-        for axis in 0..3 {
+        for axis in [0, 1, 2] {
             let at = |point: &u32| points[*point as usize][axis];
             for point in &all {
                 let plane = at(point);
