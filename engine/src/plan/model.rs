@@ -458,9 +458,10 @@ mod tests {
         assert!(error.relative_mse(256.0) > 1.8 * lucky, "{slope}, {lucky}");
         assert_eq!(error.samples(0.1), 16);
         assert!(error.samples(0.2) < 16);
-        // The interval: the level's and the picture's own spread at the pair, and the slope's beyond it.
+        // The interval: the spread of level, truth and the picture itself at the pair, and that of the slope beyond it.
         let [here, there] = [16.0, 1024.0].map(|samples| error.factor(samples, 1.0));
-        assert!((here.ln() - 1.645 * 0.5 * 0.1 * 2_f64.sqrt()).abs() < 1e-12, "{here}");
+        let deviation = (2.0 * 0.1_f64.powi(2) + TRUTH_DEVIATION.powi(2)).sqrt();
+        assert!((here.ln() - 1.645 * 0.5 * deviation).abs() < 1e-12, "{here}");
         assert!(there > here && error.factor(16.0, 1e9) < here, "{here}, {there}");
     }
 

@@ -391,7 +391,7 @@ fn gathering_states(settings: &PhotonSettings, eye: &PathSet) -> (u32, u32) {
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "BG-5",
-        name: "photon mapping as first published: a map of photons, seen directly or behind a final gather",
+        name: "photon map as first published, seen directly or behind a final gather",
         role: Role::PartOf("PM-SYS-1"),
         limits: "A map seen directly is blurred, and lacks half of its light at edges and three quarters in corners of right angles, as far as kernels reach; behind a final gather, of one ray per eye path, a part of that is missing everywhere, and pictures take hundreds of paths to be smooth.",
         sources: &[
