@@ -149,7 +149,8 @@ Differentials rough_reemission(Differentials d, vec3 direction, float pdf) {
     return reemission_differentials(footprint_side(d), direction, density, 1.0 / density);
 }
 
-// Survival of a roulette, or the probability of a specular lobe among others; to be applied once the new direction's derivatives are known.
+// Accounts for the survival of a roulette, or for the probability of choosing a specular lobe among others; to be applied once the new direction's
+// derivatives are known.
 Differentials roulette_differentials(Differentials d, float survival) {
     float scale = inversesqrt(survival);
     return Differentials(scale * d.z1, scale * d.z2, scale * d.w1, scale * d.w2);

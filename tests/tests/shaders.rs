@@ -75,10 +75,10 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("kernels/histogram.comp", "InvalidArraySize"),
 ];
 
-/// The whole workgroup comes to each of them: branches that lanes take apart end before, and loops and early returns about them are the same for
-/// all. SPIR-V 1.3 (its definition of uniform control flow) promises that such lanes are together.
+/// The whole workgroup reaches each of these operations: divergent branches end before it, and the loops and early returns around it are uniform. SPIR-V 1.3
+/// (its definition of uniform control flow) promises that lanes have reconverged there.
 const BY_WHOLE_WORKGROUPS: &str = "the whole workgroup comes to it";
-/// Votes by which lanes wait for each other, or go where another one must; what each finds is its own, with any others beside it or none.
+/// By these votes lanes wait for each other, or go where another lane must go; what each lane finds is its own, whichever other lanes vote with it.
 const WITH_ANY_COMPANY: &str = "no result depends on who votes";
 
 /// Modules with subgroup operations, each with why its results do not depend on lanes coming together again where SPIR-V does not promise it.

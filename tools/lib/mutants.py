@@ -84,6 +84,10 @@ def git(*arguments, folder=ROOT):
     return subprocess.run(["git", "-C", folder, *arguments], check=True, capture_output=True, text=True).stdout.strip()
 
 
+class Unsound(Exception):
+    """A declared fault is not of the code as it is."""
+
+
 class Mutant:
     """A fault: `old` may mark the part that is replaced by « and », so that what stands about it makes it unique."""
 
@@ -108,12 +112,12 @@ class Mutant:
         """Where the part stands in the file's text."""
         count = text.count(self.context)
         if count != 1:
-            die(f"{self}: the old text stands {count} times in the file, not once")
+            raise Unsound(f"{self}: the old text stands {count} times in the file, not once")
         if self.part == self.new:
-            die(f"{self}: changes nothing")
+            raise Unsound(f"{self}: changes nothing")
         begin = text.index(self.context) + self.begin
         if self.is_rust and "#[cfg(test)]\nmod tests {" in text and begin > text.index("#[cfg(test)]\nmod tests {"):
-            die(f"{self}: is of a test")
+            raise Unsound(f"{self}: is of a test")
         return begin, begin + len(self.part)
 
 
@@ -146,7 +150,7 @@ def rewritten(text, mutants):
     result, end, lines = "", 0, {}
     for (begin, stop), faults in sorted(spans.items(), key=lambda item: item[0]):
         if begin < end:
-            die(f"{faults[0]}: overlaps with another fault")
+            raise Unsound(f"{faults[0]}: overlaps with another fault")
         result += text[end:begin]
         first = result.count("\n") + 1
         result += "("
@@ -160,14 +164,20 @@ def rewritten(text, mutants):
 
 
 def check(root, mutants):
-    """Whether each fault's old text stands where it is said to."""
+    """Ends with all faults whose old text does not stand where it is said to."""
+    unsound = []
     for path, faults in by_path(mutants).items():
         text = (root / path).read_text()
-        if faults[0].is_rust:
-            rewritten(text, faults)
-        else:
-            for fault in faults:
+        before = len(unsound)
+        for fault in faults:
+            try:
                 fault.span(text)
+            except Unsound as why:
+                unsound.append(str(why))
+        if len(unsound) == before and faults[0].is_rust:
+            rewritten(text, faults)
+    if unsound:
+        raise Unsound("\n".join(unsound))
 
 
 # Shaders
@@ -482,7 +492,8 @@ def judged(programs, mutant, tests, limit):
     return f"found by {failed}"
 
 
-def main():
+def options_of_command_line():
+    """The options, with the shard as a slice of the list of faults."""
     parser = argparse.ArgumentParser(prog="tools/mutants", description="Puts faults into the code, and says which of them no test finds.")
     parser.add_argument("--shard", default="1/1", metavar="k/n", help="every n-th fault, from the k-th on (1 to n)")
     parser.add_argument("--few", action="store_true", help="three faults alone, in two minutes once all is built")
@@ -495,30 +506,39 @@ def main():
     shard = re.fullmatch(r"([1-9]\d*)/([1-9]\d*)", options.shard)
     if not shard or int(shard[1]) > int(shard[2]):
         parser.error("--shard takes k/n, k from 1 to n")
-    first, step = int(shard[1]) - 1, int(shard[2])
+    options.shard = slice(int(shard[1]) - 1, None, int(shard[2]))
+    return options
 
-    def chosen(mutants):
-        wanted = [m for m in mutants if (not options.path or m.path in options.path) and (m.is_of_few or not options.few)]
-        return wanted[first::step]
 
-    if options.list or options.check or options.modules:
-        mutants = read_mutants(ROOT)
-        check(ROOT, mutants)
-        if options.list:
-            for mutant in chosen(mutants):
-                print(f"{mutant.number} {mutant}")
-        if options.modules:
-            same = compile_modules(ROOT, chosen(mutants))
-            for mutant in same:
-                say(f"{mutant}: changes no module")
-            return 1 if same else 0
-        return 0
+def chosen(mutants, options):
+    """The faults that the command line asks for."""
+    without = set(options.path) - {mutant.path for mutant in mutants}
+    if without:
+        die(f"no fault is declared of {', '.join(sorted(without))}")
+    wanted = [m for m in mutants if (not options.path or m.path in options.path) and (m.is_of_few or not options.few)]
+    return wanted[options.shard]
 
+
+def look(options):
+    """What needs no build: checks the faults, and lists them or compiles the shaders with theirs. The exit code."""
+    mutants = read_mutants(ROOT)
+    check(ROOT, mutants)
+    if options.list:
+        for mutant in chosen(mutants, options):
+            print(f"{mutant.number} {mutant}")
+    same = compile_modules(ROOT, chosen(mutants, options)) if options.modules else []
+    for mutant in same:
+        say(f"{mutant}: changes no module")
+    return 1 if same else 0
+
+
+def try_all(options):
+    """Builds the last commit with its faults, and judges each that is asked for. The exit code."""
     WORK.mkdir(parents=True, exist_ok=True)
     os.environ.update(CARGO_TARGET_DIR=str(WORK / "target"), CLERESTORY_VALIDATION="off")
     commit = git("rev-parse", "HEAD")
     mutants, left_out = prepare(commit)
-    inside = [mutant for mutant in chosen(mutants) if mutant.number not in left_out]
+    inside = [mutant for mutant in chosen(mutants, options) if mutant.number not in left_out]
     rows = read_rows()
     of_each = {mutant.number: tests_of(mutant, rows) for mutant in inside}
     everything = [test for tests in of_each.values() for test in tests]
@@ -541,6 +561,14 @@ def main():
     if left_out:
         say(f"{len(left_out)} faults were left out: see {WORK}/left-out.txt")
     return 1 if missed or left_out else 0
+
+
+def main():
+    options = options_of_command_line()
+    try:
+        return look(options) if options.list or options.check or options.modules else try_all(options)
+    except Unsound as why:
+        die(why)
 
 
 if __name__ == "__main__":

@@ -3,9 +3,8 @@
 //!
 //! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and
 //! Mitsuba's rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared
-//! by [`film::z_test`]: value by value and by blocks of 8 × 8 pixels, whose means show eight times smaller differences, of which the worse verdict counts,
-//! and as a whole. In the
-//! same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error: [`Race`].
+//! by [`film::z_test`]: value by value and by blocks of 8 × 8 pixels, whose means show eight times smaller differences (the worse of both
+//! verdicts counts), and as a whole. In the same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error: [`Race`].
 //! Guarantees: pictures and errors depend on the options and the drivers alone; times are wall-clock and processor seconds, medians.
 //!
 //! [`mitsuba::scenes`]: crate::mitsuba::scenes

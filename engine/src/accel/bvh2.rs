@@ -171,7 +171,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "BG-14",
     name: "ray index: binary BVH by binned surface-area heuristic",
     role: Role::Kernel,
-    limits: "Built on the host, later than by the libraries that `clerestory index --peers` measures, and never refitted: what moves is rebuilt.",
+    limits: "Built on the host, more slowly than by the libraries that `clerestory index --peers` measures, and never refitted: what moves is rebuilt.",
     sources: &[
         sources::WALD_2007.whole(),
         sources::AILA_LAINE_2009.whole(),

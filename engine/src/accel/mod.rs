@@ -57,7 +57,7 @@ use bytemuck::{Pod, Zeroable};
 /// [`Hit::triangle`] of a ray that met nothing.
 pub const NO_HIT: u32 = constants::NO_HIT;
 
-/// What says of a traversal that can be stopped, in place of where it goes on, that it is done.
+/// Stands for "done" where a traversal that can be stopped says where to resume.
 pub const FINISHED: u32 = constants::INDEX_FINISHED;
 
 /// Smallest largest-component of a ray direction that is traced; shorter directions, zero among them, meet nothing.

@@ -6,7 +6,7 @@
 //! | [`ShiftedRestart`]: loses or repeats leaves; [`leaves_by_stack`]: all leaves of a ray | [`Scheme`](super::kd::Scheme) |
 //! | [`WaldTriangle`]: not watertight | [`intersect_triangle`](super::triangle::intersect_triangle) |
 //! | [`intersect_triangle_f64`], [`moller_trumbore`]: oracles in f64 | the same |
-//! | [`split_list_hierarchy`], [`clustered_hierarchy`]: the same trees otherwise | [`merged_hierarchy`](super::photon_map::merge::merged_hierarchy) |
+//! | [`split_list_hierarchy`], [`clustered_hierarchy`]: the same trees, built in other ways | [`merged_hierarchy`](super::photon_map::merge::merged_hierarchy) |
 //! | [`volume_sweep_tree`]: how good such a tree can be for points | the same |
 //! | [`area_sweep_tree`]: how good a tree can be for rays | [`Bvh2`](super::bvh2::Bvh2) |
 //!

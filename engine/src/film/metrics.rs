@@ -13,7 +13,7 @@ use super::tone::ToneMap;
 use crate::catalogue::{Role, Row, sources};
 use crate::{Error, Result};
 
-/// ε of the relative MSE over the square of the reference's mean radiance: what has a tenth of that mean weighs half.
+/// ε of the relative MSE over the square of the reference's mean radiance: where the reference is a tenth of that mean, ε halves the relative error's square.
 pub const RELATIVE_MSE_OFFSET: f64 = 0.01;
 
 /// ε of the relative MSE against a reference of these values: `share` of the square of their mean magnitude. It depends on the reference alone, and

@@ -28,7 +28,7 @@ pub struct Drawn {
     pub vertices: u64,
     /// Primitives that reached clipping: as draws or geometry shaders emit them.
     pub primitives: u64,
-    /// Fragment shader invocations: of some drivers blocks of pixels, of others only what an early test of depth lets pass.
+    /// Fragment shader invocations. Some drivers count whole blocks of pixels, others only the fragments that pass an early depth test.
     pub fragments: u64,
 }
 

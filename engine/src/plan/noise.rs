@@ -72,63 +72,64 @@ pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Re
     }
     let (width, height) = (first.width() as usize, first.height() as usize);
     let pixels = width * height;
-    let halves = |pairs: &[Pair<'_>]| -> Result<Vec<[Vec<f64>; 2]>> {
-        [0, 1, 2]
-            .into_iter()
-            .map(|channel| pooled(pairs, channel, pixels))
-            .collect()
-    };
-    let all = halves(pairs)?;
+    let all = means_of_halves(pairs, pixels)?;
     let epsilon = relative_mse_epsilon(all.iter().flatten().flatten().map(|value| *value as f32), offset);
-    let levels = |halves: &[[Vec<f64>; 2]]| -> Vec<Vec<f64>> {
-        let of_channel = |[a, b]: &[Vec<f64>; 2]| {
-            let mut truth = truth(a, b, width, TRUST);
-            if kind == Truth::Pixel {
-                for (truth, (a, b)) in truth.iter_mut().zip(a.iter().zip(b)) {
-                    *truth = truth.max(0.25 * (a + b) * (a + b));
-                }
-            }
-            truth.into_iter().map(f64::sqrt).collect()
-        };
-        halves.iter().map(of_channel).collect()
-    };
-    let levels_of_all = levels(&all);
+    let levels_of_all = levels(&all, width, kind);
     let estimate = |at: usize| -> Result<NoiseEstimate> {
-        let (_, [a, b]) = &pairs[at];
-        let levels = if kind == Truth::Pixel || pairs.len() == 1 {
-            &levels_of_all
-        } else {
-            let others: Vec<Pair<'_>> = pairs
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| *i != at)
-                .map(|(_, pair)| *pair)
-                .collect();
-            &levels(&halves(&others)?)
-        };
-        let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
-        let mut tiles = Tiles::new(width, height);
-        let mut squares = 0.0_f64;
-        for pixel in 0..pixels {
-            let mut of_pixel = 0.0_f64;
-            for (channel, levels) in levels.iter().enumerate() {
-                let (a, b) = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]).unwrap_or_default();
-                of_pixel += relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon);
-            }
-            squares += of_pixel * of_pixel;
-            tiles.add(pixel, of_pixel / 3.0);
+        let (_, pair) = pairs[at];
+        let others = [&pairs[..at], &pairs[at + 1..]].concat();
+        if kind == Truth::Pixel || others.is_empty() {
+            return noise_of_pair(pair, &levels_of_all, epsilon, kind);
         }
-        let (relative_mse, by_tiles) = tiles.mean();
-        Ok(NoiseEstimate {
-            relative_mse,
-            deviation: match kind {
-                // Var x ≤ E x² for each pixel, whose channels count as one.
-                Truth::Neighbourhood => squares.sqrt() / (3 * pixels.max(1)) as f64,
-                Truth::Pixel => by_tiles,
-            },
-        })
+        let levels_of_others = levels(&means_of_halves(&others, pixels)?, width, kind);
+        noise_of_pair(pair, &levels_of_others, epsilon, kind)
     };
     (0..pairs.len()).map(estimate).collect()
+}
+
+/// Of each channel: the means of all first pictures and of all second ones.
+fn means_of_halves(pairs: &[Pair<'_>], pixels: usize) -> Result<Vec<[Vec<f64>; 2]>> {
+    (0..3).map(|channel| pooled(pairs, channel, pixels)).collect()
+}
+
+/// Of each channel: the true radiance of each pixel, as far as the means of both halves know it.
+fn levels(halves: &[[Vec<f64>; 2]], width: usize, kind: Truth) -> Vec<Vec<f64>> {
+    let of_channel = |[a, b]: &[Vec<f64>; 2]| {
+        let mut truth = truth(a, b, width, TRUST);
+        if kind == Truth::Pixel {
+            for (truth, (a, b)) in truth.iter_mut().zip(a.iter().zip(b)) {
+                *truth = truth.max(0.25 * (a + b) * (a + b));
+            }
+        }
+        truth.into_iter().map(f64::sqrt).collect()
+    };
+    halves.iter().map(of_channel).collect()
+}
+
+/// The relative MSE of either picture of a pair, relative to the true radiance by channel and pixel.
+fn noise_of_pair([a, b]: [&Picture; 2], levels: &[Vec<f64>], epsilon: f64, kind: Truth) -> Result<NoiseEstimate> {
+    let (width, height) = (a.width() as usize, a.height() as usize);
+    let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
+    let mut tiles = Tiles::new(width, height);
+    let mut squares = 0.0_f64;
+    for pixel in 0..width * height {
+        let mut of_pixel = 0.0_f64;
+        for (channel, levels) in levels.iter().enumerate() {
+            let (a, b) = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]).unwrap_or_default();
+            of_pixel += relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon);
+        }
+        squares += of_pixel * of_pixel;
+        tiles.add(pixel, of_pixel / 3.0);
+    }
+    let (relative_mse, by_tiles) = tiles.mean();
+    Ok(NoiseEstimate {
+        relative_mse,
+        deviation: match kind {
+            // Var x ≤ E x² for each pixel, whose channels count as one.
+            Truth::Neighbourhood => squares.sqrt() / (3 * (width * height).max(1)) as f64,
+            Truth::Pixel => by_tiles,
+        },
+    })
 }
 
 /// Both values of a pixel; a pixel without a finite sample says nothing.

@@ -18,7 +18,7 @@ pub const PILOT_SHARE: f64 = 0.25;
 const ROUNDS_SHARE: f64 = 0.6;
 /// Seconds from which on a picture with its pilots is long.
 const LONG: f64 = 5.0;
-/// Most samples per pixel of the last pair: beyond them what is not known of the slope weighs more, and nobody waits for pilots.
+/// Most samples per pixel of the last pair: with more, the error of the slope outweighs that of the pair, which would only take longer.
 const LAST_PAIR: u32 = 4 * ROUNDS[ROUNDS.len() - 1];
 /// Beyond the relative MSE of what has met light.
 const UNLIT_COST: f64 = f64::MAX;
@@ -29,8 +29,8 @@ const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
 const HOPELESS: f64 = 2.0;
 
-/// Seconds that pilots may still take of a part of what they may take in all, beside a picture of `picture` seconds: after `spent` ones, of which rounds took
-/// `rounds`.
+/// Seconds that pilots may still take, of `part` of what they may take in all, beside a picture that takes `picture` seconds: `spent` seconds have gone by, and
+/// `rounds` of them were taken by rounds.
 fn room(part: f64, goal: Goal, picture: f64, spent: f64, rounds: f64) -> f64 {
     match goal.time {
         Some(time) => part * PILOT_SHARE * time.as_secs_f64() - spent,
@@ -39,7 +39,7 @@ fn room(part: f64, goal: Goal, picture: f64, spent: f64, rounds: f64) -> f64 {
     }
 }
 
-/// Whether a candidate more would take pilots beyond their share of a long picture, or of the time.
+/// Whether one more candidate would take pilots beyond their share of a long picture, or of the time to keep.
 pub fn is_late(trials: &[Option<Trial<'_>>], goal: Goal, spent: f64) -> bool {
     if let Some(time) = goal.time {
         return spent > ROUNDS_SHARE * PILOT_SHARE * time.as_secs_f64();
@@ -50,8 +50,8 @@ pub fn is_late(trials: &[Option<Trial<'_>>], goal: Goal, spent: f64) -> bool {
     all.is_finite() && all > LONG && spent > PILOT_SHARE * all
 }
 
-/// The last pair of the chosen one: as many samples as there is time for, and no more than the picture needs. Nothing happens where its pilots have met no light
-/// and where a time leaves no room.
+/// Renders the last pair of the chosen one: as many samples as there is time for, and no more than the picture needs. None is rendered where its pilots have
+/// met no light, or where the time to keep leaves no room.
 pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, spent: f64, rounds: f64) -> Result<()> {
     let wanted = trial.samples(asked.goal, spent);
     let picture = trial.cost.seconds(f64::from(wanted));

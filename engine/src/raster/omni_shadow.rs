@@ -22,9 +22,9 @@
 //!
 //! # Bias
 //!
-//! - The border of a shadow is that of texels, off by half of one on average: errors fall as one over the texels along a side, as long as what casts
-//!   and what gets shadows is larger than texels at its distance.
-//! - What is not, such as furniture close to the floor of a wide room, is wrong as a whole: in `builtin:conference` a third of the places that face the
+//! - The border of a shadow is that of texels, off by half of one on average: errors fall as one over the texels along a side, as long as what
+//!   casts and what receives shadows is larger than texels at its distance.
+//! - What is smaller, such as furniture close to the floor of a wide room, is wrong as a whole: in `builtin:conference` a third of the places that face the
 //!   light with 6,000 texels, 7 % in a cube and 9 % in an octahedron with 6.3 million, and errors fall by less than the root of the texels along a side
 //!   (experiment `shadow-maps`).
 //! - What lies within the move of the plane off a surface casts no shadow on it: contact shadows begin `width + 1` texel diagonals late.

@@ -3,8 +3,8 @@
 // map in shared memory and append them to the list of blocks whenever less than a block of room is left; at its end the last block of a team may be
 // partial. No workgroup waits for another. What is in a block follows from the places alone, its number from who came first.
 //
-// Teams are as wide as subgroups, yet talk to each other by shared memory and barriers, which the whole workgroup meets: whether a place asks is told
-// after branches that lanes leave one by one, and SPIR-V promises no subgroup that its lanes are together again behind them.
+// Teams are as wide as subgroups, but exchange data by shared memory and barriers, which the whole workgroup reaches: whether a place asks is known
+// only after divergent branches, and SPIR-V does not promise that a subgroup has reconverged behind them.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

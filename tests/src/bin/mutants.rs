@@ -5,7 +5,7 @@
 
 use clerestory::catalogue::{self, Row};
 
-/// The package of a test's file, what builds its program, and that program's name to cargo-nextest; `None` where none of these runs it.
+/// Of a test's file: the options that build its program, and that program's name to cargo-nextest; `None` for files whose tests tools/mutants does not run.
 fn place(file: &str) -> Option<[String; 2]> {
     let parts: Vec<&str> = file.split('/').collect();
     let package = match parts.first() {

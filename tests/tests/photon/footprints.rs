@@ -38,7 +38,7 @@ enum Event {
 struct Meeting {
     height: f64,
     event: Event,
-    /// That it is reflected or refracted about.
+    /// The normal about which it is reflected or refracted.
     normal: fn(DVec3) -> DVec3,
     /// Probability of the event, from the cosine of incidence at that normal and the ratio of cosines by which its power falls short there.
     chance: fn(f64, f64) -> f64,
@@ -90,7 +90,7 @@ fn bent(x: DVec3) -> DVec3 {
 struct Followed {
     landed: DVec3,
     chance: f64,
-    /// Its differentials if nothing but distances changed them.
+    /// Its differentials, had it met no surface: distances alone change them.
     unbent: Differentials,
 }
 

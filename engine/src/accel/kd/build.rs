@@ -187,8 +187,8 @@ impl Builder<'_> {
         best.filter(|best| best.cost < leaf_cost)
     }
 
-    /// The cheapest plane across an axis of a node with probability `own`. What its candidates share is found once, by surface area as by
-    /// SIROH, and the sweep is compiled for each heuristic.
+    /// The cheapest plane across an axis of a node with probability `own`. What the axis's candidates share is computed once, for surface area and
+    /// for SIROH alike, and the sweep is compiled for each heuristic.
     fn sweep(
         &self,
         work: &Work,
@@ -221,7 +221,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The same with the probabilities of the children of a plane.
+    /// The same, where `probabilities` gives those of the two children of a plane.
     fn cheapest(
         &self,
         work: &Work,

@@ -195,7 +195,8 @@ pub fn rough_reemission(d: &Differentials, direction: DVec3, pdf: f64) -> Differ
     reemission_differentials(footprint_side(d), direction, density, 1.0 / density)
 }
 
-/// Survival of a roulette, or the probability of a specular lobe among others; to be applied once the new direction's derivatives are known, since a re-emission would forget it.
+/// Accounts for the survival of a roulette, or for the probability of choosing a specular lobe among others. It is to be applied once the new direction's
+/// derivatives are known, since a re-emission would forget it.
 pub fn roulette_differentials(d: &Differentials, survival: f64) -> Differentials {
     let scale = 1.0 / survival.sqrt();
     Differentials {

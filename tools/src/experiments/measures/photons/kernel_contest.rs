@@ -89,8 +89,8 @@ impl Candidate {
     }
 }
 
-/// Relative RMSE, seconds, and the reference's own error over that RMSE.
-pub type Picture = [f64; 3];
+/// A picture's relative RMSE, its seconds, and the reference's own error over that RMSE.
+pub type Scored = [f64; 3];
 
 /// A scene with its reference.
 pub struct Stage {
@@ -133,7 +133,7 @@ impl Stage {
     }
 
     /// `None` when it was stopped.
-    fn picture(&self, context: &Context<'_>, of: &Candidate, passes: u32, seed: u32) -> Result<Option<Picture>> {
+    fn picture(&self, context: &Context<'_>, of: &Candidate, passes: u32, seed: u32) -> Result<Option<Scored>> {
         let options = RenderOptions {
             technique: Some("photon".into()),
             spp: passes,
@@ -159,7 +159,7 @@ impl Stage {
         context: &Context<'_>,
         of: &[&Candidate],
         budgets: &[f64],
-    ) -> Result<Option<Vec<Vec<Vec<Picture>>>>> {
+    ) -> Result<Option<Vec<Vec<Vec<Scored>>>>> {
         let mut tasks = Vec::new();
         for (i, candidate) in of.iter().enumerate() {
             // The first one compiles the kernels.
@@ -180,7 +180,7 @@ impl Stage {
             seed += 1;
             self.picture(context, of[candidate], passes, seed)
         })?;
-        let turns: Option<Vec<Vec<Picture>>> = turns.into_iter().map(|turns| turns.into_iter().collect()).collect();
+        let turns: Option<Vec<Vec<Scored>>> = turns.into_iter().map(|turns| turns.into_iter().collect()).collect();
         Ok(turns.map(|all| all.chunks(budgets.len()).map(<[_]>::to_vec).collect()))
     }
 }
@@ -196,7 +196,7 @@ pub fn time_to(error: f64, curve: &[[f64; 2]]) -> f64 {
 }
 
 /// Error and seconds at each budget, of one turn.
-pub fn curve(budgets: &[Vec<Picture>], turn: usize) -> Vec<[f64; 2]> {
+pub fn curve(budgets: &[Vec<Scored>], turn: usize) -> Vec<[f64; 2]> {
     budgets.iter().map(|turns| [turns[turn][0], turns[turn][1]]).collect()
 }
 
