@@ -79,7 +79,7 @@ pub struct ErrorReport {
     /// Relative mean squared error, mean of (a − b)² / (b² + ε); against a black reference 0 where it is matched, else not finite.
     pub relative_mse: f64,
     /// ε of the relative MSE, in squared units of the reference's radiance.
-    pub relative_mse_offset: f64,
+    pub relative_mse_epsilon: f64,
     /// Mean signed error (bias), mean of a − b.
     pub bias: f64,
     /// Mean signed error over the reference's mean, Σ(a − b) / Σb; 0 for a black reference that is matched, else not finite.
@@ -105,7 +105,7 @@ impl std::fmt::Display for ErrorReport {
         let Self {
             width, height, pixels, ..
         } = self;
-        let offset = format!("relative MSE (ε = {:.3e})", self.relative_mse_offset);
+        let offset = format!("relative MSE (ε = {:.3e})", self.relative_mse_epsilon);
         let flip = format!("FLIP ({:.2} pixels/degree)", self.pixels_per_degree);
         writeln!(f, "{:<28} {pixels} of {width} × {height}", "pixels compared")?;
         for (name, value) in [
@@ -250,7 +250,7 @@ fn compare_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &C
         mse: mean(squared),
         rmse: mean(squared).sqrt(),
         relative_mse: mean(relative),
-        relative_mse_offset: epsilon,
+        relative_mse_epsilon: epsilon,
         bias: mean(signed),
         relative_bias,
         quantile_999: errors.get(rank.saturating_sub(1)).copied().unwrap_or(0.0),
@@ -319,7 +319,7 @@ mod tests {
         assert_eq!(report.rmse, (5.25f64 / 6.0).sqrt());
         // The reference's mean is 3.5 / 6.
         let epsilon = 0.01 * 12.25 / 36.0;
-        assert!((report.relative_mse_offset / epsilon - 1.0).abs() < 1e-14);
+        assert!((report.relative_mse_epsilon / epsilon - 1.0).abs() < 1e-14);
         let relative = (1.0 / (1.0 + epsilon) + 4.0 / (1.0 + epsilon) + 0.25 / (0.25 + epsilon)) / 6.0;
         assert!((report.relative_mse - relative).abs() < 1e-14);
         assert_eq!(report.bias, 2.5 / 6.0);
