@@ -10,9 +10,10 @@
 //! that of normal numbers; they differ where more is rejected than such tails explain; between the two the test names the heavy tails and decides
 //! nothing.
 //!
-//! False alarms, as the tests simulate them: of 100 pairs that are right, with normal samples, about five are undecided by either reason and less than one
-//! differs; with skewed samples against an exact picture most can be undecided, and less than one differs, as long as each pixel has met its rarest
-//! light some twenty times.
+//! False alarms, as the tests simulate them for 768 values of 64 samples: of 100 pairs that are right, with normal samples, about five are undecided by
+//! either reason and less than one differs; with skewed samples against an exact picture most can be undecided, and less than one differs, as long as
+//! each pixel has met its rarest light some twenty times. More values reach farther into tails than their bulk tells: of 100 pairs of 12,288 values of
+//! 64 samples some fifteen are undecided where samples are normal, and two to four differ where half of them are black; with 256 samples up to one does.
 //! Guarantees: deterministic; pictures with values that are not finite differ.
 
 mod distributions;
@@ -103,7 +104,8 @@ pub struct ZTest {
     pub bulk_squared_z: Option<f64>,
     /// Degrees of freedom of the heaviest tails, by Student's t, that this is likely to come of; `None` for normal ones.
     pub degrees: Option<f64>,
-    /// Pixels that may be rejected with such tails, but for one picture in a hundred. Values count as pixels of three.
+    /// Pixels that may be rejected with such tails, but for one picture in a hundred. Values count as pixels of three, and as many pixels are allowed as
+    /// values that are independent: up to three times what chance rejects, for tails that are heavier far out than their bulk says.
     pub rejected_most: u64,
     /// The verdict on the values.
     pub verdict: Verdict,

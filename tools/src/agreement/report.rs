@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use clerestory::film::z_test::Verdict;
+use clerestory::film::z_test::{ACCEPTED_FRACTION, Verdict};
 use clerestory::film::{ZTest, atomic};
 use clerestory::gpu::Caps;
 use clerestory::{Error, Result};
@@ -78,9 +78,10 @@ impl SceneAgreement {
             .unwrap_or(Verdict::Same)
     }
 
-    /// Whether neither values nor blocks differ, and every sample is finite. What heavy tails leave undecided is no difference, and no agreement either.
+    /// Whether neither values nor blocks differ, and every sample is finite. What heavy tails leave undecided is no difference, as long as no more values
+    /// are rejected than [`ACCEPTED_FRACTION`] allows, and no agreement either.
     pub fn passes(&self) -> bool {
-        self.tested() != Verdict::Different && self.non_finite == 0
+        self.tested() != Verdict::Different && self.values.passes() && self.non_finite == 0
     }
 
     /// Whether the z-tests show that both agree.
@@ -294,9 +295,13 @@ impl AgreementReport {
                 page,
                 "- z-test of every value (pixel × channel), α = {} for the whole picture with Šidák's correction: a value is accepted with p ≥ {:.2e}. A picture \
                  agrees when all of its values are, and the mean of z² is that of normal numbers; of pictures that are right, each fails once in 100. It \
-                 differs when more values are rejected than tails as heavy as its z² shows explain. In between heavy tails leave it undecided. The means \
-                 of its blocks of 8 × 8 pixels are tested alike (p ≥ {:.2e}): they show eight times smaller differences, and the worse verdict counts.",
-                first.values.alpha, first.values.threshold, first.blocks.threshold
+                 differs when more values are rejected than tails as heavy as its z² shows explain, or more than {:.2} %. In between heavy tails leave it \
+                 undecided. The means of its blocks of 8 × 8 pixels are tested alike (p ≥ {:.2e}): they show eight times smaller differences, and the worse \
+                 verdict counts.",
+                first.values.alpha,
+                first.values.threshold,
+                100.0 * (1.0 - ACCEPTED_FRACTION),
+                first.blocks.threshold
             );
         }
         let _ = writeln!(
@@ -513,6 +518,12 @@ pub(crate) mod tests {
             text.contains("1 of 2 scenes agree, and heavy tails leave 1 undecided."),
             "{text}"
         );
+        // Tails heavy enough to explain half a per cent of rejected values do not excuse as many.
+        let mut heavy: Vec<f32> = even.iter().map(|z| z * 1.15).collect();
+        heavy[..60].fill(6.0);
+        let heavy = of(&heavy);
+        assert_eq!(heavy.verdict, Verdict::HeavyTails, "{heavy}");
+        assert_eq!(verdict(&mut report, heavy), ("**differs**", false));
         // The blocks alone.
         report.scenes[0].blocks = of(&with(300, 9.0));
         assert_eq!(verdict(&mut report, of(&even)), ("**differs**", false));

@@ -172,7 +172,7 @@ impl Study for Found {
                 |row| row.tests.into(),
             )
             .note(
-                "Synthetic kernels about the second and third hits of 2¹⁷ photons (2⁹ in a smoke run), as in `map-quality`; queries where the \
+                "Kernels of 2¹⁷ photons (2⁹ in a smoke run), footprints and stand-ins for them, as in `map-quality`; queries where the \
                  camera looks, one thread. Counts are exact. A kd-tree over points knows no kernel's extent: it asks every point as near as the \
                  widest kernel reaches, where boxes ask those of the leaves that hold the point. Its nodes of 16 and 20 bytes hold the points; \
                  those of boxes, 32 bytes a pair, do not. Bytes are of nodes and stack entries, not of kernels. Searches for the 50 nearest \

@@ -81,20 +81,20 @@ impl Ellipsoid {
         let [a, b, c] = self.inverse.map(|axis| axis.dot(way));
         a * a + b * b + c * c < 1.0
     }
-
-    /// The longest semi-axis, metres.
-    fn reach(&self) -> f32 {
-        let least = self
-            .inverse
-            .iter()
-            .map(|axis| axis.length())
-            .fold(f32::INFINITY, f32::min);
-        1.0 / least
-    }
 }
 
 fn sphere_holds(sphere: &Vec4, point: Vec3) -> bool {
     (sphere.truncate() - point).length_squared() < sphere.w * sphere.w
+}
+
+/// Semi-axes of a kernel on the surface, metres, the longer one first. The two axes that it has there are conjugate: skewed ones are shorter than the
+/// ellipse.
+fn semi_axes(kernel: &PhotonKernel) -> [f64; 2] {
+    let half = 0.5 * (kernel.along.length_squared() + kernel.across.length_squared());
+    let product = kernel_area(kernel);
+    // Of two squares that add up to 2 half and have the square of the product as theirs.
+    let longer = (half + (half * half - product * product).max(0.0).sqrt()).sqrt();
+    [longer, product / longer]
 }
 
 /// A kernel of a record: as [`kernel_weight`](clerestory::techniques::photon_mapping::kernel::kernel_weight) reads it.
@@ -214,7 +214,10 @@ impl Kernels {
                 .collect(),
             stretches: kernels
                 .iter()
-                .map(|kernel| kernel.along.length() / kernel.across.length())
+                .map(|kernel| {
+                    let [longer, shorter] = semi_axes(kernel);
+                    longer / shorter
+                })
                 .collect(),
             records: Records(Form::Footprints(pairs().map(record).collect())),
         }
@@ -293,13 +296,11 @@ impl Kernels {
 
     /// No point that a kernel holds is farther from its centre, metres.
     pub fn reach(&self) -> f32 {
-        let widest = match &self.records.0 {
-            Form::Spheres(all) => all.iter().map(|sphere| sphere.w).fold(0.0, f32::max),
-            Form::Ellipsoids(all) => all.iter().map(Ellipsoid::reach).fold(0.0, f32::max),
-            Form::Footprints(all) => all.iter().map(|footprint| footprint.along.length()).fold(0.0, f32::max),
-        };
+        // Area and ratio of the semi-axes give the longer one, and no kernel is thicker than that.
+        let squares = self.areas.iter().zip(&self.stretches);
+        let widest = squares.map(|(area, stretch)| area * stretch / std::f64::consts::PI);
         // Room for some thousand roundings: those of the kernel's test, and of its axes, which are perpendicular only up to theirs.
-        widest * (1.0 + 1e-4)
+        (widest.fold(0.0, f64::max).sqrt() * (1.0 + 1e-4)) as f32
     }
 
     /// What queries test, in an order of the kernels.
@@ -507,6 +508,26 @@ pub fn of_each_prepared<R>(context: &Context<'_>, mut rows: impl FnMut(&Prepared
     })
 }
 
+/// Records of skewed kernels, some tenths of a metre wide, on a sphere about the origin.
+#[cfg(test)]
+pub fn skewed_records(random: &mut Random, count: usize) -> Vec<PhotonRecord> {
+    let mut some = || 0.3 * random.direction().as_vec3();
+    let record = |_| {
+        let normal = some().normalize();
+        let along = some().reject_from(normal);
+        let across = (0.5 * along + 0.7 * normal.cross(along)).reject_from(normal);
+        PhotonRecord {
+            position: some(),
+            normal,
+            direction: -normal,
+            flux: Vec3::ONE,
+            along,
+            across,
+        }
+    };
+    (0..count).map(record).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use clerestory::techniques::photon_mapping::kernel::{KernelProfile, kernel_weight};
@@ -545,22 +566,8 @@ mod tests {
     #[test]
     fn footprints_hold_the_points_that_the_engines_kernels_weigh() {
         let mut random = Random::new(14);
+        let records = skewed_records(&mut random, 200);
         let mut some = || 0.3 * random.direction().as_vec3();
-        let records: Vec<PhotonRecord> = (0..200)
-            .map(|_| {
-                let normal = some().normalize();
-                let along = some().reject_from(normal);
-                let across = (0.5 * along + 0.7 * normal.cross(along)).reject_from(normal);
-                PhotonRecord {
-                    position: some(),
-                    normal,
-                    direction: -normal,
-                    flux: Vec3::ONE,
-                    along,
-                    across,
-                }
-            })
-            .collect();
         let kernels = Kernels::of_records(&records);
         let map = Map::new(&kernels, &kernels.linear(4)).unwrap();
         let mut held = 0;
@@ -582,6 +589,31 @@ mod tests {
             held += expected;
         }
         assert!(held > 100, "{held}");
+    }
+
+    #[test]
+    fn skewed_kernels_reach_farther_than_their_axes() {
+        let (along, beside) = (2.0 * Vec3::X, Vec3::new(0.9, 1.5, 0.0));
+        let record = PhotonRecord {
+            position: Vec3::new(1.0, 2.0, 3.0),
+            normal: Vec3::Z,
+            direction: Vec3::NEG_Z,
+            flux: Vec3::ONE,
+            along,
+            across: beside.cross(Vec3::Z),
+        };
+        let kernels = Kernels::of_records(&[record]);
+        let records = kernels.in_order(0..1);
+        // The ellipse of both, a thousandth smaller.
+        let rim = (0..720_u16).map(|i| {
+            let (sin, cos) = (f32::from(i) * std::f32::consts::PI / 360.0).sin_cos();
+            0.999 * (cos * along + sin * beside)
+        });
+        let held = rim.filter(|way| records.holds(0, record.position + *way));
+        let farthest = held.map(Vec3::length).fold(0.0, f32::max);
+        assert!(farthest > 1.1 * along.length(), "{farthest}");
+        let reach = kernels.reach();
+        assert!(reach > farthest && reach < 1.002 * farthest, "{reach} {farthest}");
     }
 
     #[test]

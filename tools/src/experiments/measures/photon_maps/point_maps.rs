@@ -54,37 +54,47 @@ impl<T: PointTree> PointMap<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::photon_kernels::{Map, Shape};
+    use super::super::photon_kernels::{Map, Shape, skewed_records};
     use super::super::photon_scenes::{CASES, Surfaces};
     use super::*;
+    use crate::random::Random;
     use clerestory::accel::yardstick::left_balanced::LeftBalancedTree;
     use clerestory::accel::yardstick::voxel_volume::VoxelVolumeTree;
+
+    /// All maps over kernels, at points.
+    fn check(kernels: &Kernels, points: &[Vec3]) {
+        let boxes = Map::new(kernels, &kernels.linear(8)).unwrap();
+        let centres = kernels.centres();
+        let balanced = PointMap::new(kernels, LeftBalancedTree::build(&centres).unwrap());
+        let by_volume = VoxelVolumeTree::build(&centres, kernels.reach()).unwrap();
+        let by_volume = PointMap::new(kernels, by_volume);
+        let mut sum = 0;
+        for point in points {
+            let mut works = [Work::default(); 3];
+            boxes.gather_compact(*point, &mut works[0]);
+            balanced.gather(*point, &mut works[1]);
+            by_volume.gather(*point, &mut works[2]);
+            assert_eq!(works.map(|work| work.contributions), [works[0].contributions; 3]);
+            assert_eq!(works[1].tests, works[2].tests);
+            assert!(works[1].tests <= works[1].tree.nodes);
+            sum += works[0].contributions;
+        }
+        assert!(sum > 0, "no kernel was found");
+        assert_eq!(balanced.nearest(points, 9).0, by_volume.nearest(points, 9).0);
+    }
 
     #[test]
     fn every_point_lies_in_the_kernels_of_the_compact_map() {
         let case = &CASES[0];
         let surfaces = Surfaces::load(case.scene).unwrap();
         let seen = surfaces.seen(12).unwrap();
-        for shape in Shape::ALL {
-            let kernels = Kernels::trace(&surfaces, case.light, 1000, 40.0, shape);
-            let boxes = Map::new(&kernels, &kernels.linear(8)).unwrap();
-            let centres = kernels.centres();
-            let balanced = PointMap::new(&kernels, LeftBalancedTree::build(&centres).unwrap());
-            let by_volume = VoxelVolumeTree::build(&centres, kernels.reach()).unwrap();
-            let by_volume = PointMap::new(&kernels, by_volume);
-            let mut sum = 0;
-            for point in &seen {
-                let mut works = [Work::default(); 3];
-                boxes.gather_compact(*point, &mut works[0]);
-                balanced.gather(*point, &mut works[1]);
-                by_volume.gather(*point, &mut works[2]);
-                assert_eq!(works.map(|work| work.contributions), [works[0].contributions; 3]);
-                assert_eq!(works[1].tests, works[2].tests);
-                assert!(works[1].tests <= works[1].tree.nodes);
-                sum += works[0].contributions;
-            }
-            assert!(sum > 0, "no kernel was found");
-            assert_eq!(balanced.nearest(&seen, 9).0, by_volume.nearest(&seen, 9).0);
+        for shape in [Shape::Spheres, Shape::Ellipsoids] {
+            check(&Kernels::trace(&surfaces, case.light, 1000, 40.0, shape), &seen);
         }
+        // Skewed footprints, the widest of which reach farther than their axes.
+        let mut random = Random::new(15);
+        let kernels = Kernels::of_records(&skewed_records(&mut random, 400));
+        let points: Vec<Vec3> = (0..300).map(|_| 0.3 * random.direction().as_vec3()).collect();
+        check(&kernels, &points);
     }
 }
