@@ -106,18 +106,22 @@ fn levels(halves: &[[Vec<f64>; 2]], width: usize, kind: Truth) -> Vec<Vec<f64>> 
     halves.iter().map(of_channel).collect()
 }
 
-/// The relative MSE of either picture of a pair, relative to the true radiance by channel and pixel.
+/// The relative MSE of either picture of a pair, relative to the true radiance by channel and pixel. Pixels that are not finite are left out.
 fn noise_of_pair([a, b]: [&Picture; 2], levels: &[Vec<f64>], epsilon: f64, kind: Truth) -> Result<NoiseEstimate> {
     let (width, height) = (a.width() as usize, a.height() as usize);
     let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
     let mut tiles = Tiles::new(width, height);
     let mut squares = 0.0_f64;
+    let mut measured = 0_usize;
     for pixel in 0..width * height {
-        let mut of_pixel = 0.0_f64;
+        let mut of_pixel = Some(0.0_f64);
         for (channel, levels) in levels.iter().enumerate() {
-            let (a, b) = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]).unwrap_or_default();
-            of_pixel += relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon);
+            let both = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]);
+            let square = both.map(|(a, b)| relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon));
+            of_pixel = of_pixel.zip(square).map(|(sum, square)| sum + square);
         }
+        let Some(of_pixel) = of_pixel else { continue };
+        measured += 1;
         squares += of_pixel * of_pixel;
         tiles.add(pixel, of_pixel / 3.0);
     }
@@ -126,7 +130,7 @@ fn noise_of_pair([a, b]: [&Picture; 2], levels: &[Vec<f64>], epsilon: f64, kind:
         relative_mse,
         deviation: match kind {
             // Var x ≤ E x² for each pixel, whose channels count as one.
-            Truth::Neighbourhood => squares.sqrt() / (3 * (width * height).max(1)) as f64,
+            Truth::Neighbourhood => squares.sqrt() / (3 * measured.max(1)) as f64,
             Truth::Pixel => by_tiles,
         },
     })
