@@ -4,6 +4,7 @@ pub mod accumulate;
 pub mod exr;
 pub mod gpu_film;
 pub mod hdr;
+pub mod mark;
 pub mod metrics;
 pub mod picture;
 pub mod pixel_format;
