@@ -5,7 +5,7 @@ program=${1:-clerestory}
 folder=$(dirname "$0")/path-sets
 part() {
     "$program" render 'builtin:cornell-box?sphere=glass' --size 192x192 --spp "${SPP:-1024}" --exposure 1 --path-set "$2" \
-        -o "$folder/$1.png" --stats none
+        -o "$folder/$1.png" --overwrite --stats none
     rm -f "$folder/$1.json"
 }
 part all 'all'

@@ -25,10 +25,11 @@
 //! 7. [`render`], which ties them together.
 //! 8. [`plan`], which chooses among them.
 //!
-//! [`catalogue`] has the rows that say where each published method lives; [`settings`](mod@settings), [`error`], [`fingerprint`] and [`srgb`] serve
-//! all floors.
+//! [`catalogue`] has the rows that say where each published method lives; [`settings`](mod@settings), [`error`], [`atomic`], [`fingerprint`] and
+//! [`srgb`] serve all floors.
 
 pub mod accel;
+pub mod atomic;
 pub mod catalogue;
 pub mod error;
 pub mod film;

@@ -5,6 +5,7 @@ mod failure;
 mod frame_report;
 mod options;
 mod output;
+mod outputs;
 mod pictures;
 mod stop;
 

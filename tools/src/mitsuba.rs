@@ -14,7 +14,7 @@ mod surface;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use clerestory::film::{Picture, exr};
+use clerestory::film::{Picture, atomic, exr};
 use clerestory::scene::{Camera, Environment, LightKind, Projection, Scene};
 use clerestory::{Error, Result};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
@@ -136,11 +136,7 @@ pub fn export_with(
 
     std::fs::create_dir_all(dir).map_err(|cause| Error::io(dir, cause))?;
     let mut files = Vec::new();
-    let write = |path: PathBuf, bytes: &[u8]| {
-        std::fs::write(&path, bytes)
-            .map_err(|cause| Error::io(&path, cause))
-            .map(|()| path)
-    };
+    let write = |path: PathBuf, bytes: &[u8]| atomic::write(&path, bytes).map(|()| path);
     for (index, shape) in shapes.iter().enumerate() {
         files.push(write(dir.join(mesh_file(index)), &mesh::to_ply(shape))?);
     }

@@ -301,12 +301,12 @@ fn settings_reach_the_technique_and_the_reference_is_measured() -> Tested {
     assert_eq!(report["error"]["mse"], 0.0);
     assert!(png.exists() && png.with_extension("json").exists() && !png.with_extension("exr").exists());
 
-    // A picture never takes the place of what it is compared with.
+    // A picture never takes the place of what it is compared with; outputs.rs has all other commands.
     let [r, o] = [text(&reference); 2];
     refuse(
         &["render", "--reference", r, "-o", o],
         2,
-        &["reference's place", "--seed"],
+        &["this command reads it", "another output"],
     )?;
 
     // Independent samples are other samples, and other light paths are pointed out.

@@ -2,7 +2,7 @@
 //!
 //! Written are single-part scan-line files, f32, ZIP (16 lines per block). The `radiance` layer takes the plain channels R, G, B (Y when it has one
 //! channel), which every reader shows; other layers are named as in the OpenEXR technical introduction ("layers"): `albedo.R`, `normal.X`,
-//! `depth.Z`, `samples.Y`. Metadata are string attributes, UTF-8.
+//! `depth.Z`, `samples.Y`. Metadata are string attributes, UTF-8; the standard attribute `software` names the engine.
 //! Guarantees: equal pictures give equal bytes (attributes stand in the order of their names); values round-trip to the bit; files appear as a whole.
 //! Read are flat files of any part, channel and pixel type; deep data and subsampled channels are refused.
 
@@ -12,6 +12,7 @@ use std::path::Path;
 use exr::meta::attribute::AttributeValue;
 use exr::prelude::*;
 
+use super::mark::SOFTWARE;
 use super::picture::{DEPTH, Metadata, NORMAL, POSITION, Picture, RADIANCE};
 use crate::Error as EngineError;
 use crate::Result as EngineResult;
@@ -20,7 +21,7 @@ use crate::catalogue::{Role, Row, sources};
 /// Samples (values, not pixels) that a file may hold in all; a header asking for more is refused before anything is allocated.
 const MAX_SAMPLES: usize = 1 << 29;
 
-/// Attributes that the writing library sets and that are not metadata of a picture's making.
+/// Attributes that writing sets and that are not metadata of a picture's making.
 const LIBRARY_ATTRIBUTES: [&str; 1] = ["software"];
 
 /// Writes all layers and the metadata, as a whole or not at all.
@@ -65,7 +66,10 @@ pub fn to_bytes(picture: &Picture, name: &str) -> EngineResult<Vec<u8>> {
     if channels.is_empty() {
         return Err(wrong("has no layer to write".into()));
     }
-    let mut attributes = LayerAttributes::default();
+    let mut attributes = LayerAttributes {
+        software_name: Text::new_or_none(SOFTWARE),
+        ..LayerAttributes::default()
+    };
     for (key, value) in picture.metadata.entries() {
         if key.is_empty() || !key.is_ascii() || key.len() > 255 || key.contains('\0') {
             return Err(wrong(format!("metadata key {key:?} is not 1 to 255 ASCII characters")));
@@ -285,6 +289,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/exr.rs::every_bit_and_every_attribute_comes_back",
         "engine/src/film/hdr.rs::round_trip_errs_by_at_most_a_step_of_the_largest_channel",
         "engine/src/film/png.rs::a_written_file_reads_back_to_the_byte",
+        "engine/src/film/mark.rs::every_format_bears_the_mark",
+        "engine/src/atomic.rs::modes_and_links_stay",
     ],
     api: &["clerestory::film::exr::write", "clerestory::film::exr::read"],
     ..Row::of(file!())

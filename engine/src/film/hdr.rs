@@ -8,6 +8,7 @@ use std::path::Path;
 
 use image::{ImageDecoder, ImageEncoder};
 
+use super::mark::SOFTWARE;
 use super::picture::Picture;
 use crate::{Error, Result};
 
@@ -48,8 +49,20 @@ pub fn read_from(source: impl BufRead + Seek, name: &str) -> Result<Picture> {
 /// [`Error::Picture`] when a value is negative or not finite, [`Error::Io`] when the file cannot be written.
 pub fn write(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
     let path = path.as_ref();
+    let bytes = to_bytes(picture, &path.display().to_string())?;
+    super::atomic::write(path, &bytes)
+}
+
+/// The first line of files, the signature.
+const SIGNATURE: &[u8] = b"#?RADIANCE\n";
+
+/// The file's bytes; `name` is for messages.
+///
+/// # Errors
+/// [`Error::Picture`] as for [`write()`].
+pub fn to_bytes(picture: &Picture, name: &str) -> Result<Vec<u8>> {
     let wrong = |cause: String| Error::Picture {
-        path: path.display().to_string(),
+        path: name.to_owned(),
         cause,
     };
     let values: Vec<f32> = picture.main_layer()?.pixels().flatten().collect();
@@ -69,7 +82,12 @@ pub fn write(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
             image::ExtendedColorType::Rgb32F,
         )
         .map_err(|e| wrong(e.to_string()))?;
-    super::atomic::write(path, &bytes)
+    if !bytes.starts_with(SIGNATURE) {
+        return Err(wrong("the encoder wrote another signature than Radiance's".into()));
+    }
+    let line = format!("SOFTWARE={SOFTWARE}\n");
+    bytes.splice(SIGNATURE.len()..SIGNATURE.len(), line.into_bytes());
+    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Floor 2: pictures. Accumulation, files, tone curves, error metrics.
 
 pub mod accumulate;
-pub mod atomic;
 pub mod exr;
 pub mod gpu_film;
 pub mod hdr;
+pub mod mark;
 pub mod metrics;
 pub mod picture;
 pub mod pixel_format;
@@ -12,6 +12,7 @@ pub mod png;
 pub mod tone;
 pub mod z_test;
 
+pub use crate::atomic;
 pub use accumulate::{Accumulator, TwoFloat};
 pub use gpu_film::{FilmBand, GpuFilm, Step};
 pub use metrics::{CompareOptions, ErrorReport, compare};

@@ -2,12 +2,13 @@
 //!
 //! False colours follow D. A. Green, *A colour scheme for the display of astronomical intensity images*, Bull. Astr. Soc. India 39 (2011), §3
 //! ("cubehelix"): lightness grows evenly with the value, in colour, in grey print and for the colour-blind.
-//! Guarantees: deterministic bytes; atomic writes.
+//! Guarantees: deterministic bytes; atomic writes. A text chunk, `Software`, names the engine.
 
 use std::path::Path;
 
 use image::ImageEncoder;
 
+use super::mark::SOFTWARE;
 use super::picture::Layer;
 use super::tone::{NAN_COLOR, ToneMap};
 use crate::srgb::quantize;
@@ -106,6 +107,18 @@ fn from_pixels(width: u32, pixels: impl ExactSizeIterator<Item = [u8; 3]>) -> Rg
 /// [`Error::Picture`] when it cannot be encoded, [`Error::Io`] when it cannot be written.
 pub fn write(path: impl AsRef<Path>, picture: &Rgb8) -> Result<()> {
     let path = path.as_ref();
+    let bytes = to_bytes(picture, &path.display().to_string())?;
+    super::atomic::write(path, &bytes)
+}
+
+/// Bytes of the signature and of the first chunk, IHDR, with its length, name and check sum (PNG specification, third edition, §5.2 and §11.2.1).
+const BEFORE_CHUNKS: usize = 8 + 4 + 4 + 13 + 4;
+
+/// The file's bytes; `name` is for messages.
+///
+/// # Errors
+/// [`Error::Picture`] as for [`write()`].
+pub fn to_bytes(picture: &Rgb8, name: &str) -> Result<Vec<u8>> {
     let expected = picture.width as usize * picture.height as usize * 3;
     let mut bytes = Vec::new();
     let encoded = if picture.bytes.len() == expected {
@@ -121,10 +134,28 @@ pub fn write(path: impl AsRef<Path>, picture: &Rgb8) -> Result<()> {
         Err(format!("holds {} bytes in place of {expected}", picture.bytes.len()))
     };
     encoded.map_err(|cause| Error::Picture {
-        path: path.display().to_string(),
+        path: name.to_owned(),
         cause,
     })?;
-    super::atomic::write(path, &bytes)
+    bytes.splice(BEFORE_CHUNKS..BEFORE_CHUNKS, text_chunk("Software", SOFTWARE));
+    Ok(bytes)
+}
+
+/// A chunk tEXt, which holds a key and a text in Latin-1 (§11.3.3.2).
+fn text_chunk(key: &str, text: &str) -> Vec<u8> {
+    let content = [&b"tEXt"[..], key.as_bytes(), b"\0", text.as_bytes()].concat();
+    let length = (content.len() - 4) as u32;
+    let check = crc32(&content);
+    [&length.to_be_bytes()[..], &content, &check.to_be_bytes()].concat()
+}
+
+/// The check sum of chunks (annex D).
+fn crc32(bytes: &[u8]) -> u32 {
+    const POLYNOMIAL: u32 = 0xedb8_8320;
+    let bit = |crc: u32, _| (crc >> 1) ^ (POLYNOMIAL & (crc & 1).wrapping_neg());
+    !bytes
+        .iter()
+        .fold(!0u32, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), bit))
 }
 
 #[cfg(test)]
@@ -149,6 +180,14 @@ mod tests {
         assert_eq!((read.width(), read.height()), (5, 3));
         assert_eq!(read.into_raw(), mapped.bytes);
         Ok(())
+    }
+
+    #[test]
+    fn check_sums_are_those_of_the_standard() {
+        // The check value of CRC-32/ISO-HDLC.
+        assert_eq!(crc32(b"123456789"), 0xcbf4_3926);
+        // The last chunk of every PNG file.
+        assert_eq!(crc32(b"IEND"), 0xae42_6082);
     }
 
     #[test]

@@ -1,12 +1,10 @@
 //! The on-disk pipeline cache, one file a device and driver version.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
 
 use ash::vk;
 
-/// Tells apart the temporary files of several devices in one process.
-static SAVES: AtomicU32 = AtomicU32::new(0);
+use crate::{Error, atomic};
 
 /// A `VkPipelineCache` and where it is kept. A cache that cannot be read or written is not an error: pipelines are then compiled again.
 pub(super) struct PipelineCache {
@@ -42,15 +40,13 @@ impl PipelineCache {
         let Ok(data) = (unsafe { device.get_pipeline_cache_data(self.raw) }) else {
             return;
         };
-        let turn = SAVES.fetch_add(1, Ordering::Relaxed);
-        let temporary = file.with_extension(format!("{}-{turn}.tmp", std::process::id()));
-        let written = file
+        let made = file
             .parent()
             .map_or(Ok(()), std::fs::create_dir_all)
-            .and_then(|()| std::fs::write(&temporary, data))
-            .and_then(|()| std::fs::rename(&temporary, file));
+            .map_err(|error| Error::io(file, error));
+        let written = made.and_then(|()| atomic::write_unlinked(file, &data));
         if let Err(error) = written {
-            tracing::debug!("pipeline cache {}: {error}", file.display());
+            tracing::debug!("pipeline cache {error}");
         }
     }
 

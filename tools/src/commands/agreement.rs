@@ -14,6 +14,7 @@ use super::progress::Bar;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output;
+use crate::outputs::{self, Inputs, Outputs, Overwriting};
 
 /// Compares converged pictures with those of Mitsuba 3, within their noise, and measures both renderers' time to equal error
 #[derive(Debug, Args)]
@@ -72,6 +73,8 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    overwriting: Overwriting,
+    #[command(flatten)]
     device: DeviceOptions,
 }
 
@@ -111,6 +114,16 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         keep: arguments.keep,
     };
     options.check()?;
+    let inputs = Inputs::of(&arguments.python);
+    let overwrite = arguments.overwriting.overwrite;
+    outputs::check_folder(&arguments.output, &inputs)?;
+    if let Some(prefix) = &arguments.results {
+        let files = ["json", "md"].map(|ending| prefix.with_extension(ending));
+        Outputs::plan(&files, &inputs, overwrite)?;
+    }
+    if let Some(page) = &arguments.page {
+        outputs::check_page(page, &inputs)?;
+    }
     let gpu = arguments.device.open()?;
     let bar = Bar::start()?;
     let report = run_with(&gpu, &options, &bar);

@@ -15,6 +15,7 @@ use super::{check_validation, index, index_peers, sort_rates};
 use crate::failure::{Failure, Outcome};
 use crate::options::{DeviceOptions, Size, parse_size};
 use crate::output::{self, Table};
+use crate::outputs::{self, Inputs, Outputs, Overwriting};
 
 /// Measures paths and rays per second of the path tracer: medians of repeated runs
 #[derive(Debug, Args)]
@@ -57,6 +58,8 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    overwriting: Overwriting,
+    #[command(flatten)]
     device: DeviceOptions,
 }
 
@@ -87,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         [] => defaults.iter().map(|scene| (*scene).to_owned()).collect(),
         given => given.to_vec(),
     };
+    check_outputs(arguments)?;
     let gpu = arguments.device.open()?;
     if of_kernels {
         return run_kernels(gpu, arguments, &scenes(&index::SCENES));
@@ -136,6 +140,25 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     ));
     output::print(&format!("{head}\n{}", table.text()))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Checks all that will be written, before anything is measured.
+fn check_outputs(arguments: &Arguments) -> Outcome {
+    let mut inputs = Inputs::default();
+    for address in &arguments.scenes {
+        inputs.add_address(address);
+    }
+    if let Some(folder) = &arguments.folder {
+        let of_indexes = index_peers::FILES.iter().filter(|_| !arguments.sort);
+        for names in [sort_rates::FILES.iter().collect(), of_indexes.collect::<Vec<_>>()] {
+            let files: Vec<PathBuf> = names.into_iter().map(|name| folder.join(name)).collect();
+            Outputs::plan(&files, &inputs, arguments.overwriting.overwrite)?;
+        }
+    }
+    match &arguments.page {
+        Some(page) => outputs::check_page(page, &inputs),
+        None => Ok(()),
+    }
 }
 
 /// The part of a page that holds the rates of sorts.

@@ -10,6 +10,7 @@ use clerestory::film::{CompareOptions, ErrorReport, Picture, ToneMap, ZTest, com
 
 use super::render::Tone;
 use crate::failure::{Code, Failure, Outcome};
+use crate::outputs::{Inputs, Outputs, Overwriting};
 use crate::{output, pictures};
 
 /// Compares a picture with a reference: all error metrics, and a difference picture
@@ -48,6 +49,8 @@ pub struct Arguments {
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwriting: Overwriting,
 }
 
 /// Reads a finite number.
@@ -159,6 +162,11 @@ fn noise_test(test: &Picture, reference: &Picture) -> Outcome<Option<ZTest>> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let diff = arguments
+        .diff
+        .as_deref()
+        .map(|path| plan(arguments, path))
+        .transpose()?;
     let (test, reference) = (
         pictures::read(&arguments.picture)?,
         pictures::read(&arguments.reference)?,
@@ -182,13 +190,16 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     };
     let report = compare(&test, &reference, &options)?;
     let noise = noise_test(&test, &reference)?;
-    if let Some(path) = &arguments.diff {
+    let mut unwritten = Ok(());
+    if let Some(plan) = &diff {
         let scale = arguments.diff_scale.unwrap_or_else(|| difference_scale(&report));
-        write_difference(path, &test, &reference, scale)?;
+        let picture = png::difference(test.main_layer()?, reference.main_layer()?, test.width(), scale)?;
+        let written = plan.write(&[png::to_bytes(&picture, "the difference")?], || None);
         output::note(&format!(
             "{}: full colour is a difference of {scale:.3e}",
-            path.display()
+            written.names()
         ));
+        unwritten = written.check();
     }
     let exceeded = exceeded(&report, &arguments.threshold);
     if arguments.json {
@@ -205,6 +216,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             .unwrap_or_default();
         output::print(&format!("{report}\n{noise}"))?;
     }
+    unwritten?;
     if exceeded.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
@@ -227,9 +239,16 @@ fn difference_scale(report: &ErrorReport) -> f32 {
     if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }
 }
 
-fn write_difference(path: &Path, test: &Picture, reference: &Picture, scale: f32) -> Outcome {
-    let picture = png::difference(test.main_layer()?, reference.main_layer()?, test.width(), scale)?;
-    Ok(png::write(path, &picture)?)
+/// The plan of the difference picture.
+fn plan(arguments: &Arguments, path: &Path) -> Outcome<Outputs> {
+    if pictures::extension(path) != "png" {
+        return Err(Failure::usage(format!(
+            "--diff {}: the difference is written as .png",
+            path.display()
+        )));
+    }
+    let inputs = Inputs::of([&arguments.picture, &arguments.reference]);
+    Outputs::one(path, &inputs, arguments.overwriting.overwrite)
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ use super::{check_validation, index_peers};
 use crate::failure::{Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output::{self, Table};
+use crate::outputs::{self, Inputs, Outputs, Overwriting};
 
 /// Compares ray indexes: build time, surface area cost, depth, and what rays visit
 #[derive(Debug, Args)]
@@ -58,6 +59,8 @@ pub struct Arguments {
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwriting: Overwriting,
     #[command(flatten)]
     device: DeviceOptions,
 }
@@ -152,6 +155,17 @@ fn reinserted(reinsertions: u32) -> LbvhSettings {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let mut inputs = Inputs::default();
+    for address in &arguments.scenes {
+        inputs.add_address(address);
+    }
+    if let Some(folder) = &arguments.folder {
+        let files = index_peers::FILES.map(|name| folder.join(name));
+        Outputs::plan(&files, &inputs, arguments.overwriting.overwrite)?;
+    }
+    if let Some(page) = &arguments.page {
+        outputs::check_page(page, &inputs)?;
+    }
     let gpu = arguments.device.open()?;
     if arguments.peers {
         let settings = index_peers::Settings {

@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use clerestory::Error;
 use clerestory::film::{Picture, exr, hdr};
 use clerestory::maps::resample::{MAX_SAMPLES, Reconstruction, ResampleSettings, resample_watched};
 use clerestory::maps::{MapImage, Parametrization};
-use clerestory::{Error, Result};
 use glam::{DMat3, DVec3, UVec2, Vec3};
 
 use crate::failure::{Code, Failure, Outcome};
 use crate::output::{self, Table};
+use crate::outputs::{Inputs, Outputs, Overwriting};
 use crate::pictures;
 use crate::stop::Stop;
 
@@ -62,6 +63,8 @@ pub struct Arguments {
     /// Prints JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwriting: Overwriting,
 }
 
 /// What a map is between its texels' centres.
@@ -90,6 +93,8 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             arguments.output.display()
         )));
     }
+    let inputs = Inputs::of([&arguments.input]);
+    let plan = Outputs::one(&arguments.output, &inputs, arguments.overwriting.overwrite)?;
     let picture = pictures::read(&arguments.input)?;
     let source = source(arguments, &picture)?;
     let size = arguments
@@ -110,13 +115,20 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         return Ok(Code::Interrupted.into());
     };
     let (extent, texels) = converted.to_strip(arguments.border)?;
-    let mut written = Picture::from_radiance(extent.x, extent.y, texels.iter().flat_map(Vec3::to_array).collect())?;
-    written.metadata = picture.metadata.clone();
+    let mut map = Picture::from_radiance(extent.x, extent.y, texels.iter().flat_map(Vec3::to_array).collect())?;
+    map.metadata = picture.metadata.clone();
     let facts = [("map", to.to_string()), ("map_border", arguments.border.to_string())];
     let facts = facts.map(|(key, value)| (format!("clerestory.{key}"), value));
-    written.metadata.other.extend(facts);
-    write(&arguments.output, &written)?;
-    report(arguments, &source, &converted)?;
+    map.metadata.other.extend(facts);
+    let name = arguments.output.display().to_string();
+    let bytes = match ending.as_str() {
+        "hdr" => hdr::to_bytes(&map, &name)?,
+        _ => exr::to_bytes(&map, &name)?,
+    };
+    let written = plan.write(&[bytes], || None);
+    let place = written.paths.first().unwrap_or(&arguments.output);
+    report(arguments, place, &source, &converted)?;
+    written.check()?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -187,20 +199,6 @@ fn check_output(to: Parametrization, size: UVec2, border: u32) -> Outcome<()> {
     Ok(())
 }
 
-fn write(path: &Path, picture: &Picture) -> Result<()> {
-    if let Some(folder) = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty() && !folder.exists())
-    {
-        std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?;
-        output::note(&format!("made folder {}", folder.display()));
-    }
-    match pictures::extension(path).as_str() {
-        "hdr" => hdr::write(path, picture),
-        _ => exr::write(path, picture),
-    }
-}
-
 /// The integral of radiance over the sphere.
 #[derive(Debug, serde::Serialize)]
 struct Held {
@@ -223,8 +221,8 @@ fn held(file: &Path, image: &MapImage) -> Held {
     }
 }
 
-fn report(arguments: &Arguments, source: &MapImage, converted: &MapImage) -> Outcome {
-    let both = [held(&arguments.input, source), held(&arguments.output, converted)];
+fn report(arguments: &Arguments, place: &Path, source: &MapImage, converted: &MapImage) -> Outcome {
+    let both = [held(&arguments.input, source), held(place, converted)];
     let [before, after] = &both;
     let difference = DVec3::from(after.integral) - DVec3::from(before.integral);
     let relative: Vec<Option<f64>> = (0..3)

@@ -49,8 +49,10 @@ Each command explains itself: clerestory render --help
 
 Exit codes:
   0    done
-  1    the run failed: device lost, out of memory, a picture that cannot be read, a file that cannot be written
-  2    the command line or a setting asks for the impossible; pictures to compare have different sizes
+  1    the run failed: device lost, out of memory, a picture that cannot be read, a file that cannot be written (a picture is then
+       kept in the system's folder for temporary files, which the error names)
+  2    the command line or a setting asks for the impossible; pictures to compare have different sizes; an output is a file that the
+       command reads or, without --overwrite, one that this program did not write
   3    the scene is missing or cannot be read, or the technique cannot render it
   4    pictures differ beyond a --threshold, or renderers beyond their noise; a hard case fails
   5    no Vulkan device, or none that can do it

@@ -27,6 +27,7 @@ use super::check_validation;
 use super::compare::finite;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::{DeviceOptions, Size, parse_duration, parse_size};
+use crate::outputs::{Inputs, Outputs, Overwriting, Written};
 use crate::{frame_report, output, pictures};
 use choice::ChoiceReport;
 use files::{Document, ErrorAgainst, Files};
@@ -51,6 +52,9 @@ Examples:
 Beside a model NAME.gltf, NAME.scene.toml may say what glTF cannot: environment map, measured metals, aperture, exposure, technique.
 
 Ctrl-C stops after the current step and writes the picture so far, with exit code 130; a second one stops at once and writes nothing. \
+Files that are read, or that this program did not write, are refused as output before the rendering begins. An interrupted picture does not replace one with more \
+samples, nor any picture one that came to its place in the meantime: it is written beside it, as NAME-2.exr. What cannot be written in the end is kept in the \
+system's folder for temporary files, which the error names. \
 `clerestory list` names the techniques and their settings, `clerestory scenes` the generated scenes.")]
 pub struct Arguments {
     /// A scene file (gltf, glb, ply, obj, toml) or `builtin:` address
@@ -126,6 +130,8 @@ pub struct Arguments {
     /// Tone curve of the PNG
     #[arg(long, value_enum, default_value_t = Tone::Srgb)]
     tone: Tone,
+    #[command(flatten)]
+    overwriting: Overwriting,
     #[command(flatten)]
     device: DeviceOptions,
 }
@@ -239,14 +245,11 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let reference = arguments.reference.as_deref().map(pictures::read).transpose()?;
     let options = options(arguments, &scene, reference.as_ref())?;
     let files = Files::choose(arguments.output.as_deref(), &scene.name)?;
-    if let Some(reference) = arguments.reference.as_deref().filter(|file| files.write_over(file)) {
-        return Err(Failure::usage(format!(
-            "{}: the picture would take the reference's place",
-            reference.display()
-        ))
-        .hint("-o NAME.exr writes it elsewhere; another --seed makes it independent of the reference"));
-    }
-    files.prepare()?;
+    let outputs = Outputs::plan(
+        &files.all(),
+        &inputs(arguments, &scene),
+        arguments.overwriting.overwrite,
+    )?;
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
     let interruptible = Interruptible::start()?;
@@ -291,20 +294,31 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         error,
     };
     let layers: Vec<&str> = arguments.aov.iter().map(|aov| aov.layer()).collect();
-    files.write(&rendered.picture, &layers, &document)?;
+    let written = files.write(&outputs, &rendered.picture, &layers, &document)?;
     let why = match (&plan, &arguments.technique, &scene.defaults.technique) {
         (Some(plan), ..) => Why::Chosen(plan.goal),
         (None, Some(_), _) => Why::Asked,
         (None, None, Some(_)) => Why::Scene,
         (None, None, None) => Why::Default,
     };
-    conclude(arguments, &document, &rendered.picture, &files, why)?;
+    conclude(arguments, &document, &rendered.picture, &written, why)?;
+    written.check()?;
     check_validation(&validation)?;
     Ok(if interrupted {
         Code::Interrupted.into()
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// All files that are read.
+fn inputs(arguments: &Arguments, scene: &Scene) -> Inputs {
+    let mut inputs = Inputs::of(&arguments.reference);
+    inputs.add_scene(&arguments.scene, scene);
+    if let Some(file) = arguments.settings.as_deref().and_then(|text| text.strip_prefix('@')) {
+        inputs.add(file);
+    }
+    inputs
 }
 
 fn options(arguments: &Arguments, scene: &Scene, reference: Option<&Picture>) -> Outcome<RenderOptions> {
@@ -451,10 +465,10 @@ fn measure(arguments: &Arguments, rendered: &Rendered, reference: &Picture, tone
 }
 
 /// Says what came out.
-fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, files: &Files, why: Why) -> Outcome {
+fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, written: &Written, why: Why) -> Outcome {
     match arguments.stats {
         Statistics::None => {}
-        Statistics::Summary => output::print(&summary::text(document, picture, files, why))?,
+        Statistics::Summary => output::print(&summary::text(document, picture, &written.names(), why))?,
         Statistics::Json => output::print_json(document)?,
         Statistics::Table => {
             let mut text = frame_report::text(document.report);
@@ -498,7 +512,7 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, f
     }
     // The summary begins with them.
     if arguments.stats != Statistics::Summary {
-        output::note(&format!("wrote {}", files.names()));
+        output::note(&format!("wrote {}", written.names()));
     }
     Ok(())
 }

@@ -335,6 +335,9 @@ pub fn markdown(rates: &[Rate]) -> String {
     text
 }
 
+/// The files in a folder; a plot may be left out.
+pub const FILES: [&str; 4] = ["sort.json", "sort.csv", "sort-keys.svg", "sort-pairs.svg"];
+
 /// Writes `sort.json`, `sort.csv` and for each load a plot into a folder.
 pub fn write(folder: &Path, rates: &[Rate], head: &serde_json::Value) -> Outcome {
     std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
@@ -421,8 +424,9 @@ mod tests {
         );
         let folder = tempfile::tempdir().unwrap();
         assert!(write(folder.path(), &rates, &serde_json::json!({})).is_ok());
-        for name in ["sort.json", "sort.csv", "sort-keys.svg", "sort-pairs.svg"] {
+        for name in FILES {
             assert!(folder.path().join(name).is_file(), "{name}");
         }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), FILES.len());
     }
 }

@@ -17,6 +17,7 @@ use super::check_validation;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output::{self, Table};
+use crate::outputs::{Inputs, Outputs, Overwriting};
 
 /// Runs the hard cases: extreme scales, slivers, grazing light, lights without power, media as thin as air … and says which pass
 #[derive(Debug, Args)]
@@ -29,7 +30,7 @@ Examples:
   clerestory stability scales far-from-origin
   clerestory stability --technique path
   clerestory stability --list                        what each case breaks, and the expected result
-  clerestory stability --pictures docs/hard-cases    a small picture of each case
+  clerestory stability --pictures docs/hard-cases    a small picture of each case; --overwrite where others lie there
   clerestory stability --markdown > docs/stability.md")]
 pub struct Arguments {
     /// Only these cases
@@ -50,6 +51,8 @@ pub struct Arguments {
     /// Writes a small picture of each case to this folder instead of running it
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["markdown", "json"])]
     pictures: Option<PathBuf>,
+    #[command(flatten)]
+    overwriting: Overwriting,
     #[command(flatten)]
     device: DeviceOptions,
 }
@@ -73,11 +76,16 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         list(&cases, &subjects, arguments.json)?;
         return Ok(ExitCode::SUCCESS);
     }
+    let pictures = arguments
+        .pictures
+        .as_deref()
+        .map(|folder| plan(&cases, folder, arguments.overwriting.overwrite))
+        .transpose()?;
     let gpu = arguments.device.open()?;
     let log = gpu.validation_log();
     let device = format!("{} ({})", gpu.caps().device, gpu.caps().driver);
-    if let Some(folder) = &arguments.pictures {
-        paint(&gpu, &cases, folder)?;
+    if let Some(plans) = &pictures {
+        paint(&gpu, &cases, plans)?;
         drop(gpu);
         check_validation(&log)?;
         return Ok(ExitCode::SUCCESS);
@@ -203,9 +211,18 @@ fn table(outcomes: &[&Judged]) -> String {
 /// Pixels along a side of the cases' pictures, and their samples.
 const PICTURE: (u32, u32) = (64, 512);
 
-fn paint(gpu: &Gpu, cases: &[&HardCase], folder: &Path) -> Outcome {
-    std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?;
-    for case in cases {
+/// The plans of the cases' pictures; all are checked before one is painted.
+fn plan(cases: &[&HardCase], folder: &Path, overwrite: bool) -> Outcome<Vec<Outputs>> {
+    let path = |case: &&HardCase| folder.join(format!("{}.png", case.name));
+    let plans = cases
+        .iter()
+        .map(path)
+        .map(|path| Outputs::one(&path, &Inputs::default(), overwrite));
+    plans.collect()
+}
+
+fn paint(gpu: &Gpu, cases: &[&HardCase], plans: &[Outputs]) -> Outcome {
+    for (case, plan) in cases.iter().zip(plans) {
         let options = RenderOptions {
             size: [PICTURE.0; 2],
             spp: PICTURE.1,
@@ -219,13 +236,14 @@ fn paint(gpu: &Gpu, cases: &[&HardCase], folder: &Path) -> Outcome {
             rendered => rendered?,
         };
         let layer = rendered.picture.main_layer()?;
-        let path = folder.join(format!("{}.png", case.name));
         let tone = ToneMap {
             exposure: exposure(layer.values()),
             ..ToneMap::default()
         };
-        png::write(&path, &png::tone_mapped(layer, PICTURE.0, &tone))?;
-        output::note(&format!("wrote {}", path.display()));
+        let shown = png::tone_mapped(layer, PICTURE.0, &tone);
+        let written = plan.write(&[png::to_bytes(&shown, case.name)?], || None);
+        output::note(&format!("wrote {}", written.names()));
+        written.check()?;
     }
     Ok(())
 }

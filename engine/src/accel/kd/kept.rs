@@ -6,7 +6,7 @@
 //! sound is built and written anew.
 
 use super::{KdNode, KdSettings, KdTree};
-use crate::film::atomic;
+use crate::atomic;
 use crate::fingerprint::Fingerprint;
 use crate::{Error, Result};
 use glam::Vec3;
@@ -120,7 +120,7 @@ impl KdTree {
         }
         let tree = Self::build(triangles, settings)?;
         let made = std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error));
-        let written = made.and_then(|()| atomic::write(&path, &encode(&tree, print)));
+        let written = made.and_then(|()| atomic::write_unlinked(&path, &encode(&tree, print)));
         Ok(KeptTree {
             tree,
             path,

@@ -17,6 +17,16 @@ const BLOCK: Block<'static> = Block {
     command: "clerestory index --peers",
 };
 
+/// The files in a folder; a chart may be left out.
+pub const FILES: [&str; 6] = [
+    "index.json",
+    "index.md",
+    "index.csv",
+    "index-work.csv",
+    "index-rates.svg",
+    "index-work.svg",
+];
+
 /// Words of the parts of time, in the order of [`Work::shares`].
 const PARTS: [&str; 4] = ["inner nodes", "triangles", "lanes that wait", "begin and end of rays"];
 

@@ -13,7 +13,7 @@ mod ours;
 mod verdicts;
 mod work;
 
-pub use files::{markdown, write};
+pub use files::{FILES, markdown, write};
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use clerestory::Error;
 use clerestory::film::picture::RADIANCE;
-use clerestory::film::{ErrorReport, Picture, ToneMap, atomic, exr, png};
+use clerestory::film::{ErrorReport, Picture, ToneMap, exr, png};
 use clerestory::render::FrameReport;
 
 use super::choice::ChoiceReport;
 use crate::failure::{Failure, Outcome};
+use crate::outputs::{Outputs, Written};
 use crate::{output, pictures};
 
 /// The JSON file: the frame report with what the program adds.
@@ -46,15 +46,6 @@ pub struct Files {
 }
 
 impl Files {
-    /// Whether one of the files is this one.
-    pub fn write_over(&self, file: &Path) -> bool {
-        let Ok(file) = file.canonicalize() else { return false };
-        let own = [self.exr.as_ref(), Some(&self.png), Some(&self.json)];
-        own.into_iter()
-            .flatten()
-            .any(|own| own.canonicalize().is_ok_and(|own| own == file))
-    }
-
     /// From the output as given: a file `.exr` or `.png`, a folder, or nothing for `out/`.
     pub fn choose(wanted: Option<&Path>, scene_name: &str) -> Outcome<Self> {
         let name: String = scene_name
@@ -88,20 +79,21 @@ impl Files {
         })
     }
 
-    /// Makes the folder where there is none, and says so: a rendering is not to fail at its end, nor a slip of the pen to go unseen.
-    pub fn prepare(&self) -> Outcome {
-        match self.png.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-                std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?;
-                output::note(&format!("made folder {}", folder.display()));
-                Ok(())
-            }
-            _ => Ok(()),
-        }
+    /// All of them, in the order of their writing.
+    pub fn all(&self) -> Vec<&Path> {
+        let all = self.exr.iter().chain([&self.png, &self.json]);
+        all.map(PathBuf::as_path).collect()
     }
 
-    /// Writes all files, each as a whole or not at all; the EXR gets radiance and the named layers.
-    pub fn write(&self, picture: &Picture, layers: &[&str], document: &Document<'_>) -> Outcome {
+    /// Writes all files, as their plan says; the EXR gets radiance and the named layers.
+    pub fn write(
+        &self,
+        outputs: &Outputs,
+        picture: &Picture,
+        layers: &[&str],
+        document: &Document<'_>,
+    ) -> Outcome<Written> {
+        let mut contents = Vec::new();
         if let Some(path) = &self.exr {
             let mut chosen = Picture::new(picture.width(), picture.height())?;
             chosen.metadata = picture.metadata.clone();
@@ -109,20 +101,93 @@ impl Files {
             for layer in picture.layers().iter().filter(|layer| kept(layer.name())) {
                 chosen.add_layer(layer.name(), layer.channels(), layer.values().to_vec())?;
             }
-            exr::write(path, &chosen)?;
+            contents.push(exr::to_bytes(&chosen, &path.display().to_string())?);
         }
         let shown = png::tone_mapped(picture.main_layer()?, picture.width(), &document.tone);
-        png::write(&self.png, &shown)?;
+        contents.push(png::to_bytes(&shown, &self.png.display().to_string())?);
         let text = output::json_text(&self.json.display().to_string(), document)? + "\n";
-        Ok(atomic::write(&self.json, text.as_bytes())?)
+        contents.push(text.into_bytes());
+        let better = || {
+            let there = document.interrupted && self.all().iter().any(|path| path.exists());
+            there.then(|| self.better_than(&Facts::of(document.report))).flatten()
+        };
+        Ok(outputs.write(&contents, better))
     }
 
-    /// All names, for a message.
-    pub fn names(&self) -> String {
-        let all = self.exr.iter().chain([&self.png, &self.json]);
-        all.map(|path| path.display().to_string())
-            .collect::<Vec<_>>()
-            .join(", ")
+    /// Why the picture that is there is worth more than one of these facts.
+    fn better_than(&self, new: &Facts) -> Option<String> {
+        let name = self.exr.as_ref().unwrap_or(&self.png).display();
+        let exr = self.exr.as_ref().filter(|path| path.exists());
+        let old = match exr {
+            Some(path) => exr::read(path).ok().and_then(|picture| Facts::of_picture(&picture)),
+            None => std::fs::read(&self.json).ok().and_then(|text| Facts::of_json(&text)),
+        };
+        match old {
+            None => Some(format!("{name} may be better: it does not say how many samples it has")),
+            Some(old) if !old.same_picture(new) => Some(format!("{name} is another picture")),
+            Some(old) if old.samples > new.samples => Some(format!(
+                "{name} has {} samples per pixel, the interrupted picture {}",
+                old.samples, new.samples
+            )),
+            Some(_) => None,
+        }
+    }
+}
+
+/// What a picture is judged by against an older one.
+#[derive(Debug, PartialEq, Eq)]
+struct Facts {
+    scene: String,
+    camera: String,
+    technique: String,
+    path_set: String,
+    size: [u64; 2],
+    /// Samples per pixel: the fewest of a new picture, the most of an old one.
+    samples: u64,
+}
+
+impl Facts {
+    fn of(report: &FrameReport) -> Self {
+        Self {
+            scene: report.scene.clone(),
+            camera: report.camera.clone(),
+            technique: report.technique.clone(),
+            path_set: report.path_set.clone(),
+            size: report.size.map(u64::from),
+            samples: report.samples[0].into(),
+        }
+    }
+
+    /// Of what an EXR says; `None` where it leaves something out.
+    fn of_picture(picture: &Picture) -> Option<Self> {
+        let metadata = &picture.metadata;
+        Some(Self {
+            scene: metadata.scene.clone()?,
+            camera: metadata.other.get("camera").cloned()?,
+            technique: metadata.technique.clone()?,
+            path_set: metadata.path_set.clone()?,
+            size: [picture.width(), picture.height()].map(u64::from),
+            samples: metadata.spp?,
+        })
+    }
+
+    /// Of what the report beside a PNG says.
+    fn of_json(text: &[u8]) -> Option<Self> {
+        let report: serde_json::Value = serde_json::from_slice(text).ok()?;
+        let word = |key: &str| report[key].as_str().map(str::to_owned);
+        Some(Self {
+            scene: word("scene")?,
+            camera: word("camera")?,
+            technique: word("technique")?,
+            path_set: word("path_set")?,
+            size: [report["size"][0].as_u64()?, report["size"][1].as_u64()?],
+            samples: report["samples"][1].as_u64()?,
+        })
+    }
+
+    fn same_picture(&self, other: &Self) -> bool {
+        (&self.scene, &self.camera, &self.technique) == (&other.scene, &other.camera, &other.technique)
+            && (&self.path_set, self.size) == (&other.path_set, other.size)
     }
 }
 
@@ -132,8 +197,12 @@ mod tests {
 
     #[test]
     fn names_follow_the_output_as_given() -> Outcome {
-        let names =
-            |wanted: Option<&str>, scene| Files::choose(wanted.map(Path::new), scene).map(|files| files.names());
+        let names = |wanted: Option<&str>, scene| {
+            Files::choose(wanted.map(Path::new), scene).map(|files| {
+                let names: Vec<String> = files.all().iter().map(|path| path.display().to_string()).collect();
+                names.join(", ")
+            })
+        };
         assert_eq!(names(None, "ring")?, "out/ring.exr, out/ring.png, out/ring.json");
         assert_eq!(names(Some("a/b.exr"), "ring")?, "a/b.exr, a/b.png, a/b.json");
         assert_eq!(names(Some("b.PNG"), "ring")?, "b.PNG, b.json");
@@ -142,6 +211,51 @@ mod tests {
             "new/.._x.exr, new/.._x.png, new/.._x.json"
         );
         assert!(names(Some("b.jpg"), "ring").is_err() && names(Some("b"), "ring").is_err());
+        Ok(())
+    }
+
+    fn facts(samples: u64) -> Facts {
+        Facts {
+            scene: "builtin:ring".into(),
+            camera: "main".into(),
+            technique: "path".into(),
+            path_set: "all".into(),
+            size: [1, 1],
+            samples,
+        }
+    }
+
+    #[test]
+    fn better_is_what_has_more_samples_or_cannot_be_read_or_compared() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("a.exr");
+        let files = Files::choose(Some(path.as_path()), "ring").map_err(|failure| failure.message)?;
+        let reason = |new: Facts| files.better_than(&new).unwrap_or_default();
+        let mut old = Picture::from_radiance(1, 1, vec![0.5; 3])?;
+        let metadata = &mut old.metadata;
+        metadata.scene = Some("builtin:ring".into());
+        metadata.other.insert("camera".into(), "main".into());
+        (metadata.technique, metadata.path_set) = (Some("path".into()), Some("all".into()));
+        exr::write(&path, &old)?;
+        assert!(reason(facts(1000)).contains("does not say how many samples"));
+        old.metadata.spp = Some(16);
+        exr::write(&path, &old)?;
+        assert!(reason(facts(15)).contains("16 samples per pixel"));
+        assert_eq!((reason(facts(16)), reason(facts(17))), (String::new(), String::new()));
+        let larger = Facts {
+            size: [2, 1],
+            ..facts(17)
+        };
+        assert!(reason(larger).contains("another picture"));
+        std::fs::write(&path, b"no picture")?;
+        assert!(reason(facts(1000)).contains("does not say how many samples"));
+        // Without an EXR the report counts.
+        std::fs::remove_file(&path)?;
+        let report = serde_json::json!({
+            "scene": "builtin:ring", "camera": "main", "technique": "path", "path_set": "all", "size": [1, 1], "samples": [3, 4],
+        });
+        std::fs::write(path.with_extension("json"), report.to_string())?;
+        assert!(reason(facts(3)).contains("4 samples per pixel") && reason(facts(4)).is_empty());
         Ok(())
     }
 }

@@ -6,7 +6,7 @@ use clerestory::plan::{Goal, relative_mse_by_variance};
 use clerestory::render::FrameReport;
 use clerestory::techniques::{self, Bias};
 
-use super::files::{Document, ErrorAgainst, Files};
+use super::files::{Document, ErrorAgainst};
 use crate::frame_report;
 use crate::output::{self, Stream};
 
@@ -47,8 +47,8 @@ const RATES: [(&str, &str); 4] = [
     ("photons_emitted", "photons"),
 ];
 
-/// The lines.
-pub fn text(document: &Document<'_>, picture: &Picture, files: &Files, why: Why) -> String {
+/// The lines; `files` are the names of what was written.
+pub fn text(document: &Document<'_>, picture: &Picture, files: &str, why: Why) -> String {
     let report = document.report;
     let [width, height] = report.size;
     let mut text = String::new();
@@ -57,7 +57,7 @@ pub fn text(document: &Document<'_>, picture: &Picture, files: &Files, why: Why)
             text += &format!("{name:<9}  {value}\n");
         }
     };
-    line("picture", &output::one_line(&files.names()));
+    line("picture", &output::one_line(files));
     line(
         "scene",
         &output::one_line(&format!(

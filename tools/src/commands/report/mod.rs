@@ -26,6 +26,7 @@ use super::progress::Bar;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output;
+use crate::outputs::{self, Inputs, Outputs, Overwriting};
 
 /// Runs experiments by name: error against time and work with plots, slopes and pictures, or tables of measured numbers
 #[derive(Debug, Args)]
@@ -81,6 +82,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FOLDER", default_value = "out/references")]
     references: PathBuf,
     #[command(flatten)]
+    overwriting: Overwriting,
+    #[command(flatten)]
     device: DeviceOptions,
 }
 
@@ -108,6 +111,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             return Err(Error::setting("experiment", &experiment.name, cause).into());
         }
     }
+    check_outputs(arguments, &found)?;
     let bar = Bar::start()?;
     // Opened for the first experiment that needs it, and kept: kernels compile once.
     let mut gpu = None;
@@ -138,6 +142,22 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         check_validation(&log)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Checks the folders of all experiments, before the first one runs.
+fn check_outputs(arguments: &Arguments, found: &[Experiment]) -> Outcome {
+    // Files of experiments; a name stands for none.
+    let mut inputs = Inputs::of(&arguments.experiments);
+    for address in &arguments.scenes {
+        inputs.add_address(address);
+    }
+    let overwrite = arguments.overwriting.overwrite;
+    for experiment in found {
+        let folder = folder(arguments, experiment);
+        outputs::check_folder(&folder, &inputs)?;
+        Outputs::one(&folder.join("report.json"), &inputs, overwrite)?;
+    }
+    Ok(())
 }
 
 /// Pages are made where there are some: the repository's root.

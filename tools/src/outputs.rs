@@ -1,0 +1,639 @@
+//! The one door for what commands write: a plan of all files, checked before the work begins, and their writing, which loses nothing.
+//!
+//! Guarantees: a file that the command reads is never written; a file that this program did not write, or that is write-protected, is replaced with
+//! `--overwrite` alone. The same holds for what came to the place while the command worked, and for better pictures: the new files are written
+//! beside them then. What cannot be written at its place in the end goes to the system's temporary folder, which is an error that says where.
+
+use std::fs::{DirBuilder, File, OpenOptions};
+use std::io::{self, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+use clap::Args;
+use clerestory::film::{atomic, mark};
+use clerestory::fingerprint::Fingerprint;
+use clerestory::scene::{Scene, builtin};
+use clerestory::{Error, Result};
+use serde_json::Value;
+
+use crate::failure::{Code, Failure, Outcome};
+use crate::{output, pictures};
+
+/// An option of every command that writes.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Overwriting {
+    /// Replaces files that this program did not write, too, and better pictures; never a file that the command reads
+    #[arg(long)]
+    pub overwrite: bool,
+}
+
+/// The files that a command reads.
+#[derive(Debug, Default)]
+pub struct Inputs(Vec<PathBuf>);
+
+impl Inputs {
+    /// These files.
+    pub fn of<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Self {
+        let mut inputs = Self::default();
+        for path in paths {
+            inputs.add(path);
+        }
+        inputs
+    }
+
+    /// Another file; one that is not there cannot be overwritten.
+    pub fn add(&mut self, path: impl AsRef<Path>) {
+        self.0.extend(path.as_ref().canonicalize());
+    }
+
+    /// A scene's file, and the sidecar beside it.
+    pub fn add_address(&mut self, address: &str) {
+        if !address.starts_with(builtin::PREFIX) {
+            self.add(address);
+            self.add(Path::new(address).with_extension("scene.toml"));
+        }
+    }
+
+    /// As [`Inputs::add_address`], with the files that the scene names its images and its environment by.
+    pub fn add_scene(&mut self, address: &str, scene: &Scene) {
+        self.add_address(address);
+        let folder = Path::new(address).parent().unwrap_or(Path::new(""));
+        for image in &scene.images {
+            self.add(folder.join(&image.name));
+        }
+        if let Some(environment) = &scene.environment {
+            self.add(&environment.name);
+        }
+    }
+
+    fn hold(&self, path: &Path) -> bool {
+        path.canonicalize().is_ok_and(|path| self.0.contains(&path))
+    }
+}
+
+/// Files that are written together.
+#[derive(Debug)]
+pub struct Outputs {
+    files: Vec<Planned>,
+    overwrite: bool,
+}
+
+#[derive(Debug)]
+struct Planned {
+    path: PathBuf,
+    /// What was there when the plan was made.
+    seen: Option<Seen>,
+}
+
+/// By what a file is known to be the one that was there before: its size, and the time of its last change.
+type Seen = (u64, Option<SystemTime>);
+
+/// What became of files.
+#[derive(Debug, Default)]
+pub struct Written {
+    /// Where they are now; none where they could not be written anywhere.
+    pub paths: Vec<PathBuf>,
+    /// Why they are not where they should be.
+    pub failure: Option<Failure>,
+}
+
+impl Written {
+    /// All names, for a message.
+    pub fn names(&self) -> String {
+        let names: Vec<String> = self.paths.iter().map(|path| path.display().to_string()).collect();
+        if names.is_empty() {
+            "nothing".into()
+        } else {
+            names.join(", ")
+        }
+    }
+
+    /// The failure as one.
+    pub fn check(self) -> Outcome {
+        self.failure.map_or(Ok(()), Err)
+    }
+}
+
+impl Outputs {
+    /// Checks that all the files can be written, and may be. Nothing on the disk changes; missing folders are made, and said, when files are written.
+    ///
+    /// A text without a mark of its own (`.md`, `.csv`, `.svg`) is this program's where a JSON file among the same files is.
+    pub fn plan<P: AsRef<Path>>(paths: &[P], inputs: &Inputs, overwrite: bool) -> Outcome<Self> {
+        let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
+        for path in &paths {
+            refuse_input(path, inputs)?;
+        }
+        let mut files = Vec::new();
+        for path in &paths {
+            check_old(path, &paths, overwrite)?;
+            files.push(Planned {
+                path: path.to_path_buf(),
+                seen: seen(path),
+            });
+        }
+        for path in &paths {
+            probe(path)?;
+        }
+        Ok(Self { files, overwrite })
+    }
+
+    /// As [`Outputs::plan`], of one file.
+    pub fn one(path: &Path, inputs: &Inputs, overwrite: bool) -> Outcome<Self> {
+        Self::plan(&[path], inputs, overwrite)
+    }
+
+    /// Writes the files, each as a whole or not at all, in the order of the plan. `better` says why what is there is worth more than what comes.
+    pub fn write(&self, contents: &[Vec<u8>], better: impl FnOnce() -> Option<String>) -> Written {
+        self.write_in_place(contents, better)
+            .unwrap_or_else(|cause| self.write_aside(contents, &cause))
+    }
+
+    fn write_in_place(&self, contents: &[Vec<u8>], better: impl FnOnce() -> Option<String>) -> Result<Written> {
+        let Some(first) = self.files.first() else {
+            return Ok(Written::default());
+        };
+        for file in &self.files {
+            make_folder_of(&file.path)?;
+        }
+        // Of several processes with the same output each sees what those before it wrote.
+        let _lock = Lock::of(&first.path).map_err(|cause| Error::io(&first.path, cause))?;
+        if !self.overwrite
+            && let Some(reason) = self.changed().or_else(better)
+        {
+            let paths = self.write_beside(contents)?;
+            output::warn(&format!("{reason}; written beside it instead, --overwrite replaces it"));
+            return Ok(Written { paths, failure: None });
+        }
+        for (file, bytes) in self.files.iter().zip(contents) {
+            atomic::write(&file.path, bytes)?;
+        }
+        let paths = self.files.iter().map(|file| file.path.clone()).collect();
+        Ok(Written { paths, failure: None })
+    }
+
+    /// A file that was written by somebody else since the plan was made.
+    fn changed(&self) -> Option<String> {
+        let changed = |file: &&Planned| {
+            let now = seen(&file.path);
+            now.is_some() && now != file.seen
+        };
+        let file = self.files.iter().find(changed)?;
+        Some(format!("{} has changed since this command began", file.path.display()))
+    }
+
+    /// Writes all files by names that are free: `NAME-2.exr` and so on, the same number for all.
+    fn write_beside(&self, contents: &[Vec<u8>]) -> Result<Vec<PathBuf>> {
+        const NUMBERS: std::ops::Range<u32> = 2..10_000;
+        for number in NUMBERS {
+            let paths: Vec<PathBuf> = self.files.iter().map(|file| numbered(&file.path, number)).collect();
+            if paths.iter().any(|path| path.symlink_metadata().is_ok()) {
+                continue;
+            }
+            for (path, bytes) in paths.iter().zip(contents) {
+                atomic::write_new(path, bytes)?;
+            }
+            return Ok(paths);
+        }
+        let path = &self.files[0].path;
+        Err(Error::io(
+            path,
+            io::Error::new(ErrorKind::AlreadyExists, "has no free name beside it"),
+        ))
+    }
+
+    /// Writes all files to a new folder of the system's folder for temporary files; the failure says why, and where.
+    fn write_aside(&self, contents: &[Vec<u8>], cause: &Error) -> Written {
+        let folder = std::env::temp_dir().join(format!("clerestory-{:016x}", atomic::random()));
+        let write = || -> Result<Vec<PathBuf>> {
+            private_folder(&folder).map_err(|cause| Error::io(&folder, cause))?;
+            let mut paths = Vec::new();
+            for (file, bytes) in self.files.iter().zip(contents) {
+                let path = folder.join(file.path.file_name().unwrap_or_default());
+                atomic::write_new(&path, bytes)?;
+                paths.push(path);
+            }
+            Ok(paths)
+        };
+        let (paths, hint) = match write() {
+            Ok(paths) => (paths, format!("what was to be written is kept in {}", folder.display())),
+            Err(second) => {
+                // Parts of it are of no use.
+                let _ = std::fs::remove_dir_all(&folder);
+                (Vec::new(), format!("nor could it be kept elsewhere: {second}"))
+            }
+        };
+        let failure = Failure {
+            code: Code::Run,
+            message: cause.to_string(),
+            hint: Some(hint),
+        };
+        Written {
+            paths,
+            failure: Some(failure),
+        }
+    }
+}
+
+/// Checks a page whose measured part will be replaced while all else stays: a Markdown file that the command does not read.
+pub fn check_page(page: &Path, inputs: &Inputs) -> Outcome {
+    refuse_input(page, inputs)?;
+    if pictures::extension(page) != "md" {
+        return Err(Failure::usage(format!(
+            "--page {}: pages are .md files",
+            page.display()
+        )));
+    }
+    check_old(page, &[], true)?;
+    Ok(atomic::probe(page)?)
+}
+
+/// Checks a folder of a command's own, which gets files of many names: it can be written to, and no file that the command reads lies in it.
+pub fn check_folder(folder: &Path, inputs: &Inputs) -> Outcome {
+    if let Ok(folder) = folder.canonicalize()
+        && let Some(inside) = inputs.0.iter().find(|input| input.starts_with(&folder))
+    {
+        let message = format!("{} lies in the folder that this command writes to", inside.display());
+        return Err(Failure::usage(message).hint("name another folder"));
+    }
+    probe(&folder.join(".clerestory"))
+}
+
+fn refuse_input(path: &Path, inputs: &Inputs) -> Outcome {
+    if inputs.hold(path) {
+        let message = format!("{}: this command reads it, so it will not write it", path.display());
+        return Err(
+            Failure::usage(message).hint("name another output; a .exr picture takes .png and .json beside it, too")
+        );
+    }
+    Ok(())
+}
+
+/// Refuses to replace what is no file, or should not be replaced unasked.
+fn check_old(path: &Path, all: &[&Path], overwrite: bool) -> Outcome {
+    // What cannot be looked at is found out by writing beside it.
+    let Ok(found) = std::fs::metadata(path) else {
+        return Ok(());
+    };
+    if !found.is_file() {
+        let what = if found.is_dir() {
+            "a folder"
+        } else {
+            "not a regular file"
+        };
+        return Err(
+            Failure::usage(format!("{}: is {what}, and would have to be replaced", path.display()))
+                .hint("name another output; a .exr picture takes .png and .json beside it, too"),
+        );
+    }
+    let cause = if overwrite {
+        return Ok(());
+    } else if found.permissions().readonly() {
+        "is write-protected"
+    } else if !is_ours(path, all)? {
+        "is there, and this program did not write it"
+    } else {
+        return Ok(());
+    };
+    Err(Failure::usage(format!("{} {cause}", path.display()))
+        .hint("name another output, or add --overwrite to replace it"))
+}
+
+fn is_ours(path: &Path, all: &[&Path]) -> Result<bool> {
+    match pictures::extension(path).as_str() {
+        "exr" | "hdr" | "png" => mark::is_marked(path),
+        "json" => json_is_ours(path),
+        _ => {
+            let reports = all.iter().filter(|other| pictures::extension(other) == "json");
+            for report in reports.filter(|report| report.is_file()) {
+                if json_is_ours(report)? {
+                    return Ok(true);
+                }
+            }
+            Ok(false)
+        }
+    }
+}
+
+/// Reports of this program name its version, the device and the driver; those of experiments hold verdicts.
+fn json_is_ours(path: &Path) -> Result<bool> {
+    const MOST_BYTES: u64 = 1 << 28;
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(MOST_BYTES).read_to_end(&mut bytes));
+    read.map_err(|cause| Error::io(path, cause))?;
+    let Ok(document) = serde_json::from_slice::<Value>(&bytes) else {
+        return Ok(false);
+    };
+    let has = |pointers: &[&str]| {
+        let mut values = pointers.iter().map(|pointer| document.pointer(pointer));
+        values.all(|value| value.is_some_and(Value::is_string))
+    };
+    let of_experiment =
+        document["verdicts"].is_array() && (document["tables"].is_array() || document["results"].is_object());
+    Ok(of_experiment
+        || has(&["/engine_version", "/device", "/driver"])
+        || has(&["/machine/device", "/machine/driver", "/machine/mitsuba"]))
+}
+
+fn seen(path: &Path) -> Option<Seen> {
+    let found = std::fs::metadata(path).ok()?;
+    Some((found.len(), found.modified().ok()))
+}
+
+/// Finds out whether a file can be written, or a folder be made for it in the nearest one that is there.
+fn probe(path: &Path) -> Outcome {
+    fn named(folder: &Path) -> &Path {
+        if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        }
+    }
+    let mut above = path.ancestors().skip(1).map(named);
+    let nearest = above.find(|folder| folder.symlink_metadata().is_ok());
+    let probed = match nearest {
+        Some(folder) if path.parent().map(named) != Some(folder) => atomic::probe(&folder.join(".clerestory")),
+        _ => atomic::probe(path),
+    };
+    probed.map_err(|error| match error {
+        Error::Io { source, .. } => Error::io(path, source).into(),
+        other => other.into(),
+    })
+}
+
+/// Makes the folder of a file where there is none, and says so: a slip of the pen is not to go unseen.
+fn make_folder_of(path: &Path) -> Result<()> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            std::fs::create_dir_all(folder).map_err(|cause| Error::io(folder, cause))?;
+            output::note(&format!("made folder {}", folder.display()));
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// `NAME-2.exr` for `NAME.exr`.
+fn numbered(path: &Path, number: u32) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+/// Makes a folder that must not be there, which nobody else may enter.
+fn private_folder(path: &Path) -> io::Result<()> {
+    let mut builder = DirBuilder::new();
+    close_to_others(&mut builder);
+    builder.create(path)
+}
+
+#[cfg(unix)]
+fn close_to_others(builder: &mut DirBuilder) {
+    use std::os::unix::fs::DirBuilderExt;
+    builder.mode(0o700);
+}
+
+#[cfg(not(unix))]
+fn close_to_others(_: &mut DirBuilder) {}
+
+/// The right to write the files of one name, until it is dropped: a file that only one process can make.
+struct Lock(PathBuf);
+
+impl Lock {
+    /// A lock this old was left behind by a process that was ended while it wrote.
+    const STALE: Duration = Duration::from_secs(60);
+    /// Longer than a lock can become without being stale.
+    const PATIENCE: Duration = Duration::from_secs(90);
+    /// Between two tries.
+    const PAUSE: Duration = Duration::from_millis(10);
+
+    /// Waits for it. Files that differ only in their endings share it.
+    fn of(path: &Path) -> io::Result<Self> {
+        let end = atomic::end_of_links(path)?;
+        // By a hash: the name with anything added might be too long.
+        let print = Fingerprint::of(end.file_stem().unwrap_or_default().as_encoded_bytes());
+        let lock = end.with_file_name(format!(".clerestory-{}.lock", &print[..16]));
+        let begun = Instant::now();
+        loop {
+            match OpenOptions::new().write(true).create_new(true).open(&lock) {
+                Ok(_) => return Ok(Self(lock)),
+                Err(cause) if cause.kind() != ErrorKind::AlreadyExists => return Err(cause),
+                Err(cause) if begun.elapsed() > Self::PATIENCE => return Err(cause),
+                Err(_) => {
+                    if is_older(&lock, Self::STALE) {
+                        // Another process may have taken it away already.
+                        let _ = std::fs::remove_file(&lock);
+                    }
+                    std::thread::sleep(Self::PAUSE);
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // A lock that stays is taken for stale after a while.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+fn is_older(path: &Path, age: Duration) -> bool {
+    let changed = path.symlink_metadata().and_then(|found| found.modified()).ok();
+    changed.is_some_and(|time| time.elapsed().is_ok_and(|elapsed| elapsed > age))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clerestory::film::{Picture, exr};
+
+    type Tested = std::result::Result<(), Box<dyn std::error::Error>>;
+
+    fn said<T>(outcome: Outcome<T>) -> (Option<Code>, String) {
+        match outcome {
+            Ok(_) => (None, String::new()),
+            Err(failure) => (Some(failure.code), failure.message),
+        }
+    }
+
+    fn never() -> Option<String> {
+        None
+    }
+
+    fn mine(value: f32) -> std::result::Result<Vec<u8>, Error> {
+        exr::to_bytes(&Picture::from_radiance(1, 1, vec![value; 3])?, "a picture")
+    }
+
+    #[test]
+    fn plans_refuse_inputs_foreign_files_and_folders() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        let (input, ours, foreign) = (at("input.exr"), at("ours.exr"), at("foreign.exr"));
+        std::fs::write(&input, mine(1.0)?)?;
+        std::fs::write(&ours, mine(2.0)?)?;
+        std::fs::write(&foreign, b"somebody else's")?;
+        std::fs::create_dir(at("folder.json"))?;
+        let inputs = Inputs::of([&input]);
+        let usage = |path: &Path, overwrite, word: &str| {
+            let (code, message) = said(Outputs::one(path, &inputs, overwrite));
+            assert!(
+                code == Some(Code::Usage) && message.contains(word),
+                "{}: {message}",
+                path.display()
+            );
+        };
+        for overwrite in [false, true] {
+            usage(&input, overwrite, "reads it");
+            usage(&at("./folder.json/../input.exr"), overwrite, "reads it");
+            usage(&at("folder.json"), overwrite, "is a folder");
+        }
+        usage(&foreign, false, "did not write it");
+        assert!(Outputs::one(&foreign, &inputs, true).is_ok());
+        let both = [at("new/a.exr"), foreign.clone()];
+        assert_eq!(said(Outputs::plan(&both, &inputs, false)).0, Some(Code::Usage));
+        assert!(Outputs::one(&ours, &inputs, false).is_ok() && Outputs::one(&at("new/a.exr"), &inputs, false).is_ok());
+        // Plans leave nothing.
+        assert_eq!(std::fs::read_dir(folder.path())?.count(), 4);
+        // A folder that cannot be made, since a file stands there.
+        let (code, _) = said(Outputs::one(&at("ours.exr/a.exr"), &inputs, false));
+        assert_eq!(code, Some(Code::Run));
+        let mut protected = ours.metadata()?.permissions();
+        protected.set_readonly(true);
+        std::fs::set_permissions(&ours, protected)?;
+        usage(&ours, false, "write-protected");
+        Ok(())
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_an_input_is_the_input() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let (input, link) = (folder.path().join("input.exr"), folder.path().join("link.exr"));
+        std::fs::write(&input, mine(1.0)?)?;
+        std::os::unix::fs::symlink("input.exr", &link)?;
+        for (read, written) in [(&input, &link), (&link, &input)] {
+            let (code, message) = said(Outputs::one(written, &Inputs::of([read]), true));
+            assert!(code == Some(Code::Usage) && message.contains("reads it"), "{message}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn reports_are_known_by_what_they_say() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        let package = "{\"name\": \"x\", \"version\": \"1.0\", \"device\": \"d\"}";
+        let report = "{\"device\": \"d\", \"driver\": \"e\", \"engine_version\": \"0.1.0\", \"samples\": [1, 2]}";
+        let agreement = "{\"machine\": {\"device\": \"d\", \"driver\": \"e\", \"mitsuba\": \"m\"}}";
+        let experiment = "{\"headline\": null, \"verdicts\": [], \"tables\": []}";
+        for (text, ours) in [
+            (package, false),
+            (report, true),
+            (agreement, true),
+            (experiment, true),
+            ("[1]", false),
+            ("", false),
+        ] {
+            let paths = [at("a.json"), at("a.csv")];
+            std::fs::write(&paths[0], text)?;
+            std::fs::write(&paths[1], "1,2\n")?;
+            assert_eq!(Outputs::plan(&paths, &Inputs::default(), false).is_ok(), ours, "{text}");
+            // A table without its report could be anybody's.
+            assert!(Outputs::one(&paths[1], &Inputs::default(), false).is_err());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn of_two_that_write_one_output_neither_loses_anything() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("a.exr");
+        std::fs::write(&path, mine(0.0)?)?;
+        let threads = 8;
+        let plans: Vec<Outputs> = (0..threads)
+            .map(|_| Outputs::one(&path, &Inputs::default(), false))
+            .collect::<Outcome<_>>()
+            .map_err(|failure| failure.message)?;
+        // Sizes differ, so that the files do whatever the clock of the file system can tell apart.
+        let contents: Vec<Vec<u8>> = (1..=threads).map(|count| vec![b'x'; count]).collect();
+        let places: Vec<PathBuf> = std::thread::scope(|scope| {
+            let write = |(plan, content): (&Outputs, &Vec<u8>)| plan.write(std::slice::from_ref(content), never);
+            let running: Vec<_> = plans
+                .iter()
+                .zip(&contents)
+                .map(|one| scope.spawn(move || write(one)))
+                .collect();
+            running
+                .into_iter()
+                .flat_map(|one| one.join().expect("no panic").paths)
+                .collect()
+        });
+        assert_eq!(places.len(), threads);
+        for (place, content) in places.iter().zip(&contents) {
+            assert_eq!(&std::fs::read(place)?, content, "{}", place.display());
+        }
+        assert_eq!(places.iter().filter(|place| **place == path).count(), 1);
+        // No lock and no temporary file stays.
+        assert_eq!(std::fs::read_dir(folder.path())?.count(), threads);
+        Ok(())
+    }
+
+    #[test]
+    fn better_files_stay_unless_they_are_to_be_overwritten() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let paths = [folder.path().join("a.exr"), folder.path().join("a.json")];
+        std::fs::write(&paths[0], mine(1.0)?)?;
+        let before = std::fs::read(&paths[0])?;
+        let write = |overwrite, better: Option<&str>| {
+            let plan = Outputs::plan(&paths, &Inputs::default(), overwrite).map_err(|failure| failure.message)?;
+            Ok::<_, String>(plan.write(&[mine(2.0).unwrap_or_default(), b"{}".to_vec()], || {
+                better.map(str::to_owned)
+            }))
+        };
+        let beside = write(false, Some("it is better"))?;
+        assert_eq!(
+            beside.paths,
+            ["a-2.exr", "a-2.json"].map(|name| folder.path().join(name))
+        );
+        assert!(beside.failure.is_none() && std::fs::read(&paths[0])? == before && !paths[1].exists());
+        assert_eq!(write(false, Some("it is better"))?.names().matches("a-3").count(), 2);
+        assert_eq!(write(true, Some("it is better"))?.paths, paths);
+        assert_ne!(std::fs::read(&paths[0])?, before);
+        Ok(())
+    }
+
+    #[test]
+    fn what_has_no_place_goes_to_the_temporary_folder() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("new/a.exr");
+        let plan = Outputs::one(&path, &Inputs::default(), false).map_err(|failure| failure.message)?;
+        std::fs::write(folder.path().join("new"), "a file in place of the folder")?;
+        let written = plan.write(&[mine(1.0)?], never);
+        let failure = written.failure.as_ref().ok_or("no failure")?;
+        let kept = written.paths.first().ok_or("no file")?;
+        let hint = failure.hint.clone().unwrap_or_default();
+        let inside = kept.parent().ok_or("no folder")?;
+        assert_eq!((failure.code, std::fs::read(kept)?), (Code::Run, mine(1.0)?));
+        assert!(hint.contains(&inside.display().to_string()), "{hint}");
+        std::fs::remove_dir_all(inside)?;
+        Ok(())
+    }
+
+    #[test]
+    fn a_lock_left_behind_is_taken_for_stale() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("a.exr");
+        let lock = Lock::of(&path)?;
+        assert!(lock.0.exists() && !is_older(&lock.0, Lock::STALE));
+        let long_ago = SystemTime::now() - 2 * Lock::STALE;
+        File::options().write(true).open(&lock.0)?.set_modified(long_ago)?;
+        assert!(is_older(&lock.0, Lock::STALE));
+        let other = Lock::of(&path.with_extension("png"))?;
+        assert_eq!(other.0, lock.0);
+        Ok(())
+    }
+}
