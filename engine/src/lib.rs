@@ -34,6 +34,7 @@ pub mod error;
 pub mod film;
 pub mod fingerprint;
 pub mod gpu;
+mod kept_file;
 pub mod kernels;
 pub mod maps;
 pub mod plan;

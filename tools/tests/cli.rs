@@ -209,6 +209,53 @@ fn kd_trees_are_kept_and_read_again() -> Tested {
     Ok(())
 }
 
+/// A kept tree that is broken, or in whose place something else stands, costs a build and a warning: neither the run nor the picture.
+#[test]
+fn kept_kd_trees_that_are_broken_are_built_anew_and_said_once() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let cache = folder.path().join("indexes");
+    let picture = folder.path().join("a.exr");
+    let render = || {
+        let size = ["render", "builtin:cornell-box", "--size", "8", "--spp", "1"];
+        let index = ["--index", "kd", "--index-cache", text(&cache), "-o", text(&picture)];
+        succeed(&[&size[..], &index].concat())
+    };
+    render()?;
+    let pixels = exr::read(&picture)?.main_layer()?.values().to_vec();
+    let kept = std::fs::read_dir(&cache)?.next().ok_or("no file")??.path();
+    let whole = std::fs::read(&kept)?;
+    for broken in [&b""[..], b"not a tree", &whole[..whole.len() / 2]] {
+        std::fs::write(&kept, broken)?;
+        let output = render()?;
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(stderr.matches("made anew").count(), 1, "{}", said(&output));
+        assert_eq!(json_file(&picture.with_extension("json"))?["index"]["kept"], "written");
+        assert_eq!(exr::read(&picture)?.main_layer()?.values(), pixels);
+        assert_eq!(std::fs::read(&kept)?, whole);
+    }
+    // Every repeat meets what cannot be replaced; it is said once.
+    std::fs::remove_file(&kept)?;
+    std::fs::create_dir(&kept)?;
+    let index = [
+        "index",
+        "--scene",
+        "builtin:cornell-box",
+        "--repeat",
+        "3",
+        "--rays",
+        "10",
+    ];
+    let output = succeed(&[&index[..], &["--index-cache", text(&cache)]].concat())?;
+    assert_eq!(said(&output).matches("made anew").count(), 1, "{}", said(&output));
+    assert!(said(&output).contains("not kept"), "{}", said(&output));
+    for command in ["render", "index"] {
+        let help = String::from_utf8(succeed(&[command, "--help"])?.stdout)?;
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(help.contains("trusted with how long rays take"), "{help}");
+    }
+    Ok(())
+}
+
 #[test]
 fn indexes_are_compared_also_where_the_device_cannot_build_one() -> Tested {
     let scenes = ["builtin:triangle-soup?n=1", "builtin:triangle-soup?n=500"];
