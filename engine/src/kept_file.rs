@@ -1,4 +1,4 @@
-//! Files that keep what can be made again: read whole and within a bound, and complained about once.
+//! Files that keep what can be made again: read whole and within a bound, written whole, and complained about once.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -40,6 +40,14 @@ pub fn read(path: &Path, most: u64) -> Result<Option<Vec<u8>>, String> {
 
 fn is_absent(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
+}
+
+/// Writes a file as a whole: readers see none, the old one or the new one.
+///
+/// # Errors
+/// Why not, in words.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    crate::film::atomic::write(path, bytes).map_err(|error| error.to_string())
 }
 
 /// Warns that a file is not used, once for each file in a process. Returns whether it did.

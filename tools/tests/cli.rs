@@ -256,6 +256,76 @@ fn kept_kd_trees_that_are_broken_are_built_anew_and_said_once() -> Tested {
     Ok(())
 }
 
+/// A command that opens a device, but neither compiles nor dispatches anything.
+fn opens_a_device() -> Command {
+    let mut command = program();
+    command.args([
+        "index",
+        "--scene",
+        "builtin:triangle-soup?n=1",
+        "--repeat",
+        "1",
+        "--rays",
+        "2",
+    ]);
+    command.env_remove("LOCALAPPDATA").stdin(Stdio::null());
+    command
+}
+
+#[test]
+fn pipelines_are_kept_in_absolute_folders_only() -> Tested {
+    for (caches, home) in [("", ""), ("caches", "home"), ("./", "..")] {
+        let folder = tempfile::tempdir()?;
+        let below = folder.path().join("current");
+        std::fs::create_dir(&below)?;
+        let mut command = opens_a_device();
+        command
+            .current_dir(&below)
+            .env("XDG_CACHE_HOME", caches)
+            .env("HOME", home);
+        let output = command.output()?;
+        assert!(output.status.success(), "{}", said(&output));
+        for place in [
+            "clerestory",
+            ".cache/clerestory",
+            "caches/clerestory",
+            "home/.cache/clerestory",
+            "../.cache/clerestory",
+        ] {
+            assert!(!below.join(place).exists(), "{caches:?} and {home:?} lead to {place}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_pipeline_cache_that_is_broken_is_made_anew_and_said_once() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let cache = folder.path().join("clerestory");
+    let open = || -> Result<(String, std::path::PathBuf), Box<dyn std::error::Error>> {
+        let output = opens_a_device().env("XDG_CACHE_HOME", folder.path()).output()?;
+        assert!(output.status.success(), "{}", said(&output));
+        let files: Vec<_> = std::fs::read_dir(&cache)?.collect::<Result<_, _>>()?;
+        assert_eq!(files.len(), 1, "{files:?}");
+        Ok((String::from_utf8_lossy(&output.stderr).into_owned(), files[0].path()))
+    };
+    let (stderr, file) = open()?;
+    assert!(!stderr.contains("made anew"), "{stderr}");
+    let whole = std::fs::read(&file)?;
+    for broken in [&whole[..whole.len() / 2], &whole[36..], b"", b"no cache"] {
+        std::fs::write(&file, broken)?;
+        let (stderr, file) = open()?;
+        assert_eq!(stderr.matches("made anew").count(), 1, "{stderr}");
+        assert!(std::fs::read(&file)?.starts_with(b"CLPIPELN"), "{file:?}");
+        let (stderr, _) = open()?;
+        assert!(!stderr.contains("made anew"), "{stderr}");
+    }
+    let help = String::from_utf8(succeed(&["--help"])?.stdout)?;
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(help.contains("trusted as the driver is"), "{help}");
+    Ok(())
+}
+
 #[test]
 fn indexes_are_compared_also_where_the_device_cannot_build_one() -> Tested {
     let scenes = ["builtin:triangle-soup?n=1", "builtin:triangle-soup?n=500"];
