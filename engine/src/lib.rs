@@ -35,6 +35,7 @@ pub mod error;
 pub mod film;
 pub mod fingerprint;
 pub mod gpu;
+mod kept_file;
 pub mod kernels;
 pub mod maps;
 pub mod plan;

@@ -183,7 +183,8 @@ pub struct RendererDesc {
     /// Kind of the ray index.
     pub index: IndexKind,
     /// Folder where a kd-tree is read from if the same was kept there before, and kept otherwise. The report says which
-    /// ([`IndexReport::kept`]); failing to read or write there is not an error.
+    /// ([`IndexReport::kept`]); failing to read or write there is not an error. Files there are trusted with how long rays take, not with the
+    /// picture ([`KdTree::kept`](crate::accel::kd::KdTree::kept)).
     pub index_folder: Option<PathBuf>,
 }
 

@@ -363,16 +363,35 @@ fn the_pipeline_cache_is_written_and_read_again() {
         drop(gpu);
         let files = files();
         assert_eq!(files.len(), 1, "{files:?}");
-        // The header that Vulkan prescribes: its size and version 1.
         let bytes = std::fs::read(&files[0]).unwrap();
-        assert!(bytes.len() >= 32);
-        assert_eq!(bytes[..8], [32, 0, 0, 0, 1, 0, 0, 0]);
-        files[0].clone()
+        // The file's letters and version, and behind its other numbers the header that Vulkan prescribes: its size and version 1.
+        assert_eq!(bytes[..12], *b"CLPIPELN\x01\0\0\0");
+        assert_eq!(bytes[36..44], [32, 0, 0, 0, 1, 0, 0, 0]);
+        assert!(bytes.len() >= 36 + 32 + 16);
+        (files[0].clone(), bytes)
     };
-    let file = run();
-    assert_eq!(run(), file);
-    std::fs::write(&file, b"not a pipeline cache").unwrap();
-    assert_eq!(run(), file);
+    let (_, whole) = run();
+    let (file, _) = run();
+    // Data as the driver wrote it is not enough, nor is a file that has lost its end, or has changed.
+    let mut changed = whole.clone();
+    changed[40] ^= 1;
+    for broken in [
+        &b"not a pipeline cache"[..],
+        &whole[36..whole.len() - 16],
+        &whole[..whole.len() - 1],
+        &changed,
+    ] {
+        std::fs::write(&file, broken).unwrap();
+        let (again, _) = run();
+        std::fs::rename(again, &file).unwrap();
+    }
+    // Two devices at a time, of which one goes first, leave one file for the next to read.
+    let both = [gpu_with(&options), gpu_with(&options)];
+    for gpu in &both {
+        assert_eq!(many_dispatches(gpu, 3), [1, 2, 3]);
+    }
+    drop(both);
+    run();
 }
 
 #[test]

@@ -1,10 +1,10 @@
-//! Every dependency's licence is one of those that `deny.toml` allows.
+//! Every dependency's licence and source is one of those that `deny.toml` allows, and every second version of a crate is one that it lists.
 //!
-//! Offline: `cargo metadata` on the lock file, and the SPDX expressions evaluated here (AND, OR, WITH, parentheses; `/` as the old
-//! form of OR). An unknown word, a missing licence or a syntax error fails. The crates used directly have their line in
-//! `third_party_notes/crates.md`, and every page of notes is in the index.
+//! Offline: licences by `cargo metadata` of this platform, with the SPDX expressions evaluated here (AND, OR, WITH, parentheses; `/` as the old
+//! form of OR). An unknown word, a missing licence or a syntax error fails. Sources and versions by `Cargo.lock`, which has the packages of all
+//! platforms and features. The crates used directly have their line in `third_party_notes/crates.md`, and every page of notes is in the index.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
@@ -61,19 +61,36 @@ fn one(words: &mut &[&str], allowed: &BTreeSet<String>) -> Result<bool, String> 
     }
 }
 
-/// The strings of the `allow` list of `deny.toml`.
-fn allow_list(root: &Path) -> BTreeSet<String> {
-    let text = std::fs::read_to_string(root.join("deny.toml")).expect("deny.toml");
-    let list = text.split_once("\nallow = [").expect("a list of licences").1;
-    let list = list.split_once(']').expect("its end").0;
-    list.split('"').skip(1).step_by(2).map(str::to_owned).collect()
+fn root() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-#[test]
-fn every_dependency_has_an_allowed_licence() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let allowed = allow_list(&root);
-    assert!(allowed.contains("MIT") && allowed.contains("Apache-2.0"), "{allowed:?}");
+fn table(text: &str) -> toml::Table {
+    toml::from_str(text).expect("TOML")
+}
+
+fn file(name: &str) -> toml::Table {
+    table(&std::fs::read_to_string(root().join(name)).expect(name))
+}
+
+/// The tables or strings of a list.
+fn list<'a>(table: &'a toml::Table, section: &str, name: &str) -> &'a [toml::Value] {
+    let list = table[section].get(name).and_then(toml::Value::as_array);
+    list.map(Vec::as_slice).unwrap_or_default()
+}
+
+fn strings(list: &[toml::Value]) -> BTreeSet<String> {
+    let text = |value: &toml::Value| value.as_str().expect("a string").to_owned();
+    list.iter().map(text).collect()
+}
+
+/// The strings of the `allow` list of `deny.toml`.
+fn allow_list() -> BTreeSet<String> {
+    strings(list(&file("deny.toml"), "licenses", "allow"))
+}
+
+/// What `cargo metadata` says of the packages for this platform.
+fn metadata() -> serde_json::Value {
     let output = Command::new(env!("CARGO"))
         .args([
             "metadata",
@@ -84,11 +101,207 @@ fn every_dependency_has_an_allowed_licence() {
             "--filter-platform",
         ])
         .arg(host())
-        .current_dir(&root)
+        .current_dir(root())
         .output()
         .expect("cargo runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+/// A package of a lock file.
+struct Package {
+    name: String,
+    version: String,
+    /// Where it is from; `None` for one by its path.
+    source: Option<String>,
+    has_checksum: bool,
+    /// Names, with the version where there are several.
+    dependencies: BTreeSet<String>,
+}
+
+fn packages(lock: &toml::Table) -> Vec<Package> {
+    let text = |package: &toml::Value, key: &str| Some(package.get(key)?.as_str()?.to_owned());
+    let package = |package: &toml::Value| Package {
+        name: text(package, "name").expect("a name"),
+        version: text(package, "version").expect("a version"),
+        source: text(package, "source"),
+        has_checksum: text(package, "checksum").is_some_and(|sum| sum.len() == 64),
+        dependencies: package
+            .get("dependencies")
+            .and_then(toml::Value::as_array)
+            .map(|list| strings(list))
+            .unwrap_or_default(),
+    };
+    lock["package"]
+        .as_array()
+        .expect("packages")
+        .iter()
+        .map(package)
+        .collect()
+}
+
+/// Packages that are neither of the workspace nor, with a checksum, of a registry that is allowed, nor of a repository that is.
+fn of_unknown_sources(lock: &toml::Table, deny: &toml::Table, workspace: &BTreeSet<String>) -> Vec<String> {
+    let registries = strings(list(deny, "sources", "allow-registry"));
+    let repositories = strings(list(deny, "sources", "allow-git"));
+    let is_known = |package: &Package| match &package.source {
+        None => workspace.contains(&package.name),
+        Some(source) => match source.split_once('+') {
+            Some(("registry" | "sparse", address)) => registries.contains(address) && package.has_checksum,
+            Some(("git", address)) => repositories.contains(address.split(['?', '#']).next().unwrap_or_default()),
+            _ => false,
+        },
+    };
+    let unknown = packages(lock).into_iter().filter(|package| !is_known(package));
+    unknown
+        .map(|package| {
+            let source = package.source.as_deref().unwrap_or("a path");
+            format!("{} {} from {source}", package.name, package.version)
+        })
+        .collect()
+}
+
+/// Crates with more than one version that is not listed, and entries of the lists that name no second version.
+fn duplicates(lock: &toml::Table, deny: &toml::Table) -> Vec<String> {
+    let packages = packages(lock);
+    let specs = |name: &str| -> BTreeSet<String> {
+        let spec = |entry: &toml::Value| entry["crate"].as_str().expect("a crate").to_owned();
+        list(deny, "bans", name).iter().map(spec).collect()
+    };
+    let (skipped, trees) = (specs("skip"), specs("skip-tree"));
+    let spec = |package: &Package| format!("{}@{}", package.name, package.version);
+    // Versions that only a tree's root asks for.
+    let is_of_tree = |package: &Package| {
+        let name = format!("{} {}", package.name, package.version);
+        let mut users = packages
+            .iter()
+            .filter(|user| user.dependencies.contains(&name))
+            .peekable();
+        users.peek().is_some() && users.all(|user| trees.contains(&spec(user)))
+    };
+    let mut versions: BTreeMap<&str, Vec<&Package>> = BTreeMap::new();
+    for package in &packages {
+        versions.entry(&package.name).or_default().push(package);
+    }
+    versions.retain(|_, versions| versions.len() > 1);
+    let mut faults = Vec::new();
+    for (name, versions) in &versions {
+        let left = |package: &&&Package| !skipped.contains(&spec(package)) && !is_of_tree(package);
+        let left: Vec<&str> = versions
+            .iter()
+            .filter(left)
+            .map(|package| package.version.as_str())
+            .collect();
+        if left.len() > 1 {
+            faults.push(format!("{name}: {}", left.join(", ")));
+        }
+    }
+    let several: BTreeSet<String> = versions.values().flatten().map(|package| spec(package)).collect();
+    faults.extend(
+        skipped
+            .difference(&several)
+            .map(|spec| format!("{spec} is listed in vain")),
+    );
+    let all: BTreeSet<String> = packages.iter().map(spec).collect();
+    faults.extend(trees.difference(&all).map(|spec| format!("{spec} is listed in vain")));
+    faults
+}
+
+#[test]
+fn every_dependency_is_from_a_known_source() {
+    let deny = file("deny.toml");
+    for rule in ["unknown-registry", "unknown-git"] {
+        assert_eq!(deny["sources"][rule].as_str(), Some("deny"), "{rule}");
+    }
+    let metadata = metadata();
+    let packages = metadata["packages"].as_array().expect("packages");
+    let members = metadata["workspace_members"].as_array().expect("members");
+    let workspace: BTreeSet<String> = packages
+        .iter()
+        .filter(|package| members.contains(&package["id"]))
+        .filter_map(|package| package["name"].as_str().map(str::to_owned))
+        .collect();
+    assert!(
+        workspace.contains("clerestory") && workspace.len() == members.len(),
+        "{workspace:?}"
+    );
+    let unknown = of_unknown_sources(&file("Cargo.lock"), &deny, &workspace);
+    assert!(unknown.is_empty(), "{unknown:#?}");
+}
+
+#[test]
+fn every_second_version_is_listed() {
+    let deny = file("deny.toml");
+    assert_eq!(deny["bans"]["multiple-versions"].as_str(), Some("deny"));
+    let found = duplicates(&file("Cargo.lock"), &deny);
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn foreign_sources_and_unlisted_versions_are_found() {
+    const CRATES_IO: &str = "registry+https://github.com/rust-lang/crates.io-index";
+    let sum = "0".repeat(64);
+    let package = |name: &str, version: &str, source: &str, rest: &str| {
+        let source = match source {
+            "" => String::new(),
+            source => format!("source = \"{source}\"\n"),
+        };
+        format!("[[package]]\nname = \"{name}\"\nversion = \"{version}\"\n{source}{rest}\n")
+    };
+    let from_registry = |name: &str, version: &str| package(name, version, CRATES_IO, &format!("checksum = \"{sum}\""));
+    let deny = table(
+        "[bans]\nskip = [{ crate = \"a@1.0.0\" }]\nskip-tree = [{ crate = \"root@1.0.0\" }]\n\
+         [sources]\nallow-registry = [\"https://github.com/rust-lang/crates.io-index\"]\nallow-git = [\"https://host/good\"]\n",
+    );
+    let workspace = BTreeSet::from(["own".to_owned()]);
+    let unknown = |packages: &[String]| of_unknown_sources(&table(&packages.concat()), &deny, &workspace);
+    let good = [
+        package("own", "0.1.0", "", ""),
+        from_registry("a", "1.0.0"),
+        package("b", "1.0.0", "git+https://host/good?rev=1#123", ""),
+    ];
+    assert_eq!(unknown(&good), [""; 0]);
+    for (name, source, rest) in [
+        ("path", "", String::new()),
+        ("no-checksum", CRATES_IO, String::new()),
+        (
+            "registry",
+            "registry+https://host/index",
+            format!("checksum = \"{sum}\""),
+        ),
+        ("git", "git+https://host/bad#123", String::new()),
+        ("longer", "git+https://host/good-or-bad#123", String::new()),
+        (
+            "strange",
+            "https://github.com/rust-lang/crates.io-index",
+            format!("checksum = \"{sum}\""),
+        ),
+    ] {
+        let found = unknown(&[good.concat(), package(name, "1.0.0", source, &rest)]);
+        assert!(found.len() == 1 && found[0].starts_with(name), "{name}: {found:?}");
+    }
+
+    let versions = |packages: &[String]| duplicates(&table(&packages.concat()), &deny);
+    let root = package("root", "1.0.0", CRATES_IO, "dependencies = [\"c 1.0.0\", \"c 2.0.0\"]");
+    let two = [from_registry("a", "1.0.0"), from_registry("a", "2.0.0"), root];
+    assert_eq!(versions(&two), [""; 0]);
+    let third = [two.concat(), from_registry("a", "3.0.0")];
+    assert_eq!(versions(&third), ["a: 2.0.0, 3.0.0"]);
+    // Several versions of c are the tree's own, until somebody else asks for one.
+    let c = ["1.0.0", "2.0.0", "3.0.0"].map(|version| from_registry("c", version));
+    let tree = [two.concat(), c.concat()];
+    assert_eq!(versions(&tree), [""; 0]);
+    let user = package("user", "1.0.0", CRATES_IO, "dependencies = [\"c 2.0.0\"]");
+    assert_eq!(versions(&[tree.concat(), user]), ["c: 2.0.0, 3.0.0"]);
+    let in_vain = versions(&[from_registry("a", "1.0.0")]);
+    assert_eq!(in_vain, ["a@1.0.0 is listed in vain", "root@1.0.0 is listed in vain"]);
+}
+
+#[test]
+fn every_dependency_has_an_allowed_licence() {
+    let allowed = allow_list();
+    assert!(allowed.contains("MIT") && allowed.contains("Apache-2.0"), "{allowed:?}");
+    let metadata = metadata();
     let packages = metadata["packages"].as_array().expect("packages");
     assert!(packages.len() > 50, "{} packages", packages.len());
     let refused: Vec<String> = packages
@@ -118,7 +331,7 @@ fn host() -> String {
 
 #[test]
 fn crates_used_directly_and_pages_of_notes_are_listed() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = root();
     let read = |path: &str| std::fs::read_to_string(root.join(path)).expect("file");
     let manifest = read("Cargo.toml");
     let list = manifest.split_once("[workspace.dependencies]").expect("dependencies").1;

@@ -209,6 +209,123 @@ fn kd_trees_are_kept_and_read_again() -> Tested {
     Ok(())
 }
 
+/// A kept tree that is broken, or in whose place something else stands, costs a build and a warning: neither the run nor the picture.
+#[test]
+fn kept_kd_trees_that_are_broken_are_built_anew_and_said_once() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let cache = folder.path().join("indexes");
+    let picture = folder.path().join("a.exr");
+    let render = || {
+        let size = ["render", "builtin:cornell-box", "--size", "8", "--spp", "1"];
+        let index = ["--index", "kd", "--index-cache", text(&cache), "-o", text(&picture)];
+        succeed(&[&size[..], &index].concat())
+    };
+    render()?;
+    let pixels = exr::read(&picture)?.main_layer()?.values().to_vec();
+    let kept = std::fs::read_dir(&cache)?.next().ok_or("no file")??.path();
+    let whole = std::fs::read(&kept)?;
+    for broken in [&b""[..], b"not a tree", &whole[..whole.len() / 2]] {
+        std::fs::write(&kept, broken)?;
+        let output = render()?;
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(stderr.matches("made anew").count(), 1, "{}", said(&output));
+        assert_eq!(json_file(&picture.with_extension("json"))?["index"]["kept"], "written");
+        assert_eq!(exr::read(&picture)?.main_layer()?.values(), pixels);
+        assert_eq!(std::fs::read(&kept)?, whole);
+    }
+    // Every repeat meets what cannot be replaced; it is said once.
+    std::fs::remove_file(&kept)?;
+    std::fs::create_dir(&kept)?;
+    let index = [
+        "index",
+        "--scene",
+        "builtin:cornell-box",
+        "--repeat",
+        "3",
+        "--rays",
+        "10",
+    ];
+    let output = succeed(&[&index[..], &["--index-cache", text(&cache)]].concat())?;
+    assert_eq!(said(&output).matches("made anew").count(), 1, "{}", said(&output));
+    assert!(said(&output).contains("not kept"), "{}", said(&output));
+    for command in ["render", "index"] {
+        let help = String::from_utf8(succeed(&[command, "--help"])?.stdout)?;
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(help.contains("trusted with how long rays take"), "{help}");
+    }
+    Ok(())
+}
+
+/// A command that opens a device, but neither compiles nor dispatches anything.
+fn opens_a_device() -> Command {
+    let mut command = program();
+    command.args([
+        "index",
+        "--scene",
+        "builtin:triangle-soup?n=1",
+        "--repeat",
+        "1",
+        "--rays",
+        "2",
+    ]);
+    command.env_remove("LOCALAPPDATA").stdin(Stdio::null());
+    command
+}
+
+#[test]
+fn pipelines_are_kept_in_absolute_folders_only() -> Tested {
+    for (caches, home) in [("", ""), ("caches", "home"), ("./", "..")] {
+        let folder = tempfile::tempdir()?;
+        let below = folder.path().join("current");
+        std::fs::create_dir(&below)?;
+        let mut command = opens_a_device();
+        command
+            .current_dir(&below)
+            .env("XDG_CACHE_HOME", caches)
+            .env("HOME", home);
+        let output = command.output()?;
+        assert!(output.status.success(), "{}", said(&output));
+        for place in [
+            "clerestory",
+            ".cache/clerestory",
+            "caches/clerestory",
+            "home/.cache/clerestory",
+            "../.cache/clerestory",
+        ] {
+            assert!(!below.join(place).exists(), "{caches:?} and {home:?} lead to {place}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_pipeline_cache_that_is_broken_is_made_anew_and_said_once() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let cache = folder.path().join("clerestory");
+    let open = || -> Result<(String, std::path::PathBuf), Box<dyn std::error::Error>> {
+        let output = opens_a_device().env("XDG_CACHE_HOME", folder.path()).output()?;
+        assert!(output.status.success(), "{}", said(&output));
+        let files: Vec<_> = std::fs::read_dir(&cache)?.collect::<Result<_, _>>()?;
+        assert_eq!(files.len(), 1, "{files:?}");
+        Ok((String::from_utf8_lossy(&output.stderr).into_owned(), files[0].path()))
+    };
+    let (stderr, file) = open()?;
+    assert!(!stderr.contains("made anew"), "{stderr}");
+    let whole = std::fs::read(&file)?;
+    for broken in [&whole[..whole.len() / 2], &whole[36..], b"", b"no cache"] {
+        std::fs::write(&file, broken)?;
+        let (stderr, file) = open()?;
+        assert_eq!(stderr.matches("made anew").count(), 1, "{stderr}");
+        assert!(std::fs::read(&file)?.starts_with(b"CLPIPELN"), "{file:?}");
+        let (stderr, _) = open()?;
+        assert!(!stderr.contains("made anew"), "{stderr}");
+    }
+    let help = String::from_utf8(succeed(&["--help"])?.stdout)?;
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(help.contains("trusted as the driver is"), "{help}");
+    Ok(())
+}
+
 #[test]
 fn indexes_are_compared_also_where_the_device_cannot_build_one() -> Tested {
     let scenes = ["builtin:triangle-soup?n=1", "builtin:triangle-soup?n=500"];

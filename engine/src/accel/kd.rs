@@ -17,6 +17,7 @@ mod counters;
 mod entries;
 mod kept;
 pub mod probability;
+mod replay;
 pub(crate) mod shifted_restart;
 pub(crate) mod traverse;
 mod tree;

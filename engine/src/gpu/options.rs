@@ -1,5 +1,6 @@
 //! What a host may choose about its device.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -98,7 +99,12 @@ pub struct GpuOptions {
     pub device: DeviceSelection,
     /// Validation layers; the default obeys the environment variable `CLERESTORY_VALIDATION`.
     pub validation: Validation,
-    /// Folder of the pipeline cache; `None` keeps none. The default is `$XDG_CACHE_HOME/clerestory`, else `~/.cache/clerestory`.
+    /// Folder of the pipeline cache; `None` keeps none. The default is the folder `clerestory` in `$XDG_CACHE_HOME`, else in `$HOME/.cache`, else in
+    /// `%LOCALAPPDATA%`, the first of these that is an absolute path.
+    ///
+    /// A file there is trusted as the driver is: it reaches the driver once length, version, device and hash fit, which finds
+    /// what is damaged, but not what somebody has forged who may write there. A folder that others may write to is not for this. What does not fit is
+    /// removed with one warning and made anew. Processes may share a folder.
     pub cache_folder: Option<PathBuf>,
     /// Writes a marker before every pass, so that a lost device names the last one that was reached. Costs a pass a 4-byte fill between two
     /// barriers, so that passes do not overlap; off, they overlap as far as their own barriers allow.
@@ -124,15 +130,21 @@ pub struct Lesser {
     pub heap_bytes: Option<u64>,
 }
 
+/// Where caches are kept, by the environment. What is empty or relative would depend on the folder that a program happens to run in.
+fn default_cache_folder(variable: impl Fn(&'static str) -> Option<OsString>) -> Option<PathBuf> {
+    let folder = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    folder("XDG_CACHE_HOME")
+        .or_else(|| folder("HOME").map(|home| home.join(".cache")))
+        .or_else(|| folder("LOCALAPPDATA"))
+        .map(|caches| caches.join("clerestory"))
+}
+
 impl Default for GpuOptions {
     fn default() -> Self {
-        let cache = std::env::var_os("XDG_CACHE_HOME")
-            .map(PathBuf::from)
-            .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")));
         Self {
             device: DeviceSelection::default(),
             validation: Validation::default(),
-            cache_folder: cache.map(|folder| folder.join("clerestory")),
+            cache_folder: default_cache_folder(std::env::var_os),
             crash_markers: true,
             fault: None,
             lesser: Lesser::default(),
@@ -143,6 +155,32 @@ impl Default for GpuOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn caches_lie_in_the_first_absolute_folder() {
+        let root = if cfg!(windows) { "C:/" } else { "/" };
+        let folders = ["x", "h", "l"].map(|name| format!("{root}{name}"));
+        let [x, h, l] = folders.each_ref().map(String::as_str);
+        let cases = [
+            ([Some(x), Some(h), None], Some("x/clerestory")),
+            ([None, Some(h), Some(l)], Some("h/.cache/clerestory")),
+            ([Some(""), Some(h), None], Some("h/.cache/clerestory")),
+            ([Some("x"), Some(h), None], Some("h/.cache/clerestory")),
+            ([Some("./x"), Some(".."), Some(l)], Some("l/clerestory")),
+            ([Some(""), Some(""), Some("")], None),
+            ([None, Some("h"), Some("l")], None),
+            ([None; 3], None),
+        ];
+        for (values, expected) in cases {
+            let variable = |wanted: &str| {
+                let names = ["XDG_CACHE_HOME", "HOME", "LOCALAPPDATA"];
+                let found = names.iter().position(|name| *name == wanted)?;
+                values[found].map(OsString::from)
+            };
+            let expected = expected.map(|path| PathBuf::from(format!("{root}{path}")));
+            assert_eq!(default_cache_folder(variable), expected, "{values:?}");
+        }
+    }
 
     #[test]
     fn an_unknown_value_of_the_variable_is_an_error() {

@@ -44,7 +44,7 @@ pub struct Arguments {
     /// Rays
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(2..))]
     rays: u32,
-    /// Folder that keeps kd-trees: a tree over the same triangles is read from there instead of being built again, in repeats too
+    /// Folder that keeps kd-trees: a tree over the same triangles is read from there instead of being built again, in repeats too. A file there is trusted with how long rays take, not with what they hit: what is damaged, or no such tree, is built anew
     #[arg(long, value_name = "FOLDER", conflicts_with = "peers")]
     index_cache: Option<PathBuf>,
     /// Measures builds, and rays per second of the device's kernels, beside obvhs, bvh and, where it is installed, Embree on the processor, instead

@@ -47,6 +47,9 @@ Examples:
 
 Each command explains itself: clerestory render --help
 
+Compiled pipelines are kept in $XDG_CACHE_HOME/clerestory, else $HOME/.cache/clerestory. A file there is trusted as the driver is: what is \
+damaged is made anew, but let nobody else write there.
+
 Exit codes:
   0    done
   1    the run failed: device lost, out of memory, a picture that cannot be read, a file that cannot be written (a picture is then

@@ -10,7 +10,8 @@
 use super::bounds::Bounds;
 use super::clip::clipped_bounds;
 use super::probability::{AreaTerms, Heuristic, InteriorOrigin};
-use super::{KdSettings, MAX_DEPTH};
+use super::tree::KdKind;
+use super::{KdSettings, KdTree, MAX_DEPTH};
 use crate::accel::Aabb;
 use crate::accel::input::bounds_of;
 use crate::catalogue::{Role, Row, sources};
@@ -79,53 +80,30 @@ struct Plane {
 
 /// Where a triangle goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+pub(super) enum Side {
     Below,
     Above,
     Both,
 }
 
-struct Builder<'a> {
+/// Construction over triangles that rays can meet.
+pub(super) struct Builder<'a> {
     triangles: &'a [[Vec3; 3]],
     settings: &'a KdSettings,
+    /// Box of all triangles.
+    bounds: Aabb,
     scene: Bounds,
     max_depth: u32,
 }
 
 /// The tree over triangles that rays can meet, all of them within `bounds`.
 pub fn build(triangles: &[[Vec3; 3]], bounds: Aabb, settings: &KdSettings) -> Built {
-    let mut scene = Bounds::from(bounds);
-    let pad = FLAT_SHARE * scene.extent().length();
-    for axis in 0..3 {
-        if scene.extent()[axis] < pad {
-            scene.upper[axis] = scene.lower[axis] + pad;
-        }
-    }
-    let builder = Builder {
-        triangles,
-        settings,
-        scene,
-        max_depth: settings.max_depth.min(MAX_DEPTH),
-    };
-    let boxes: Vec<Aabb> = triangles.par_iter().map(triangle_bounds).collect();
-    let events = [0, 1, 2].map(|axis| {
-        let mut events = Vec::with_capacity(2 * boxes.len());
-        for (i, bounds) in boxes.iter().enumerate() {
-            push_events(&mut events, bounds, i as u32, axis);
-        }
-        events.par_sort_unstable_by(Event::order);
-        events
-    });
-    builder.node(Work {
-        bounds,
-        triangles: (0..triangles.len() as u32).collect(),
-        events,
-        depth: 0,
-    })
+    let builder = Builder::new(triangles, bounds, settings);
+    builder.node(builder.root())
 }
 
 /// With one kind of zero, since events compare planes by their bits.
-fn triangle_bounds(triangle: &[Vec3; 3]) -> Aabb {
+pub(super) fn triangle_bounds(triangle: &[Vec3; 3]) -> Aabb {
     bounds_of(triangle).without_negative_zero()
 }
 
@@ -140,13 +118,47 @@ fn push_events(events: &mut Vec<Event>, bounds: &Aabb, triangle: u32, axis: usiz
     }
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
+    /// All triangles lie within `bounds`.
+    pub(super) fn new(triangles: &'a [[Vec3; 3]], bounds: Aabb, settings: &'a KdSettings) -> Self {
+        let mut scene = Bounds::from(bounds);
+        let pad = FLAT_SHARE * scene.extent().length();
+        for axis in 0..3 {
+            if scene.extent()[axis] < pad {
+                scene.upper[axis] = scene.lower[axis] + pad;
+            }
+        }
+        Self {
+            triangles,
+            settings,
+            bounds,
+            scene,
+            max_depth: settings.max_depth.min(MAX_DEPTH),
+        }
+    }
+
+    /// The node of all triangles.
+    fn root(&self) -> Work {
+        let boxes: Vec<Aabb> = self.triangles.par_iter().map(triangle_bounds).collect();
+        let events = [0, 1, 2].map(|axis| {
+            let mut events = Vec::with_capacity(2 * boxes.len());
+            for (i, bounds) in boxes.iter().enumerate() {
+                push_events(&mut events, bounds, i as u32, axis);
+            }
+            events.par_sort_unstable_by(Event::order);
+            events
+        });
+        Work {
+            bounds: self.bounds,
+            triangles: (0..self.triangles.len() as u32).collect(),
+            events,
+            depth: 0,
+        }
+    }
+
     fn node(&self, work: Work) -> Built {
         let count = work.triangles.len();
-        if count <= self.settings.leaf_size as usize || work.depth >= self.max_depth {
-            return Built::Leaf(work.triangles);
-        }
-        let Some(best) = self.best_plane(&work) else {
+        let Some(best) = self.plane_of(&work) else {
             return Built::Leaf(work.triangles);
         };
         let [below, above] = self.split(work, &best);
@@ -157,6 +169,32 @@ impl Builder<'_> {
             [self.node(below), self.node(above)]
         };
         Built::Inner(best.axis as u8, best.plane, Box::new(children))
+    }
+
+    /// The plane that cuts a node; `None` for a leaf.
+    fn plane_of(&self, work: &Work) -> Option<Plane> {
+        if work.triangles.len() <= self.settings.leaf_size as usize || work.depth >= self.max_depth {
+            return None;
+        }
+        self.best_plane(work)
+    }
+
+    /// Whether a tree over the same triangles is cut, or left uncut, as here at all nodes that are `wanted`; with a node those above it are.
+    pub(super) fn has_built(&self, tree: &KdTree, wanted: &[bool]) -> bool {
+        !wanted[0] || self.has_built_below(self.root(), tree, 0, wanted)
+    }
+
+    fn has_built_below(&self, work: Work, tree: &KdTree, node: u32, wanted: &[bool]) -> bool {
+        match (tree.nodes[node as usize].kind(), self.plane_of(&work)) {
+            (KdKind::Leaf { .. }, None) => true,
+            (KdKind::Inner { axis, plane, children }, Some(best)) if axis == best.axis && plane == best.plane => {
+                let [below, above] = self.split(work, &best);
+                [(children, below), (children + 1, above)]
+                    .into_iter()
+                    .all(|(child, work)| !wanted[child as usize] || self.has_built_below(work, tree, child, wanted))
+            }
+            _ => false,
+        }
     }
 
     /// The cheapest plane, if it is cheaper than a leaf.
@@ -340,7 +378,7 @@ impl Builder<'_> {
     }
 
     /// The box of what a node has of a triangle.
-    fn part(&self, triangle: &[Vec3; 3], node: &Aabb) -> Option<Aabb> {
+    pub(super) fn part(&self, triangle: &[Vec3; 3], node: &Aabb) -> Option<Aabb> {
         if self.settings.clip {
             return clipped_bounds(triangle, node);
         }
@@ -373,6 +411,21 @@ fn sides(work: &Work, best: &Plane) -> Vec<Side> {
         }
     }
     sides
+}
+
+/// Where a triangle goes by the box of what the node has of it, the same as by its events; `None` for one in the plane, which goes where the
+/// plane's choice says.
+pub(super) fn side_of(part: &Aabb, axis: usize, plane: f32) -> Option<Side> {
+    let (lower, upper) = (part.lower[axis], part.upper[axis]);
+    if lower == plane && upper == plane {
+        None
+    } else if upper <= plane {
+        Some(Side::Below)
+    } else if lower >= plane {
+        Some(Side::Above)
+    } else {
+        Some(Side::Both)
+    }
 }
 
 /// Two sorted runs as one.
