@@ -25,8 +25,8 @@
 //! 7. [`render`], which ties them together.
 //! 8. [`plan`], which chooses among them.
 //!
-//! [`catalogue`] has the rows that say where each published method lives; [`settings`](mod@settings), [`error`], [`fingerprint`] and [`srgb`] serve
-//! all floors.
+//! [`catalogue`] has the rows that say where each published method lives; [`settings`](mod@settings), [`error`], [`fingerprint`], [`input`] and
+//! [`srgb`] serve all floors.
 
 pub mod accel;
 pub mod catalogue;
@@ -34,6 +34,7 @@ pub mod error;
 pub mod film;
 pub mod fingerprint;
 pub mod gpu;
+pub mod input;
 pub mod kernels;
 pub mod maps;
 pub mod plan;
