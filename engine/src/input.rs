@@ -392,7 +392,8 @@ impl<'o> InputFiles<'o> {
     pub fn read_if_there(&self, path: &Path) -> io::Result<Option<Arc<Vec<u8>>>> {
         match self.read(path) {
             Ok(bytes) => Ok(Some(bytes)),
-            Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
+            // A longer name than the system allows is no file's.
+            Err(cause) if matches!(cause.kind(), ErrorKind::NotFound | ErrorKind::InvalidFilename) => Ok(None),
             Err(cause) => Err(cause),
         }
     }

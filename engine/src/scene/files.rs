@@ -65,10 +65,29 @@ pub fn load(address_or_path: &str) -> Result<Scene> {
 
 /// As [`load`], with files by the host's resolver and within its limits; says which files were read.
 ///
+/// ```no_run
+/// use std::sync::Arc;
+///
+/// use clerestory::input::Folder;
+/// use clerestory::scene::{LoadOptions, load_with};
+///
+/// # fn main() -> clerestory::Result<()> {
+/// let options = LoadOptions {
+///     resolver: Arc::new(Folder::new("uploads")?),
+///     ..LoadOptions::default()
+/// };
+/// let loaded = load_with("model.glb", &options)?;
+/// for file in &loaded.files {
+///     println!("{} ({} bytes)", file.path.display(), file.bytes);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// As [`load`]; beyond a limit, the error names the file or the place that asked for too much.
 pub fn load_with(address_or_path: &str, options: &LoadOptions) -> Result<Loaded> {
-    let files = InputFiles::new(options.resolver.as_ref(), options.limits);
+    let files = InputFiles::new(&*options.resolver, options.limits);
     let scene = load_from(address_or_path, &files)?;
     Ok(Loaded {
         scene,
