@@ -25,7 +25,7 @@
 //! 7. [`render`], which ties them together.
 //! 8. [`plan`], which chooses among them.
 //!
-//! [`catalogue`] has the rows that say where each published method lives; [`settings`](mod@settings), [`error`], [`atomic`], [`fingerprint`] and
+//! [`catalogue`] has the rows that say where each published method lives; [`settings`](mod@settings), [`error`], [`atomic`], [`fingerprint`], [`input`] and
 //! [`srgb`] serve all floors.
 
 pub mod accel;
@@ -35,6 +35,7 @@ pub mod error;
 pub mod film;
 pub mod fingerprint;
 pub mod gpu;
+pub mod input;
 mod kept_file;
 pub mod kernels;
 pub mod maps;

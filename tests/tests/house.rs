@@ -143,6 +143,42 @@ fn uses_are_found_in_all_their_forms() {
     assert_eq!(floors_included("#include \"film/a.glsl\"\n").len(), 1);
 }
 
+/// Ways to open a file that look neither at its kind nor at its length.
+const OTHER_DOORS: [&str; 5] = [
+    "fs::read",
+    "File::open",
+    "OpenOptions",
+    "ImageReader::open",
+    "_from_file(",
+];
+
+#[test]
+fn files_that_others_name_are_read_through_one_door() {
+    let root = repository();
+    let mut seen = 0;
+    for folder in ["engine/src/scene", "engine/src/film"] {
+        for path in files(&root.join(folder), &["rs"]) {
+            let source = std::fs::read_to_string(&path).expect("source");
+            let below = path.strip_prefix(&root).expect("below the root");
+            let is_test = below.iter().any(|part| part == "tests");
+            let code = source.split("#[cfg(test)]").next().unwrap_or_default();
+            // Outputs are written by one module, which opens them as new.
+            if is_test || path.ends_with("film/atomic.rs") {
+                continue;
+            }
+            seen += 1;
+            for door in OTHER_DOORS {
+                assert!(
+                    !code.contains(door),
+                    "{}: {door} in place of crate::input",
+                    path.display()
+                );
+            }
+        }
+    }
+    assert!(seen > 50, "{seen} files");
+}
+
 /// Methods that may use another one's code and kernels: photon mapping's eye paths are the path tracer's.
 const METHODS_BESIDE: [[&str; 2]; 1] = [["photon_mapping", "path"]];
 

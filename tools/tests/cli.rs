@@ -68,6 +68,31 @@ fn gray(path: &Path, size: u32, value: f32) -> Tested {
 }
 
 #[test]
+fn info_says_which_files_a_scene_has_read() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let model = folder.path().join("m.obj");
+    std::fs::write(&model, "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")?;
+    std::fs::write(folder.path().join("m.mtl"), "newmtl a\n")?;
+    let model = model.display().to_string();
+    let info = json(&succeed(&["info", &model, "--files", "--json"])?.stdout)?;
+    let files = info["files"].as_array().into_iter().flatten();
+    let names: Vec<&str> = files.filter_map(|file| file["path"].as_str()).collect();
+    assert!(
+        names.len() == 2 && names[0].ends_with("m.obj") && names[1].ends_with("m.mtl"),
+        "{info}"
+    );
+    assert_eq!(info["files"][1]["bytes"], 9);
+    assert!(
+        json(&succeed(&["info", &model, "--json"])?.stdout)?
+            .get("files")
+            .is_none()
+    );
+    let text = succeed(&["info", "builtin:cornell-box", "--files"])?.stdout;
+    assert!(String::from_utf8_lossy(&text).contains("file          none"));
+    Ok(())
+}
+
+#[test]
 fn a_rendering_leaves_picture_preview_and_report() -> Tested {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("new/a.exr");

@@ -4,9 +4,11 @@
 //! channel), which every reader shows; other layers are named as in the OpenEXR technical introduction ("layers"): `albedo.R`, `normal.X`,
 //! `depth.Z`, `samples.Y`. Metadata are string attributes, UTF-8; the standard attribute `software` names the engine.
 //! Guarantees: equal pictures give equal bytes (attributes stand in the order of their names); values round-trip to the bit; files appear as a whole.
-//! Read are flat files of any part, channel and pixel type; deep data and subsampled channels are refused.
+//! Read are flat files of any part, channel and pixel type; deep data and subsampled channels are refused. Reading takes memory in proportion to the
+//! file's length, whatever its header says, and time in proportion to its channels.
 
-use std::io::{BufRead, Cursor, Seek};
+use std::collections::HashMap;
+use std::io::{BufRead, Cursor, Seek, SeekFrom};
 use std::path::Path;
 
 use exr::meta::attribute::AttributeValue;
@@ -17,9 +19,13 @@ use super::picture::{DEPTH, Metadata, NORMAL, POSITION, Picture, RADIANCE};
 use crate::Error as EngineError;
 use crate::Result as EngineResult;
 use crate::catalogue::{Role, Row, sources};
+use crate::input::{InputLimits, open_regular};
 
 /// Samples (values, not pixels) that a file may hold in all; a header asking for more is refused before anything is allocated.
 const MAX_SAMPLES: usize = 1 << 29;
+
+/// Bytes in memory for each byte of a file, beyond what is free: the deflate format packs no more than 1032 into one.
+const MEMORY_PER_BYTE: u64 = 1024;
 
 /// Attributes that writing sets and that are not metadata of a picture's making.
 const LIBRARY_ATTRIBUTES: [&str; 1] = ["software"];
@@ -142,11 +148,13 @@ fn sort_attributes(bytes: &mut [u8]) -> Option<()> {
 /// name stands for a missing prefix. f16 and u32 values become f32. Text attributes become metadata.
 ///
 /// # Errors
-/// [`crate::Error::Io`] when the file cannot be opened; [`crate::Error::Picture`] when it is not a flat EXR file, holds more than 2²⁹ values, has
-/// subsampled channels or parts of different sizes.
+/// [`crate::Error::Io`] when the file cannot be opened, is not a regular file or is longer than [`InputLimits::file`];
+/// [`crate::Error::Picture`] when it is not a flat EXR file, holds more than 2²⁹ values or more than its length can say, has subsampled channels or
+/// parts of different sizes.
 pub fn read(path: impl AsRef<Path>) -> EngineResult<Picture> {
     let path = path.as_ref();
-    let file = std::fs::File::open(path).map_err(|cause| EngineError::io(path, cause))?;
+    let opened = open_regular(path, InputLimits::default().file);
+    let (file, _) = opened.map_err(|cause| EngineError::io(path, cause))?;
     read_from(std::io::BufReader::new(file), &path.display().to_string())
 }
 
@@ -159,8 +167,10 @@ pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineRe
         path: name.to_owned(),
         cause,
     };
+    let length = source.seek(SeekFrom::End(0)).map_err(|e| wrong(e.to_string()))?;
+    source.rewind().map_err(|e| wrong(e.to_string()))?;
     let meta = MetaData::read_from_buffered(&mut source, false).map_err(|e| wrong(e.to_string()))?;
-    let mut samples = 0usize;
+    let (mut samples, mut memory) = (0usize, 0u64);
     for header in &meta.headers {
         if header
             .channels
@@ -173,10 +183,25 @@ pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineRe
         let count = header.layer_size.0.checked_mul(header.layer_size.1);
         let count = count.and_then(|pixels| pixels.checked_mul(header.channels.list.len()));
         samples = samples.saturating_add(count.unwrap_or(usize::MAX));
+        // Values as they are in the file, and as f32.
+        for channel in &header.channels.list {
+            let bytes = channel.sample_type.bytes_per_sample() + size_of::<f32>();
+            let bytes = header
+                .layer_size
+                .0
+                .saturating_mul(header.layer_size.1)
+                .saturating_mul(bytes);
+            memory = memory.saturating_add(bytes as u64);
+        }
     }
     if samples > MAX_SAMPLES {
         return Err(wrong(format!("holds {samples} values; {MAX_SAMPLES} can be read")));
     }
+    let limits = InputLimits {
+        per_byte: MEMORY_PER_BYTE,
+        ..InputLimits::default()
+    };
+    limits.check_decoded(memory, length).map_err(wrong)?;
     source.rewind().map_err(|e| wrong(e.to_string()))?;
     let image = exr::prelude::read()
         .no_deep_data()
@@ -191,7 +216,7 @@ pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineRe
     let side = |length: usize| u32::try_from(length).map_err(|_| wrong(format!("has a side of {length} pixels")));
     let mut picture = Picture::new(side(size.0)?, side(size.1)?)?;
     let many = image.layer_data.len() > 1;
-    let mut entries = Vec::new();
+    let (mut entries, mut names) = (Vec::new(), Names::default());
     collect_text(&image.attributes.other, &mut entries);
     for part in &image.layer_data {
         if part.size != size || part.attributes.layer_position != position {
@@ -201,8 +226,15 @@ pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineRe
         }
         collect_text(&part.attributes.other, &mut entries);
         let part_name = part.attributes.layer_name.as_ref().map(ToString::to_string);
-        add_part(&mut picture, part, &part_name.filter(|_| many).unwrap_or_default())?;
+        add_part(
+            &mut picture,
+            &mut names,
+            part,
+            &part_name.filter(|_| many).unwrap_or_default(),
+        )?;
     }
+    // Maps have no order of their own; where two parts disagree the result must not depend on it.
+    entries.sort();
     picture.metadata = Metadata::from_entries(entries);
     Ok(picture)
 }
@@ -216,21 +248,28 @@ fn collect_text(attributes: &std::collections::HashMap<Text, AttributeValue>, en
             entries.push((key, value));
         }
     }
-    // The map has no order of its own; where two parts disagree the result must not depend on it.
-    entries.sort();
 }
 
 /// Groups the channels of one part by their prefix and adds them as layers.
-fn add_part(picture: &mut Picture, part: &Layer<AnyChannels<FlatSamples>>, part_name: &str) -> EngineResult<()> {
+fn add_part(
+    picture: &mut Picture,
+    names: &mut Names,
+    part: &Layer<AnyChannels<FlatSamples>>,
+    part_name: &str,
+) -> EngineResult<()> {
     let mut groups: Vec<(String, Vec<(String, &FlatSamples)>)> = Vec::new();
+    let mut places: HashMap<String, usize> = HashMap::new();
     for channel in &part.channel_data.list {
         let full = channel.name.to_string();
         let (prefix, suffix) = full.rsplit_once('.').unwrap_or(("", &full));
         let prefix = if prefix.is_empty() { part_name } else { prefix };
         let entry = (suffix.to_owned(), &channel.sample_data);
-        match groups.iter_mut().find(|(name, _)| name == prefix) {
-            Some((_, channels)) => channels.push(entry),
-            None => groups.push((prefix.to_owned(), vec![entry])),
+        match places.get(prefix) {
+            Some(&place) => groups[place].1.push(entry),
+            None => {
+                places.insert(prefix.to_owned(), groups.len());
+                groups.push((prefix.to_owned(), vec![entry]));
+            }
         }
     }
     for (prefix, mut channels) in groups {
@@ -245,7 +284,7 @@ fn add_part(picture: &mut Picture, part: &Layer<AnyChannels<FlatSamples>>, part_
                 let values = r.zip(g).zip(b).flat_map(|((r, g), b)| [r, g, b]).collect();
                 let shown = prefix.is_empty() && picture.layer(RADIANCE).is_none() && triple[0] == "R";
                 let name = if shown { RADIANCE } else { &prefix };
-                add_unique(picture, name, 3, values)?;
+                names.add(picture, name, 3, values)?;
                 channels.retain(|(suffix, _)| !triple.iter().any(|wanted| suffix.eq_ignore_ascii_case(wanted)));
             }
         }
@@ -260,22 +299,38 @@ fn add_part(picture: &mut Picture, part: &Layer<AnyChannels<FlatSamples>>, part_
                 (prefix, _) if is_short && picture.layer(prefix).is_none() => prefix.to_owned(),
                 (prefix, other) => format!("{prefix}.{other}"),
             };
-            add_unique(picture, &name, 1, samples.values_as_f32().collect())?;
+            names.add(picture, &name, 1, samples.values_as_f32().collect())?;
         }
     }
     Ok(())
 }
 
-/// Adds a layer under `name`, or `name 2` and so on when that is taken.
-fn add_unique(picture: &mut Picture, name: &str, channels: usize, values: Vec<f32>) -> EngineResult<()> {
-    let name = if name.is_empty() { "layer" } else { name };
-    let mut unique = name.to_owned();
-    let mut number = 1;
-    while picture.layer(&unique).is_some() {
-        number += 1;
-        unique = format!("{name} {number}");
+/// The numbers that layers of one name were given last.
+#[derive(Default)]
+struct Names {
+    last: HashMap<String, u32>,
+    /// Names that were looked up.
+    tried: u64,
+}
+
+impl Names {
+    /// Adds a layer under `name`, or `name 2` and so on when that is taken. Each number is tried once, since layers stay.
+    fn add(&mut self, picture: &mut Picture, name: &str, channels: usize, values: Vec<f32>) -> EngineResult<()> {
+        let name = if name.is_empty() { "layer" } else { name };
+        let number = self.last.entry(name.to_owned()).or_insert(0);
+        let unique = loop {
+            *number += 1;
+            self.tried += 1;
+            let unique = match *number {
+                1 => name.to_owned(),
+                _ => format!("{name} {number}"),
+            };
+            if picture.layer(&unique).is_none() {
+                break unique;
+            }
+        };
+        picture.add_layer(&unique, channels, values)
     }
-    picture.add_layer(&unique, channels, values)
 }
 
 /// Rows of the catalogue.
@@ -421,6 +476,74 @@ mod tests {
         let picture = read_from(Cursor::new(encode(image)?), "test")?;
         assert_eq!(picture.main_layer()?.values()[0], 1.0);
         assert_eq!(picture.require(ALBEDO)?.values()[0], 2.0);
+        Ok(())
+    }
+
+    #[test]
+    fn layers_of_one_name_are_numbered_in_as_many_steps_as_there_are() -> EngineResult<()> {
+        const COUNT: u64 = 3000;
+        let mut picture = Picture::new(1, 1)?;
+        let mut names = Names::default();
+        for name in ["a 3", "a"] {
+            names.add(&mut picture, name, 1, vec![0.0])?;
+        }
+        for _ in 2..COUNT {
+            names.add(&mut picture, "a", 1, vec![0.0])?;
+        }
+        names.add(&mut picture, "", 1, vec![0.0])?;
+        let found: Vec<&str> = picture.layers()[..5].iter().map(|layer| layer.name()).collect();
+        assert_eq!(found, ["a 3", "a", "a 2", "a 4", "a 5"]);
+        assert_eq!(picture.layers().len() as u64, COUNT + 1);
+        // One more for the name that was taken.
+        assert_eq!(names.tried, COUNT + 2);
+        Ok(())
+    }
+
+    #[test]
+    fn thousands_of_channels_and_parts_keep_their_names() -> EngineResult<()> {
+        let prefixes = 2000;
+        let list = (0..prefixes).map(|i| channel(&format!("p{i:04}.x"), FlatSamples::F32(vec![i as f32])));
+        let channels = AnyChannels::sort(list.collect());
+        let picture = read_from(Cursor::new(encode(Image::from_channels((1, 1), channels))?), "test")?;
+        assert_eq!(picture.layers().len(), prefixes);
+        assert_eq!(picture.require("p1234.x")?.values(), [1234.0]);
+        let part = |i: usize| {
+            let list = [channel("p.x", FlatSamples::F32(vec![i as f32]))];
+            let channels = AnyChannels::sort(list.into_iter().collect());
+            Layer::new(
+                (1, 1),
+                LayerAttributes::named(format!("{i}").as_str()),
+                Encoding::UNCOMPRESSED,
+                channels,
+            )
+        };
+        let image = Image::from_layers(
+            ImageAttributes::with_size((1, 1)),
+            (0..300).map(part).collect::<Layers<_>>(),
+        );
+        let picture = read_from(Cursor::new(encode(image)?), "test")?;
+        assert_eq!(picture.layers().len(), 300);
+        assert_eq!(picture.require("p.x 300")?.values(), [299.0]);
+        Ok(())
+    }
+
+    #[test]
+    fn a_header_that_promises_more_than_the_file_can_hold_is_refused() -> EngineResult<()> {
+        let mut bytes = to_bytes(&Picture::from_radiance(2, 2, vec![0.5; 12])?, "a")?;
+        // The windows' last pixel: 13000² pixels of three f32 would take 4 GB. As many values as that may be read from files that hold them.
+        for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+            let place = bytes
+                .windows(name.len())
+                .position(|window| window == name)
+                .expect("attribute");
+            // Behind the value's length and the first pixel.
+            let corner = place + name.len() + 4 + 8;
+            bytes[corner..corner + 4].copy_from_slice(&12_999i32.to_le_bytes());
+            bytes[corner + 4..corner + 8].copy_from_slice(&12_999i32.to_le_bytes());
+        }
+        let read = read_from(Cursor::new(bytes), "small");
+        let message = read.expect_err("huge").to_string();
+        assert!(message.contains("takes 4056000000 bytes of memory"), "{message}");
         Ok(())
     }
 

@@ -3,25 +3,29 @@
 //! Guarantees: what the format cannot say (negative and non-finite values) is refused in writing, not bent; a colour errs by at most 1/128
 //! of its largest channel. Atomic writes.
 
-use std::io::{BufRead, Seek};
+use std::io::{BufRead, Seek, SeekFrom};
 use std::path::Path;
 
 use image::{ImageDecoder, ImageEncoder};
 
 use super::mark::SOFTWARE;
 use super::picture::Picture;
+use crate::input::{InputLimits, open_regular};
 use crate::{Error, Result};
 
 /// The largest file content read, in pixels: 16384 × 8192, the largest environment maps in use.
 const MAX_PIXELS: u64 = 1 << 27;
+/// Bytes in memory for each byte of a file, beyond what is free: runs of up to 127 pixels take eight bytes in the file, and are 12 bytes each.
+const MEMORY_PER_BYTE: u64 = 256;
 
 /// Reads a Radiance HDR picture as the `radiance` layer.
 ///
 /// # Errors
-/// [`Error::Io`] or [`Error::Picture`] with the cause.
+/// [`Error::Io`] when the file cannot be opened, is not a regular file or is longer than [`InputLimits::file`]; [`Error::Picture`] with the cause.
 pub fn read(path: impl AsRef<Path>) -> Result<Picture> {
     let path = path.as_ref();
-    let file = std::fs::File::open(path).map_err(|cause| Error::io(path, cause))?;
+    let opened = open_regular(path, InputLimits::default().file);
+    let (file, _) = opened.map_err(|cause| Error::io(path, cause))?;
     read_from(std::io::BufReader::new(file), &path.display().to_string())
 }
 
@@ -29,16 +33,24 @@ pub fn read(path: impl AsRef<Path>) -> Result<Picture> {
 ///
 /// # Errors
 /// [`Error::Picture`] with the cause.
-pub fn read_from(source: impl BufRead + Seek, name: &str) -> Result<Picture> {
+pub fn read_from(mut source: impl BufRead + Seek, name: &str) -> Result<Picture> {
     let wrong = |cause: String| Error::Picture {
         path: name.to_owned(),
         cause,
     };
+    let length = source.seek(SeekFrom::End(0)).map_err(|e| wrong(e.to_string()))?;
+    source.rewind().map_err(|e| wrong(e.to_string()))?;
     let decoder = image::codecs::hdr::HdrDecoder::new(source).map_err(|e| wrong(e.to_string()))?;
     let (width, height) = decoder.dimensions();
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         return Err(wrong(format!("{width}×{height} pixels are more than {MAX_PIXELS}")));
     }
+    let limits = InputLimits {
+        per_byte: MEMORY_PER_BYTE,
+        ..InputLimits::default()
+    };
+    let memory = decoder.total_bytes();
+    limits.check_decoded(memory, length).map_err(wrong)?;
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?;
     Picture::from_radiance(width, height, decoded.into_rgb32f().into_raw())
 }
@@ -133,5 +145,11 @@ mod tests {
         }
         let huge = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\n";
         assert!(read_from(std::io::Cursor::new(huge), "huge").is_err());
+        // As many pixels as a file may have, in one that cannot hold them.
+        let large = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 8192\n";
+        let error = read_from(std::io::Cursor::new(large), "large")
+            .expect_err("large")
+            .to_string();
+        assert!(error.contains("takes 805306368 bytes of memory"), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 //! Guarantees: every layer holds exactly width × height pixels, the top row first; names are unique; non-finite values are kept as they
 //! are and can be counted.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use crate::{Error, Result};
 
@@ -194,6 +194,8 @@ pub struct Picture {
     width: u32,
     height: u32,
     layers: Vec<Layer>,
+    /// Where each name is among the layers: files may have thousands of them.
+    places: HashMap<String, usize>,
     /// How the picture came to be.
     pub metadata: Metadata,
 }
@@ -214,6 +216,7 @@ impl Picture {
             width,
             height,
             layers: Vec::new(),
+            places: HashMap::new(),
             metadata: Metadata::default(),
         })
     }
@@ -264,6 +267,7 @@ impl Picture {
                 cause,
             });
         }
+        self.places.insert(name.to_owned(), self.layers.len());
         self.layers.push(Layer {
             name: name.to_owned(),
             channels,
@@ -279,12 +283,12 @@ impl Picture {
 
     /// A layer by name.
     pub fn layer(&self, name: &str) -> Option<&Layer> {
-        self.layers.iter().find(|layer| layer.name == name)
+        self.layers.get(*self.places.get(name)?)
     }
 
     /// A layer by name, to change its values.
     pub fn layer_mut(&mut self, name: &str) -> Option<&mut Layer> {
-        self.layers.iter_mut().find(|layer| layer.name == name)
+        self.layers.get_mut(*self.places.get(name)?)
     }
 
     /// A layer by name.

@@ -2,41 +2,125 @@
 //!
 //! A model without a camera gets one that frames it, and a model without any light gets a uniform environment, so that a picture comes
 //! out; both are reported as notes, and so is a model without any geometry.
+//!
+//! Everything that a scene names comes through [`input`](crate::input): each file is read once, what may be read and how much is the host's to say.
 
+use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
 use super::{Camera, Environment, EnvironmentUse, Note, Scene, SceneProfile, builtin, gltf, obj, ply, sidecar};
+use crate::input::{AnyFile, InputFile, InputFiles, InputLimits, Resolver};
 use crate::{Error, Result};
+
+/// Which files a scene may read, and how much of them.
+#[derive(Clone)]
+pub struct LoadOptions {
+    /// Finds and reads the files. By default [`AnyFile`]: every regular file that the process may read.
+    pub resolver: Arc<dyn Resolver>,
+    /// Bounds of the files and of their decoded contents.
+    pub limits: InputLimits,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            resolver: Arc::new(AnyFile),
+            limits: InputLimits::default(),
+        }
+    }
+}
+
+impl fmt::Debug for LoadOptions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LoadOptions")
+            .field("limits", &self.limits)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A scene and what was read for it.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The scene.
+    pub scene: Scene,
+    /// All files, in the order of their first use; none for a `builtin:` address.
+    pub files: Vec<InputFile>,
+    /// Bytes of decoded texels, densities, radiance and materials that were counted against the limits.
+    pub bytes_decoded: u64,
+}
 
 /// Loads a scene: a `builtin:` address, a model (`.gltf`, `.glb`, `.ply`, `.obj`) or a sidecar (`.toml` with `file`).
 ///
-/// Beside a model `NAME.EXT`, a file `NAME.scene.toml` is read as its sidecar.
+/// Beside a model `NAME.EXT`, a file `NAME.scene.toml` is read as its sidecar. The scene may name every file that the process may read, by
+/// absolute paths, `..` and links: [`load_with`] keeps scenes that are not trusted in a folder.
 ///
 /// # Errors
-/// [`Error::Io`] for a file that cannot be read; [`Error::Scene`] with the place of the first fault in it.
+/// [`Error::Io`] for a file that cannot be read, is not a regular file or is too long; [`Error::Scene`] with the place of the first fault in it.
 pub fn load(address_or_path: &str) -> Result<Scene> {
+    load_with(address_or_path, &LoadOptions::default()).map(|loaded| loaded.scene)
+}
+
+/// As [`load`], with files by the host's resolver and within its limits; says which files were read.
+///
+/// ```no_run
+/// use std::sync::Arc;
+///
+/// use clerestory::input::Folder;
+/// use clerestory::scene::{LoadOptions, load_with};
+///
+/// # fn main() -> clerestory::Result<()> {
+/// let options = LoadOptions {
+///     resolver: Arc::new(Folder::new("uploads")?),
+///     ..LoadOptions::default()
+/// };
+/// let loaded = load_with("model.glb", &options)?;
+/// for file in &loaded.files {
+///     println!("{} ({} bytes)", file.path.display(), file.bytes);
+/// }
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// As [`load`]; beyond a limit, the error names the file or the place that asked for too much.
+pub fn load_with(address_or_path: &str, options: &LoadOptions) -> Result<Loaded> {
+    let files = InputFiles::new(&*options.resolver, options.limits);
+    let scene = load_from(address_or_path, &files)?;
+    Ok(Loaded {
+        scene,
+        files: files.files(),
+        bytes_decoded: files.bytes_decoded(),
+    })
+}
+
+fn load_from(address_or_path: &str, files: &InputFiles<'_>) -> Result<Scene> {
     if address_or_path.starts_with(builtin::PREFIX) {
         return builtin::generate(address_or_path);
     }
     let path = Path::new(address_or_path);
     let mut scene = if extension(path) == "toml" {
-        let sidecar = sidecar::Sidecar::read(path)?;
+        let bytes = read(path, files)?;
+        let sidecar = sidecar::Sidecar::from_bytes(&bytes, path)?;
         let address = sidecar.model()?;
         let mut scene = if address.starts_with(builtin::PREFIX) {
             builtin::generate(&address)?
         } else {
-            model(Path::new(&address)).map_err(|error| sidecar.in_file_of("file", error))?
+            model(Path::new(&address), files).map_err(|error| sidecar.in_file_of("file", error))?
         };
         scene.name = stem(path);
-        sidecar.apply(&mut scene)?;
+        sidecar.apply_from(&mut scene, files)?;
         scene
     } else {
-        let mut scene = model(path)?;
+        let mut scene = model(path, files)?;
         let beside = path.with_extension("scene.toml");
-        if beside.is_file() {
-            sidecar::Sidecar::read(&beside)?.apply(&mut scene)?;
+        let found = files
+            .read_if_there(&beside)
+            .map_err(|cause| Error::io(&beside, cause))?;
+        if let Some(bytes) = found {
+            sidecar::Sidecar::from_bytes(&bytes, &beside)?.apply_from(&mut scene, files)?;
         }
         scene
     };
@@ -44,6 +128,16 @@ pub fn load(address_or_path: &str) -> Result<Scene> {
     complete(&mut scene);
     scene.check()?;
     Ok(scene)
+}
+
+/// The bytes of a file that a scene names.
+pub(super) fn read(path: &Path, files: &InputFiles<'_>) -> Result<Arc<Vec<u8>>> {
+    files.read(path).map_err(|cause| Error::io(path, cause))
+}
+
+/// Reads one file by a function with a reader of files of its own: default limits, and whatever the process may read.
+pub(super) fn alone<T>(read: impl FnOnce(&InputFiles<'_>) -> Result<T>) -> Result<T> {
+    read(&InputFiles::new(&AnyFile, InputLimits::default()))
 }
 
 fn extension(path: &Path) -> String {
@@ -61,11 +155,11 @@ pub(super) fn stem(path: &Path) -> String {
     stem.strip_suffix(".scene").map(str::to_string).unwrap_or(stem)
 }
 
-fn model(path: &Path) -> Result<Scene> {
+fn model(path: &Path, files: &InputFiles<'_>) -> Result<Scene> {
     match extension(path).as_str() {
-        "gltf" | "glb" => gltf::load(path),
-        "ply" => ply::load(path),
-        "obj" => obj::load(path),
+        "gltf" | "glb" => gltf::load_from(path, files),
+        "ply" => ply::load(path, files),
+        "obj" => obj::load(path, files),
         other => {
             let cause = match other {
                 "" => "has no ending that tells its kind".into(),

@@ -19,7 +19,7 @@ pub mod sidecar;
 pub mod tangents;
 pub mod texture;
 
-pub use files::load;
+pub use files::{LoadOptions, Loaded, load, load_with};
 pub use medium::{DensityGrid, MajorantGrid, Medium, Phase};
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, MediaUse, PhaseUse, SceneProfile, TransmissionUse};
 
@@ -122,7 +122,7 @@ impl Scene {
 }
 
 /// Something a reader met and did not model: always reported, never dropped silently.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash, serde::Serialize)]
 pub struct Note {
     /// The extension or feature by its name.
     pub feature: String,

@@ -2,33 +2,77 @@
 //!
 //! Read by the crate `tobj`, libraries by `mtl.rs`; polygons are cut into fans. Materials are Lambert with their Kd, and emit their Ke; everything else an
 //! `.mtl` says is reported, and so are free-form curves and surfaces. Texts that are not UTF-8 (names in older encodings) are read as far as they are;
-//! what older exporters write that the crate does not take is made plain before.
+//! what older exporters write that the crate does not take is made plain before. A library that is named again changes nothing: it is read once, and
+//! its materials exist once.
 
 use std::cell::RefCell;
+use std::collections::HashSet;
 use std::io::Cursor;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
 use super::mtl::{self, LibraryMaterial};
 use super::{Material, Mesh, Note, Scene, files};
+use crate::input::InputFiles;
 use crate::{Error, Result};
 
 /// Reflectance of what has no material of its own.
 const GREY: Vec3 = Vec3::splat(0.6);
 
 /// Reads an OBJ file and the material libraries beside it.
-pub(super) fn load(path: &Path) -> Result<Scene> {
-    let bytes = std::fs::read(path).map_err(|source| Error::io(path, source))?;
+pub(super) fn load(path: &Path, read: &InputFiles<'_>) -> Result<Scene> {
+    let bytes = files::read(path, read)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut scene = parse(&bytes, &path.display().to_string(), |library| {
-        std::fs::read(folder.join(library)).ok()
-    })?;
+    let mut scene = parse(&bytes, &path.display().to_string(), folder, read)?;
     scene.name = files::stem(path);
     Ok(scene)
 }
 
-fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>) -> Result<Scene> {
+/// The libraries of one model, each read at its first use.
+struct Libraries<'r> {
+    folder: &'r Path,
+    read: &'r InputFiles<'r>,
+    /// Names that were met.
+    names: HashSet<Box<Path>>,
+    /// Where the bytes of those lie that were read: one file may have many names.
+    files: HashSet<*const Vec<u8>>,
+    materials: Vec<LibraryMaterial>,
+    /// Names of those that cannot be read, and why.
+    unread: Vec<(String, String)>,
+}
+
+impl Libraries<'_> {
+    /// The materials that a library adds: none when it has been met before, or cannot be read.
+    fn add(&mut self, name: &Path) -> &[LibraryMaterial] {
+        let known = self.materials.len();
+        if self.names.insert(name.into())
+            && let Err(cause) = self.parse(name)
+        {
+            self.unread.push((name.display().to_string(), cause));
+        }
+        &self.materials[known..]
+    }
+
+    fn parse(&mut self, name: &Path) -> Result<(), String> {
+        let bytes = self
+            .read
+            .read(&self.folder.join(name))
+            .map_err(|cause| cause.to_string())?;
+        if !self.files.insert(Arc::as_ptr(&bytes)) {
+            return Ok(());
+        }
+        let materials = mtl::parse(&String::from_utf8_lossy(&bytes))?;
+        let each = size_of::<LibraryMaterial>() + size_of::<tobj::Material>() + size_of::<Material>();
+        let memory = materials.len() as u64 * each as u64;
+        self.read.reserve(memory, memory)?;
+        self.materials.extend(materials);
+        Ok(())
+    }
+}
+
+fn parse(bytes: &[u8], source: &str, folder: &Path, read: &InputFiles<'_>) -> Result<Scene> {
     let at_line = |(line, cause): (usize, String)| Error::scene(source, format!("line {line}"), cause);
     let text = plain(bytes).map_err(at_line)?;
     check_indices(&text).map_err(at_line)?;
@@ -42,26 +86,23 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
         source: source.into(),
         ..Scene::default()
     };
-    let (materials, unread) = (RefCell::new(Vec::new()), RefCell::new(Vec::new()));
+    let libraries = RefCell::new(Libraries {
+        folder,
+        read,
+        names: HashSet::new(),
+        files: HashSet::new(),
+        materials: Vec::new(),
+        unread: Vec::new(),
+    });
     let loaded = tobj::load_obj_buf(&mut Cursor::new(text.as_bytes()), &options, |name| {
-        let text = library(name).ok_or_else(|| "there is no such file".to_owned());
-        match text.and_then(|text| mtl::parse(&String::from_utf8_lossy(&text))) {
-            Ok(read) => {
-                let named = |material: &LibraryMaterial| tobj::Material {
-                    name: material.name.clone(),
-                    ..tobj::Material::default()
-                };
-                let all: Vec<tobj::Material> = read.iter().map(named).collect();
-                let indices = all.iter().enumerate().map(|(i, material)| (material.name.clone(), i));
-                let indices = indices.collect();
-                materials.borrow_mut().extend(read);
-                Ok((all, indices))
-            }
-            Err(cause) => {
-                unread.borrow_mut().push((name.display().to_string(), cause));
-                Ok(Default::default())
-            }
-        }
+        let named = |material: &LibraryMaterial| tobj::Material {
+            name: material.name.clone(),
+            ..tobj::Material::default()
+        };
+        let all: Vec<tobj::Material> = libraries.borrow_mut().add(name).iter().map(named).collect();
+        let indices = all.iter().enumerate().map(|(i, material)| (material.name.clone(), i));
+        let indices = indices.collect();
+        Ok((all, indices))
     });
     let (models, _) = loaded.map_err(|error| Error::scene(source, "content", error.to_string()))?;
     if let Some(number) = (text.lines()).position(|line| FREE_FORM.contains(&key_of(line))) {
@@ -71,14 +112,14 @@ fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>>)
             instead: "left out".into(),
         });
     }
-    for (name, cause) in unread.into_inner() {
+    let Libraries { materials, unread, .. } = libraries.into_inner();
+    for (name, cause) in unread {
         scene.notes.push(Note {
             feature: format!("material library that cannot be read: {cause}"),
             at: format!("mtllib {name}"),
             instead: "its materials are grey".into(),
         });
     }
-    let materials = materials.into_inner();
     for material in &materials {
         add_material(&mut scene, material);
     }
@@ -264,7 +305,18 @@ fn check_indices(text: &str) -> Result<(), (usize, String)> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::ErrorKind;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::*;
+    use crate::input::{Callback, InputLimits, Memory};
+
+    /// A model whose libraries come from a function.
+    fn parse(bytes: &[u8], source: &str, library: impl Fn(&Path) -> Option<Vec<u8>> + Send + Sync) -> Result<Scene> {
+        let resolver = Callback::new(|path, _| library(path).ok_or(ErrorKind::NotFound.into()));
+        let read = InputFiles::new(&resolver, InputLimits::default());
+        super::parse(bytes, source, Path::new(""), &read)
+    }
 
     const TEXT: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 2\nusemtl red\n\
         f 1/1/1 2/2/1 3/3/1 -1/-1/-1\nusemtl lamp\nf 1//1 2//1 3//1\n";
@@ -399,6 +451,38 @@ mod tests {
                 let _ = parse(TEXT.as_bytes(), "a.obj", |_| Some(changed.clone()));
             }
         }
+    }
+
+    #[test]
+    fn a_library_named_again_is_read_once_and_adds_nothing() {
+        let names = "mtllib a.mtl\nmtllib ./a.mtl\nmtllib x/../a.mtl\nmtllib none.mtl\n".repeat(500);
+        let count = AtomicUsize::new(0);
+        let library = |path: &Path| {
+            count.fetch_add(1, Ordering::Relaxed);
+            (path == Path::new("a.mtl")).then(|| MTL.as_bytes().to_vec())
+        };
+        let scene = parse(format!("{names}{TEXT}").as_bytes(), "a.obj", library).expect("scene");
+        assert_eq!(count.load(Ordering::Relaxed), 2, "the library and the missing one");
+        let names: Vec<&str> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+        assert_eq!(names, ["red", "lamp", "default"]);
+        let unread = scene.notes.iter().filter(|note| note.at == "mtllib none.mtl");
+        assert_eq!(unread.count(), 1);
+    }
+
+    #[test]
+    fn materials_are_counted_before_they_are_made() {
+        let mut memory = Memory::default();
+        memory.add("a.mtl", "newmtl a\n".repeat(1000));
+        let limits = InputLimits {
+            free: 0,
+            per_byte: 1,
+            ..InputLimits::default()
+        };
+        let read = InputFiles::new(&memory, limits);
+        let scene = super::parse(TEXT.as_bytes(), "a.obj", Path::new(""), &read).expect("scene");
+        assert_eq!((scene.materials.len(), read.bytes_decoded()), (1, 0));
+        let note = scene.notes.iter().find(|note| note.at == "mtllib a.mtl").expect("note");
+        assert!(note.feature.contains("bytes of memory"), "{}", note.feature);
     }
 
     #[test]

@@ -14,12 +14,13 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::{Material, Mesh, Note, Scene, files};
 use crate::catalogue::{Role, Row, sources};
+use crate::input::InputFiles;
 use crate::srgb::linear_from_srgb;
 use crate::{Error, Result};
 
 /// Reads a PLY file as one grey mesh.
-pub(super) fn load(path: &Path) -> Result<Scene> {
-    let bytes = std::fs::read(path).map_err(|source| Error::io(path, source))?;
+pub(super) fn load(path: &Path, read: &InputFiles<'_>) -> Result<Scene> {
+    let bytes = files::read(path, read)?;
     let source = path.display().to_string();
     let mesh = parse(&bytes).map_err(|(at, cause)| Error::scene(&source, at, cause))?;
     let mut scene = Scene {

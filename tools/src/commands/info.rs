@@ -5,8 +5,9 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::gpu::{Caps, DeviceSelection, DeviceSummary, Gpu, GpuOptions};
+use clerestory::input::InputFile;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{self, Camera, Projection, Scene, SceneProfile};
+use clerestory::scene::{self, Camera, LoadOptions, Projection, Scene, SceneProfile};
 use clerestory::techniques::{self, Card, Lack};
 
 use super::check_validation;
@@ -20,12 +21,19 @@ use crate::output::{self, Stream};
 Examples:
   clerestory info                          devices, limits, and what each technique needs of them
   clerestory info builtin:cornell-box      profile, cameras, the reader's notes, techniques
+  clerestory info model.gltf --files       also the files that the scene has read
   clerestory info --device lavapipe        one device
-  clerestory info --json | jq '.devices[].name'")]
+  clerestory info --json | jq '.devices[].name'
+
+A scene may name every file that you may read, by absolute paths, `..` and links, and what it shows of them (bounds, counts, pictures) says what is \
+in them. --files lists what a scene has read; hosts can keep scenes in a folder (clerestory::scene::load_with).")]
 pub struct Arguments {
     /// A scene file or `builtin:` address
     #[arg(conflicts_with_all = ["device", "validation"])]
     scene: Option<String>,
+    /// Also lists the files that the scene has read, with their lengths
+    #[arg(long, requires = "scene")]
+    files: bool,
     /// Prints JSON
     #[arg(long)]
     json: bool,
@@ -37,7 +45,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     match &arguments.scene {
         Some(address) => {
-            let info = SceneInfo::of(&scene::load(address).map_err(Failure::scene)?);
+            let loaded = scene::load_with(address, &LoadOptions::default()).map_err(Failure::scene)?;
+            let info = SceneInfo {
+                files: arguments.files.then_some(loaded.files),
+                ..SceneInfo::of(&loaded.scene)
+            };
             if arguments.json {
                 output::print_json(&info)?;
             } else {
@@ -311,6 +323,9 @@ struct SceneInfo {
     cameras: Vec<CameraInfo>,
     notes: Vec<scene::Note>,
     techniques: Vec<TechniqueVerdict>,
+    /// What was read, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    files: Option<Vec<InputFile>>,
 }
 
 #[derive(serde::Serialize)]
@@ -390,6 +405,7 @@ impl SceneInfo {
                 })
                 .collect(),
             profile,
+            files: None,
         }
     }
 
@@ -422,6 +438,13 @@ impl SceneInfo {
             let text = format!("note          {} ({}): {}", note.feature, note.at, note.instead);
             output::one_line(&text)
         }));
+        lines.extend(self.files.iter().flatten().map(|file| {
+            let text = format!("file          {} ({} bytes)", file.path.display(), file.bytes);
+            output::one_line(&text)
+        }));
+        if self.files.as_ref().is_some_and(Vec::is_empty) {
+            lines.push("file          none".into());
+        }
         lines.join("\n") + "\n"
     }
 }

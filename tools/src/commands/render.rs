@@ -5,7 +5,7 @@ mod files;
 mod progress;
 mod summary;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -14,6 +14,7 @@ use clerestory::Error;
 use clerestory::accel::IndexKind;
 use clerestory::film::picture::{ALBEDO, DEPTH, NORMAL, SAMPLES, VARIANCE};
 use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
+use clerestory::input::read_text;
 use clerestory::plan::Goal;
 use clerestory::render::{RenderOptions, Rendered, Renderer, RendererDesc};
 use clerestory::scene::{self, Scene};
@@ -425,11 +426,14 @@ fn option_of(name: &str) -> Option<&'static str> {
     }
 }
 
+/// Most bytes of a file of settings.
+const MOST_SETTINGS: u64 = 1 << 20;
+
 fn read_settings(text: &str) -> Outcome<Map<String, Value>> {
     let (text, from) = match text.strip_prefix('@') {
         Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .map_err(|cause| Failure::usage(format!("--settings: {path}: {cause}")))?;
+            let text = read_text(Path::new(path), MOST_SETTINGS)
+                .map_err(|error| Failure::usage(format!("--settings: {error}")))?;
             (text, path)
         }
         None => (text.to_owned(), "the text"),
@@ -520,6 +524,13 @@ fn conclude(arguments: &Arguments, document: &Document<'_>, picture: &Picture, w
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn settings_come_from_regular_files_alone() {
+        let refusal = read_settings("@/dev/zero").err().map(|failure| failure.message);
+        assert!(refusal.is_some_and(|message| message.contains("not a regular file")));
+    }
 
     #[test]
     fn pictures_that_cannot_fit_are_refused() {

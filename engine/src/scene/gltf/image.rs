@@ -5,6 +5,7 @@ use std::path::Path;
 
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{self, Index};
+use ::image::ImageDecoder;
 use serde_json::Value;
 
 use super::{MAX_IMAGE_SIDE, MAX_TEXELS, Reader, uri};
@@ -119,12 +120,19 @@ impl Reader<'_> {
         let external;
         let bytes = match (&image.uri, image.buffer_view) {
             (Some(uri), _) => {
-                external = uri::read(uri, folder, self.source, &format!("{place}.uri"))?;
+                external = uri::read(uri, folder, self.files, self.source, &format!("{place}.uri"))?;
                 &external[..]
             }
             (None, Some(view)) => self.view(view, &format!("{place}.bufferView"))?.0,
             (None, None) => return self.fail(place, "has neither uri nor bufferView"),
         };
+        // Buffers and files stay in memory; what a data URI holds does not, and its place may be another's later.
+        let is_kept = image.uri.as_ref().is_none_or(|uri| !uri.starts_with("data:"));
+        let content = is_kept.then_some((bytes.as_ptr() as usize, bytes.len()));
+        if let Some(&known) = content.and_then(|content| self.decoded.get(&content)) {
+            self.images.insert(i, Some(known));
+            return Ok(Some(known));
+        }
         let fail = |cause: String| Error::scene(self.source, &place, cause);
         let format = ::image::guess_format(bytes);
         if !matches!(format, Ok(::image::ImageFormat::Png | ::image::ImageFormat::Jpeg)) {
@@ -140,19 +148,25 @@ impl Reader<'_> {
             self.images.insert(i, None);
             return Ok(None);
         }
-        let mut decoder = ::image::ImageReader::new(Cursor::new(bytes))
+        let mut reader = ::image::ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
             .map_err(|error| fail(error.to_string()))?;
         let mut limits = ::image::Limits::default();
         limits.max_image_width = Some(MAX_IMAGE_SIDE);
         limits.max_image_height = Some(MAX_IMAGE_SIDE);
         limits.max_alloc = Some(MAX_DECODER_BYTES);
-        decoder.limits(limits);
-        let decoded = decoder.decode().map_err(|error| fail(error.to_string()))?;
-        let texels = self.texels + u64::from(decoded.width()) * u64::from(decoded.height());
+        reader.limits(limits);
+        // Nothing of the picture's size is allocated before its size is known to be allowed.
+        let decoder = reader.into_decoder().map_err(|error| fail(error.to_string()))?;
+        let (width, height) = decoder.dimensions();
+        let texels = self.texels + u64::from(width) * u64::from(height);
         if texels > MAX_TEXELS {
             return self.fail(place, format!("the file's images have more than {MAX_TEXELS} texels"));
         }
+        let is_jpeg = matches!(format, Ok(::image::ImageFormat::Jpeg));
+        let (peak, kept) = memory_of([width, height], decoder.total_bytes(), is_jpeg);
+        self.files.reserve(peak, kept).map_err(fail)?;
+        let decoded = ::image::DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))?;
         self.texels = texels;
         let rgba = decoded.into_rgba8();
         let index = self.scene.add_image(Image {
@@ -162,8 +176,30 @@ impl Reader<'_> {
             texels: rgba.pixels().map(|p| p.0).collect(),
         });
         self.images.insert(i, Some(index));
+        if let Some(content) = content {
+            self.decoded.insert(content, index);
+        }
         Ok(Some(index))
     }
+}
+
+/// Bytes that decoding a picture takes at its peak, and those that stay; the decoder's output has `output` bytes.
+///
+/// A JPEG that is progressive, or has a scan for each component, is decoded from the coefficients of the whole picture: 16 bits for each of up
+/// to four components, in blocks of up to 32² pixels.
+fn memory_of([width, height]: [u32; 2], output: u64, is_jpeg: bool) -> (u64, u64) {
+    const COEFFICIENTS: u64 = 4 * 2;
+    const BLOCK: u64 = 32;
+    let (width, height) = (u64::from(width), u64::from(height));
+    let kept = 4 * width * height;
+    let coefficients = if is_jpeg {
+        COEFFICIENTS * width.next_multiple_of(BLOCK) * height.next_multiple_of(BLOCK)
+    } else {
+        0
+    };
+    // Then RGBA stands beside the output, and the scene's texels beside RGBA.
+    let peak = output.saturating_add(coefficients.max(kept)).max(2 * kept);
+    (peak, kept)
 }
 
 /// Translation · rotation · scale as in KHR_texture_transform; its rotation is counter-clockwise with v downwards.

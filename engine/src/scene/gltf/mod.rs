@@ -4,8 +4,8 @@
 //! deserializes the JSON; every index, offset and count is checked here before use, because that crate's own accessors (and its
 //! validation of positions) index unchecked.
 //!
-//! Guarantees: malformed input ends in [`Error::Scene`] with the JSON place; work and memory are bounded by the file's size and by the
-//! limits below; what is not modelled becomes a [`Note`] or, when the file requires it, an error by name.
+//! Guarantees: malformed input ends in [`Error::Scene`] with the JSON place; work and memory are bounded by the files' size and by the
+//! limits below, however often one file or image is named; what is not modelled becomes a [`Note`] or, when the file requires it, an error by name.
 
 mod accessor;
 mod container;
@@ -18,13 +18,15 @@ mod uri;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
+use std::sync::Arc;
 
 use ::gltf::json::{self, Index, Root};
 
-use super::{Note, Scene};
+use super::{Note, Scene, files};
 use crate::catalogue::{Role, Row, sources};
+use crate::input::InputFiles;
 use crate::{Error, Result};
 
 /// Extensions that are carried over.
@@ -53,15 +55,20 @@ const MAX_TEXELS: u64 = 1 << 27;
 /// Greatest size of one side of an image.
 const MAX_IMAGE_SIDE: u32 = 1 << 15;
 
-/// Reads a glTF file.
+/// Reads a glTF file, and whatever files it names that the process may read, within the default limits; [`load_with`](super::load_with) lets the
+/// host choose both.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read, [`Error::Scene`] with the JSON place for everything else.
 pub fn load(path: &Path) -> Result<Scene> {
-    let bytes = std::fs::read(path).map_err(|source| Error::io(path, source))?;
+    files::alone(|read| load_from(path, read))
+}
+
+pub(super) fn load_from(path: &Path, read: &InputFiles<'_>) -> Result<Scene> {
+    let bytes = files::read(path, read)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut scene = load_slice(&bytes, folder, &path.display().to_string())?;
-    scene.name = super::files::stem(path);
+    let mut scene = load_bytes(&bytes, folder, read, &path.display().to_string())?;
+    scene.name = files::stem(path);
     Ok(scene)
 }
 
@@ -70,16 +77,26 @@ pub fn load(path: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`load`].
 pub fn load_slice(bytes: &[u8], folder: &Path, source: &str) -> Result<Scene> {
+    files::alone(|read| {
+        read.count(bytes.len() as u64);
+        load_bytes(bytes, folder, read, source)
+    })
+}
+
+fn load_bytes(bytes: &[u8], folder: &Path, files: &InputFiles<'_>, source: &str) -> Result<Scene> {
     let container::Container { root, blob } = container::open(bytes, source)?;
     let mut reader = Reader {
         source,
+        files,
         root: &root,
         buffers: Vec::new(),
         elements: 0,
         element_budget: 0,
         texels: 0,
         images: BTreeMap::new(),
+        decoded: BTreeMap::new(),
         meshes: BTreeMap::new(),
+        noted: HashSet::new(),
         scene: Scene {
             source: source.into(),
             ..Scene::default()
@@ -97,8 +114,10 @@ pub fn load_slice(bytes: &[u8], folder: &Path, source: &str) -> Result<Scene> {
 /// What one file's reading carries along.
 struct Reader<'a> {
     source: &'a str,
+    files: &'a InputFiles<'a>,
     root: &'a Root,
-    buffers: Vec<Vec<u8>>,
+    /// Buffers of one file share its bytes.
+    buffers: Vec<Arc<Vec<u8>>>,
     /// Accessor elements decoded so far.
     elements: u64,
     /// How many may be.
@@ -107,8 +126,12 @@ struct Reader<'a> {
     texels: u64,
     /// glTF image index to scene image index; `None` for one that cannot be used.
     images: BTreeMap<usize, Option<u32>>,
+    /// Where an image's bytes begin in memory and how many there are, to the scene's image: what is there once is decoded once.
+    decoded: BTreeMap<(usize, usize), u32>,
     /// glTF mesh index to the scene meshes of its primitives.
     meshes: BTreeMap<usize, Vec<u32>>,
+    /// The scene's notes, for none to be there twice.
+    noted: HashSet<Note>,
     scene: Scene,
 }
 
@@ -123,7 +146,7 @@ impl<'a> Reader<'a> {
             at: at.into(),
             instead: instead.into(),
         };
-        if !self.scene.notes.contains(&note) {
+        if self.noted.insert(note.clone()) {
             self.scene.notes.push(note);
         }
     }
@@ -167,9 +190,9 @@ impl<'a> Reader<'a> {
         for (i, buffer) in self.root.buffers.iter().enumerate() {
             let at = format!("buffers[{i}]");
             let bytes = match (&buffer.uri, i) {
-                (Some(uri), _) => uri::read(uri, folder, self.source, &format!("{at}.uri"))?,
+                (Some(uri), _) => uri::read(uri, folder, self.files, self.source, &format!("{at}.uri"))?,
                 (None, 0) => match blob.take() {
-                    Some(blob) => blob,
+                    Some(blob) => Arc::new(blob),
                     None => return self.fail(at, "has no uri, and there is no binary chunk"),
                 },
                 (None, _) => return self.fail(at, "has no uri; only the first buffer may be the binary chunk"),
@@ -182,7 +205,9 @@ impl<'a> Reader<'a> {
             }
             self.buffers.push(bytes);
         }
-        let bytes: u64 = self.buffers.iter().map(|b| b.len() as u64).sum();
+        let mut counted = BTreeSet::new();
+        let new = self.buffers.iter().filter(|buffer| counted.insert(Arc::as_ptr(buffer)));
+        let bytes: u64 = new.map(|buffer| buffer.len() as u64).sum();
         self.element_budget = (FREE_ELEMENTS + ELEMENTS_PER_BYTE * bytes).min(MAX_ELEMENTS);
         Ok(())
     }

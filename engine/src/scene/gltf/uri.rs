@@ -1,11 +1,13 @@
 //! URIs of buffers and images: `data:` (RFC 2397, base64) and relative file references (percent-encoded).
 
 use std::path::Path;
+use std::sync::Arc;
 
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
+use crate::input::InputFiles;
 use crate::{Error, Result};
 
 /// Padding is often missing in the wild.
@@ -14,17 +16,18 @@ const LENIENT: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// Reads what a URI refers to; `at` is its place in the JSON.
-pub fn read(uri: &str, folder: &Path, source: &str, at: &str) -> Result<Vec<u8>> {
+/// Reads what a URI refers to; `at` is its place in the JSON. What one file holds is there once, however many URIs refer to it.
+pub fn read(uri: &str, folder: &Path, files: &InputFiles<'_>, source: &str, at: &str) -> Result<Arc<Vec<u8>>> {
     let fail = |cause: String| Err(Error::scene(source, at, cause));
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((head, body)) = data.split_once(',') else {
             return fail("data URI without a comma".into());
         };
         return if head.ends_with(";base64") {
-            LENIENT.decode(body).or_else(|error| fail(format!("base64: {error}")))
+            let decoded = LENIENT.decode(body).map(Arc::new);
+            decoded.or_else(|error| fail(format!("base64: {error}")))
         } else {
-            Ok(percent_encoding::percent_decode_str(body).collect())
+            Ok(Arc::new(percent_encoding::percent_decode_str(body).collect()))
         };
     }
     if uri
@@ -40,7 +43,9 @@ pub fn read(uri: &str, folder: &Path, source: &str, at: &str) -> Result<Vec<u8>>
         return fail("is not UTF-8 after percent-decoding".into());
     };
     let path = folder.join(decoded.as_ref());
-    std::fs::read(&path).or_else(|error| fail(format!("cannot read {}: {error}", path.display())))
+    files
+        .read(&path)
+        .or_else(|error| fail(format!("cannot read {}: {error}", path.display())))
 }
 
 fn shortened(text: &str) -> String {

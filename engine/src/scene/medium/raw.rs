@@ -7,6 +7,7 @@ use std::path::Path;
 use glam::DAffine3;
 
 use super::{DensityGrid, MAX_DENSITY_CELLS};
+use crate::input::{InputLimits, read_file};
 use crate::{Error, Result};
 
 /// The type of a grid's numbers.
@@ -66,7 +67,7 @@ pub(super) type Fault = (String, String);
 /// # Errors
 /// [`Error::Io`] when it cannot be read; [`Error::Scene`] when it is not exactly as long as the layout says, or a number cannot be a density.
 pub fn read(path: &Path, layout: &RawLayout) -> Result<DensityGrid> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::io(path, cause))?;
+    let bytes = read_file(path, InputLimits::default().file)?;
     parse(&bytes, layout).map_err(|(at, cause)| Error::scene(path.display().to_string(), at, cause))
 }
 

@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 
 use super::DensityGrid;
 use super::raw::{self, Fault, NumberType, RawLayout};
+use crate::input::{InputLimits, read_file};
 use crate::{Error, Result};
 
 const MAGIC: [u8; 3] = *b"VOL";
@@ -25,8 +26,17 @@ const UINT8: u32 = 3;
 /// # Errors
 /// [`Error::Io`] when it cannot be read; [`Error::Scene`] with the place in it for everything else.
 pub fn read(path: &Path) -> Result<DensityGrid> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::io(path, cause))?;
+    let bytes = read_file(path, InputLimits::default().file)?;
     parse(&bytes).map_err(|(at, cause)| Error::scene(path.display().to_string(), at, cause))
+}
+
+/// The cells along x, y and z that a file says it has; `None` for what is no such file or too short.
+pub(in crate::scene) fn size(bytes: &[u8]) -> Option<[u32; 3]> {
+    if !bytes.starts_with(&MAGIC) || bytes.get(MAGIC.len()) != Some(&VERSION) {
+        return None;
+    }
+    let (words, _) = bytes.get(8..20)?.as_chunks::<4>();
+    Some([0, 1, 2].map(|axis| u32::from_le_bytes(words[axis])))
 }
 
 /// A grid from a file's bytes; the place and cause of what is wrong otherwise.

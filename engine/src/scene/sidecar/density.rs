@@ -13,15 +13,19 @@
 //! A grid fills the box from `low` to `high`, metres; without them the file's own bounds or the unit cube. `scale` (one number or three), `rotate`
 //! (degrees about x, then y, then z) and `translate` move it from there, in this order.
 
+use std::path::Path;
+use std::sync::Arc;
+
 use glam::{DAffine3, DQuat, DVec3, EulerRot};
 use serde::Deserialize;
 
-use super::Sidecar;
-use crate::Result;
-use crate::scene::DensityGrid;
+use super::{Budget, Sidecar};
+use crate::input::InputFiles;
 use crate::scene::medium::generate::{Generator, MAX_SIDE};
 use crate::scene::medium::raw::{self, NumberType, RawLayout};
-use crate::scene::medium::vol;
+use crate::scene::medium::{MAX_DENSITY_CELLS, vol};
+use crate::scene::{DensityGrid, files};
+use crate::{Error, Result};
 
 /// `density` of a medium.
 #[derive(Debug, Default, Deserialize)]
@@ -61,10 +65,10 @@ impl<T: Copy> OneOrThree<T> {
 
 impl Sidecar {
     /// Reads or makes the grid of a table.
-    pub(super) fn density(&self, key: &str, table: &DensityTable) -> Result<DensityGrid> {
+    pub(super) fn density(&self, key: &str, table: &DensityTable, budget: &mut Budget<'_>) -> Result<DensityGrid> {
         let mut grid = match (&table.file, &table.generate) {
-            (Some(file), None) => self.density_file(key, table, file)?,
-            (None, Some(name)) => self.generated_density(key, table, name)?,
+            (Some(file), None) => self.density_file(key, table, file, budget)?,
+            (None, Some(name)) => self.generated_density(key, table, name, budget)?,
             _ => return Err(self.fault(key, "needs either file or generate")),
         };
         let factor = table.factor.unwrap_or(1.0);
@@ -101,7 +105,33 @@ impl Sidecar {
         })
     }
 
-    fn density_file(&self, key: &str, table: &DensityTable, file: &str) -> Result<DensityGrid> {
+    /// Counts the cells of a grid before it is made: those of all grids of the scene are bounded.
+    fn take_cells(&self, key: &str, size: [u32; 3], budget: &mut Budget<'_>) -> Result<u64> {
+        let cells = size.iter().map(|side| u64::from(*side)).fold(1, u64::saturating_mul);
+        *budget.cells = budget.cells.saturating_add(cells);
+        let cause = format!(
+            "the density grids of all media hold {} cells with this one; at most {MAX_DENSITY_CELLS} are allowed",
+            budget.cells
+        );
+        self.require(*budget.cells <= MAX_DENSITY_CELLS, key, &cause)?;
+        Ok(cells)
+    }
+
+    /// As [`Sidecar::take_cells`] for a grid from a file, whose cells take memory beside the file's bytes.
+    fn take_file_cells(&self, key: &str, size: [u32; 3], budget: &mut Budget<'_>) -> Result<()> {
+        let cells = self.take_cells(key, size, budget)?;
+        let memory = cells * size_of::<f32>() as u64;
+        let counted = budget.read.reserve(memory, memory);
+        counted.map_err(|cause| self.fault(key, cause))
+    }
+
+    fn density_file(
+        &self,
+        key: &str,
+        table: &DensityTable,
+        file: &str,
+        budget: &mut Budget<'_>,
+    ) -> Result<DensityGrid> {
         let path = self.folder().join(file);
         let at = format!("{key}.file");
         self.require(
@@ -117,7 +147,13 @@ impl Sidecar {
             "vol" => {
                 let described = table.size.is_some() || table.number.is_some() || table.endian.is_some() || table.offset.is_some();
                 self.require(!described, key, "a .vol file says itself what size, type, endian and offset are")?;
-                vol::read(&path)
+                let bytes = self.bytes(&path, &at, budget.read)?;
+                // What is no .vol file is refused below, with its place.
+                if let Some(size) = vol::size(&bytes) {
+                    self.take_file_cells(&at, size, budget)?;
+                }
+                let grid = vol::parse(&bytes);
+                grid.map_err(|(place, cause)| Error::scene(path.display().to_string(), place, cause))
             }
             "vdb" | "nvdb" => {
                 let cause = "sparse grids of OpenVDB and NanoVDB are not read; convert the grid to a dense one: to .vol with Mitsuba's \
@@ -134,10 +170,17 @@ impl Sidecar {
                     big_endian: self.big_endian(key, table)?,
                     offset: table.offset.unwrap_or(0),
                 };
-                raw::read(&path, &layout)
+                let bytes = self.bytes(&path, &at, budget.read)?;
+                self.take_file_cells(&at, layout.size, budget)?;
+                let grid = raw::parse(&bytes, &layout);
+                grid.map_err(|(place, cause)| Error::scene(path.display().to_string(), place, cause))
             }
         }
         .map_err(|error| self.in_file_of(&at, error))
+    }
+
+    fn bytes(&self, path: &Path, at: &str, read: &InputFiles<'_>) -> Result<Arc<Vec<u8>>> {
+        files::read(path, read).map_err(|error| self.in_file_of(at, error))
     }
 
     fn number_type(&self, key: &str, table: &DensityTable) -> Result<NumberType> {
@@ -160,7 +203,13 @@ impl Sidecar {
         }
     }
 
-    fn generated_density(&self, key: &str, table: &DensityTable, name: &str) -> Result<DensityGrid> {
+    fn generated_density(
+        &self,
+        key: &str,
+        table: &DensityTable,
+        name: &str,
+        budget: &mut Budget<'_>,
+    ) -> Result<DensityGrid> {
         const DEFAULT_SIDE: u32 = 64;
         let Some(generator) = Generator::by_name(name) else {
             let known: Vec<&str> = Generator::ALL.iter().map(|(known, _)| *known).collect();
@@ -176,6 +225,7 @@ impl Sidecar {
             &format!("{key}.size"),
             &format!("must lie between 1 and {MAX_SIDE}"),
         )?;
+        self.take_cells(&format!("{key}.size"), size, budget)?;
         Ok(generator.grid(size, table.seed.unwrap_or(0)))
     }
 }

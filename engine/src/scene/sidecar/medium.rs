@@ -28,9 +28,10 @@ use serde::Deserialize;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::Sidecar;
 use super::density::DensityTable;
+use super::{Budget, Named, Sidecar};
 use crate::Result;
+use crate::scene::medium::MAX_MEDIA;
 use crate::scene::{Medium, Phase, Scene};
 
 /// One table.
@@ -105,16 +106,28 @@ pub(super) fn one_or_many<'de, D: Deserializer<'de>>(deserializer: D) -> Result<
 
 impl Sidecar {
     /// Adds the medium of a table and puts it in its place.
-    pub(super) fn medium(&self, scene: &mut Scene, index: usize, table: &MediumTable) -> Result<()> {
+    pub(super) fn medium(
+        &self,
+        scene: &mut Scene,
+        named: &Named,
+        index: usize,
+        table: &MediumTable,
+        budget: &mut Budget<'_>,
+    ) -> Result<()> {
         let key = match (&table.name, self.content.medium.len()) {
             (Some(name), _) => format!("medium.{name}"),
             (None, 1) => "medium".into(),
             (None, _) => format!("medium[{index}]"),
         };
+        self.require(
+            scene.media.len() < MAX_MEDIA,
+            &key,
+            &format!("is one more than the {MAX_MEDIA} media that a scene may have"),
+        )?;
         let (sigma_a, sigma_s) = self.coefficients(&key, table)?;
         let emission = self.bands(&key, "emission", table.emission)?;
         let density = match &table.density {
-            Some(density) => Some(self.density(&format!("{key}.density"), density)?),
+            Some(density) => Some(self.density(&format!("{key}.density"), density, budget)?),
             None => None,
         };
         let medium = Medium {
@@ -146,15 +159,14 @@ impl Sidecar {
             return Ok(());
         };
         let at = format!("{key}.material");
-        let mut found = false;
-        for material in scene.materials.iter_mut().filter(|m| m.name == *name) {
+        let Some(places) = named.get(name) else {
+            return Err(self.unknown_material(scene, &at));
+        };
+        for &place in places {
+            let material = &mut scene.materials[place];
             self.require(material.interior.is_none(), &at, "has another medium inside already")?;
             material.interior = Some(number);
             material.boundary = table.boundary;
-            found = true;
-        }
-        if !found {
-            return Err(self.unknown_material(scene, &at));
         }
         scene.media.push(medium);
         Ok(())

@@ -33,16 +33,22 @@
 pub mod density;
 pub mod medium;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::io::{self, Cursor, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use ::image::ImageDecoder;
+use exr::prelude::{ReadChannels, ReadLayers};
 use glam::{DVec3, Quat, Vec3};
 use serde::Deserialize;
 
 use medium::MediumTable;
 
-use super::{Camera, ConductorIor, Environment, Material, Note, Projection, Scene, builtin, metals, phong_roughness};
+use super::{
+    Camera, ConductorIor, Environment, Material, Note, Projection, Scene, builtin, files, metals, phong_roughness,
+};
 use crate::catalogue::{Role, Row};
+use crate::input::InputFiles;
 use crate::{Error, Result};
 
 /// Greatest number of texels of an environment map.
@@ -123,8 +129,12 @@ impl Sidecar {
     /// # Errors
     /// [`Error::Io`] when it cannot be read; [`Error::Scene`] with the line for a syntax error, an unknown key or a wrong type.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
-        Self::parse(&text, path)
+        files::alone(|read| Self::from_bytes(&files::read(path, read)?, path))
+    }
+
+    pub(super) fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
+        let not_text = |_| Error::io(path, io::Error::new(ErrorKind::InvalidData, "is not UTF-8"));
+        Self::parse(std::str::from_utf8(bytes).map_err(not_text)?, path)
     }
 
     /// Reads a sidecar from its text; `path` names it and is where its files are looked for.
@@ -177,12 +187,16 @@ impl Sidecar {
         }
     }
 
-    /// Changes a scene as the sidecar says.
+    /// Changes a scene as the sidecar says; the files that it names are those that the process may read, within the default limits.
     ///
     /// # Errors
     /// [`Error::Scene`] naming the key, for unknown metals or materials, for values that cannot be, and for an environment map that cannot
     /// be read.
     pub fn apply(&self, scene: &mut Scene) -> Result<()> {
+        files::alone(|read| self.apply_from(scene, read))
+    }
+
+    pub(super) fn apply_from(&self, scene: &mut Scene, read: &InputFiles<'_>) -> Result<()> {
         let content = &self.content;
         if let Some(exposure) = content.exposure {
             self.require(exposure.is_finite(), "exposure", "must be finite")?;
@@ -196,21 +210,36 @@ impl Sidecar {
             scene.defaults.aspect = Some(aspect);
         }
         if let Some(table) = &content.environment {
-            let (environment, notes) = self.environment(table)?;
+            let (environment, notes) = self.environment(table, read)?;
             scene.environment = Some(environment);
             scene.notes.extend(notes);
         }
+        let named = named(scene.materials.iter().map(|material| material.name.as_str()));
         for (name, metal) in &content.metals {
-            self.metal(scene, name, metal)?;
+            self.metal(scene, &named, name, metal)?;
         }
         for (name, table) in &content.phong {
-            self.phong(scene, name, table)?;
+            self.phong(scene, &named, name, table)?;
         }
+        let mut cameras = self::named(scene.cameras.iter().map(|camera| camera.name.as_str()));
         for table in &content.cameras {
-            self.camera(scene, table)?;
+            self.camera(scene, &mut cameras, table)?;
+        }
+        let mut cells = 0;
+        for medium in &scene.media {
+            cells += medium.density.as_ref().map_or(0, |grid| grid.values.len() as u64);
         }
         for (index, table) in content.medium.iter().enumerate() {
-            self.medium(scene, index, table)?;
+            self.medium(
+                scene,
+                &named,
+                index,
+                table,
+                &mut Budget {
+                    read,
+                    cells: &mut cells,
+                },
+            )?;
         }
         Ok(())
     }
@@ -235,9 +264,9 @@ impl Sidecar {
         )
     }
 
-    fn environment(&self, table: &EnvironmentTable) -> Result<(Environment, Option<Note>)> {
+    fn environment(&self, table: &EnvironmentTable, read: &InputFiles<'_>) -> Result<(Environment, Option<Note>)> {
         let (mut environment, note) = match (&table.file, table.color) {
-            (Some(file), None) => read_environment(&self.folder().join(file))
+            (Some(file), None) => read_environment(&self.folder().join(file), read)
                 .map_err(|error| self.in_file_of("environment.file", error))?,
             (None, Some(color)) => {
                 let sound = color.iter().all(|c| c.is_finite() && *c >= 0.0);
@@ -259,7 +288,7 @@ impl Sidecar {
         Ok((environment, note))
     }
 
-    fn metal(&self, scene: &mut Scene, name: &str, metal: &Metal) -> Result<()> {
+    fn metal(&self, scene: &mut Scene, named: &Named, name: &str, metal: &Metal) -> Result<()> {
         let key = format!("metals.{name}");
         let conductor = match metal {
             Metal::Named(metal) => metals::by_name(metal).ok_or_else(|| {
@@ -279,13 +308,13 @@ impl Sidecar {
                 }
             }
         };
-        self.change_materials(scene, &key, name, |material| {
+        self.change_materials(scene, named, [&key, name], |material| {
             material.conductor = Some(conductor);
             material.metallic = 1.0;
         })
     }
 
-    fn phong(&self, scene: &mut Scene, name: &str, table: &PhongTable) -> Result<()> {
+    fn phong(&self, scene: &mut Scene, named: &Named, name: &str, table: &PhongTable) -> Result<()> {
         let key = format!("phong.{name}");
         let &PhongTable { exponent, share } = table;
         self.require(
@@ -295,7 +324,7 @@ impl Sidecar {
         )?;
         let share = share.unwrap_or(1.0);
         self.require((0.0..=1.0).contains(&share), &key, "needs a share from 0 to 1")?;
-        self.change_materials(scene, &key, name, |material| {
+        self.change_materials(scene, named, [&key, name], |material| {
             *material = Material {
                 metallic: share,
                 roughness: phong_roughness(exponent),
@@ -307,22 +336,25 @@ impl Sidecar {
     }
 
     /// Changes all materials of a name, of which there must be one.
-    fn change_materials(&self, scene: &mut Scene, key: &str, name: &str, change: impl Fn(&mut Material)) -> Result<()> {
-        let mut found = false;
-        for material in scene.materials.iter_mut().filter(|m| m.name == name) {
-            change(material);
-            found = true;
+    fn change_materials(
+        &self,
+        scene: &mut Scene,
+        named: &Named,
+        [key, name]: [&str; 2],
+        change: impl Fn(&mut Material),
+    ) -> Result<()> {
+        let Some(places) = named.get(name) else {
+            return Err(self.unknown_material(scene, key));
+        };
+        for &place in places {
+            change(&mut scene.materials[place]);
         }
-        if found {
-            Ok(())
-        } else {
-            Err(self.unknown_material(scene, key))
-        }
+        Ok(())
     }
 
-    fn camera(&self, scene: &mut Scene, table: &CameraTable) -> Result<()> {
+    fn camera(&self, scene: &mut Scene, named: &mut Named, table: &CameraTable) -> Result<()> {
         let key = format!("cameras.{}", table.name);
-        let existing = scene.cameras.iter().position(|c| c.name == table.name);
+        let existing = named.get(&table.name).and_then(|places| places.first().copied());
         let vectors = [table.eye, table.target, table.up];
         let finite = vectors.iter().flatten().flatten().all(|x| x.is_finite());
         self.require(finite, &key, "eye, target and up must be finite")?;
@@ -374,7 +406,10 @@ impl Sidecar {
         }
         match existing {
             Some(i) => scene.cameras[i] = camera,
-            None => scene.cameras.push(camera),
+            None => {
+                named.insert(table.name.clone(), vec![scene.cameras.len()]);
+                scene.cameras.push(camera);
+            }
         }
         Ok(())
     }
@@ -391,16 +426,36 @@ impl Sidecar {
     }
 }
 
+/// Where in a list the items of each name are.
+type Named = HashMap<String, Vec<usize>>;
+
+fn named<'n>(names: impl Iterator<Item = &'n str>) -> Named {
+    let mut named = Named::new();
+    for (place, name) in names.enumerate() {
+        named.entry(name.to_owned()).or_default().push(place);
+    }
+    named
+}
+
+/// What the media of a scene may still read and hold.
+struct Budget<'b> {
+    read: &'b InputFiles<'b>,
+    /// Cells of all density grids so far.
+    cells: &'b mut u64,
+}
+
 /// Reads a latitude–longitude map. Channels that are negative, as compression leaves them in dark colours, become 0, and texels that are
 /// not finite black; both are counted in a note.
-fn read_environment(path: &Path) -> Result<(Environment, Option<Note>)> {
+fn read_environment(path: &Path, read: &InputFiles<'_>) -> Result<(Environment, Option<Note>)> {
     let fail = |cause: String| Error::Picture {
         path: path.display().to_string(),
         cause,
     };
     let name = path.display().to_string();
     let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let (width, height, mut radiance) = if is_exr { read_exr(path) } else { read_hdr(path) }.map_err(fail)?;
+    let bytes = files::read(path, read)?;
+    let read_file = if is_exr { read_exr } else { read_hdr };
+    let (width, height, mut radiance) = read_file(&bytes, read).map_err(fail)?;
     let mut replaced = 0;
     for r in radiance.iter_mut().filter(|r| !r.is_finite() || r.min_element() < 0.0) {
         *r = if r.is_finite() { r.max(Vec3::ZERO) } else { Vec3::ZERO };
@@ -424,32 +479,50 @@ fn read_environment(path: &Path) -> Result<(Environment, Option<Note>)> {
 
 type Texels = (u32, u32, Vec<Vec3>);
 
-fn read_exr(path: &Path) -> Result<Texels, String> {
-    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|error| error.to_string())?;
-    let texels = meta
-        .headers
-        .iter()
-        .map(|h| h.layer_size.area() as u64)
-        .max()
-        .unwrap_or(0);
+/// Counts the texels of a map before they are allocated: `decoded` bytes each while it is decoded, and those of the scene's own.
+fn reserve([width, height]: [u64; 2], decoded: u64, read: &InputFiles<'_>) -> Result<(), String> {
+    let texels = width.saturating_mul(height);
     if texels > MAX_TEXELS {
         return Err(format!("has {texels} texels; at most {MAX_TEXELS} are allowed"));
     }
-    let image = exr::prelude::read_first_rgba_layer_from_file(
-        path,
-        |size, _| (size, vec![Vec3::ZERO; size.area()]),
-        |(size, texels), at, (r, g, b, _): (f32, f32, f32, f32)| {
-            texels[at.y() * size.width() + at.x()] = Vec3::new(r, g, b)
-        },
-    )
-    .map_err(|error| error.to_string())?;
+    let kept = texels * size_of::<Vec3>() as u64;
+    read.reserve(kept + texels * decoded, kept)
+}
+
+fn read_exr(bytes: &[u8], read: &InputFiles<'_>) -> Result<Texels, String> {
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| error.to_string())?;
+    let mut most = [0, 0];
+    for header in &meta.headers {
+        let size = [header.layer_size.width() as u64, header.layer_size.height() as u64];
+        if size[0].saturating_mul(size[1]) > most[0] * most[1] {
+            most = size;
+        }
+        // The decoder holds whole blocks of all channels, up to as many as the picture has.
+        let channels = header.channels.list.len() as u64;
+        let samples = size[0].saturating_mul(size[1]).saturating_mul(channels);
+        read.reserve(samples.saturating_mul(4), 0)?;
+    }
+    reserve(most, 0, read)?;
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            |size, _| (size, vec![Vec3::ZERO; size.area()]),
+            |(size, texels), at, (r, g, b, _): (f32, f32, f32, f32)| {
+                texels[at.y() * size.width() + at.x()] = Vec3::new(r, g, b)
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|error| error.to_string())?;
     let (size, radiance) = image.layer_data.channel_data.pixels;
     Ok((size.width() as u32, size.height() as u32, radiance))
 }
 
-fn read_hdr(path: &Path) -> Result<Texels, String> {
-    let mut reader = ::image::ImageReader::open(path)
-        .and_then(::image::ImageReader::with_guessed_format)
+fn read_hdr(bytes: &[u8], read: &InputFiles<'_>) -> Result<Texels, String> {
+    let mut reader = ::image::ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
         .map_err(|error| error.to_string())?;
     let mut limits = ::image::Limits::default();
     limits.max_alloc = Some(MAX_TEXELS * 12);
@@ -457,12 +530,12 @@ fn read_hdr(path: &Path) -> Result<Texels, String> {
     if reader.format() != Some(::image::ImageFormat::Hdr) {
         return Err("is neither OpenEXR nor Radiance HDR".into());
     }
-    let image = reader.decode().map_err(|error| error.to_string())?.into_rgb32f();
-    Ok((
-        image.width(),
-        image.height(),
-        image.pixels().map(|p| Vec3::from_array(p.0)).collect(),
-    ))
+    let decoder = reader.into_decoder().map_err(|error| error.to_string())?;
+    let (width, height) = decoder.dimensions();
+    reserve([width.into(), height.into()], 12, read)?;
+    let image = ::image::DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
+    let image = image.into_rgb32f();
+    Ok((width, height, image.pixels().map(|p| Vec3::from_array(p.0)).collect()))
 }
 
 /// Rows of the catalogue.
