@@ -14,7 +14,7 @@ pub mod z_test;
 
 pub use accumulate::{Accumulator, TwoFloat};
 pub use gpu_film::{FilmBand, GpuFilm, Step};
-pub use metrics::{CompareOptions, ErrorReport, compare};
+pub use metrics::{CompareOptions, ErrorReport, PIXELS_PER_DEGREE, compare};
 pub use picture::{Layer, Metadata, NonFinite, NonFiniteSamples, Picture};
 pub use pixel_format::PixelFormat;
 pub use tone::{ToneCurve, ToneMap};
