@@ -248,7 +248,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
     let _ = writeln!(
         text,
         "/// The {word} as a type: its push constants and specialization constants.\n#[derive(Debug)]\npub enum {kind} {{}}\n\
-         impl {}Shader for {kind} {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}",
+         // SAFETY: all is the module's by reflection.\n#[allow(unsafe_code)]\nunsafe impl {}Shader for {kind} {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}",
         interface.stage
     );
     text += "}\n";

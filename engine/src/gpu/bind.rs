@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::barrier::Access;
+use super::image::Image;
 use super::interface::{BindingInfo, BindingKind, BindingSet, BoundResource, ShaderInfo, Stage};
 use super::layout::descriptor_type;
 use super::recorder::Pass;
@@ -141,6 +142,12 @@ impl Pass<'_> {
         Ok(())
     }
 
+    /// Fails for an image of another device, or one that was not made for a use.
+    pub(super) fn check_image(&self, image: &Image, usage: vk::ImageUsageFlags) -> Result<()> {
+        self.recorder.check_device(&image.inner.gpu, "image", image.name())?;
+        image.check_usage(usage)
+    }
+
     /// Writes a resource to its place in a set that is not in use yet, and notes the use.
     pub(super) fn write_descriptor(
         &mut self,
@@ -156,6 +163,13 @@ impl Pass<'_> {
         match (slot.kind, resource) {
             (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
                 let uniform = slot.kind == BindingKind::UniformBuffer;
+                if view.bytes == 0 {
+                    let message = format!("binding {} was given nothing of {:?}", slot.name, view.buffer.name());
+                    return Err(Error::Shader {
+                        name: slot.shader.into(),
+                        message,
+                    });
+                }
                 view.check(if uniform {
                     inner.caps.uniform_buffer_alignment
                 } else {
@@ -199,6 +213,7 @@ impl Pass<'_> {
                 };
             }
             (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
+                self.check_image(image, vk::ImageUsageFlags::STORAGE)?;
                 self.recorder.keep(&image.inner);
                 let raw = [vk::DescriptorImageInfo::default()
                     .image_view(image.view())
@@ -207,6 +222,9 @@ impl Pass<'_> {
                 unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
             }
             (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
+                self.check_image(view.image, vk::ImageUsageFlags::SAMPLED)?;
+                self.recorder
+                    .check_device(&view.sampler.inner.gpu, "sampler", slot.name)?;
                 self.recorder.keep(&view.image.inner);
                 self.recorder.keep(&view.sampler.inner);
                 let raw = [vk::DescriptorImageInfo::default()
