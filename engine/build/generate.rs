@@ -201,11 +201,15 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         let (reads, writes) = access(&binding.resource);
         let _ = writeln!(
             text,
-            "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes}, used: {} }},",
+            "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes}, used: {}, \
+             view: {} }},",
             binding.set,
             binding.binding,
             binding.name,
-            interface.used.contains(&(binding.set, binding.binding))
+            interface.used.contains(&(binding.set, binding.binding)),
+            binding
+                .view
+                .map_or("None".into(), |view| format!("Some(ViewKind::{view})"))
         );
     }
     text += "    ],\n    spec_constants: &[\n";

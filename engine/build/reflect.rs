@@ -91,6 +91,8 @@ pub struct Binding {
     pub binding: u32,
     pub name: String,
     pub resource: Resource,
+    /// What an image is seen as, by its name in `gpu::interface::ViewKind`.
+    pub view: Option<&'static str>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -387,12 +389,29 @@ impl Reader {
                 _ => return Err(format!("set {set} binding {binding} has no name")),
             };
         }
+        let view = match &resource {
+            Resource::StorageImage { .. } => Some(self.view_kind(pointee)?),
+            Resource::SampledImage => Some(self.view_kind(self.id_operand(pointee, 0)?)?),
+            _ => None,
+        };
         Ok(Binding {
             set,
             binding,
             name,
             resource,
+            view,
         })
+    }
+
+    /// What an image type is seen as: its operands are the sampled type, the dimension, depth or not, and arrayed or not.
+    fn view_kind(&self, image: u32) -> Result<&'static str, String> {
+        let operands = &self.definition(image)?.operands;
+        match (operands.get(1), operands.get(3)) {
+            (Some(Operand::Dim(Dim::Dim2D)), Some(Operand::LiteralBit32(0))) => Ok("Plane"),
+            (Some(Operand::Dim(Dim::Dim2D)), Some(Operand::LiteralBit32(1))) => Ok("Layers"),
+            (Some(Operand::Dim(Dim::DimCube)), Some(Operand::LiteralBit32(0))) => Ok("Cube"),
+            other => Err(format!("an image of kind {other:?} is not supported")),
+        }
     }
 
     /// An image of dimension `Buffer` that is read through texel fetches.

@@ -316,6 +316,21 @@ fn images_are_used_as_they_were_made_to_be() {
             })
             .unwrap();
         let probe = gpu.compute_pipeline::<cube_probe::Kernel>(&()).unwrap();
+        // A plane has no five other faces.
+        let plane = image(gpu, vk::ImageUsageFlags::SAMPLED);
+        let mut recorder = gpu.recorder("plane").unwrap();
+        let looked_up = recorder.pass("a plane as a cube", |pass| {
+            let set = cube_probe::Set0 {
+                cube: SampledView {
+                    image: &plane,
+                    sampler: &sampler,
+                },
+                seen: rows.view(),
+            };
+            pass.dispatch(&probe, &[&set], &(), [1, 1, 1])
+        });
+        assert!(matches!(&looked_up, Err(Error::Shader { .. })), "{looked_up:?}");
+        drop(recorder);
         refused(gpu, words, "sampled", |pass| {
             let set = cube_probe::Set0 {
                 cube: SampledView {

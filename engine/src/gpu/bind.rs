@@ -7,7 +7,7 @@ use ash::vk;
 
 use super::barrier::Access;
 use super::image::Image;
-use super::interface::{BindingInfo, BindingKind, BindingSet, BoundResource, ShaderInfo, Stage};
+use super::interface::{BindingInfo, BindingKind, BindingSet, BoundResource, ShaderInfo, Stage, ViewKind};
 use super::layout::descriptor_type;
 use super::recorder::Pass;
 use crate::{Error, Result};
@@ -48,8 +48,34 @@ pub(super) struct Slot<'a> {
     pub name: &'a str,
     pub binding: u32,
     pub kind: BindingKind,
+    /// What the shader sees an image as.
+    pub view: Option<ViewKind>,
     /// How the shader uses what is there.
     pub access: Access,
+}
+
+impl Slot<'_> {
+    /// Fails for an image that is not seen as the shader does: it would look for layers that are not there.
+    fn check_view(&self, image: &Image) -> Result<()> {
+        let wanted = match self.view {
+            None => return Ok(()),
+            Some(ViewKind::Plane) => vk::ImageViewType::TYPE_2D,
+            Some(ViewKind::Layers) => vk::ImageViewType::TYPE_2D_ARRAY,
+            Some(ViewKind::Cube) => vk::ImageViewType::CUBE,
+        };
+        let found = image.inner.kind;
+        if found == wanted {
+            return Ok(());
+        }
+        Err(Error::Shader {
+            name: self.shader.into(),
+            message: format!(
+                "{} is seen as {wanted:?}, and {:?} is {found:?}",
+                self.name,
+                image.name()
+            ),
+        })
+    }
 }
 
 /// Fails when one command would read a buffer by texels and write it: texel fetches may see the memory as it was before, whatever the
@@ -127,6 +153,7 @@ impl Pass<'_> {
                         name: binding.name,
                         binding: binding.binding,
                         kind: binding.kind,
+                        view: binding.view,
                         access: access(shader.stage, binding),
                     };
                     self.write_descriptor(raw, &slot, *resource)?;
@@ -214,6 +241,7 @@ impl Pass<'_> {
             }
             (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
                 self.check_image(image, vk::ImageUsageFlags::STORAGE)?;
+                slot.check_view(image)?;
                 self.recorder.keep(&image.inner);
                 let raw = [vk::DescriptorImageInfo::default()
                     .image_view(image.view())
@@ -223,6 +251,7 @@ impl Pass<'_> {
             }
             (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
                 self.check_image(view.image, vk::ImageUsageFlags::SAMPLED)?;
+                slot.check_view(view.image)?;
                 self.recorder
                     .check_device(&view.sampler.inner.gpu, "sampler", slot.name)?;
                 self.recorder.keep(&view.image.inner);

@@ -80,6 +80,20 @@ pub struct BindingInfo {
     pub writes: bool,
     /// The optimized module touches it. Only used bindings take part in layouts, limits and barrier checks.
     pub used: bool,
+    /// What an image is seen as; `None` for what is no image.
+    pub view: Option<ViewKind>,
+}
+
+/// What a shader sees an image as. It is given one whose view is of that kind: a whole image, or a part by its
+/// [`ImagePart::kind`](crate::gpu::ImagePart).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ViewKind {
+    /// One layer: `TYPE_2D`.
+    Plane,
+    /// Layers by number: `TYPE_2D_ARRAY`.
+    Layers,
+    /// Six layers by direction: `CUBE`.
+    Cube,
 }
 
 impl ShaderInfo {

@@ -346,6 +346,7 @@ mod tests {
             reads: true,
             writes: false,
             used: true,
+            view: None,
         }
     }
 

@@ -44,7 +44,7 @@
 //!   with other push constants, specialization constants or contents of buffers (an index that is no tree, say), may lead it out of them. In
 //!   buffers and texel buffers `robustBufferAccess` keeps it anyway. A host's device without that feature has nothing that does, which
 //!   [`Gpu::from_host`] makes its host promise.
-//! - *The view's dimension and the texel format* of a sampled image are not compared with the shader's.
+//! - *The texel format* of an image is not compared with the type that a shader reads or writes it by: what is read is undefined then.
 //! - *Counts of indirect dispatches and draws* are the device's to read: more than it can do may hang it.
 //! - *The driver's own faults.*
 //!

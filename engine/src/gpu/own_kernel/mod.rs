@@ -432,6 +432,7 @@ impl Pass<'_> {
                     name: &binding.name,
                     binding: binding.binding,
                     kind: binding.kind,
+                    view: None,
                     access: binding.access(),
                 };
                 self.write_descriptor(raw, &slot, resource.bound())?;
