@@ -202,14 +202,15 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         let _ = writeln!(
             text,
             "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes}, used: {}, \
-             view: {} }},",
+             view: {}, fixed_bytes: {} }},",
             binding.set,
             binding.binding,
             binding.name,
             interface.used.contains(&(binding.set, binding.binding)),
             binding
                 .view
-                .map_or("None".into(), |view| format!("Some(ViewKind::{view})"))
+                .map_or("None".into(), |view| format!("Some(ViewKind::{view})")),
+            binding.resource.fixed_bytes()
         );
     }
     text += "    ],\n    spec_constants: &[\n";

@@ -50,6 +50,8 @@ pub(super) struct Slot<'a> {
     pub kind: BindingKind,
     /// What the shader sees an image as.
     pub view: Option<ViewKind>,
+    /// Bytes that the shader reaches by no index.
+    pub fixed_bytes: u64,
     /// How the shader uses what is there.
     pub access: Access,
 }
@@ -154,6 +156,7 @@ impl Pass<'_> {
                         binding: binding.binding,
                         kind: binding.kind,
                         view: binding.view,
+                        fixed_bytes: binding.fixed_bytes.into(),
                         access: access(shader.stage, binding),
                     };
                     self.write_descriptor(raw, &slot, *resource)?;
@@ -216,6 +219,14 @@ impl Pass<'_> {
                     vk::BufferUsageFlags::STORAGE_BUFFER
                 })?;
                 self.recorder.touch(self.name, view.buffer, slot.access)?;
+                if !inner.caps.robust_buffer_access && view.bytes < slot.fixed_bytes {
+                    return Err(Error::LimitExceeded {
+                        name: view.buffer.name().into(),
+                        value: slot.fixed_bytes,
+                        limit_name: "size of the range, which nothing guards without robustBufferAccess",
+                        limit: view.bytes,
+                    });
+                }
                 let raw = [vk::DescriptorBufferInfo {
                     buffer: view.buffer.raw(),
                     offset: view.raw_offset(),

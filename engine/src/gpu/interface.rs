@@ -82,6 +82,8 @@ pub struct BindingInfo {
     pub used: bool,
     /// What an image is seen as; `None` for what is no image.
     pub view: Option<ViewKind>,
+    /// Bytes of a block up to its array without a size, or to its end; 0 for what is no block.
+    pub fixed_bytes: u32,
 }
 
 /// What a shader sees an image as. It is given one whose view is of that kind: a whole image, or a part by its

@@ -347,6 +347,7 @@ mod tests {
             writes: false,
             used: true,
             view: None,
+            fixed_bytes: 0,
         }
     }
 

@@ -42,8 +42,8 @@
 //!   barriers over buffers; layouts are the author's.
 //! - *A kernel's own arrays*. Kernels stay inside of them for what their documentation allows; a host that dispatches one of [`shaders`] by itself,
 //!   with other push constants, specialization constants or contents of buffers (an index that is no tree, say), may lead it out of them. In
-//!   buffers and texel buffers `robustBufferAccess` keeps it anyway. A host's device without that feature has nothing that does, which
-//!   [`Gpu::from_host`] makes its host promise.
+//!   buffers and texel buffers `robustBufferAccess` keeps it anyway. On a host's device without that feature a range is at
+//!   least as long as what a shader reaches there by no index; that indices stay in it [`Gpu::from_host`] makes the host promise.
 //! - *The texel format* of an image is not compared with the type that a shader reads or writes it by: what is read is undefined then.
 //! - *Counts of indirect dispatches and draws* are the device's to read: more than it can do may hang it.
 //! - *The driver's own faults.*

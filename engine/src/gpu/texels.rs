@@ -103,8 +103,8 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Setting`] for a buffer of another device or that was made for other uses, one without room for a texel, or a format that has no texels
-    /// of whole bytes; [`Error::MissingFeature`] for one that the device has no texel buffers of; [`Error::LimitExceeded`] past `maxTexelBufferElements`, or for one that does not begin at a multiple of
-    /// `minTexelBufferOffsetAlignment` (256 always is).
+    /// of whole bytes; [`Error::MissingFeature`] for one that the device has no texel buffers of; [`Error::LimitExceeded`] past
+    /// `maxTexelBufferElements`, or for one that does not begin at a multiple of `minTexelBufferOffsetAlignment` (256 always is).
     pub fn texel_view_of(&self, buffer: &Buffer, format: vk::Format) -> Result<TexelView> {
         if !Arc::ptr_eq(&buffer.inner.gpu, &self.inner) {
             return Err(Error::setting("buffer", buffer.name(), "belongs to another device"));

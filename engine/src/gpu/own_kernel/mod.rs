@@ -433,6 +433,8 @@ impl Pass<'_> {
                     binding: binding.binding,
                     kind: binding.kind,
                     view: None,
+                    // Checked on every device.
+                    fixed_bytes: 0,
                     access: binding.access(),
                 };
                 self.write_descriptor(raw, &slot, resource.bound())?;
