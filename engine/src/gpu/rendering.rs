@@ -133,8 +133,8 @@ impl<'a> Pass<'a> {
         if let Some(target) = &targets.depth {
             self.check_image(target.image, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT)?;
         }
-        self.check_limits(targets)?;
         let (area, layers) = self.check_targets(&images, targets)?;
+        self.check_limits(targets)?;
         for image in &images {
             self.recorder.keep(&image.inner);
         }
