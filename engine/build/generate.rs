@@ -201,11 +201,16 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         let (reads, writes) = access(&binding.resource);
         let _ = writeln!(
             text,
-            "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes}, used: {} }},",
+            "        BindingInfo {{ set: {}, binding: {}, name: {:?}, kind: BindingKind::{kind}, reads: {reads}, writes: {writes}, used: {}, \
+             view: {}, fixed_bytes: {} }},",
             binding.set,
             binding.binding,
             binding.name,
-            interface.used.contains(&(binding.set, binding.binding))
+            interface.used.contains(&(binding.set, binding.binding)),
+            binding
+                .view
+                .map_or("None".into(), |view| format!("Some(ViewKind::{view})")),
+            binding.resource.fixed_bytes()
         );
     }
     text += "    ],\n    spec_constants: &[\n";
@@ -248,7 +253,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
     let _ = writeln!(
         text,
         "/// The {word} as a type: its push constants and specialization constants.\n#[derive(Debug)]\npub enum {kind} {{}}\n\
-         impl {}Shader for {kind} {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}",
+         // SAFETY: all is the module's by reflection.\n#[allow(unsafe_code)]\nunsafe impl {}Shader for {kind} {{\n    type Push = {push};\n    type Spec = Spec;\n    fn info() -> &'static ShaderInfo {{ &INFO }}\n}}",
         interface.stage
     );
     text += "}\n";

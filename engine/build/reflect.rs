@@ -85,12 +85,28 @@ pub enum Resource {
     TexelBuffer,
 }
 
+impl Resource {
+    /// Bytes of a block up to the end of its last member that has a size; 0 for what is no block.
+    pub fn fixed_bytes(&self) -> u32 {
+        let (Self::Storage { block, .. } | Self::Uniform { block }) = self else {
+            return 0;
+        };
+        let fixed = block.members.iter().filter(|m| !matches!(m.kind, Type::Runtime(..)));
+        fixed
+            .map(|member| member.offset + member.kind.size())
+            .max()
+            .unwrap_or(0)
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Binding {
     pub set: u32,
     pub binding: u32,
     pub name: String,
     pub resource: Resource,
+    /// What an image is seen as, by its name in `gpu::interface::ViewKind`.
+    pub view: Option<&'static str>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -387,12 +403,29 @@ impl Reader {
                 _ => return Err(format!("set {set} binding {binding} has no name")),
             };
         }
+        let view = match &resource {
+            Resource::StorageImage { .. } => Some(self.view_kind(pointee)?),
+            Resource::SampledImage => Some(self.view_kind(self.id_operand(pointee, 0)?)?),
+            _ => None,
+        };
         Ok(Binding {
             set,
             binding,
             name,
             resource,
+            view,
         })
+    }
+
+    /// What an image type is seen as: its operands are the sampled type, the dimension, depth or not, and arrayed or not.
+    fn view_kind(&self, image: u32) -> Result<&'static str, String> {
+        let operands = &self.definition(image)?.operands;
+        match (operands.get(1), operands.get(3)) {
+            (Some(Operand::Dim(Dim::Dim2D)), Some(Operand::LiteralBit32(0))) => Ok("Plane"),
+            (Some(Operand::Dim(Dim::Dim2D)), Some(Operand::LiteralBit32(1))) => Ok("Layers"),
+            (Some(Operand::Dim(Dim::DimCube)), Some(Operand::LiteralBit32(0))) => Ok("Cube"),
+            other => Err(format!("an image of kind {other:?} is not supported")),
+        }
     }
 
     /// An image of dimension `Buffer` that is read through texel fetches.

@@ -16,11 +16,11 @@ use std::sync::Mutex;
 use clerestory::Error;
 use clerestory::gpu::ash::{self, vk};
 use clerestory::gpu::{
-    BufferDesc, Category, DeviceSelection, EnabledFeatures, Gpu, GpuOptions, HostDevice, OptionalFeatures,
+    Access, BufferDesc, Category, DeviceSelection, EnabledFeatures, Gpu, GpuOptions, HostDevice, OptionalFeatures,
     VALIDATION_LAYER,
 };
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory_tests::shaders::out_of_bounds;
+use clerestory_tests::shaders::{out_of_bounds, uniform_probe};
 use clerestory_tests::{assert_no_messages, gpu, gpu_with, with_gpu};
 
 /// A host's own Vulkan objects, destroyed by the host.
@@ -228,6 +228,39 @@ fn a_picture_on_a_lent_device_beside_the_hosts_work_is_the_same_to_the_bit() {
     assert!(lent.iter().any(|value| *value > 0.0));
     assert!(lent == path_traced(&own, || {}), "the pictures differ");
     assert_no_messages(&own);
+}
+
+#[test]
+fn without_robust_access_a_range_holds_what_its_block_has() {
+    let host = Host::new();
+    let gpu = host.lend(EnabledFeatures::REQUIRED).unwrap();
+    assert!(!gpu.caps().robust_buffer_access);
+    let pipeline = gpu.compute_pipeline::<uniform_probe::Kernel>(&()).unwrap();
+    let addend = gpu.buffer(&BufferDesc::uniform("addend", 16, Category::Work)).unwrap();
+    let words = gpu.buffer(&BufferDesc::storage("words", 32, Category::Work)).unwrap();
+    let mut recorder = gpu.recorder("ranges").unwrap();
+    recorder
+        .pass("ranges", |pass| {
+            pass.fill(addend.view(), 3)?;
+            pass.fill(words.view(), 4)?;
+            pass.memory_barrier(Access::TRANSFER, Access::COMPUTE | Access::COMPUTE_UNIFORM_READ);
+            let mut add = |bytes| {
+                let set = uniform_probe::Set0 {
+                    addend: addend.slice(0, bytes),
+                    words: words.view(),
+                };
+                pass.dispatch(&pipeline, &[&set], &(), [1, 1, 1])
+            };
+            let short = add(2);
+            assert!(
+                matches!(&short, Err(Error::LimitExceeded { value: 4, limit: 2, .. })),
+                "{short:?}"
+            );
+            add(16)
+        })
+        .unwrap();
+    recorder.submit().unwrap().wait().unwrap();
+    assert_eq!(gpu.read::<u32>(words.view(), 8).unwrap(), [7; 8]);
 }
 
 #[test]

@@ -16,8 +16,12 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 fn faulty(call: FaultCall, nth: u32, result: vk::Result) -> (MutexGuard<'static, ()>, Gpu) {
     let guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let options = GpuOptions {
-        fault: Some(FaultPlan { call, nth, result }),
+    (guard, gpu_with(&planned(FaultPlan { call, nth, result })))
+}
+
+fn planned(plan: FaultPlan) -> GpuOptions {
+    GpuOptions {
+        fault: Some(plan),
         // GPU-assisted validation submits by another command than the one that fails here.
         validation: match clerestory_tests::validation() {
             Validation::GpuAssisted => Validation::Core,
@@ -25,8 +29,7 @@ fn faulty(call: FaultCall, nth: u32, result: vk::Result) -> (MutexGuard<'static,
         },
         cache_folder: None,
         ..GpuOptions::default()
-    };
-    (guard, gpu_with(&options))
+    }
 }
 
 /// Submits two passes that fill a buffer.
@@ -274,7 +277,8 @@ fn the_marker_of_a_pass_is_written_when_all_before_has_ended_and_none_after() {
         .unwrap();
     let submission = recorder.submit().unwrap();
     let start = std::time::Instant::now();
-    while seen.read::<u32>(0, 1).unwrap() != [7] {
+    // SAFETY: the device writes the words once, and what a read in the middle of that gives is not used.
+    while unsafe { seen.read_in_use::<u32>(0, 1) }.unwrap() != [7] {
         assert!(
             start.elapsed() < Duration::from_secs(60),
             "the device does not reach the pass"
@@ -291,4 +295,24 @@ fn the_marker_of_a_pass_is_written_when_all_before_has_ended_and_none_after() {
     // SAFETY: the submission is gone, and with it the last use.
     unsafe { device.destroy_event(event, None) };
     assert_no_messages(&gpu);
+}
+
+#[test]
+fn a_second_device_with_a_plan_is_refused_while_the_first_lives() {
+    let (_guard, first) = faulty(FaultCall::QueueSubmit, 100, vk::Result::ERROR_DEVICE_LOST);
+    let options = planned(FaultPlan {
+        call: FaultCall::QueueSubmit,
+        nth: 1,
+        result: vk::Result::ERROR_DEVICE_LOST,
+    });
+    match Gpu::headless(&options) {
+        Err(Error::Setting { name, .. }) => assert_eq!(name, "fault"),
+        Err(other) => panic!("expected a refused plan, got {other}"),
+        Ok(_) => panic!("the first device's calls would go to the second's driver"),
+    }
+    // The first works on by its own plan, and makes room when it goes.
+    submit_fills(&first, ["a1", "a2"]).unwrap().wait().unwrap();
+    drop(first);
+    let second = gpu_with(&options);
+    assert_eq!(last_pass(submit_fills(&second, ["b1", "b2"])), "before the first pass");
 }

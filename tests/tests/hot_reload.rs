@@ -39,7 +39,9 @@ fn a_changed_source_takes_effect_and_a_faulty_one_does_not() {
     let elsewhere = tempfile::tempdir().unwrap();
     save(&source, original, 0);
     with_gpu(|gpu| {
-        let mut kernel = HotReload::<out_of_bounds::Kernel>::new(gpu, folder.path(), ()).unwrap();
+        // SAFETY: the folder is this test's, and no version of the kernel has arrays of its own.
+        #[expect(unsafe_code, reason = "kernels from a folder")]
+        let mut kernel = unsafe { HotReload::<out_of_bounds::Kernel>::new(gpu, folder.path(), ()) }.unwrap();
         assert!(!kernel.poll().unwrap());
         assert_eq!(written(gpu, kernel.pipeline()), 5);
 

@@ -6,6 +6,8 @@
 //! Guarantees: sums are compensated f64 sums in pixel order, so the same pictures give the same bits; pixels that are not finite in either
 //! picture are left out, counted and reported.
 
+use std::ops::RangeInclusive;
+
 pub use super::z_test::{ZTest, z_test};
 
 use super::picture::{Layer, Picture};
@@ -39,6 +41,13 @@ pub fn relative_square(square: f64, level: f64, epsilon: f64) -> f64 {
     }
 }
 
+/// The pixels per degree of visual angle that FLIP takes. Fewer than two, and its filters of edges and points have no weight that a float can hold;
+/// a thousand is a screen of ours seen from ten metres. FLIP's time and memory grow with the filters' widths, at most 273 pixels here.
+pub const PIXELS_PER_DEGREE: RangeInclusive<f32> = 2.0..=1000.0;
+
+/// The most pixels that are compared: FLIP numbers its pictures' values by 32-bit integers.
+const MOST_PIXELS: u64 = i32::MAX as u64 / 3;
+
 /// The quantile of the absolute error that is reported.
 pub const QUANTILE: f64 = 0.999;
 
@@ -50,7 +59,8 @@ pub struct CompareOptions {
     pub relative_mse_offset: f64,
     /// Tone map applied to both pictures before FLIP; default: exposure 0, clipped sRGB.
     pub tone: ToneMap,
-    /// Pixels per degree of visual angle for FLIP; default 67, the authors' choice: a screen 0.7 m and 3840 pixels wide seen from 0.7 m.
+    /// Pixels per degree of visual angle for FLIP, in [`PIXELS_PER_DEGREE`]: 2 to 1000. Default 67, the authors' choice: a screen 0.7 m and 3840
+    /// pixels wide seen from 0.7 m.
     pub pixels_per_degree: f32,
 }
 
@@ -161,7 +171,8 @@ pub fn luminance(rgb: [f32; 3]) -> f64 {
 /// Compares the main layers of two pictures.
 ///
 /// # Errors
-/// [`Error::Picture`] when sizes or channel counts differ, a main layer is missing, or an option is out of its range.
+/// [`Error::Picture`] when sizes or channel counts differ, a main layer is missing, there are more than 715 million pixels, or an option is out of
+/// its range: the offset of the relative MSE is finite and above 0, pixels per degree are in [`PIXELS_PER_DEGREE`].
 pub fn compare(test: &Picture, reference: &Picture, options: &CompareOptions) -> Result<ErrorReport> {
     let size = check(test, reference, options)?;
     compare_layers(test.main_layer()?, reference.main_layer()?, size, options)
@@ -192,8 +203,21 @@ fn check(test: &Picture, reference: &Picture, options: &CompareOptions) -> Resul
             size.0, size.1, expected.0, expected.1
         ));
     }
-    if !(options.relative_mse_offset > 0.0 && options.pixels_per_degree > 0.0) {
-        return wrong("the relative MSE's offset and the pixels per degree must be above 0".into());
+    if u64::from(size.0) * u64::from(size.1) > MOST_PIXELS {
+        return wrong(format!("{}×{} are more than {MOST_PIXELS} pixels", size.0, size.1));
+    }
+    let offset = options.relative_mse_offset;
+    if !(offset > 0.0 && offset.is_finite()) {
+        return wrong(format!(
+            "the relative MSE's offset must be finite and above 0, and is {offset}"
+        ));
+    }
+    if !PIXELS_PER_DEGREE.contains(&options.pixels_per_degree) {
+        let (least, most) = (*PIXELS_PER_DEGREE.start(), *PIXELS_PER_DEGREE.end());
+        let given = options.pixels_per_degree;
+        return wrong(format!(
+            "the pixels per degree must be in {least} to {most}, and are {given}"
+        ));
     }
     Ok(size)
 }
@@ -295,6 +319,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
         "engine/src/film/metrics.rs::relative_errors_are_the_same_in_every_unit",
         "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
+        "engine/src/film/metrics.rs::pixels_per_degree_are_in_their_range_and_finite_there",
     ],
     api: &["clerestory::film::compare", "clerestory::film::ErrorReport"],
     settings: &["clerestory::film::CompareOptions", "clerestory compare a.exr b.exr"],
@@ -393,6 +418,36 @@ mod tests {
             compare(&wide, &tall, &CompareOptions::default()),
             Err(Error::Picture { .. })
         ));
+        Ok(())
+    }
+
+    #[test]
+    fn pixels_per_degree_are_in_their_range_and_finite_there() -> Result<()> {
+        let values: Vec<f32> = (0..16 * 16 * 3).map(|i| (i % 7) as f32 / 7.0).collect();
+        let test = Picture::from_radiance(16, 16, values)?;
+        let reference = Picture::from_radiance(16, 16, vec![0.5; 16 * 16 * 3])?;
+        let of = |pixels_per_degree, relative_mse_offset| {
+            let options = CompareOptions {
+                pixels_per_degree,
+                relative_mse_offset,
+                ..CompareOptions::default()
+            };
+            compare(&test, &reference, &options).map(|report| report.flip)
+        };
+        for pixels_per_degree in [*PIXELS_PER_DEGREE.start(), 67.0, *PIXELS_PER_DEGREE.end()] {
+            let flip = of(pixels_per_degree, RELATIVE_MSE_OFFSET)?;
+            assert!(flip > 0.0 && flip <= 1.0, "{pixels_per_degree}: {flip}");
+        }
+        // 1e-30 gave NaN, 1e9 did not end and 3e9 crashed.
+        for refused in [1e-30, 0.0, -67.0, 1.9, 1000.5, 1e9, 3e9, f32::INFINITY, f32::NAN] {
+            match of(refused, RELATIVE_MSE_OFFSET) {
+                Err(Error::Picture { cause, .. }) => assert!(cause.contains("2 to 1000"), "{cause}"),
+                other => panic!("{refused}: {other:?}"),
+            }
+        }
+        for refused in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+            assert!(matches!(of(67.0, refused), Err(Error::Picture { .. })), "{refused}");
+        }
         Ok(())
     }
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::barrier::Access;
-use super::interface::{BindingInfo, BindingKind, BindingSet, BoundResource, ShaderInfo, Stage};
+use super::image::Image;
+use super::interface::{BindingInfo, BindingKind, BindingSet, BoundResource, ShaderInfo, Stage, ViewKind};
 use super::layout::descriptor_type;
 use super::recorder::Pass;
 use crate::{Error, Result};
@@ -47,8 +48,36 @@ pub(super) struct Slot<'a> {
     pub name: &'a str,
     pub binding: u32,
     pub kind: BindingKind,
+    /// What the shader sees an image as.
+    pub view: Option<ViewKind>,
+    /// Bytes that the shader reaches by no index.
+    pub fixed_bytes: u64,
     /// How the shader uses what is there.
     pub access: Access,
+}
+
+impl Slot<'_> {
+    /// Fails for an image that is not seen as the shader does: it would look for layers that are not there.
+    fn check_view(&self, image: &Image) -> Result<()> {
+        let wanted = match self.view {
+            None => return Ok(()),
+            Some(ViewKind::Plane) => vk::ImageViewType::TYPE_2D,
+            Some(ViewKind::Layers) => vk::ImageViewType::TYPE_2D_ARRAY,
+            Some(ViewKind::Cube) => vk::ImageViewType::CUBE,
+        };
+        let found = image.inner.kind;
+        if found == wanted {
+            return Ok(());
+        }
+        Err(Error::Shader {
+            name: self.shader.into(),
+            message: format!(
+                "{} is seen as {wanted:?}, and {:?} is {found:?}",
+                self.name,
+                image.name()
+            ),
+        })
+    }
 }
 
 /// Fails when one command would read a buffer by texels and write it: texel fetches may see the memory as it was before, whatever the
@@ -126,6 +155,8 @@ impl Pass<'_> {
                         name: binding.name,
                         binding: binding.binding,
                         kind: binding.kind,
+                        view: binding.view,
+                        fixed_bytes: binding.fixed_bytes.into(),
                         access: access(shader.stage, binding),
                     };
                     self.write_descriptor(raw, &slot, *resource)?;
@@ -139,6 +170,12 @@ impl Pass<'_> {
             };
         }
         Ok(())
+    }
+
+    /// Fails for an image of another device, or one that was not made for a use.
+    pub(super) fn check_image(&self, image: &Image, usage: vk::ImageUsageFlags) -> Result<()> {
+        self.recorder.check_device(&image.inner.gpu, "image", image.name())?;
+        image.check_usage(usage)
     }
 
     /// Writes a resource to its place in a set that is not in use yet, and notes the use.
@@ -156,6 +193,13 @@ impl Pass<'_> {
         match (slot.kind, resource) {
             (BindingKind::StorageBuffer | BindingKind::UniformBuffer, BoundResource::Buffer(view)) => {
                 let uniform = slot.kind == BindingKind::UniformBuffer;
+                if view.bytes == 0 {
+                    let message = format!("binding {} was given nothing of {:?}", slot.name, view.buffer.name());
+                    return Err(Error::Shader {
+                        name: slot.shader.into(),
+                        message,
+                    });
+                }
                 view.check(if uniform {
                     inner.caps.uniform_buffer_alignment
                 } else {
@@ -175,6 +219,14 @@ impl Pass<'_> {
                     vk::BufferUsageFlags::STORAGE_BUFFER
                 })?;
                 self.recorder.touch(self.name, view.buffer, slot.access)?;
+                if !inner.caps.robust_buffer_access && view.bytes < slot.fixed_bytes {
+                    return Err(Error::LimitExceeded {
+                        name: view.buffer.name().into(),
+                        value: slot.fixed_bytes,
+                        limit_name: "size of the range, which nothing guards without robustBufferAccess",
+                        limit: view.bytes,
+                    });
+                }
                 let raw = [vk::DescriptorBufferInfo {
                     buffer: view.buffer.raw(),
                     offset: view.raw_offset(),
@@ -199,6 +251,8 @@ impl Pass<'_> {
                 };
             }
             (BindingKind::StorageImage, BoundResource::StorageImage(image)) => {
+                self.check_image(image, vk::ImageUsageFlags::STORAGE)?;
+                slot.check_view(image)?;
                 self.recorder.keep(&image.inner);
                 let raw = [vk::DescriptorImageInfo::default()
                     .image_view(image.view())
@@ -207,6 +261,10 @@ impl Pass<'_> {
                 unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
             }
             (BindingKind::SampledImage, BoundResource::Sampled(view)) => {
+                self.check_image(view.image, vk::ImageUsageFlags::SAMPLED)?;
+                slot.check_view(view.image)?;
+                self.recorder
+                    .check_device(&view.sampler.inner.gpu, "sampler", slot.name)?;
                 self.recorder.keep(&view.image.inner);
                 self.recorder.keep(&view.sampler.inner);
                 let raw = [vk::DescriptorImageInfo::default()

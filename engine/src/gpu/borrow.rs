@@ -24,7 +24,7 @@
 //! ```
 
 use std::ops::{Deref, DerefMut};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use ash::vk;
 
@@ -108,10 +108,11 @@ impl Recorder {
     /// - It is executed by a queue of that family, in an order with the engine's own submissions that the host sees to: the engine's queue,
     ///   held by [`Gpu::lock_queue`], gives the order of submissions.
     /// - The [`Recorded`] lives until the device is done with it for the last time, and the host's own objects that were lent by
-    ///   [`Gpu::borrow_buffer`] do, too. Without a `Recorded` (the recorder was dropped) it is not executed.
+    ///   [`Gpu::borrow_buffer`] do, too. Without a `Recorded` (the recorder was dropped), and after a panic inside a pass, it is not executed.
     /// - With timestamps or counts it is executed once at most.
     /// - What the engine's objects hold is not used by other work at the same time: recording a frame twice over one picture wants the
-    ///   barriers that two passes in one command buffer want.
+    ///   barriers that two passes in one command buffer want. While the device works on it, mapped buffers that it uses are neither written
+    ///   nor read ([`Buffer::write`] and [`Buffer::read`] know of the engine's own submissions alone).
     pub unsafe fn borrow(gpu: &Gpu, desc: &BorrowDesc<'_>) -> Result<BorrowedRecorder> {
         gpu.inner.check_alive()?;
         let recorder = Self {
@@ -122,6 +123,8 @@ impl Recorder {
             recorded: Recorded::new(gpu, desc.timestamps)?,
             markers: None,
             tracker: cfg!(debug_assertions).then(Tracker::default),
+            refused: None,
+            in_pass: false,
         };
         if desc.opening_barrier {
             // SAFETY: the caller's command buffer is recording, outside a rendering.
@@ -203,6 +206,7 @@ impl Gpu {
                 bytes: lent.bytes,
                 usage: lent.usage,
                 memory: Memory::Host,
+                in_use_until: Mutex::new(0),
             }),
         })
     }

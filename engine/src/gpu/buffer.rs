@@ -1,6 +1,7 @@
 //! Buffers: named, counted, checked against the device's limits.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -32,9 +33,22 @@ pub struct BufferDesc<'a> {
     pub residency: Residency,
     /// What it is counted as.
     pub category: Category,
-    /// How it is used.
+    /// How it is used: one or several of Vulkan 1.0's uses.
     pub usage: vk::BufferUsageFlags,
 }
+
+/// The uses of Vulkan 1.0; others want features that no device here has enabled.
+const USES: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
+    vk::BufferUsageFlags::TRANSFER_SRC.as_raw()
+        | vk::BufferUsageFlags::TRANSFER_DST.as_raw()
+        | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER.as_raw()
+        | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER.as_raw()
+        | vk::BufferUsageFlags::UNIFORM_BUFFER.as_raw()
+        | vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
+        | vk::BufferUsageFlags::INDEX_BUFFER.as_raw()
+        | vk::BufferUsageFlags::VERTEX_BUFFER.as_raw()
+        | vk::BufferUsageFlags::INDIRECT_BUFFER.as_raw(),
+);
 
 impl<'a> BufferDesc<'a> {
     /// A storage buffer in device memory that can also be copied, filled and hold indirect arguments.
@@ -115,12 +129,38 @@ pub(super) struct BufferInner {
     pub bytes: u64,
     pub usage: vk::BufferUsageFlags,
     pub memory: Memory,
+    /// The value of the device's timeline at which its last submission that uses this is over; 0 when none is. Of mapped memory alone. Locked
+    /// while the host reads or writes the memory, and while a submission that uses it is handed to the queue.
+    pub in_use_until: Mutex<u64>,
+}
+
+impl BufferInner {
+    /// Nothing of the engine's touches mapped memory while the guard lives.
+    pub fn lock(&self) -> MutexGuard<'_, u64> {
+        // What a panic left behind is at worst half of a copy of plain words.
+        self.in_use_until.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The host reaches the memory.
+    pub fn is_mapped(&self) -> bool {
+        self.mapping().is_some()
+    }
+
+    fn mapping(&self) -> Option<*mut u8> {
+        match &self.memory {
+            // Where all memory is the host's, that of devices has an address, too.
+            Memory::Own { residency, .. } if *residency == Residency::Device => None,
+            Memory::Own { allocation, .. } => Some(allocation.as_ref()?.mapped_ptr()?.as_ptr().cast()),
+            Memory::Host => None,
+        }
+    }
 }
 
 /// Whose memory a buffer is in.
 pub(super) enum Memory {
     /// The engine's.
     Own {
+        residency: Residency,
         category: Category,
         bytes: u64,
         /// `None` only while it is made or dropped.
@@ -134,16 +174,22 @@ impl Gpu {
     /// Allocates a buffer.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] past `maxStorageBufferRange` (storage) or `maxMemoryAllocationSize`, [`Error::OutOfMemory`].
+    /// [`Error::LimitExceeded`] past `maxStorageBufferRange` (storage) or `maxMemoryAllocationSize`, [`Error::Setting`] for no use or one beyond
+    /// Vulkan 1.0's, [`Error::OutOfMemory`].
     pub fn buffer(&self, desc: &BufferDesc<'_>) -> Result<Buffer> {
         let caps = self.caps();
-        let bytes = desc.bytes.max(16).next_multiple_of(4);
         let limit = |limit_name, limit| Error::LimitExceeded {
             name: desc.name.into(),
-            value: bytes,
+            value: desc.bytes,
             limit_name,
             limit,
         };
+        if desc.usage.is_empty() || !USES.contains(desc.usage) {
+            let cause = format!("is not what the buffer {:?} can be made for", desc.name);
+            return Err(Error::setting("usage", format!("{:?}", desc.usage), cause));
+        }
+        let bytes = desc.bytes.max(16).checked_next_multiple_of(4);
+        let bytes = bytes.ok_or_else(|| limit("maxMemoryAllocationSize", caps.max_allocation_size))?;
         if desc.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER) && bytes > caps.max_storage_buffer_range {
             return Err(limit("maxStorageBufferRange", caps.max_storage_buffer_range));
         }
@@ -175,10 +221,12 @@ impl Gpu {
             bytes,
             usage: desc.usage,
             memory: Memory::Own {
+                residency: desc.residency,
                 category: desc.category,
                 bytes: requirements.size,
                 allocation: None,
             },
+            in_use_until: Mutex::new(0),
         };
         let allocation = gpu
             .memory
@@ -189,6 +237,7 @@ impl Gpu {
                 .bind_buffer_memory(raw, allocation.memory(), allocation.offset())
         };
         inner.memory = Memory::Own {
+            residency: desc.residency,
             category: desc.category,
             bytes: requirements.size,
             allocation: Some(allocation),
@@ -238,29 +287,73 @@ impl Buffer {
         }
     }
 
-    /// Writes a mapped buffer. The device must not be using that part.
+    /// Writes a mapped buffer. One thread at a time reads or writes it; the others wait.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when `data` does not fit or the buffer is not mapped.
+    /// [`Error::LimitExceeded`] when `data` does not fit or the buffer is not mapped; [`Error::Setting`] while a submission that uses the buffer
+    /// is not over; [`Error::DeviceLost`] when it never will be.
     pub fn write<T: bytemuck::NoUninit>(&self, offset: u64, data: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let pointer = self.mapped(offset, bytes.len() as u64)?;
-        // SAFETY: `mapped` checked that the range lies inside the mapping; the source cannot overlap device memory.
+        let _alone = self.lock_unused()?;
+        // SAFETY: `mapped` checked that the range lies inside the mapping, which no submission uses and no other thread while the lock is held;
+        // the source cannot overlap device memory.
         unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), pointer, bytes.len()) };
         Ok(())
     }
 
-    /// Reads a mapped buffer. The device must have finished writing that part.
+    /// Reads a mapped buffer. One thread at a time reads or writes it; the others wait.
     ///
     /// # Errors
-    /// As [`Buffer::write`].
+    /// As [`Buffer::write`], before any memory is taken for the values.
     pub fn read<T: bytemuck::Pod>(&self, offset: u64, count: usize) -> Result<Vec<T>> {
-        let mut data = vec![T::zeroed(); count];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
-        let pointer = self.mapped(offset, bytes.len() as u64)?;
+        let pointer = self.mapped(offset, bytes_of::<T>(count))?;
+        let _alone = self.lock_unused()?;
         // SAFETY: as in `write`.
-        unsafe { std::ptr::copy_nonoverlapping(pointer, bytes.as_mut_ptr(), bytes.len()) };
-        Ok(data)
+        Ok(unsafe { values_at(pointer, count) })
+    }
+
+    /// Reads a mapped buffer that a submission is using: what the device has made visible to the host in the middle of its work.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] as [`Buffer::read`].
+    ///
+    /// # Safety
+    /// Neither the device nor another thread writes this part meanwhile.
+    pub unsafe fn read_in_use<T: bytemuck::Pod>(&self, offset: u64, count: usize) -> Result<Vec<T>> {
+        let pointer = self.mapped(offset, bytes_of::<T>(count))?;
+        // SAFETY: `mapped` checked the range; the rest is the caller's.
+        Ok(unsafe { values_at(pointer, count) })
+    }
+
+    /// The first words of a mapped buffer as they are now, whatever the device does with them; `None` when there are not so many.
+    pub(super) fn words_now(&self, count: usize) -> Option<Vec<u32>> {
+        let pointer = self.mapped(0, bytes_of::<u32>(count)).ok()?.cast::<u32>();
+        if !pointer.is_aligned() {
+            return None;
+        }
+        // SAFETY: the words are aligned and lie inside the mapping; an atomic read of a word may meet a write of it.
+        let word = |at| unsafe { AtomicU32::from_ptr(pointer.add(at)) }.load(Ordering::Relaxed);
+        Some((0..count).map(word).collect())
+    }
+
+    /// The lock of mapped memory that no submission uses.
+    fn lock_unused(&self) -> Result<MutexGuard<'_, u64>> {
+        let mut until = self.inner.lock();
+        if *until == 0 {
+            return Ok(until);
+        }
+        let gpu = &self.inner.gpu;
+        gpu.check_alive()?;
+        // SAFETY: the timeline lives as long as the device.
+        let reached = unsafe { gpu.device.get_semaphore_counter_value(gpu.timeline) }
+            .map_err(|result| gpu.error("vkGetSemaphoreCounterValue", result))?;
+        if reached < *until {
+            let cause = "is in use by a submission that is not over; wait for it first";
+            return Err(Error::setting("buffer", self.name(), cause));
+        }
+        *until = 0;
+        Ok(until)
     }
 
     fn mapped(&self, offset: u64, bytes: u64) -> Result<*mut u8> {
@@ -273,14 +366,27 @@ impl Buffer {
         if offset.saturating_add(bytes) > self.inner.bytes {
             return Err(error("size", self.inner.bytes));
         }
-        let pointer = match &self.inner.memory {
-            Memory::Own { allocation, .. } => allocation.as_ref().and_then(Allocation::mapped_ptr),
-            Memory::Host => None,
-        };
-        let pointer = pointer.ok_or_else(|| error("mapped size", 0))?;
+        let pointer = self.inner.mapping().ok_or_else(|| error("mapped size", 0))?;
         // SAFETY: the offset lies inside the mapping.
-        Ok(unsafe { pointer.as_ptr().cast::<u8>().add(offset as usize) })
+        Ok(unsafe { pointer.add(offset as usize) })
     }
+}
+
+/// Bytes of so many values; more than any buffer has where they cannot be numbered.
+fn bytes_of<T>(count: usize) -> u64 {
+    (count as u64).saturating_mul(size_of::<T>() as u64)
+}
+
+/// Copies values out of mapped memory.
+///
+/// # Safety
+/// So many values begin there, and nothing writes them meanwhile.
+unsafe fn values_at<T: bytemuck::Pod>(pointer: *const u8, count: usize) -> Vec<T> {
+    let mut data = vec![T::zeroed(); count];
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
+    // SAFETY: the caller's; new memory overlaps nothing.
+    unsafe { std::ptr::copy_nonoverlapping(pointer, bytes.as_mut_ptr(), bytes.len()) };
+    data
 }
 
 impl Drop for BufferInner {
@@ -289,6 +395,7 @@ impl Drop for BufferInner {
             category,
             bytes,
             allocation,
+            ..
         } = &mut self.memory
         else {
             return;

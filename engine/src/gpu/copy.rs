@@ -1,5 +1,7 @@
 //! Copies and fills of buffers and images, checked against their sizes.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use super::barrier::Access;
@@ -12,9 +14,18 @@ impl Pass<'_> {
     /// Fills a buffer with a word; the part must begin at and be a multiple of 4 bytes.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] for a part that is not in the buffer, [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] for a part that is not in the buffer or not of whole words, [`Error::Setting`] for a buffer of another device or one
+    /// that was not made for it, [`Error::MissingBarrier`] in debug builds.
     pub fn fill(&mut self, view: BufferView<'_>, word: u32) -> Result<()> {
         view.check(4)?;
+        if !view.bytes.is_multiple_of(4) {
+            return Err(Error::LimitExceeded {
+                name: view.buffer.name().into(),
+                value: view.bytes,
+                limit_name: "whole words of a fill, in bytes",
+                limit: view.bytes / 4 * 4,
+            });
+        }
         view.check_usage(vk::BufferUsageFlags::TRANSFER_DST)?;
         if view.bytes == 0 {
             return Ok(());
@@ -37,7 +48,7 @@ impl Pass<'_> {
     /// Writes a few values (at most 64 KiB) that travel inside the command buffer.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when they do not fit, [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] when they do not fit, [`Error::Setting`] as [`Pass::fill`], [`Error::MissingBarrier`] in debug builds.
     pub fn update<T: bytemuck::NoUninit>(&mut self, view: BufferView<'_>, data: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let limit = view.bytes.min(65_536);
@@ -71,7 +82,8 @@ impl Pass<'_> {
     /// Copies `from` to the start of `to`.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when it does not fit, [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] when it does not fit, [`Error::Setting`] as [`Pass::fill`] and when one part lies over the other,
+    /// [`Error::MissingBarrier`] in debug builds.
     pub fn copy(&mut self, from: BufferView<'_>, to: BufferView<'_>) -> Result<()> {
         if from.bytes > to.bytes {
             return Err(Error::LimitExceeded {
@@ -87,6 +99,12 @@ impl Pass<'_> {
         to.check_usage(vk::BufferUsageFlags::TRANSFER_DST)?;
         if from.bytes == 0 {
             return Ok(());
+        }
+        let (source, target) = (from.raw_offset(), to.raw_offset());
+        let is_one = from.buffer.raw() == to.buffer.raw() && Arc::ptr_eq(&from.buffer.inner.gpu, &to.buffer.inner.gpu);
+        if is_one && source.abs_diff(target) < from.bytes {
+            let cause = "is copied onto a part that lies over it";
+            return Err(Error::setting("buffer", from.buffer.name(), cause));
         }
         self.recorder.next_command();
         self.recorder.touch(self.name, from.buffer, Access::TRANSFER_READ)?;
@@ -111,9 +129,11 @@ impl Pass<'_> {
     /// Copies all layers of an image's first mip level, in layout `TRANSFER_SRC_OPTIMAL`, to a buffer, rows and layers packed.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::Setting`] for an image or a buffer of another device or one that was not made
+    /// for it, [`Error::MissingBarrier`] in debug builds.
     pub fn copy_image_to_buffer(&mut self, from: &Image, to: BufferView<'_>) -> Result<()> {
         image_rows(from, to)?;
+        self.check_image(from, vk::ImageUsageFlags::TRANSFER_SRC)?;
         to.check_usage(vk::BufferUsageFlags::TRANSFER_DST)?;
         self.recorder.next_command();
         self.recorder.keep(&from.inner);
@@ -135,9 +155,11 @@ impl Pass<'_> {
     /// Copies packed rows and layers to an image's first mip level, in layout `TRANSFER_DST_OPTIMAL`.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::LimitExceeded`] when the buffer is too small, [`Error::Setting`] for an image or a buffer of another device or one that was not made
+    /// for it, [`Error::MissingBarrier`] in debug builds.
     pub fn copy_buffer_to_image(&mut self, from: BufferView<'_>, to: &Image) -> Result<()> {
         image_rows(to, from)?;
+        self.check_image(to, vk::ImageUsageFlags::TRANSFER_DST)?;
         from.check_usage(vk::BufferUsageFlags::TRANSFER_SRC)?;
         self.recorder.next_command();
         self.recorder.keep(&to.inner);

@@ -49,7 +49,8 @@ impl Gpu {
     /// # Safety
     /// The handles must be valid and belong together, must outlive the returned `Gpu` and everything made from it, the features in
     /// `host.enabled` must really be enabled, and the host must not use the queue while the engine submits: take
-    /// [`Gpu::lock_queue`] around the host's own submissions.
+    /// [`Gpu::lock_queue`] around the host's own submissions. Without `robustBufferAccess` nothing keeps kernels in their buffers: then whatever
+    /// indices kernels find in what they are given lie in what they are given, and of scenes and pictures from elsewhere the host knows that.
     ///
     /// # Errors
     /// [`Error::MissingFeature`] naming the required features that the host did not enable; [`Error::Setting`] as [`Gpu::headless`].
@@ -67,7 +68,7 @@ impl Gpu {
             (host.queue, host.queue_family),
             caps,
             options,
-            (false, false),
+            (false, false, None),
         )
     }
 
@@ -116,7 +117,10 @@ impl Gpu {
         // Nothing uses it yet.
         enabled.optional.descriptor_indexing = false;
         if let Some(features) = options.lesser.features {
+            // What keeps kernels in their buffers is not an option's to take away; every device has it.
+            let robust_buffer_access = enabled.optional.robust_buffer_access;
             enabled.optional = enabled.optional.and(features);
+            enabled.optional.robust_buffer_access = robust_buffer_access;
         }
         // SAFETY: the physical device belongs to the instance.
         let families = unsafe {
@@ -154,6 +158,7 @@ impl Gpu {
         });
         enabled.optional.shader_viewport_index_layer = caps.vertex_layer && wanted.shader_viewport_index_layer;
         enabled.restrict(&mut caps);
+        let fault = options.fault.map(|_| fault::Claim::take()).transpose()?;
         let device = create_device(
             &instance,
             physical_device,
@@ -174,7 +179,7 @@ impl Gpu {
             (queue, queue_family),
             caps,
             options,
-            (true, presents),
+            (true, presents, fault),
         )
     }
 
@@ -185,7 +190,7 @@ impl Gpu {
         (queue, queue_family): (vk::Queue, u32),
         mut caps: Caps,
         options: &GpuOptions,
-        (owned, presents): (bool, bool),
+        (owned, presents, fault): (bool, bool, Option<fault::Claim>),
     ) -> Result<Self> {
         caps.pretend(&options.lesser);
         let give_up = |error| {
@@ -229,6 +234,7 @@ impl Gpu {
             presents,
             lost: OnceLock::new(),
             next_id: AtomicU64::new(1),
+            _fault: fault,
             owned,
             instance,
         };

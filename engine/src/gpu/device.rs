@@ -7,6 +7,7 @@ use ash::vk::Handle;
 use ash::{ext, vk};
 
 use super::caps::Caps;
+use super::fault;
 use super::instance::{Instance, ValidationLog, ValidationMessage};
 use super::marker::InFlight;
 use super::memory::{AllocationInfo, Memory, MemoryReport};
@@ -52,6 +53,8 @@ pub(super) struct Inner {
     /// The last pass that a lost device reached.
     pub lost: OnceLock<String>,
     pub next_id: AtomicU64,
+    /// Given back when the device is gone.
+    pub _fault: Option<fault::Claim>,
     /// The device is destroyed with the last handle.
     pub owned: bool,
     /// Dropped last.

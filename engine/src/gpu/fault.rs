@@ -1,12 +1,15 @@
 //! A dispatch table that fails on purpose: the n-th call of a Vulkan command returns an error code.
 //!
 //! Software drivers never lose a device or run out of memory by themselves, so this is how those errors are reached in tests. The count is
-//! process-wide: tests that plan a fault run one at a time in a process of their own.
+//! process-wide: tests that plan a fault run one at a time in a process of their own. A second device with a plan is refused while the first is
+//! alive.
 
 use std::ffi::{CStr, c_void};
-use std::sync::atomic::{AtomicI32, AtomicPtr, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, AtomicPtr, AtomicU32, Ordering};
 
 use ash::vk;
+
+use crate::{Error, Result};
 
 /// Which call fails, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +25,30 @@ pub struct FaultPlan {
 static PLANNED_CALL: AtomicU32 = AtomicU32::new(u32::MAX);
 static REMAINING: AtomicI32 = AtomicI32::new(0);
 static RESULT: AtomicI32 = AtomicI32::new(0);
+
+/// A device with a plan is alive.
+static TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// The one device that has a plan. The trampolines know the entry points of one device, and those of another may belong to another driver.
+#[derive(Debug)]
+pub(super) struct Claim(());
+
+impl Claim {
+    /// Fails while another device has a plan.
+    pub fn take() -> Result<Self> {
+        if TAKEN.swap(true, Ordering::SeqCst) {
+            let cause = "is planned for a second device; one at a time has a plan";
+            return Err(Error::setting("fault", "a plan", cause));
+        }
+        Ok(Self(()))
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        TAKEN.store(false, Ordering::SeqCst);
+    }
+}
 
 /// The planned error, when this call is the one.
 fn planned(call: FaultCall) -> Option<vk::Result> {

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::device::{Gpu, Inner};
+use super::image::texel_bytes;
 use super::interface::{Capability, FragmentShader, GeometryShader, ShaderInfo, SpecConstants, Stage, VertexShader};
 use super::layout::{PipelineObjects, ShaderModule, specialization_data, stage_flags};
 use super::pipeline::PipelineInfo;
@@ -38,14 +39,18 @@ pub struct DepthBias {
 }
 
 /// What stands between the vertex and the fragment shader: a [`GeometryShader`], or [`NoGeometry`].
-pub trait GeometryStage {
+///
+/// # Safety
+/// As of a [`GeometryShader`], where there is a shader.
+pub unsafe trait GeometryStage {
     /// Specialization constants, `()` for none.
     type Spec: SpecConstants;
     /// The reflected interface of the shader, if there is one.
     fn info() -> Option<&'static ShaderInfo>;
 }
 
-impl<G: GeometryShader> GeometryStage for G {
+// SAFETY: that of the shader.
+unsafe impl<G: GeometryShader> GeometryStage for G {
     type Spec = G::Spec;
 
     fn info() -> Option<&'static ShaderInfo> {
@@ -57,7 +62,8 @@ impl<G: GeometryShader> GeometryStage for G {
 #[derive(Debug)]
 pub enum NoGeometry {}
 
-impl GeometryStage for NoGeometry {
+// SAFETY: there is no shader.
+unsafe impl GeometryStage for NoGeometry {
     type Spec = ();
 
     fn info() -> Option<&'static ShaderInfo> {
@@ -180,7 +186,8 @@ impl Gpu {
     /// # Errors
     /// [`Error::Shader`] when the shaders do not agree on a binding or on the push constants, [`Error::MissingFeature`] on a queue without
     /// graphics, when a shader needs what the device lacks (geometry shaders, clip distances, views, layers from vertex shaders), writes
-    /// buffers or images from a stage that cannot, or when the descriptors, attachments or views are more than the device allows,
+    /// buffers or images from a stage that cannot, when the descriptors, attachments or views are more than the device allows, or for a format that
+    /// the device cannot render into, [`Error::Setting`] for a topology or comparison beyond those of pipelines without tessellation,
     /// [`Error::OutOfMemory`], [`Error::Vulkan`].
     pub fn graphics_pipeline<V: VertexShader, F: FragmentShader, G: GeometryStage>(
         &self,
@@ -193,6 +200,7 @@ impl Gpu {
         self.inner.check_alive()?;
         check_shaders(&self.inner, &shaders)?;
         check_attachments(&self.inner, shaders[0].name, desc.colors, desc.view_mask)?;
+        check_state(&self.inner, shaders[0].name, desc)?;
         let attachments = desc.colors.len() as u32;
         let mut objects = PipelineObjects::new(&self.inner, &shaders, attachments)?;
         let name = shaders[0].name;
@@ -325,6 +333,65 @@ fn check_attachments(gpu: &Inner, name: &str, colors: &[vk::Format], view_mask: 
     ] {
         if wanted > offered {
             return Err(missing(gpu, format!("{limit} >= {wanted}"), name, instead));
+        }
+    }
+    Ok(())
+}
+
+/// Fails for formats, topologies and comparisons that the device, or no device, has pipelines of.
+fn check_state<V: VertexShader, F: FragmentShader, G: GeometryStage>(
+    gpu: &Inner,
+    name: &str,
+    desc: &GraphicsDesc<'_, V, F, G>,
+) -> Result<()> {
+    let blended = if desc.additive {
+        vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND
+    } else {
+        vk::FormatFeatureFlags::empty()
+    };
+    let colors = desc.colors.iter().filter(|format| **format != vk::Format::UNDEFINED);
+    let colors = colors.map(|format| (*format, vk::FormatFeatureFlags::COLOR_ATTACHMENT | blended));
+    let depth = desc
+        .depth
+        .map(|format| (format, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT));
+    for (format, wanted) in colors.chain(depth) {
+        // Others have no image here, and drivers need not know what to answer.
+        let known = texel_bytes(format).is_some();
+        // SAFETY: the physical device belongs to the instance.
+        let offered = known.then(|| unsafe {
+            gpu.instance
+                .raw
+                .get_physical_device_format_properties(gpu.physical_device, format)
+        });
+        if !offered.is_some_and(|offered| offered.optimal_tiling_features.contains(wanted)) {
+            let feature = format!("{wanted:?} for format {format:?}");
+            return Err(missing(gpu, feature, name, "choose another format"));
+        }
+    }
+    let topologies = [
+        vk::PrimitiveTopology::POINT_LIST,
+        vk::PrimitiveTopology::LINE_LIST,
+        vk::PrimitiveTopology::LINE_STRIP,
+        vk::PrimitiveTopology::TRIANGLE_LIST,
+        vk::PrimitiveTopology::TRIANGLE_STRIP,
+        vk::PrimitiveTopology::TRIANGLE_FAN,
+    ];
+    let comparisons = vk::CompareOp::NEVER.as_raw()..=vk::CompareOp::ALWAYS.as_raw();
+    for (setting, value, known) in [
+        (
+            "topology",
+            format!("{:?}", desc.topology),
+            topologies.contains(&desc.topology),
+        ),
+        (
+            "depth_compare",
+            format!("{:?}", desc.depth_compare),
+            comparisons.contains(&desc.depth_compare.as_raw()),
+        ),
+    ] {
+        if !known {
+            let cause = format!("is not one that the pipeline of {name} can have");
+            return Err(Error::setting(setting, value, cause));
         }
     }
     Ok(())

@@ -32,7 +32,11 @@ impl<K: ComputeShader> HotReload<K> {
     ///
     /// # Errors
     /// As [`Gpu::compute_pipeline`]; [`Error::Io`] when there is no such source.
-    pub fn new(gpu: &Gpu, shaders: &Path, spec: K::Spec) -> Result<Self> {
+    ///
+    /// # Safety
+    /// Whatever stands in the folder while this lives, a kernel that compiles there stays inside its own arrays (those of an invocation and of a
+    /// workgroup), as a [`ComputeShader`] promises: nobody else writes there.
+    pub unsafe fn new(gpu: &Gpu, shaders: &Path, spec: K::Spec) -> Result<Self> {
         let source = shaders.join(K::info().name);
         Ok(Self {
             seen: Some(changed(&source)?),

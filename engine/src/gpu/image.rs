@@ -8,6 +8,7 @@ use gpu_allocator::vulkan::Allocation;
 
 use super::device::{Gpu, Inner};
 use super::memory::Category;
+use super::surface::SwapchainInner;
 use crate::{Error, Result};
 
 /// What image to allocate: two-dimensional, one sample, in device memory. Square images with a multiple of six layers can be seen as cubes
@@ -38,6 +39,11 @@ const VIEWED: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
         | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
 );
 
+/// The uses of Vulkan 1.0, but for attachments without memory of their own.
+const USES: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
+    VIEWED.as_raw() | vk::ImageUsageFlags::TRANSFER_SRC.as_raw() | vk::ImageUsageFlags::TRANSFER_DST.as_raw(),
+);
+
 /// Faces of a cube.
 pub(super) const CUBE_FACES: u32 = 6;
 
@@ -64,6 +70,9 @@ pub(super) struct ImageInner {
     /// Of the first mip level that is in `range`.
     pub size: [u32; 2],
     pub format: vk::Format,
+    pub usage: vk::ImageUsageFlags,
+    /// What shaders see it as.
+    pub kind: vk::ImageViewType,
     /// Six of its layers can be seen as a cube.
     pub cubes: bool,
     /// What of `raw` this is.
@@ -79,8 +88,8 @@ pub(super) enum Owner {
         category: Category,
         allocation: Option<Allocation>,
     },
-    /// A swapchain.
-    Swapchain,
+    /// A swapchain, which goes with its last image.
+    Swapchain(#[expect(dead_code, reason = "it is kept alive")] Arc<SwapchainInner>),
     /// The image that this one is a part of.
     Whole(#[expect(dead_code, reason = "it is kept alive")] Arc<ImageInner>),
 }
@@ -89,7 +98,8 @@ impl Gpu {
     /// Allocates an image in layout `UNDEFINED`.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], [`Error::MissingFeature`] for a format or use that the device lacks, [`Error::LimitExceeded`] for a size.
+    /// [`Error::OutOfMemory`], [`Error::MissingFeature`] for a format or use that the device lacks, [`Error::LimitExceeded`] for a size,
+    /// [`Error::Setting`] for no use, one beyond Vulkan 1.0's, or a format of blocks, planes or stencils.
     pub fn image(&self, desc: &ImageDesc<'_>) -> Result<Image> {
         let gpu = &self.inner;
         gpu.check_alive()?;
@@ -120,6 +130,12 @@ impl Gpu {
             name: desc.name.into(),
             size: desc.size,
             format: desc.format,
+            usage: desc.usage,
+            kind: if desc.layers > 1 {
+                vk::ImageViewType::TYPE_2D_ARRAY
+            } else {
+                vk::ImageViewType::TYPE_2D
+            },
             cubes: image_flags(desc).contains(vk::ImageCreateFlags::CUBE_COMPATIBLE),
             range: whole_range(desc.format, desc.layers, desc.mips),
             owner: Owner::Own {
@@ -139,11 +155,7 @@ impl Gpu {
         bound.map_err(|result| gpu.error("vkBindImageMemory", result))?;
         gpu.name(raw, desc.name);
         if desc.usage.intersects(VIEWED) {
-            inner.make_view(if desc.layers > 1 {
-                vk::ImageViewType::TYPE_2D_ARRAY
-            } else {
-                vk::ImageViewType::TYPE_2D
-            })?;
+            inner.make_view()?;
         }
         Ok(Image { inner: Arc::new(inner) })
     }
@@ -152,6 +164,14 @@ impl Gpu {
 impl Inner {
     /// Fails when the device cannot make such an image.
     fn check_image(&self, desc: &ImageDesc<'_>) -> Result<()> {
+        if desc.usage.is_empty() || !USES.contains(desc.usage) {
+            let cause = format!("is not what the image {:?} can be made for", desc.name);
+            return Err(Error::setting("usage", format!("{:?}", desc.usage), cause));
+        }
+        if texel_bytes(desc.format).is_none() {
+            let cause = format!("is not a format that the image {:?} can have", desc.name);
+            return Err(Error::setting("format", format!("{:?}", desc.format), cause));
+        }
         // SAFETY: the physical device belongs to the instance.
         let properties = unsafe {
             self.instance.raw.get_physical_device_image_format_properties(
@@ -190,8 +210,13 @@ impl Inner {
 }
 
 impl ImageInner {
-    /// Wraps an image that a swapchain owns; only the view is this one's.
-    pub fn borrowed(gpu: &Arc<Inner>, raw: vk::Image, name: &str, size: [u32; 2], format: vk::Format) -> Result<Self> {
+    /// Wraps an image that a swapchain owns and this keeps; only the view is this one's.
+    pub fn of_swapchain(raw: vk::Image, swapchain: &Arc<SwapchainInner>) -> Result<Self> {
+        let SwapchainInner {
+            size, format, usage, ..
+        } = **swapchain;
+        let gpu = swapchain.gpu();
+        let name = "swapchain image";
         let mut inner = Self {
             gpu: Arc::clone(gpu),
             raw,
@@ -199,20 +224,22 @@ impl ImageInner {
             name: name.into(),
             size,
             format,
+            usage,
+            kind: vk::ImageViewType::TYPE_2D,
             cubes: false,
             range: whole_range(format, 1, 1),
-            owner: Owner::Swapchain,
+            owner: Owner::Swapchain(Arc::clone(swapchain)),
         };
         gpu.name(raw, name);
-        inner.make_view(vk::ImageViewType::TYPE_2D)?;
+        inner.make_view()?;
         Ok(inner)
     }
 
     /// Makes the view of what this is.
-    pub fn make_view(&mut self, kind: vk::ImageViewType) -> Result<()> {
+    pub fn make_view(&mut self) -> Result<()> {
         let info = vk::ImageViewCreateInfo::default()
             .image(self.raw)
-            .view_type(kind)
+            .view_type(self.kind)
             .format(self.format)
             .subresource_range(self.range);
         // SAFETY: the image is alive and bound.
@@ -257,6 +284,33 @@ impl Image {
     /// The view of all of it; null for an image that is only copied.
     pub fn view(&self) -> vk::ImageView {
         self.inner.view
+    }
+
+    /// Fails when the image was not made for a use.
+    pub(super) fn check_usage(&self, usage: vk::ImageUsageFlags) -> Result<()> {
+        if self.inner.usage.contains(usage) {
+            return Ok(());
+        }
+        let cause = format!("is used as {usage:?}, for which it was not made");
+        Err(Error::setting("image", self.name(), cause))
+    }
+
+    /// Fails for a layout that the image cannot be in, by what it was made for.
+    pub(super) fn check_layout(&self, layout: vk::ImageLayout) -> Result<()> {
+        let usage = match layout {
+            vk::ImageLayout::GENERAL => return Ok(()),
+            vk::ImageLayout::PRESENT_SRC_KHR if matches!(self.inner.owner, Owner::Swapchain(_)) => return Ok(()),
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL => vk::ImageUsageFlags::TRANSFER_SRC,
+            vk::ImageLayout::TRANSFER_DST_OPTIMAL => vk::ImageUsageFlags::TRANSFER_DST,
+            vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL => vk::ImageUsageFlags::SAMPLED,
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL => vk::ImageUsageFlags::COLOR_ATTACHMENT,
+            vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+            other => {
+                let cause = format!("cannot be in layout {other:?}");
+                return Err(Error::setting("image", self.name(), cause));
+            }
+        };
+        self.check_usage(usage)
     }
 }
 
@@ -340,6 +394,32 @@ pub struct SamplerDesc<'a> {
     pub address: vk::SamplerAddressMode,
 }
 
+impl SamplerDesc<'_> {
+    /// Fails for a filter or address mode that is an extension's or a feature's that no device here has enabled.
+    fn check(&self) -> Result<()> {
+        let filters = [vk::Filter::NEAREST, vk::Filter::LINEAR];
+        let addresses = [
+            vk::SamplerAddressMode::REPEAT,
+            vk::SamplerAddressMode::MIRRORED_REPEAT,
+            vk::SamplerAddressMode::CLAMP_TO_EDGE,
+            vk::SamplerAddressMode::CLAMP_TO_BORDER,
+        ];
+        for (name, value, known) in [
+            ("filter", format!("{:?}", self.filter), filters.contains(&self.filter)),
+            (
+                "address",
+                format!("{:?}", self.address),
+                addresses.contains(&self.address),
+            ),
+        ] {
+            if !known {
+                return Err(Error::setting(name, value, "is not one of Vulkan 1.0's"));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// A sampler. Cloning shares it.
 #[derive(Clone)]
 pub struct Sampler {
@@ -353,7 +433,7 @@ impl std::fmt::Debug for Sampler {
 }
 
 pub(super) struct SamplerInner {
-    gpu: Arc<Inner>,
+    pub gpu: Arc<Inner>,
     pub raw: vk::Sampler,
 }
 
@@ -361,8 +441,9 @@ impl Gpu {
     /// Makes a sampler.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`Error::OutOfMemory`]; [`Error::Setting`] for filters and address modes beyond Vulkan 1.0's.
     pub fn sampler(&self, desc: &SamplerDesc<'_>) -> Result<Sampler> {
+        desc.check()?;
         let mipmap = if desc.filter == vk::Filter::NEAREST {
             vk::SamplerMipmapMode::NEAREST
         } else {

@@ -68,6 +68,8 @@ impl Image {
             name: whole.name.clone(),
             size: whole.size.map(halved),
             format: whole.format,
+            usage: whole.usage,
+            kind: part.kind,
             cubes: whole.cubes,
             range: vk::ImageSubresourceRange {
                 base_mip_level: whole.range.base_mip_level + part.mips.start,
@@ -79,7 +81,7 @@ impl Image {
             owner: Owner::Whole(Arc::clone(whole)),
         };
         if whole.view != vk::ImageView::null() {
-            inner.make_view(part.kind)?;
+            inner.make_view()?;
         }
         Ok(Self { inner: Arc::new(inner) })
     }

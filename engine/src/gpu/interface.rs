@@ -80,6 +80,22 @@ pub struct BindingInfo {
     pub writes: bool,
     /// The optimized module touches it. Only used bindings take part in layouts, limits and barrier checks.
     pub used: bool,
+    /// What an image is seen as; `None` for what is no image.
+    pub view: Option<ViewKind>,
+    /// Bytes of a block up to its array without a size, or to its end; 0 for what is no block.
+    pub fixed_bytes: u32,
+}
+
+/// What a shader sees an image as. It is given one whose view is of that kind: a whole image, or a part by its
+/// [`ImagePart::kind`](crate::gpu::ImagePart).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ViewKind {
+    /// One layer: `TYPE_2D`.
+    Plane,
+    /// Layers by number: `TYPE_2D_ARRAY`.
+    Layers,
+    /// Six layers by direction: `CUBE`.
+    Cube,
 }
 
 impl ShaderInfo {
@@ -128,7 +144,30 @@ impl SpecConstants for () {
 }
 
 /// A compute shader as a type; implemented by the generated modules.
-pub trait ComputeShader {
+///
+/// ```compile_fail,E0200
+/// use clerestory::gpu::interface::{ComputeShader, ShaderInfo};
+///
+/// enum Mine {}
+///
+/// impl ComputeShader for Mine {
+///     type Push = ();
+///     type Spec = ();
+///     fn info() -> &'static ShaderInfo {
+///         &clerestory::gpu::shaders::film::display::INFO
+///     }
+/// }
+/// ```
+///
+/// # Safety
+/// Drivers trust modules, and nothing here reads them again:
+/// - [`ComputeShader::info`] is always the same one. Its module is valid SPIR-V for Vulkan 1.1 and of that stage, and all else that the info says is
+///   so: bindings with what is read, written and used, the size of the push constants' block, the constants, the workgroup, subgroup operations and
+///   capabilities.
+/// - The module asks for no other capabilities than those of Vulkan 1.0 and of what every [`Gpu`](crate::gpu::Gpu) enables.
+/// - Given what its documentation allows in push constants, specialization constants, buffers and images, no invocation leaves its own arrays or
+///   those of its workgroup. Those of buffers the device keeps it in where [`Caps::robust_buffer_access`](crate::gpu::Caps) says so.
+pub unsafe trait ComputeShader {
     /// Push constants, `()` for none.
     type Push: PushConstants;
     /// Specialization constants, `()` for none.
@@ -138,7 +177,10 @@ pub trait ComputeShader {
 }
 
 /// A vertex shader as a type; implemented by the generated modules.
-pub trait VertexShader {
+///
+/// # Safety
+/// As of a [`ComputeShader`].
+pub unsafe trait VertexShader {
     /// Push constants, `()` for none.
     type Push: PushConstants;
     /// Specialization constants, `()` for none.
@@ -148,7 +190,10 @@ pub trait VertexShader {
 }
 
 /// A geometry shader as a type; implemented by the generated modules.
-pub trait GeometryShader {
+///
+/// # Safety
+/// As of a [`ComputeShader`].
+pub unsafe trait GeometryShader {
     /// Push constants, `()` for none.
     type Push: PushConstants;
     /// Specialization constants, `()` for none.
@@ -158,7 +203,10 @@ pub trait GeometryShader {
 }
 
 /// A fragment shader as a type; implemented by the generated modules.
-pub trait FragmentShader {
+///
+/// # Safety
+/// As of a [`ComputeShader`].
+pub unsafe trait FragmentShader {
     /// Push constants, `()` for none.
     type Push: PushConstants;
     /// Specialization constants, `()` for none.
@@ -169,7 +217,7 @@ pub trait FragmentShader {
 
 /// A push-constant block.
 pub trait PushConstants {
-    /// The bytes to push.
+    /// The bytes to push. A dispatch or draw refuses another number of them than its shader's block has.
     fn bytes(&self) -> &[u8];
 }
 
@@ -179,7 +227,8 @@ impl PushConstants for () {
     }
 }
 
-/// A descriptor set's worth of resources; implemented by the generated modules.
+/// A descriptor set's worth of resources; implemented by the generated modules. What it gives is checked against what the shaders declare where it
+/// is bound.
 pub trait BindingSet<'a> {
     /// Descriptor set number.
     fn set(&self) -> u32;

@@ -89,6 +89,11 @@ impl PipelineObjects {
         Ok(())
     }
 
+    /// The device that they are of.
+    pub fn gpu(&self) -> &Arc<Inner> {
+        &self.gpu
+    }
+
     /// Takes the pipeline that was made with the layout.
     pub fn set_pipeline(&mut self, raw: vk::Pipeline, name: &str) {
         self.raw = raw;
@@ -299,7 +304,7 @@ impl<'a> ShaderModule<'a> {
             message: error.to_string(),
         })?;
         let create = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words are a module that was validated when it was built.
+        // SAFETY: the words are a valid module: the build's, as the unsafe traits of shaders promise, or what a compiler of source text made.
         let raw = unsafe { gpu.device.create_shader_module(&create, None) }
             .map_err(|result| gpu.error("vkCreateShaderModule", result))?;
         gpu.name(raw, name);
@@ -341,6 +346,8 @@ mod tests {
             reads: true,
             writes: false,
             used: true,
+            view: None,
+            fixed_bytes: 0,
         }
     }
 

@@ -35,7 +35,7 @@ impl InFlight {
     /// The name of the last pass that began, of all submissions.
     pub fn last_pass(&self) -> String {
         let begun = |(markers, passes): &(Buffer, Vec<String>)| {
-            let words: Vec<u32> = markers.read(0, MAX_PASSES).ok()?;
+            let words = markers.words_now(MAX_PASSES)?;
             let last = words.iter().take(passes.len()).rposition(|word| *word == BEGUN)?;
             passes.get(last).cloned()
         };

@@ -4,6 +4,53 @@
 //! on a timeline, or into a host's command buffer, which the host submits ([`Recorder::borrow`]). All handles are cheap to clone and keep what they need alive; what the device still uses is kept by its [`Submission`].
 //!
 //! `unsafe` lives in this folder and at the FFI edge only.
+//!
+//! # What safe calls can do to memory
+//!
+//! Every public safe function here, with what keeps it from breaking the memory of its process or its device. What is checked is checked in release
+//! builds, too, and before anything is recorded.
+//!
+//! | call | what could go wrong | what holds |
+//! |---|---|---|
+//! | [`Gpu::headless`], [`Gpu::for_window`], [`Gpu::list`], [`Gpu::surface`] | handles of windows that are gone | borrowed while they are used; a [`Surface`] keeps its window. `robustBufferAccess` is enabled on every device made here, whatever [`Lesser`] says |
+//! | [`GpuOptions::fault`] | trampolines of one driver called with another's handles | one device at a time has a plan |
+//! | [`GpuOptions::cache_folder`] | a pipeline cache that somebody else wrote reaches the driver | the driver's own check of it: name a folder that only its user writes |
+//! | [`Gpu::buffer`], [`Gpu::buffer_with`], [`Gpu::storage_texels`], [`Gpu::texels_with`] | sizes that wrap, uses and formats without their features | sizes are checked before they are rounded; uses are Vulkan 1.0's; formats have known texels and the device's word |
+//! | [`Gpu::image`], [`Image::part`], [`Gpu::sampler`] | sizes, layers, formats, filters that the device lacks | asked of the device, or from a list |
+//! | [`Gpu::texel_view_of`] | a view past its buffer's end, or of another device's | whole texels of the buffer; device, use, alignment and limits |
+//! | [`Buffer::write`], [`Buffer::read`] | races with threads and with the device; a count beyond the buffer | the buffer's lock, which a submission takes, too; an error while a submission that uses it is not over; the range, before memory is taken |
+//! | [`Gpu::upload`], [`Gpu::read`] | ranges past the end | the range; the staging memory is theirs alone |
+//! | [`Gpu::compute_pipeline`], [`Gpu::graphics_pipeline`] | modules that are not valid or not as their interface says | shaders are types of `unsafe` traits ([`ComputeShader`](interface::ComputeShader) …), which the build implements from reflection; a pipeline is found by its interface's place, not its name; workgroups, descriptors, formats and states are checked |
+//! | `OwnKernel::wgsl`, [`Pass`]`::dispatch_own` | any source | validated; every index is checked in the kernel; bindings, sizes, overlaps and push constants where it is dispatched |
+//! | [`Pass::dispatch`], [`Pass::dispatch_indirect`], [`Render::draw`], [`Render::draw_indirect`] | foreign or missing resources, short push constants, too many workgroups | device, kind, use, range, alignment and limits of each binding; the size of push constants; counts from the host. Sets, push constants and specialization constants come by safe traits, and are checked for that |
+//! | [`Pass::fill`], [`Pass::update`], [`Pass::copy`] and those with images | ranges past the end, parts over each other | ranges, whole words, overlap, device and use |
+//! | [`Pass::barrier`], [`Pass::image_barrier`], [`Pass::memory_barrier`] | handles of another device, layouts that an image cannot be in | device and use; a refused one is left out, and the pass fails |
+//! | [`Pass::render`] | targets that differ, are no targets, or are too many | size, area, layers, views, device and use; attachments are those that the pipeline was made for |
+//! | [`Recorder::pass`], [`Recorder::submit`] | passes without an end after a panic | a recorder with one is not submitted |
+//! | [`Submission`], [`Recorded`] | memory that goes while the device uses it | both keep all that was recorded; a submission waits when it is dropped. One that is leaked leaks what it keeps |
+//! | [`Surface::present`] | an image that is kept beyond its swapchain | images keep their swapchain, and that its surface and window |
+//! | `raw` of anything, [`Gpu::raw_device`], [`Gpu::lock_queue`] | nothing: what is done with handles is `unsafe` in `ash` | |
+//!
+//! `unsafe`, each with its conditions: [`Gpu::from_host`], [`Gpu::borrow_buffer`], [`Recorder::borrow`], [`Recorder::submit_with`],
+//! [`Buffer::read_in_use`], the traits of shaders and [`GeometryStage`], and with the feature `hot-reload` `OwnKernel::glsl` and `HotReload::new`.
+//!
+//! [`Gpu`], [`Buffer`], [`Image`], [`TexelView`], [`Sampler`] and pipelines are shared between threads; what changes inside of them has its lock (the
+//! queue, memory, the table of pipelines, recycled command buffers, mapped buffers). A [`Recorder`] is changed through `&mut` alone.
+//!
+//! What no check catches, and what it costs:
+//! - *A missing barrier or a wrong layout* leaves what is read undefined (rubbish, or a device that hangs or is lost). Debug builds refuse missing
+//!   barriers over buffers; layouts are the author's.
+//! - *A kernel's own arrays*. Kernels stay inside of them for what their documentation allows; a host that dispatches one of [`shaders`] by itself,
+//!   with other push constants, specialization constants or contents of buffers (an index that is no tree, say), may lead it out of them. In
+//!   buffers and texel buffers `robustBufferAccess` keeps it anyway. On a host's device without that feature a range is at
+//!   least as long as what a shader reaches there by no index; that indices stay in it [`Gpu::from_host`] makes the host promise.
+//! - *The texel format* of an image is not compared with the type that a shader reads or writes it by: what is read is undefined then.
+//! - *Counts of indirect dispatches and draws* are the device's to read: more than it can do may hang it.
+//! - *The driver's own faults.*
+//!
+//! Miri has not been run: it knows no calls to a driver, and of what needs no device nothing here is `unsafe`. The address sanitizer has not been run
+//! either; with a nightly compiler it takes `RUSTFLAGS=-Zsanitizer=address cargo +nightly test --target x86_64-unknown-linux-gnu -p clerestory-tests
+//! --test safe_calls`, and sees the host's side of a software driver, not the code that the driver compiles. CI needs neither.
 #![expect(unsafe_code, reason = "Vulkan is called here")]
 
 mod barrier;

@@ -109,7 +109,7 @@ pub struct GpuOptions {
     /// Writes a marker before every pass, so that a lost device names the last one that was reached. Costs a pass a 4-byte fill between two
     /// barriers, so that passes do not overlap; off, they overlap as far as their own barriers allow.
     pub crash_markers: bool,
-    /// Makes the n-th call of a Vulkan command fail, for tests.
+    /// Makes the n-th call of a Vulkan command fail, for tests. One device at a time has a plan: a second is an [`Error::Setting`].
     pub fault: Option<FaultPlan>,
     /// Makes the device look smaller than it is, for tests.
     pub lesser: Lesser,
@@ -122,7 +122,7 @@ pub struct Lesser {
     pub descriptors: Option<DescriptorLimits>,
     /// At most as many bits of a timestamp count.
     pub timestamp_valid_bits: Option<u32>,
-    /// At most these optional features are enabled.
+    /// At most these optional features are enabled, and `robustBufferAccess` in any case where there is any.
     pub features: Option<OptionalFeatures>,
     /// At most as many workgroups of a dispatch, along each axis.
     pub max_workgroups: Option<[u32; 3]>,

@@ -11,8 +11,9 @@ use super::interface::{ComputeShader, LocalSize, ShaderInfo, SpecConstants};
 use super::layout::{PipelineObjects, ShaderModule, specialization_data};
 use crate::{Error, Result};
 
-/// Live pipelines by shader and specialization, so that equal ones are made once.
-pub(super) type PipelineTable = BTreeMap<(&'static str, Vec<(u32, u32)>), Weak<PipelineInner>>;
+/// Live pipelines by shader and specialization, so that equal ones are made once. A shader is the place of its [`ShaderInfo`]: two crates may have
+/// kernels of one name.
+pub(super) type PipelineTable = BTreeMap<(usize, Vec<(u32, u32)>), Weak<PipelineInner>>;
 
 /// Pipelines that are kept beyond their last user: several techniques' worth. The next picture of a scene with the same features takes them as they are.
 const KEPT: usize = 128;
@@ -100,8 +101,8 @@ impl Gpu {
     /// the device, or until [`Gpu::release_pipelines`]: to compile one may take a driver longer than the picture that it is for.
     ///
     /// # Errors
-    /// [`Error::MissingFeature`] when the workgroup is larger or the descriptors are more than the device allows,
-    /// [`Error::OutOfMemory`], [`Error::Vulkan`], [`Error::DeviceLost`].
+    /// [`Error::MissingFeature`] when the workgroup is larger or the descriptors are more than the device allows, [`Error::Shader`] for a workgroup
+    /// without invocations, [`Error::OutOfMemory`], [`Error::Vulkan`], [`Error::DeviceLost`].
     pub fn compute_pipeline<K: ComputeShader>(&self, spec: &K::Spec) -> Result<ComputePipeline<K>> {
         self.inner.check_alive()?;
         let inner = self.shared_pipeline(K::info(), spec.values())?;
@@ -113,7 +114,7 @@ impl Gpu {
     }
 
     fn shared_pipeline(&self, info: &'static ShaderInfo, values: Vec<(u32, u32)>) -> Result<Arc<PipelineInner>> {
-        let key = (info.name, values.clone());
+        let key = (std::ptr::from_ref(info).addr(), values.clone());
         let mut table = self.inner.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(inner) = table.get(&key).and_then(Weak::upgrade) {
             return Ok(inner);
@@ -165,19 +166,33 @@ impl<K> ComputePipeline<K> {
     }
 }
 
-/// Fails for a workgroup of more invocations than the device has.
+/// Fails for a workgroup of more invocations than the device has, or of none.
 pub(super) fn check_workgroup(gpu: &Inner, name: &str, local_size: [u32; 3]) -> Result<()> {
-    let most = gpu.caps.max_workgroup_invocations;
-    let invocations = local_size.iter().fold(1u32, |all, side| all.saturating_mul(*side));
-    if invocations <= most {
-        return Ok(());
+    if local_size.contains(&0) {
+        return Err(Error::Shader {
+            name: name.into(),
+            message: format!("a workgroup of {local_size:?} has no invocations"),
+        });
     }
-    Err(Error::MissingFeature {
-        feature: format!("maxComputeWorkGroupInvocations >= {invocations}"),
+    let lacks = |limit: &str, wanted: u32, instead: String| Error::MissingFeature {
+        feature: format!("{limit} >= {wanted}"),
         needed_by: name.into(),
         device: gpu.caps.device.clone(),
-        instead: format!("choose a workgroup of at most {most}"),
-    })
+        instead,
+    };
+    let most = gpu.caps.max_workgroup_invocations;
+    let invocations = local_size.iter().fold(1u32, |all, side| all.saturating_mul(*side));
+    if invocations > most {
+        let instead = format!("choose a workgroup of at most {most}");
+        return Err(lacks("maxComputeWorkGroupInvocations", invocations, instead));
+    }
+    for (axis, (size, most)) in local_size.iter().zip(gpu.caps.max_workgroup_size).enumerate() {
+        if *size > most {
+            let instead = format!("choose a workgroup of at most {most} there");
+            return Err(lacks(&format!("maxComputeWorkGroupSize[{axis}]"), *size, instead));
+        }
+    }
+    Ok(())
 }
 
 impl PipelineObjects {
@@ -211,7 +226,11 @@ impl PipelineInner {
         gpu.check_alive()?;
         let local_size = info.local_size.map(|size| match size {
             LocalSize::Fixed(size) => size,
-            LocalSize::Spec(wanted) => spec.iter().find(|(id, _)| *id == wanted).map_or(1, |(_, value)| *value),
+            LocalSize::Spec(wanted) => {
+                let given = spec.iter().find(|(id, _)| *id == wanted).map(|(_, value)| *value);
+                let own = || info.spec_constants.iter().find(|constant| constant.id == wanted);
+                given.or_else(|| own().map(|constant| constant.default)).unwrap_or(1)
+            }
         });
         check_workgroup(gpu, info.name, local_size)?;
         let mut objects = PipelineObjects::new(gpu, &[info], 0)?;

@@ -1,9 +1,12 @@
 //! What a recorded command buffer needs until the device is done with it, and the times of its passes.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use ash::vk;
 
+use super::buffer::BufferInner;
 use super::device::{Gpu, Inner};
 use super::recorder::{Kept, MAX_PASSES};
 use super::resources::{COUNTS_OF_DRAWS, Lease};
@@ -22,6 +25,8 @@ pub struct Recorded {
     /// Barrier commands of each pass.
     pub(super) barriers: Vec<u32>,
     pub(super) kept: Kept,
+    /// The buffers in use that the host reaches, too, by their numbers: all threads lock several of them in one order.
+    pub(super) mapped: BTreeMap<u64, Arc<BufferInner>>,
     /// The first pass whose invocations are counted.
     pub(super) counted_from: Option<usize>,
     /// Passes write timestamps.
@@ -48,6 +53,7 @@ impl Recorded {
             passes: Vec::new(),
             barriers: Vec::new(),
             kept: Kept::new(),
+            mapped: BTreeMap::new(),
             counted_from: None,
             is_timed,
         })

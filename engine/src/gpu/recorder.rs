@@ -9,8 +9,8 @@ use ash::vk;
 use super::barrier::{Access, BufferBarrier, ImageBarrier};
 use super::buffer::{Buffer, BufferDesc, BufferView, Residency};
 use super::caps::DeviceKind;
-use super::device::Gpu;
-use super::interface::{BindingSet, ComputeShader, PushConstants};
+use super::device::{Gpu, Inner};
+use super::interface::{BindingSet, ComputeShader, PushConstants, ShaderInfo};
 use super::marker::BEGUN;
 use super::memory::Category;
 use super::pipeline::ComputePipeline;
@@ -42,6 +42,10 @@ pub struct Recorder {
     pub(super) recorded: Recorded,
     pub(super) markers: Option<Buffer>,
     pub(super) tracker: Option<Tracker>,
+    /// Why a barrier of the pass was left out.
+    pub(super) refused: Option<Error>,
+    /// A pass is being recorded, or a panic ended it.
+    pub(super) in_pass: bool,
 }
 
 /// One pass: what is recorded between two timestamps.
@@ -81,6 +85,8 @@ impl Gpu {
             recorded,
             markers,
             tracker: cfg!(debug_assertions).then(Tracker::default),
+            refused: None,
+            in_pass: false,
         };
         recorder.begin()?;
         Ok(recorder)
@@ -104,8 +110,10 @@ impl Recorder {
     /// Records a pass: a debug label, a timestamp pair and a crash marker around what `record` does.
     ///
     /// # Errors
-    /// Whatever `record` returns; [`Error::LimitExceeded`] past 1024 passes.
+    /// Whatever `record` returns; [`Error::LimitExceeded`] past 1024 passes; [`Error::Setting`] for a barrier over what belongs to another device or
+    /// for a layout that its image was not made for, and after a pass that a panic ended.
     pub fn pass<R>(&mut self, name: &str, record: impl FnOnce(&mut Pass<'_>) -> Result<R>) -> Result<R> {
+        self.check_whole()?;
         let index = self.recorded.passes.len();
         if index == MAX_PASSES {
             return Err(Error::LimitExceeded {
@@ -136,11 +144,13 @@ impl Recorder {
                 device.cmd_begin_query(command_buffer, statistics, index as u32, vk::QueryControlFlags::empty());
             }
         }
+        self.in_pass = true;
         let result = record(&mut Pass {
             recorder: self,
             command_buffer,
             name,
         });
+        self.in_pass = false;
         // SAFETY: as above.
         unsafe {
             if counted {
@@ -151,7 +161,26 @@ impl Recorder {
                 debug.cmd_end_debug_utils_label(command_buffer);
             }
         }
-        result
+        let refused = self.refused.take();
+        result.and_then(|value| refused.map_or(Ok(value), Err))
+    }
+
+    /// Fails after a pass that a panic ended: queries or a rendering that it began have no end.
+    fn check_whole(&self) -> Result<()> {
+        if !self.in_pass {
+            return Ok(());
+        }
+        let cause = "has a pass that a panic ended; record anew";
+        Err(Error::setting("recorder", &self.name, cause))
+    }
+
+    /// Fails for what was made by another `Gpu`, whose handles mean nothing, or something else, to this one's device.
+    pub(super) fn check_device(&self, of: &Arc<Inner>, kind: &str, name: &str) -> Result<()> {
+        if Arc::ptr_eq(of, &self.gpu.inner) {
+            return Ok(());
+        }
+        let cause = format!("belongs to another device than the recorder {:?}", self.name);
+        Err(Error::setting(kind, name, cause))
     }
 
     /// Where the device has timestamps.
@@ -183,16 +212,29 @@ impl Recorder {
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`]; [`Error::Setting`] for a host's command buffer, which the host submits.
     pub fn submit(self) -> Result<Submission> {
-        self.submit_with(&[], &[])
+        // SAFETY: there are no semaphores.
+        unsafe { self.submit_with(&[], &[]) }
     }
 
     /// As [`Recorder::submit`], waiting for and signalling binary semaphores (those of a swapchain).
     ///
+    /// ```compile_fail,E0133
+    /// # use clerestory::gpu::{Recorder, ash::vk};
+    /// # fn host(recorder: Recorder, semaphore: vk::Semaphore) {
+    /// let submission = recorder.submit_with(&[semaphore], &[]);
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// As [`Recorder::submit`].
-    pub fn submit_with(self, wait: &[vk::Semaphore], signal: &[vk::Semaphore]) -> Result<Submission> {
+    ///
+    /// # Safety
+    /// The semaphores are binary ones of the recorder's device, and live until the submission is over. Those in `wait` are signalled, or will be by
+    /// what was submitted before; nothing else waits for them. Those in `signal` are not signalled, and nothing else signals them meanwhile.
+    pub unsafe fn submit_with(self, wait: &[vk::Semaphore], signal: &[vk::Semaphore]) -> Result<Submission> {
         let inner = Arc::clone(&self.gpu.inner);
         inner.check_alive()?;
+        self.check_whole()?;
         if self.is_borrowed {
             return Err(Error::setting(
                 "recorder",
@@ -223,8 +265,14 @@ impl Recorder {
                 .in_flight()
                 .begin(value, markers.clone(), self.recorded.passes.clone());
         }
-        // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`.
+        // From here on the device may use mapped memory, and the host waits until it is known whether it does.
+        let mut mapped: Vec<_> = self.recorded.mapped.values().map(|buffer| buffer.lock()).collect();
+        // SAFETY: everything that the command buffer uses is in `kept` until the timeline has reached `value`; the semaphores are the caller's.
         let submitted = unsafe { submission::submit(&inner, queue.raw, command_buffer, wait, signal, value) };
+        if matches!(submitted, Ok(()) | Err(Error::DeviceLost { .. })) {
+            mapped.iter_mut().for_each(|until| **until = value);
+        }
+        drop(mapped);
         if let Err(error) = submitted {
             drop(queue);
             inner.in_flight().end(value, false);
@@ -285,7 +333,14 @@ impl Recorder {
     }
 
     pub(super) fn touch(&mut self, pass: &str, buffer: &Buffer, access: Access) -> Result<()> {
+        self.check_device(&buffer.inner.gpu, "buffer", buffer.name())?;
         self.keep(&buffer.inner);
+        if buffer.inner.is_mapped() {
+            let mapped = &mut self.recorded.mapped;
+            mapped
+                .entry(buffer.inner.id)
+                .or_insert_with(|| Arc::clone(&buffer.inner));
+        }
         self.tracker
             .as_mut()
             .map_or(Ok(()), |tracker| tracker.touch(pass, buffer, access))
@@ -328,7 +383,8 @@ impl Pass<'_> {
     /// Dispatches workgroups of a kernel with its descriptor sets and push constants. State bound before is lost.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] past `maxComputeWorkGroupCount`, [`Error::Shader`] when the sets do not cover the shader's bindings,
+    /// [`Error::LimitExceeded`] past `maxComputeWorkGroupCount` and for a range that is not in its buffer, [`Error::Shader`] when the sets do not
+    /// cover the shader's bindings, [`Error::Setting`] for what belongs to another device or was not made for the use,
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn dispatch<K: ComputeShader>(
         &mut self,
@@ -381,8 +437,16 @@ impl Pass<'_> {
         Ok(())
     }
 
-    /// Records buffer barriers.
+    /// Records buffer barriers: none where a buffer belongs to another device, which is an error of the pass.
     pub fn barrier(&mut self, barriers: &[BufferBarrier<'_>]) {
+        let of_this = barriers.iter().try_for_each(|barrier| {
+            let buffer = barrier.buffer;
+            self.recorder.check_device(&buffer.inner.gpu, "buffer", buffer.name())
+        });
+        if let Err(error) = of_this {
+            self.recorder.refused.get_or_insert(error);
+            return;
+        }
         let raw: Vec<_> = barriers
             .iter()
             .map(|barrier| {
@@ -422,8 +486,21 @@ impl Pass<'_> {
         self.pipeline_barrier(&vk::DependencyInfo::default().memory_barriers(&barrier));
     }
 
-    /// Records image barriers and layout transitions.
+    /// Records image barriers and layout transitions: none where an image belongs to another device or was not made for a layout, which is an
+    /// error of the pass. That the layout before is the one that the image is in is the author's to know.
     pub fn image_barrier(&mut self, barriers: &[ImageBarrier<'_>]) {
+        let sound = barriers.iter().try_for_each(|barrier| {
+            let image = barrier.image;
+            self.recorder.check_device(&image.inner.gpu, "image", image.name())?;
+            if barrier.old_layout != vk::ImageLayout::UNDEFINED {
+                image.check_layout(barrier.old_layout)?;
+            }
+            image.check_layout(barrier.new_layout)
+        });
+        if let Err(error) = sound {
+            self.recorder.refused.get_or_insert(error);
+            return;
+        }
         let raw: Vec<_> = barriers
             .iter()
             .map(|barrier| {
@@ -500,6 +577,10 @@ impl Pass<'_> {
     ) -> Result<()> {
         let inner = Arc::clone(&self.recorder.gpu.inner);
         let info = pipeline.inner.info;
+        self.recorder
+            .check_device(pipeline.inner.objects.gpu(), "pipeline", info.name)?;
+        let bytes = push.bytes();
+        check_push(info, bytes)?;
         self.recorder.keep(&pipeline.inner);
         let point = vk::PipelineBindPoint::COMPUTE;
         // SAFETY: pipeline, layout and sets are alive and come from one reflection.
@@ -515,10 +596,9 @@ impl Pass<'_> {
             &pipeline.inner.objects.sets,
             sets,
         )?;
-        let bytes = push.bytes();
         if !bytes.is_empty() {
             let stages = vk::ShaderStageFlags::COMPUTE;
-            // SAFETY: the generated struct has the size of the block.
+            // SAFETY: the bytes are as many as the block has, which was checked.
             unsafe {
                 inner
                     .device
@@ -527,6 +607,21 @@ impl Pass<'_> {
         }
         Ok(())
     }
+}
+
+/// Fails for push constants of another size than the shader's block.
+pub(super) fn check_push(shader: &ShaderInfo, bytes: &[u8]) -> Result<()> {
+    if bytes.len() == shader.push_constant_bytes as usize {
+        return Ok(());
+    }
+    Err(Error::Shader {
+        name: shader.name.into(),
+        message: format!(
+            "its push constants have {} bytes, and {} were given",
+            shader.push_constant_bytes,
+            bytes.len()
+        ),
+    })
 }
 
 /// Rows of the catalogue.

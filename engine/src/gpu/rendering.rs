@@ -12,7 +12,7 @@ use super::buffer::BufferView;
 use super::graphics::{Attachments, GeometryStage, GraphicsPipeline};
 use super::image::Image;
 use super::interface::{BindingSet, FragmentShader, PushConstants, VertexShader};
-use super::recorder::Pass;
+use super::recorder::{Pass, check_push};
 use crate::{Error, Result};
 
 /// What a colour attachment is filled with.
@@ -115,7 +115,8 @@ impl<'a> Pass<'a> {
     ///
     /// # Errors
     /// [`Error::Picture`] when the targets differ in size, there is none, the area is not in them or they have fewer layers than there are
-    /// views; whatever `record` returns.
+    /// views; [`Error::Setting`] for an image of another device or one that was not made to be such a target; [`Error::LimitExceeded`] past
+    /// `maxColorAttachments` or `maxMultiviewViewCount`; [`Error::MissingFeature`] on a queue without graphics; whatever `record` returns.
     pub fn render<R>(
         &mut self,
         targets: &Targets<'_>,
@@ -126,7 +127,14 @@ impl<'a> Pass<'a> {
             .map(|target| target.image)
             .chain(targets.depth.map(|target| target.image))
             .collect();
+        for target in colors() {
+            self.check_image(target.image, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
+        }
+        if let Some(target) = &targets.depth {
+            self.check_image(target.image, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT)?;
+        }
         let (area, layers) = self.check_targets(&images, targets)?;
+        self.check_limits(targets)?;
         for image in &images {
             self.recorder.keep(&image.inner);
         }
@@ -163,6 +171,38 @@ impl<'a> Pass<'a> {
         // SAFETY: rendering was begun above.
         unsafe { inner.device.cmd_end_rendering(command_buffer) };
         result
+    }
+
+    /// Fails for what the device cannot render into at once.
+    fn check_limits(&self, targets: &Targets<'_>) -> Result<()> {
+        let caps = self.recorder.gpu.caps();
+        if !caps.graphics {
+            return Err(Error::MissingFeature {
+                feature: "a graphics queue".into(),
+                needed_by: self.name.into(),
+                device: caps.device.clone(),
+                instead: "choose a device that has one".into(),
+            });
+        }
+        let views = u32::BITS - targets.view_mask.leading_zeros();
+        for (value, limit_name, limit) in [
+            (
+                targets.colors.len() as u64,
+                "maxColorAttachments",
+                caps.max_color_attachments,
+            ),
+            (u64::from(views), "maxMultiviewViewCount", caps.max_views),
+        ] {
+            if value > u64::from(limit) {
+                return Err(Error::LimitExceeded {
+                    name: self.name.into(),
+                    value,
+                    limit_name,
+                    limit: u64::from(limit),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// The area to render and the layers of the targets.
@@ -252,7 +292,7 @@ impl Render<'_, '_> {
     ///
     /// # Errors
     /// [`Error::Shader`] when the pipeline's attachments are not those of the targets or the sets do not cover the bindings,
-    /// [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::Setting`] for what belongs to another device or was not made for the use, [`Error::MissingBarrier`] in debug builds.
     pub fn draw<V: VertexShader, F: FragmentShader, G: GeometryStage>(
         &mut self,
         pipeline: &GraphicsPipeline<V, F, G>,
@@ -314,16 +354,20 @@ impl Render<'_, '_> {
                 message: format!("made for {:?}, drawn into {:?}", inner.attachments, self.attachments),
             });
         }
+        let bytes = push.bytes();
+        pass.recorder
+            .check_device(inner.objects.gpu(), "pipeline", F::info().name)?;
+        // The vertex shader's block is the pipeline's.
+        check_push(inner.shaders[0], bytes)?;
         pass.recorder.keep(inner);
         let point = vk::PipelineBindPoint::GRAPHICS;
         let device = pass.recorder.gpu.inner.device.clone();
         // SAFETY: pipeline, layout and sets are alive and come from one reflection.
         unsafe { device.cmd_bind_pipeline(pass.command_buffer, point, inner.objects.raw) };
         pass.bind_sets(&inner.shaders, point, inner.objects.layout, &inner.objects.sets, sets)?;
-        let bytes = push.bytes();
         if !bytes.is_empty() {
             let layout = inner.objects.layout;
-            // SAFETY: the generated struct has the size of the block.
+            // SAFETY: the bytes are as many as the block has, which was checked.
             unsafe { device.cmd_push_constants(pass.command_buffer, layout, inner.stages(), 0, bytes) };
         }
         Ok(())

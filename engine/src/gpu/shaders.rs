@@ -57,5 +57,7 @@
 //!
 //! Kernels that only tests or samples use are in those crates' own folders `shaders/`, whose build scripts share `engine/build/shaders.rs`
 //! and may include the engine's GLSL; a host's crate can do the same.
+//! What is generated implements `unsafe` traits ([`ComputeShader`](super::interface::ComputeShader)): such a crate may deny unsafe code, and cannot
+//! forbid it.
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));

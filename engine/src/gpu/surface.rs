@@ -32,23 +32,56 @@ pub enum Presented {
 
 /// A window's surface. It keeps the window alive, and is destroyed before it.
 pub struct Surface {
-    gpu: Arc<Inner>,
     handle: Gpu,
-    loader: khr::surface::Instance,
+    inner: Arc<SurfaceInner>,
     swapchains: khr::swapchain::Device,
-    raw: vk::SurfaceKHR,
     format: vk::SurfaceFormatKHR,
     swapchain: Option<Swapchain>,
     acquired: vk::Semaphore,
-    /// Dropped last.
+}
+
+/// A surface with its window, which goes after it.
+struct SurfaceInner {
+    gpu: Arc<Inner>,
+    loader: khr::surface::Instance,
+    raw: vk::SurfaceKHR,
     _window: Arc<dyn std::any::Any + Send + Sync>,
 }
 
+impl Drop for SurfaceInner {
+    fn drop(&mut self) {
+        // SAFETY: swapchains keep the surface, so there are none any more.
+        unsafe { self.loader.destroy_surface(self.raw, None) };
+    }
+}
+
 struct Swapchain {
-    raw: vk::SwapchainKHR,
-    size: [u32; 2],
+    inner: Arc<SwapchainInner>,
     /// With each image the semaphore that its presentation waits for.
     images: Vec<(Image, vk::Semaphore)>,
+}
+
+/// A swapchain, which its images keep: whoever is handed one may keep it beyond its frame.
+pub(super) struct SwapchainInner {
+    surface: Arc<SurfaceInner>,
+    device: khr::swapchain::Device,
+    raw: vk::SwapchainKHR,
+    pub size: [u32; 2],
+    pub format: vk::Format,
+    pub usage: vk::ImageUsageFlags,
+}
+
+impl SwapchainInner {
+    pub fn gpu(&self) -> &Arc<Inner> {
+        &self.surface.gpu
+    }
+}
+
+impl Drop for SwapchainInner {
+    fn drop(&mut self) {
+        // SAFETY: its images are gone with their views, which submissions keep; the queue was idle when the surface gave it up.
+        unsafe { self.device.destroy_swapchain(self.raw, None) };
+    }
 }
 
 impl std::fmt::Debug for Surface {
@@ -84,20 +117,15 @@ impl Gpu {
         // SAFETY: the window is kept alive by the surface.
         let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None) }
             .map_err(vulkan("vkCreateSurfaceKHR"))?;
-        let mut surface = Surface {
-            loader: khr::surface::Instance::new(&instance.entry, &instance.raw),
-            swapchains: khr::swapchain::Device::new(&instance.raw, &gpu.device),
-            handle: self.clone(),
-            raw,
-            format: vk::SurfaceFormatKHR::default(),
-            swapchain: None,
-            acquired: vk::Semaphore::null(),
-            _window: window,
+        let inner = SurfaceInner {
             gpu: Arc::clone(&gpu),
+            loader: khr::surface::Instance::new(&instance.entry, &instance.raw),
+            raw,
+            _window: window,
         };
         // SAFETY: surface and physical device belong to one instance.
         let supported = unsafe {
-            surface
+            inner
                 .loader
                 .get_physical_device_surface_support(gpu.physical_device, gpu.queue_family, raw)
         };
@@ -106,18 +134,25 @@ impl Gpu {
         }
         // SAFETY: as above.
         let formats = unsafe {
-            surface
+            inner
                 .loader
                 .get_physical_device_surface_formats(gpu.physical_device, raw)
         }
         .map_err(vulkan("vkGetPhysicalDeviceSurfaceFormatsKHR"))?;
         let plain = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
-        surface.format = formats
+        let format = formats
             .iter()
             .find(|format| plain.contains(&format.format))
             .copied()
             .ok_or_else(|| missing("a surface format of four plain bytes", "choose another device"))?;
-        Ok(surface)
+        Ok(Surface {
+            handle: self.clone(),
+            inner: Arc::new(inner),
+            swapchains: khr::swapchain::Device::new(&instance.raw, &gpu.device),
+            format,
+            swapchain: None,
+            acquired: vk::Semaphore::null(),
+        })
     }
 }
 
@@ -127,11 +162,16 @@ impl Surface {
         self.format.format
     }
 
+    fn gpu(&self) -> &Arc<Inner> {
+        &self.inner.gpu
+    }
+
     /// Shows one frame. `record` records what comes before, for the size in pixels that it is given; `finish` then fills the image, in layout
     /// `TRANSFER_DST_OPTIMAL`, in a pass of its own. `size` is the window's inner size, for window systems that leave the choice.
     ///
     /// # Errors
-    /// Whatever the closures return; [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Vulkan`] when the window is gone.
+    /// Whatever the closures return; [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Vulkan`] when the window is gone, and for a new size
+    /// while an image of an earlier frame is kept: with it lives the old swapchain, and a window has one.
     pub fn present(
         &mut self,
         size: [u32; 2],
@@ -148,7 +188,7 @@ impl Surface {
             // SAFETY: the semaphore is idle: the submission that waited for it before has been waited for.
             let acquired = unsafe {
                 self.swapchains
-                    .acquire_next_image(swapchain.raw, u64::MAX, self.acquired, vk::Fence::null())
+                    .acquire_next_image(swapchain.inner.raw, u64::MAX, self.acquired, vk::Fence::null())
             };
             let index = match acquired {
                 Ok((index, _)) => index,
@@ -156,10 +196,10 @@ impl Surface {
                     self.retire();
                     continue;
                 }
-                Err(result) => return Err(self.gpu.error("vkAcquireNextImageKHR", result)),
+                Err(result) => return Err(self.gpu().error("vkAcquireNextImageKHR", result)),
             };
             let (image, rendered) = swapchain.images[index as usize].clone();
-            let (raw, drawn_size) = (swapchain.raw, swapchain.size);
+            let (raw, drawn_size) = (swapchain.inner.raw, swapchain.inner.size);
             let timings = self.draw(&image, rendered, drawn_size, &mut record, &mut finish);
             let timings = match timings {
                 Ok(timings) => timings,
@@ -173,7 +213,7 @@ impl Surface {
                 .wait_semaphores(&waits)
                 .swapchains(&chains)
                 .image_indices(&indices);
-            let queue = self.gpu.lock_queue();
+            let queue = self.gpu().lock_queue();
             // SAFETY: the image was acquired and is in the layout for presenting; the queue is locked.
             let shown = unsafe { self.swapchains.queue_present(queue.raw, &info) };
             drop(queue);
@@ -181,7 +221,7 @@ impl Surface {
                 Ok(false) => {}
                 // Shown, but the next frame wants a new swapchain.
                 Ok(true) | Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.retire(),
-                Err(result) => return Err(self.gpu.error("vkQueuePresentKHR", result)),
+                Err(result) => return Err(self.gpu().error("vkQueuePresentKHR", result)),
             }
             return Ok(Presented::Shown(timings));
         }
@@ -216,17 +256,20 @@ impl Surface {
             }]);
             Ok(())
         })?;
-        recorder.submit_with(&[self.acquired], &[rendered])?.wait()
+        // SAFETY: the swapchain signals the one, and the other is free: its last presentation came before that of this image. The submission is
+        // waited for.
+        unsafe { recorder.submit_with(&[self.acquired], &[rendered]) }?.wait()
     }
 
     /// Makes a swapchain when there is none of that size. False when the window has no area.
     fn make_ready(&mut self, wanted: [u32; 2]) -> Result<bool> {
         // SAFETY: surface and physical device belong to one instance.
         let limits = unsafe {
-            self.loader
-                .get_physical_device_surface_capabilities(self.gpu.physical_device, self.raw)
+            self.inner
+                .loader
+                .get_physical_device_surface_capabilities(self.gpu().physical_device, self.inner.raw)
         }
-        .map_err(|result| self.gpu.error("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", result))?;
+        .map_err(|result| self.gpu().error("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", result))?;
         let fixed = limits.current_extent.width != u32::MAX;
         let size = if fixed {
             [limits.current_extent.width, limits.current_extent.height]
@@ -241,16 +284,20 @@ impl Surface {
             return Ok(false);
         }
         if self.acquired == vk::Semaphore::null() {
-            self.acquired = semaphore(&self.gpu, "image acquired")?;
+            self.acquired = semaphore(self.gpu(), "image acquired")?;
         }
-        if self.swapchain.as_ref().is_some_and(|swapchain| swapchain.size == size) {
+        if self
+            .swapchain
+            .as_ref()
+            .is_some_and(|swapchain| swapchain.inner.size == size)
+        {
             return Ok(true);
         }
         if !limits.supported_usage_flags.contains(vk::ImageUsageFlags::TRANSFER_DST) {
             return Err(Error::MissingFeature {
                 feature: "copies to swapchain images".into(),
                 needed_by: "presenting to a window".into(),
-                device: self.gpu.caps.device.clone(),
+                device: self.gpu().caps.device.clone(),
                 instead: "render headless".into(),
             });
         }
@@ -260,8 +307,10 @@ impl Surface {
         } else {
             limits.max_image_count
         };
+        // The attachment use, which every surface has, lets the images have views.
+        let usage = vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::COLOR_ATTACHMENT;
         let info = vk::SwapchainCreateInfoKHR::default()
-            .surface(self.raw)
+            .surface(self.inner.raw)
             .min_image_count((limits.min_image_count + 1).min(most))
             .image_format(self.format.format)
             .image_color_space(self.format.color_space)
@@ -270,28 +319,36 @@ impl Surface {
                 height: size[1],
             })
             .image_array_layers(1)
-            // The attachment use, which every surface has, lets the images have views.
-            .image_usage(vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::COLOR_ATTACHMENT)
+            .image_usage(usage)
             .image_sharing_mode(vk::SharingMode::EXCLUSIVE)
             .pre_transform(limits.current_transform)
             .composite_alpha(opaque(limits.supported_composite_alpha))
             .present_mode(vk::PresentModeKHR::FIFO)
             .clipped(true);
-        // SAFETY: the surface is alive and has no other swapchain.
+        let gpu = Arc::clone(self.gpu());
+        // SAFETY: the surface is alive; where a kept image keeps its last swapchain, the window system says so.
         let raw = unsafe { self.swapchains.create_swapchain(&info, None) }
-            .map_err(|result| self.gpu.error("vkCreateSwapchainKHR", result))?;
-        let swapchain = self.swapchain.insert(Swapchain {
+            .map_err(|result| gpu.error("vkCreateSwapchainKHR", result))?;
+        let inner = Arc::new(SwapchainInner {
+            surface: Arc::clone(&self.inner),
+            device: self.swapchains.clone(),
             raw,
             size,
+            format: self.format.format,
+            usage,
+        });
+        let swapchain = self.swapchain.insert(Swapchain {
+            inner: Arc::clone(&inner),
             images: Vec::new(),
         });
         // SAFETY: the swapchain was just made.
         let images = unsafe { self.swapchains.get_swapchain_images(raw) }
-            .map_err(|result| self.gpu.error("vkGetSwapchainImagesKHR", result))?;
+            .map_err(|result| gpu.error("vkGetSwapchainImagesKHR", result))?;
         for image in images {
-            let inner = ImageInner::borrowed(&self.gpu, image, "swapchain image", size, self.format.format)?;
-            let rendered = semaphore(&self.gpu, "image rendered")?;
-            let image = Image { inner: Arc::new(inner) };
+            let image = Image {
+                inner: Arc::new(ImageInner::of_swapchain(image, &inner)?),
+            };
+            let rendered = semaphore(&gpu, "image rendered")?;
             swapchain.images.push((image, rendered));
         }
         Ok(true)
@@ -301,34 +358,28 @@ impl Surface {
     fn abandon(&mut self) {
         self.retire();
         // SAFETY: `retire` waited for the queue.
-        unsafe { self.gpu.device.destroy_semaphore(self.acquired, None) };
+        unsafe { self.gpu().device.destroy_semaphore(self.acquired, None) };
         self.acquired = vk::Semaphore::null();
     }
 
-    /// Destroys the swapchain once the queue is done with it.
+    /// Gives the swapchain up once the queue is done with it. It goes with its last image.
     fn retire(&mut self) {
         let Some(swapchain) = self.swapchain.take() else {
             return;
         };
-        self.gpu.wait_for_queue();
-        for (image, rendered) in swapchain.images {
-            drop(image);
+        self.gpu().wait_for_queue();
+        for (_, rendered) in &swapchain.images {
             // SAFETY: the queue is idle, so no presentation waits for the semaphore.
-            unsafe { self.gpu.device.destroy_semaphore(rendered, None) };
+            unsafe { self.gpu().device.destroy_semaphore(*rendered, None) };
         }
-        // SAFETY: the views of its images are gone, and the queue is idle.
-        unsafe { self.swapchains.destroy_swapchain(swapchain.raw, None) };
     }
 }
 
 impl Drop for Surface {
     fn drop(&mut self) {
         self.retire();
-        // SAFETY: the swapchain is gone and the queue idle.
-        unsafe {
-            self.gpu.device.destroy_semaphore(self.acquired, None);
-            self.loader.destroy_surface(self.raw, None);
-        }
+        // SAFETY: the queue is idle, or never had work of this surface's.
+        unsafe { self.gpu().device.destroy_semaphore(self.acquired, None) };
     }
 }
 

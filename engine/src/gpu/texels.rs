@@ -36,7 +36,8 @@ impl Gpu {
     /// one.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] past `maxTexelBufferElements`, and as [`Gpu::buffer`] and [`Gpu::upload`].
+    /// [`Error::LimitExceeded`] past `maxTexelBufferElements`, [`Error::Setting`] and [`Error::MissingFeature`] for a format that texel buffers do not
+    /// have, here or on the device, and as [`Gpu::buffer`] and [`Gpu::upload`].
     pub fn texels_with<T: bytemuck::NoUninit>(
         &self,
         name: &str,
@@ -44,8 +45,7 @@ impl Gpu {
         format: vk::Format,
         data: &[T],
     ) -> Result<TexelView> {
-        let texel = texel_bytes(format).unwrap_or(1);
-        let texels = (size_of_val(data) as u64).div_ceil(texel);
+        let texels = (size_of_val(data) as u64).div_ceil(texel_size(name, format)?);
         let view = self.texel_view(
             name,
             category,
@@ -63,7 +63,7 @@ impl Gpu {
     /// contents are undefined.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] past `maxTexelBufferElements`, and as [`Gpu::buffer`].
+    /// As [`Gpu::texels_with`].
     pub fn storage_texels(&self, name: &str, category: Category, format: vk::Format, texels: u64) -> Result<TexelView> {
         let usage = vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
         self.texel_view(name, category, format, texels, usage)
@@ -77,6 +77,7 @@ impl Gpu {
         texels: u64,
         usage: vk::BufferUsageFlags,
     ) -> Result<TexelView> {
+        let texel = texel_size(name, format)?;
         let texels = texels.max(1);
         let limit = self.caps().max_texel_buffer_elements;
         if texels > limit {
@@ -89,7 +90,7 @@ impl Gpu {
         }
         let buffer = self.buffer(&BufferDesc {
             name,
-            bytes: texels * texel_bytes(format).unwrap_or(1),
+            bytes: texels * texel,
             residency: Residency::Device,
             category,
             usage: usage | vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST,
@@ -101,10 +102,13 @@ impl Gpu {
     /// host's ([`Gpu::borrow_buffer`]), to be used where kernels take texels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a buffer that was made for other uses, one without room for a texel, or a format that has no texels of whole
-    /// bytes; [`Error::LimitExceeded`] past `maxTexelBufferElements`, or for one that does not begin at a multiple of
-    /// `minTexelBufferOffsetAlignment` (256 always is).
+    /// [`Error::Setting`] for a buffer of another device or that was made for other uses, one without room for a texel, or a format that has no texels
+    /// of whole bytes; [`Error::MissingFeature`] for one that the device has no texel buffers of; [`Error::LimitExceeded`] past
+    /// `maxTexelBufferElements`, or for one that does not begin at a multiple of `minTexelBufferOffsetAlignment` (256 always is).
     pub fn texel_view_of(&self, buffer: &Buffer, format: vk::Format) -> Result<TexelView> {
+        if !Arc::ptr_eq(&buffer.inner.gpu, &self.inner) {
+            return Err(Error::setting("buffer", buffer.name(), "belongs to another device"));
+        }
         let view = buffer.view();
         view.check_usage(vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER)?;
         view.check(self.caps().texel_buffer_alignment)?;
@@ -128,6 +132,23 @@ impl Gpu {
 
     fn make_texel_view(&self, name: &str, buffer: &Buffer, format: vk::Format, range: u64) -> Result<TexelView> {
         let gpu = &self.inner;
+        // SAFETY: the physical device belongs to the instance.
+        let offered = unsafe {
+            gpu.instance
+                .raw
+                .get_physical_device_format_properties(gpu.physical_device, format)
+        };
+        if !offered
+            .buffer_features
+            .contains(vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER)
+        {
+            return Err(Error::MissingFeature {
+                feature: format!("texel buffers of format {format:?}"),
+                needed_by: name.into(),
+                device: gpu.caps.device.clone(),
+                instead: "choose another format".into(),
+            });
+        }
         let info = vk::BufferViewCreateInfo::default()
             .buffer(buffer.raw())
             .offset(buffer.raw_offset())
@@ -145,6 +166,14 @@ impl Gpu {
             }),
         })
     }
+}
+
+/// Bytes of a texel.
+fn texel_size(name: &str, format: vk::Format) -> Result<u64> {
+    texel_bytes(format).ok_or_else(|| {
+        let cause = format!("has no texels that the buffer {name:?} can be made of");
+        Error::setting("format", format!("{format:?}"), cause)
+    })
 }
 
 impl TexelView {

@@ -66,6 +66,7 @@ impl Gpu {
                 limit: view.bytes,
             });
         }
+        BufferView { bytes, ..view }.check(1)?;
         let bytes = bytes.next_multiple_of(4);
         let staging = self.buffer(&BufferDesc::readback("readback", bytes))?;
         let mut recorder = self.recorder("readback")?;

@@ -9,6 +9,21 @@
 //! Kernels number up to 2³¹ elements, but a device's buffers end before: none holds 2³⁰ words, and `maxStorageBufferRange` says how many fit;
 //! for sorts see [`RadixSort::max_keys`].
 //!
+//! # What safe calls can do to memory
+//!
+//! No code here is `unsafe`; what is recorded goes through [`gpu`](crate::gpu), whose checks hold. Beyond these:
+//!
+//! | call | what holds |
+//! |---|---|
+//! | `new` of each | its specialization constants are made here, from checked options: bins of a [`Histogram`] are at most [`MAX_BINS`], words of a [`Permute`]'s elements at most 64, bits of a [`RadixSort`] a part of its keys; what shared memory a kernel takes is less than the device's |
+//! | `record` of each | the number of elements, every range and the scratch memory are compared before anything is recorded. A count on the device that is above its capacity is taken for none |
+//! | [`Permute`] | indices out of range touch nothing, and are counted |
+//! | [`StreamStatus::read`] | as [`Gpu::read`](crate::gpu::Gpu::read) |
+//! | `device_model` | buffers and sizes are its own |
+//! | twins | slices, whose bounds Rust checks |
+//!
+//! Ranges that must be apart and are not, and barriers that are missing, give other numbers, within the buffers.
+//!
 //! The twin of a kernel is a plain Rust function of the same result ([`scan()`], [`radix_sort()`] …); tests hold both together.
 //!
 //! ```no_run

@@ -362,7 +362,9 @@ fn a_kernel_in_glsl_goes_by_the_same_rules() {
                 uint i = gl_GlobalInvocationID.x;
                 results[i] = push.factor * texelFetch(numbers, int(i)).x;
             }";
-        let kernel = OwnKernel::glsl(gpu, "texels", source).unwrap();
+        // SAFETY: the kernel has no arrays of its own.
+        #[expect(unsafe_code, reason = "GLSL from text")]
+        let kernel = unsafe { OwnKernel::glsl(gpu, "texels", source) }.unwrap();
         let numbers = gpu
             .texels_with("numbers", Category::Work, vk::Format::R32_UINT, &[4u32; 32])
             .unwrap();
@@ -383,7 +385,10 @@ fn a_kernel_in_glsl_goes_by_the_same_rules() {
             .unwrap();
         recorder.submit().unwrap().wait().unwrap();
         assert_eq!(gpu.read::<u32>(output.view(), 32).unwrap(), [20; 32]);
-        let wrong = OwnKernel::glsl(gpu, "wrong", &source.replace("push.factor", "push.missing"));
+        let wrong = source.replace("push.factor", "push.missing");
+        // SAFETY: as above.
+        #[expect(unsafe_code, reason = "GLSL from text")]
+        let wrong = unsafe { OwnKernel::glsl(gpu, "wrong", &wrong) };
         assert!(matches!(&wrong, Err(Error::KernelSource { line: 8, .. })), "{wrong:?}");
     });
 }

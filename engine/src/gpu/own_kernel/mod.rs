@@ -29,7 +29,7 @@
 //! What holds of WGSL: an index beyond an array, a buffer's end included, reads zero and writes nothing, and division by zero is defined, so
 //! no source breaks memory of others. What does not: loops have no bound that helps. A loop without an end hangs a device, or loses it where
 //! the system has a watchdog, and the software driver silently ends loops after 65,535 iterations. GLSL has what the device's robust
-//! buffer access gives it. Bindings are storage and uniform buffers, in GLSL texel buffers, too; images and samplers are refused.
+//! buffer access gives it, and nothing keeps it inside its own arrays: to make a kernel of it is `unsafe`. Bindings are storage and uniform buffers, in GLSL texel buffers, too; images and samplers are refused.
 
 #[cfg(feature = "hot-reload")]
 mod glsl;
@@ -190,8 +190,12 @@ impl OwnKernel {
     ///
     /// # Errors
     /// As [`OwnKernel::wgsl`]; [`Error::Io`] without the feature `shaderc` where there is no program `glslc`.
+    ///
+    /// # Safety
+    /// Whatever the kernel is given, it stays inside its own arrays (those of an invocation and of a workgroup), and where the device has no
+    /// [`Caps::robust_buffer_access`](super::Caps) inside its buffers: unlike WGSL's, its indices are not checked.
     #[cfg(feature = "hot-reload")]
-    pub fn glsl(gpu: &Gpu, name: &str, source: &str) -> Result<Self> {
+    pub unsafe fn glsl(gpu: &Gpu, name: &str, source: &str) -> Result<Self> {
         Self::new(gpu, name, glsl::translate(name, source)?)
     }
 
@@ -380,25 +384,14 @@ fn check_limits(gpu: &Inner, name: &str, module: &Module) -> Result<()> {
             return refuse(cause);
         }
     }
-    let lacks = |feature: String, instead: String| Error::MissingFeature {
-        feature,
-        needed_by: name.into(),
-        device: gpu.caps.device.clone(),
-        instead,
-    };
-    for (axis, (size, most)) in module.local_size.iter().zip(gpu.caps.max_workgroup_size).enumerate() {
-        if *size > most {
-            let feature = format!("maxComputeWorkGroupSize[{axis}] >= {size}");
-            return Err(lacks(feature, format!("choose a workgroup of at most {most} there")));
-        }
-    }
     let most = gpu.caps.max_shared_memory;
     if module.shared_bytes > u64::from(most) {
-        let feature = format!("maxComputeSharedMemorySize >= {}", module.shared_bytes);
-        return Err(lacks(
-            feature,
-            format!("use at most {most} bytes of workgroup variables"),
-        ));
+        return Err(Error::MissingFeature {
+            feature: format!("maxComputeSharedMemorySize >= {}", module.shared_bytes),
+            needed_by: name.into(),
+            device: gpu.caps.device.clone(),
+            instead: format!("use at most {most} bytes of workgroup variables"),
+        });
     }
     Ok(())
 }
@@ -409,7 +402,7 @@ impl Pass<'_> {
     ///
     /// # Errors
     /// [`Error::Binding`] for what does not fit, [`Error::LimitExceeded`] past `maxComputeWorkGroupCount`, both before anything is recorded;
-    /// [`Error::MissingBarrier`] in debug builds.
+    /// [`Error::Setting`] for what belongs to another device; [`Error::MissingBarrier`] in debug builds.
     pub fn dispatch_own(
         &mut self,
         kernel: &OwnKernel,
@@ -419,6 +412,8 @@ impl Pass<'_> {
     ) -> Result<()> {
         self.check_groups(&kernel.inner.name, groups)?;
         let gpu = Arc::clone(&self.recorder.gpu.inner);
+        self.recorder
+            .check_device(kernel.inner.objects.gpu(), "kernel", &kernel.inner.name)?;
         let resources = kernel.check(&gpu, given, push)?;
         self.recorder.next_command();
         self.recorder.keep(&kernel.inner);
@@ -437,6 +432,9 @@ impl Pass<'_> {
                     name: &binding.name,
                     binding: binding.binding,
                     kind: binding.kind,
+                    view: None,
+                    // Checked on every device.
+                    fixed_bytes: 0,
                     access: binding.access(),
                 };
                 self.write_descriptor(raw, &slot, resource.bound())?;
