@@ -4,12 +4,12 @@
 
 use super::wave::stage_barrier;
 use crate::Result;
-use crate::gpu::shaders::constants::{NO_MEDIUM, SHADOW_SURFACES, SHADOW_SURFACES_ALPHA, WORK_UNIT};
+use crate::gpu::shaders::constants::{NO_MEDIUM, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
 use crate::gpu::shaders::walk::{extend, shadow};
-use crate::gpu::{BufferView, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo, SOFTWARE_LOOP_CAP};
-use crate::transport::GpuScene;
+use crate::gpu::{BufferView, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo};
+use crate::transport::{GpuScene, ray_iterations};
 
 /// Loop iterations after which a ray goes on in a later dispatch, where nothing else is asked for: at most half of what a software driver runs.
 pub const RAY_QUOTA: u32 = 32_768;
@@ -27,14 +27,14 @@ const MEDIA_ALPHA_QUOTA_MAX: u32 = 512;
 /// # Errors
 /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where a leaf of the scene's index alone takes a software driver too many.
 pub fn ray_quota(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<u32> {
-    // With media half of the iterations are for walks through grids.
-    let (most, iterations) = match (scene.profile().has_alpha(), scene.profile().media.any()) {
-        (false, false) => (u32::MAX, SOFTWARE_LOOP_CAP),
-        (true, false) => (ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP),
-        (false, true) => (MEDIA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES),
-        (true, true) => (MEDIA_ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES_ALPHA),
-    };
     let filters = scene.profile().has_alpha();
+    let most = match (filters, scene.profile().media.any()) {
+        (false, false) => u32::MAX,
+        (true, false) => ALPHA_QUOTA_MAX,
+        (false, true) => MEDIA_QUOTA_MAX,
+        (true, true) => MEDIA_ALPHA_QUOTA_MAX,
+    };
+    let iterations = ray_iterations(scene.profile());
     scene
         .index_traversal()
         .quota_within(gpu.caps(), wanted.min(most), iterations, filters)
