@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use clerestory::gpu::{DeviceKind, Gpu};
+use clerestory::plan::{self, Goal};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{Camera, DensityGrid, Environment, LightKind, Material, Medium, Mesh, Scene};
 use clerestory::settings::Settings;
@@ -234,6 +235,27 @@ fn budgets_end_renderings_that_would_not() {
         assert_eq!(rendered.report.samples, [0, 0]);
         let radiance = rendered.picture.require("radiance").unwrap();
         assert!(radiance.values().iter().all(|value| *value == 0.0));
+    });
+}
+
+#[test]
+fn automatic_choices_end_where_first_pilots_do_not() {
+    with_gpu(|gpu| {
+        let renderer = Renderer::new(gpu, &sparse_grid(1e6)).unwrap();
+        let options = RenderOptions {
+            size: [64, 64],
+            ..RenderOptions::default()
+        };
+        let [error, time] = [(Some(0.1), None), (None, Some(Duration::from_millis(1)))];
+        // A wish to stop, and a time that is over.
+        for ((error, time), goes_on) in [(error, false), (time, true)] {
+            let refused = plan::plan(&renderer, &options, Goal { error, time }, &mut || goes_on);
+            let message = refused.map(|plan| plan.chosen).unwrap_err().to_string();
+            assert!(
+                message.contains("first pilot") && message.contains("time budget"),
+                "{message}"
+            );
+        }
     });
 }
 
