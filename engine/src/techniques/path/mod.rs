@@ -65,7 +65,7 @@ pub struct PathCounters {
     pub stalls: u64,
     /// Submissions that ended with paths left for later, since their work was used up.
     pub postponed: u64,
-    /// Submissions of waves. May differ from run to run where paths are left for later, as may the next two.
+    /// Submissions of waves. Their number may differ from run to run where paths are left for later.
     pub submissions: u64,
     /// Loop iterations of long rays and of walks through density grids, and steps of queries of maps: what bounds a submission.
     pub work: u64,
