@@ -18,6 +18,9 @@ use crate::techniques::{self, Card, Skipped, Technique, View};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
+/// How long samples that are under way when the time is used up may go on.
+const GRACE: Duration = Duration::from_millis(500);
+
 /// What to render and how.
 ///
 /// ```
@@ -49,7 +52,8 @@ pub struct RenderOptions {
     pub seed: u32,
     /// Also gathers albedo, normal and depth of what is seen first.
     pub aovs: bool,
-    /// Stops after about this long, with what is there.
+    /// Stops after about this long, with what is there: after the step at hand, or half a second later at most where samples are under way; never before the first
+    /// step, which compiles the kernels. A scene that is too hard may leave pixels without a sample, as the report's `samples` says.
     pub time_budget: Option<Duration>,
     /// The technique's settings: its struct, or JSON. Seed and AOVs are those above, whatever a struct says.
     pub settings: Settings,
@@ -128,7 +132,7 @@ pub struct FrameReport {
     pub upload_seconds: f64,
     /// Wall-clock seconds since the technique was ready, with the compilation of kernels by the driver in the first step.
     pub render_seconds: f64,
-    /// Wall-clock seconds after the first step, which compiles the kernels.
+    /// Wall-clock seconds after the first step that ended with samples, and has compiled the kernels.
     pub steady_seconds: f64,
     /// Work units (see the technique's counters) per second of steady time.
     pub steady_rates: BTreeMap<String, f64>,
@@ -304,7 +308,10 @@ impl Renderer {
             camera: camera.name.clone(),
             technique,
             start,
-            first_step: None,
+            begun: None,
+            done: 0,
+            within_samples: false,
+            first_samples: None,
             passes: BTreeMap::new(),
             finished: false,
         })
@@ -319,24 +326,24 @@ pub struct Rendering {
     camera: String,
     technique: Box<dyn Technique>,
     start: Instant,
-    /// When the first step ended, and the counters then.
-    first_step: Option<(Instant, BTreeMap<&'static str, u64>)>,
+    /// When the first step ended.
+    begun: Option<Instant>,
+    /// Pixel samples that are there, and whether the last step has ended with others under way.
+    done: u64,
+    within_samples: bool,
+    /// When the first step ended that had samples, and the counters then.
+    first_samples: Option<(Instant, BTreeMap<&'static str, u64>)>,
     passes: BTreeMap<String, (u64, Option<u64>)>,
     finished: bool,
 }
 
 impl Rendering {
-    /// Does a bounded piece of work; `None` when all samples are there or the time is used up.
+    /// Does a bounded piece of work, whatever the scene, so that a host can stop between two steps; `None` when all samples are there or the time is used up.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`].
     pub fn step(&mut self) -> Result<Option<Progress>> {
-        let out_of_time = self
-            .options
-            .time_budget
-            .is_some_and(|budget| self.start.elapsed() >= budget);
-        // One step is always done, so that there is a picture.
-        if out_of_time && self.first_step.is_some() {
+        if self.is_out_of_time() {
             return Ok(None);
         }
         let Some(step) = self.technique.step(self.options.spp)? else {
@@ -350,8 +357,11 @@ impl Rendering {
         }
         let counters = self.technique.counters();
         let rays = counters.get("rays").copied().unwrap_or(0);
-        if self.first_step.is_none() {
-            self.first_step = Some((Instant::now(), counters));
+        self.begun.get_or_insert_with(Instant::now);
+        self.within_samples = step.done <= self.done;
+        self.done = step.done;
+        if self.first_samples.is_none() && step.done > 0 {
+            self.first_samples = Some((Instant::now(), counters));
         }
         self.finished = step.done >= step.wanted;
         let seconds = self.start.elapsed().as_secs_f64();
@@ -365,6 +375,15 @@ impl Rendering {
             seconds,
             rays,
         }))
+    }
+
+    /// Whether the time is used up. One step is always done, and samples under way have a little more time, counted from when kernels were there.
+    fn is_out_of_time(&self) -> bool {
+        let (Some(budget), Some(begun)) = (self.options.time_budget, self.begun) else {
+            return false;
+        };
+        let late = self.start.elapsed().checked_sub(budget);
+        late.is_some_and(|late| !self.within_samples || late.min(begun.elapsed()) >= GRACE)
     }
 
     /// Asks for another number of samples per pixel; those that are there stay.
@@ -389,7 +408,8 @@ impl Rendering {
     /// [`Error::Setting`], [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         self.camera.clone_from(&camera.name);
-        (self.start, self.first_step, self.finished) = (Instant::now(), None, false);
+        (self.start, self.begun, self.finished) = (Instant::now(), None, false);
+        (self.first_samples, self.done, self.within_samples) = (None, 0, false);
         self.passes.clear();
         self.technique.set_camera(camera)
     }
@@ -410,7 +430,7 @@ impl Rendering {
         Ok(self.technique.picture()?.0)
     }
 
-    /// The picture and its report, at any time after the first step.
+    /// The picture and its report, at any time after the first step. Pixels that have no sample yet are black.
     ///
     /// # Errors
     /// As [`Rendering::picture`].
@@ -438,7 +458,7 @@ impl Rendering {
     fn report(&self, picture: &Picture, non_finite_samples: NonFiniteSamples, end: Instant) -> FrameReport {
         let caps = self.renderer.gpu.caps();
         let counters = self.technique.counters();
-        let (steady_start, before) = self.first_step.clone().unwrap_or((end, counters.clone()));
+        let (steady_start, before) = self.first_samples.clone().unwrap_or((end, counters.clone()));
         let steady_seconds = end.saturating_duration_since(steady_start).as_secs_f64();
         let rate = |(name, count): (&&'static str, &u64)| {
             let done = count - before.get(*name).copied().unwrap_or(0);

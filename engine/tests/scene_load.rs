@@ -50,6 +50,29 @@ fn a_bare_mesh_is_framed_and_lit() {
 }
 
 #[test]
+fn geometry_that_no_camera_can_frame_is_named_not_the_camera() {
+    let of = |sidecar: &str, far: &str| {
+        let folder = folder(sidecar);
+        let obj = OBJ.replace("v 1 0 0", &format!("v {far} 0 0"));
+        std::fs::write(folder.path().join("m.obj"), obj).expect("file");
+        load(folder.path(), "m.obj")
+    };
+    let message = of("", "3e38").expect_err("too far").to_string();
+    assert!(
+        message.contains("geometry") && message.contains("no camera can frame"),
+        "{message}"
+    );
+    assert!(!message.contains("cameras[0]"), "{message}");
+    // What is as far as can be framed, or is seen by a camera of the user's own, is none of it.
+    of("", "1e30").expect("a camera far away");
+    of(
+        "[[cameras]]\nname = \"near\"\neye = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\n",
+        "3e38",
+    )
+    .expect("a camera near the origin");
+}
+
+#[test]
 fn a_sidecar_adds_what_the_model_cannot_say() {
     let folder = folder(
         "exposure = 1.5\ntechnique = \"path\"\naspect = 2.0\n[environment]\ncolor = [1.0, 2.0, 3.0]\nstrength = 2.0\nrotation = 90.0\n\

@@ -137,6 +137,7 @@ uint bvh2_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
         }
     } while (BVH2_GOES_ON);
     BVH2_END_CANDIDATES
+    index_iterations += iterations;
     if (INDEX_COUNT) {
         index_counters.iterations += iterations;
     }

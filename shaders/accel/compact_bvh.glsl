@@ -50,6 +50,9 @@ uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z);
 #define COMPACT_UPPER(PLANES) (PLANES)
 #endif
 
+// Nodes and records of the invocation's queries so far.
+uint compact_steps = 0u;
+
 bool compact_point_query(CompactRoot root, vec3 point) {
     bool mine = all(lessThan(COMPACT_LOWER(root.lower), point)) && all(lessThan(point, COMPACT_UPPER(root.upper)));
     uint next = COMPACT_ANY(mine) ? root.reference : COMPACT_NOTHING;
@@ -58,7 +61,8 @@ bool compact_point_query(CompactRoot root, vec3 point) {
     bool stack_mine[COMPACT_STACK_SIZE];
 #endif
     uint top = 0u;
-    for (uint step = 0u; next != COMPACT_NOTHING && step < COMPACT_QUOTA; ++step) {
+    uint step = 0u;
+    for (; next != COMPACT_NOTHING && step < COMPACT_QUOTA; ++step) {
         bool pop = true;
         if ((next & COMPACT_LEAF_BIT) != 0u) {
             pop = !compact_visit_point(next ^ COMPACT_LEAF_BIT);
@@ -94,6 +98,7 @@ bool compact_point_query(CompactRoot root, vec3 point) {
 #endif
         }
     }
+    compact_steps += step;
     return next == COMPACT_NOTHING;
 }
 #endif

@@ -39,6 +39,9 @@ struct IndexCounters {
 
 IndexCounters index_counters = IndexCounters(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
 
+// Loop iterations of the invocation's traversals so far.
+uint index_iterations = 0u;
+
 #define INDEX_COUNT_ONE(counter) \
     if (INDEX_COUNT) { \
         ++index_counters.counter; \

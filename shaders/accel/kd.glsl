@@ -460,6 +460,7 @@ uint kd_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     if (KD_STACK_STOPS && stops && !done) {
         walk.flags = kd_flags_of_stack(walk, root, along);
     }
+    index_iterations += walk.iterations;
     if (INDEX_COUNT) {
         index_counters.iterations += walk.iterations;
     }

@@ -15,6 +15,8 @@
 
 // Iterations of a grid walk in one dispatch: blocks left and tentative collisions. Software drivers end loops silently after 65,535 of all lanes.
 const uint GRID_WALK_QUOTA = 2048u;
+// Iterations of all grid walks of the invocation so far.
+uint grid_iterations = 0u;
 // Transmittances below this are decided by roulette, with this chance to go on.
 const float RATIO_ROULETTE_BELOW = 0.1;
 const float RATIO_ROULETTE_SURVIVAL = 0.5;
@@ -71,6 +73,7 @@ uint next_tentative_collision(SceneMedium m, float scale, float depth, inout Gri
             return GRID_STOPPED;
         }
         --iterations;
+        ++grid_iterations;
         majorant = m.majorant * fetch_majorant(m, w.block);
         vec3 faces = ((vec3(w.block) + ahead) * m.block - w.origin) * w.inverse;
         float face = min(faces.x, min(faces.y, faces.z));

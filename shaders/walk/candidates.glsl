@@ -6,18 +6,22 @@
 #ifndef CLERESTORY_WALK_CANDIDATES_GLSL
 #define CLERESTORY_WALK_CANDIDATES_GLSL
 
+#define CLERESTORY_SAMPLER SAMPLER_PCG
+#include "walk/wave.glsl"
+
 // What a scene has, by the ids of transport/features.glsl.
 layout(constant_id = 17) const bool HAS_ALPHA = true;
 layout(constant_id = 19) const bool HAS_MEDIA = true;
-// Goes on with rays that the quota stopped in an earlier dispatch.
+// Goes on with rays that the quota stopped in an earlier dispatch; without it, only with rays that were left for later before they began.
 layout(constant_id = 18) const bool RESUMES = false;
+// Loop iterations of a ray from which on they count as work of the submission.
+layout(constant_id = 27) const uint WORK_LEAST = WORK_UNIT;
 
-#define CLERESTORY_SAMPLER SAMPLER_PCG
-#include "walk/wave.glsl"
 
 layout(push_constant, scalar) uniform Push {
     WalkKey key;
     uint surrounding;  // index of the medium outside all bodies, or NO_MEDIUM
+    uint goes_on;      // 1 where an earlier dispatch has handled a part of the places, as walk_resume says
 } push;
 
 #include "transport/attribute_features.glsl"

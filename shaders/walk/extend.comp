@@ -2,7 +2,7 @@
 // The extend stage of a wave: the closest hit of every walk's ray.
 //
 // A ray that its quota stops is counted and stalls the wave: the later stages leave at once, and the host runs this stage again, which
-// goes on where the ray was.
+// goes on where the ray was. So do rays that are left for later, since the submission's work is used up; they have not begun.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -16,23 +16,31 @@ void main() {
     if (status.stalled == STALLED_SHADOW || place >= status.active_count) {
         return;
     }
+    uint resume = push.goes_on != 0u ? walk_resume[place] : INDEX_START;
+    if (resume == INDEX_FINISHED) {
+        return;
+    }
+    if (!has_work_left()) {
+        walk_resume[place] = resume;
+        leave_for_later(STALLED_EXTEND);
+        return;
+    }
     uint slot = load_slot(place);
     WalkState walk = load_walk(slot);
     begin_candidates(slot, walk.bounce, CANDIDATES_EXTEND);
     Hit hit = no_hit(FAR_AWAY);
-    uint resume = INDEX_START;
-    if (RESUMES) {
+    if (RESUMES && resume != INDEX_START) {
         hit = walk_hits_out[place];
-        resume = walk_resume[place];
     }
     float t_min = 0.0;
     if (HAS_MEDIA) {
         // Behind the boundaries that the walk has passed.
         t_min = status.rounds > 0u ? search_start(walk_medium_states[slot].start) : 0.0;
     }
-    resume = closest_hit(Ray(walk.origin, t_min, walk.direction, FAR_AWAY), resume, hit);
+    resume = closest_hit(Ray(walk.origin, t_min, walk.direction, FAR_AWAY), RESUMES ? resume : INDEX_START, hit);
     walk_hits_out[place] = hit;
     walk_resume[place] = resume;
+    count_work(index_iterations, WORK_LEAST);
     if (resume != INDEX_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_EXTEND);

@@ -2,7 +2,7 @@
 // The shadow stage of a wave: adds to what walks have gathered what their shadow rays carry, wherever nothing stands in between; in scenes with
 // media, as much of it as the media let through.
 //
-// Stopped rays stall the wave as in extend.comp.
+// Rays that are stopped or left for later stall the wave as in extend.comp.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -12,21 +12,16 @@ layout(local_size_x = 64) in;
 #include "walk/shadow_media.glsl"
 
 // Whether light passes, and nothing else.
-void trace_shadow_ray(uint place) {
+void trace_shadow_ray(uint place, uint resume) {
     ShadowRay s = load_shadow_ray(texelFetch(walk_waiting_queue_in, int(place)).x);
     begin_candidates(s.slot, s.bounce, CANDIDATES_SHADOW);
     Hit hit = no_hit(s.t_max);
-    uint resume = INDEX_START;
-    if (RESUMES) {
-        resume = walk_resume[place];
-    }
-    bool ended = resume == INDEX_FINISHED;
-    resume = any_hit(Ray(s.origin, 0.0, s.direction, s.t_max), resume, hit);
+    resume = any_hit(Ray(s.origin, 0.0, s.direction, s.t_max), RESUMES ? resume : INDEX_START, hit);
     walk_resume[place] = resume;
     if (resume != INDEX_FINISHED) {
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_SHADOW);
-    } else if (!ended && hit.triangle == NO_HIT) {
+    } else if (hit.triangle == NO_HIT) {
         walk_gathered[s.slot].radiance += s.contribution;
     }
 }
@@ -36,9 +31,22 @@ void main() {
     if (status.stalled == STALLED_EXTEND || place >= status.waiting_count) {
         return;
     }
-    if (HAS_MEDIA) {
-        trace_shadow_rays_through_media(place);
-    } else {
-        trace_shadow_ray(place);
+    uint resume = push.goes_on != 0u ? walk_resume[place] : INDEX_START;
+    if (resume == INDEX_FINISHED) {
+        return;
     }
+    if (!has_work_left()) {
+        walk_resume[place] = resume;
+        if (HAS_MEDIA && push.goes_on == 0u) {
+            store_unbegun_rays(place);
+        }
+        leave_for_later(STALLED_SHADOW);
+        return;
+    }
+    if (HAS_MEDIA) {
+        trace_shadow_rays_through_media(place, resume);
+    } else {
+        trace_shadow_ray(place, resume);
+    }
+    count_work(index_iterations + GRID_ITERATION_WORK * grid_iterations, WORK_LEAST);
 }

@@ -1,7 +1,7 @@
 // Shadow rays in scenes with media: boundaries are passed, every other surface blocks.
 //
 // Homogeneous media in closed form, grids by ratio tracking: unbiased. A ray that has met too many surfaces, or whose traversal or grid walk a quota
-// stops, stalls the wave and goes on from where it is.
+// stops, stalls the wave and goes on from where it is. One that is left for later before it began has the state that it begins with.
 #ifndef CLERESTORY_WALK_SHADOW_MEDIA_GLSL
 #define CLERESTORY_WALK_SHADOW_MEDIA_GLSL
 
@@ -82,16 +82,22 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
     return ended;
 }
 
-void trace_shadow_rays_through_media(uint queue_place) {
-    uint resume = INDEX_START;
-    if (RESUMES) {
-        resume = walk_resume[queue_place];
-        if (resume == INDEX_FINISHED) {
-            return;
-        }
-    }
+// Rays to follow from a place, by its flags.
+uint rays_of_place(uint place) {
+    return texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
+}
+
+// Of a place whose rays are left for later.
+void store_unbegun_rays(uint queue_place) {
     uint place = texelFetch(walk_waiting_queue_in, int(queue_place)).x;
-    uint rays = texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
+    uint rays = rays_of_place(place);
+    walk_shadow_states[queue_place] = begin_ray(place, rays, first_ray(place, rays).t_max, 0u);
+}
+
+void trace_shadow_rays_through_media(uint queue_place, uint from) {
+    uint resume = RESUMES ? from : INDEX_START;
+    uint place = texelFetch(walk_waiting_queue_in, int(queue_place)).x;
+    uint rays = rays_of_place(place);
     if (RESUMES) {
         rays = walk_shadow_states[queue_place].rays;
     }

@@ -21,6 +21,15 @@ const uint STALLED_NOT = 0u;
 const uint STALLED_EXTEND = 1u;
 const uint STALLED_SHADOW = 2u;
 const uint STALLED_ARRIVAL = 3u;  // a stage between arrival and scattering
+const uint STALLED_SCATTER = 4u;
+
+// Stands in walk_resume for a place that a scatter stage has handled, should the stage stall elsewhere.
+const uint PLACE_SCATTERED = 0xFFFFFFFDu;
+
+// Loop iterations of a unit of work. What takes less is not counted: it is bounded by the places of a wave.
+const uint WORK_UNIT = 64u;
+// Units of work of an iteration of a walk through a grid: it draws numbers and looks up densities.
+const uint GRID_ITERATION_WORK = 4u;
 
 const uint FLAG_ALIVE = 1u;
 const uint FLAG_WAITING = 2u;  // something waits at the place
@@ -113,6 +122,8 @@ layout(set = 0, binding = 0, scalar) restrict buffer WaveStatusBlock {
     uint rounds;             // bounces finished in this wave
     uint rays[2];            // 64-bit counters, low word first: rays followed to their ends
     uint waited[2];          // places that have waited
+    uint unstarted;          // 1 where places were left for later, since the submission's work was used up
+    coherent int work_left;  // of this submission, in units of WORK_UNIT iterations; the places under way may take it below 0
 } status;
 layout(set = 0, binding = 1) uniform utextureBuffer walk_queue_in;
 layout(set = 0, binding = 2, scalar) restrict writeonly buffer WalkQueueOut { uint walk_queue_out[]; };
@@ -127,7 +138,7 @@ layout(set = 0, binding = 10) uniform utextureBuffer walk_waiting_queue_in;  // 
 layout(set = 0, binding = 11, scalar) restrict writeonly buffer WalkWaitingQueueOut { uint walk_waiting_queue_out[]; };
 layout(set = 0, binding = 12) uniform utextureBuffer walk_flags_in;  // four places per texel
 layout(set = 0, binding = 13, scalar) restrict writeonly buffer WalkFlagsOut { uint walk_flags_out[]; };
-// Where stopped rays go on, by place in the queue of the stage that stalled.
+// Where stopped rays go on, and which places are done, by place in the queue of the stage that stalled.
 layout(set = 0, binding = 14, scalar) restrict buffer WalkResume { uint walk_resume[]; };
 layout(set = 0, binding = 15, scalar) restrict buffer WalkChunks { uvec2 walk_chunks[]; };  // walks alive, waiting places
 
@@ -151,6 +162,24 @@ layout(set = 0, binding = 21, scalar) restrict buffer WalkMediumCounters {
     if (counted_amount > 0u && atomicAdd(medium_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
         atomicAdd(medium_counters.COUNTER[1], 1u); \
     } \
+}
+
+// Whether a place may be begun. What one place takes is bounded by its quota, so that a submission ends soon after its work is used up, whatever the scene.
+bool has_work_left() { return status.work_left > 0; }
+
+// Counts loop iterations, where they are `least` or more.
+void count_work(uint iterations, uint least) {
+    if (iterations >= least) {
+        atomicAdd(status.work_left, -int(iterations / WORK_UNIT));
+    }
+}
+
+// Leaves a place for a later submission: its stage stalls, and goes on with those that walk_resume does not say to be done.
+void leave_for_later(uint stage) {
+    if (status.unstarted == 0u) {
+        atomicMax(status.unstarted, 1u);
+        atomicMax(status.stalled, stage);
+    }
 }
 
 WalkState load_walk(uint slot) {

@@ -167,22 +167,25 @@ fn what_the_device_cannot_build_the_host_does_and_says_so() {
 }
 
 #[test]
-fn leaves_that_software_devices_cannot_end_are_refused() {
+fn leaves_that_software_devices_cannot_end_are_those_of_another_index_which_says_so() {
     with_gpu(|gpu| {
         // In one place, so that no plane parts them.
         let mut scene = builtin("builtin:cornell-box");
         let mut heap = scene.meshes[0].clone();
         heap.triangles = vec![heap.triangles[0]; 20_000];
         scene.place(heap);
-        let kd = IndexKind::Kd(KdSettings::default());
-        for (kind, refused) in [(IndexKind::default(), false), (kd, gpu.caps().kind == DeviceKind::Cpu)] {
-            match render(gpu, &scene, &kind) {
-                Ok(_) => assert!(!refused, "{kind}"),
-                Err(Error::LimitExceeded { name, value, .. }) => {
-                    assert!(refused && name.contains("leaf") && value >= 20_000, "{name}: {value}");
-                }
-                Err(error) => panic!("{kind}: {error}"),
-            }
+        let truth = render(gpu, &scene, &IndexKind::default()).unwrap();
+        assert_eq!(truth.report.index.instead_because, None);
+        let rendered = render(gpu, &scene, &IndexKind::Kd(KdSettings::default())).unwrap();
+        assert!(bits(&rendered) == bits(&truth));
+        let (kind, because) = (rendered.report.index.kind, rendered.report.index.instead_because);
+        if gpu.caps().kind == DeviceKind::Cpu {
+            assert!(
+                kind == "bvh2" && because.is_some_and(|cause| cause.contains("leaf")),
+                "{kind}"
+            );
+        } else {
+            assert_eq!((kind, because), ("kd", None));
         }
     });
 }

@@ -142,6 +142,9 @@ fn rest(report: &FrameReport) -> String {
     if let Some(cause) = report.index.host_because {
         let _ = writeln!(text, "       built on the host: {cause}");
     }
+    if let Some(cause) = report.index.instead_because {
+        let _ = writeln!(text, "       instead of the one asked for: {cause}");
+    }
     let excluded = index.excluded_range + index.excluded_degenerate;
     if excluded > 0 {
         // Writing to a string cannot fail.

@@ -115,6 +115,7 @@ impl IndexKind {
                         build_ms: 1e3 * begin.elapsed().as_secs_f64(),
                         stages: built.stages,
                         host_because: None,
+                        instead_because: None,
                         kept: None,
                         statistics: built.statistics,
                     };
@@ -165,6 +166,7 @@ impl IndexKind {
             build_ms: 1e3 * begin.elapsed().as_secs_f64(),
             stages: index.stages(),
             host_because: None,
+            instead_because: None,
             kept,
             statistics: index.statistics(),
         };
@@ -237,6 +239,9 @@ pub struct IndexReport {
     /// Why the host has built what the device was to build.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub host_because: Option<&'static str>,
+    /// Why it is of another kind than was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instead_because: Option<&'static str>,
     /// What became of it, where it was to be kept on disk.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kept: Option<IndexKept>,

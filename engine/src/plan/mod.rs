@@ -36,6 +36,7 @@ mod tiles;
 mod trial;
 mod verdict;
 
+use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -166,7 +167,7 @@ impl Plan {
 
 /// Renders pilots and chooses among the engine's techniques. `options` is the picture as asked for: view, size, seed, and what of technique and
 /// settings is not free; its samples are not looked at. `proceed` is called between pieces of work; when it says no, pilots end and the choice
-/// is made among what is known.
+/// is made among what is known. A scene whose first pilot has not ended half a second later, or in half of the time that the goal gives, is refused.
 ///
 /// # Errors
 /// [`Error::Setting`] for a goal that is none; [`Error::Unsupported`] when no technique can render the scene as asked, with every
@@ -199,11 +200,14 @@ pub fn plan_among(
     let start = Instant::now();
     check(goal)?;
     let fixed = options.settings.to_json();
+    let proceed: &mut dyn FnMut() -> bool = &mut || proceed();
     let asked = Asked {
         renderer,
         options,
         paths: wanted_path_set(&fixed)?,
         goal,
+        proceed: RefCell::new(proceed),
+        gave_up: Cell::new(false),
     };
     let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) = candidates(cards, &fixed).into_iter().unzip();
     let mut trials: Vec<Option<Trial<'_>>> = Vec::new();
@@ -212,7 +216,7 @@ pub fn plan_among(
         // Settings can be left out, techniques only where a time is to be kept.
         let can_wait = goal.time.is_some() || trials.iter().flatten().any(|trial| trial.card.id == card.id);
         let late = can_wait && is_late(&trials, goal, start.elapsed().as_secs_f64());
-        let trial = if tried && (late || !proceed()) {
+        let trial = if asked.gave_up.get() || (tried && (late || !asked.proceeds())) {
             candidate.reason = "there was no time to try it".into();
             None
         } else {
@@ -234,10 +238,10 @@ pub fn plan_among(
             }
         }
     }
-    run_rounds(&mut trials, &asked, start, proceed)?;
+    run_rounds(&mut trials, &asked, start, &mut || asked.proceeds())?;
     let chosen = loop {
         let chosen = best(&mut candidates, &trials, &asked, start)?;
-        if proceed() {
+        if asked.proceeds() {
             let rounds = seconds_of_rounds(&trials);
             if let Some(trial) = &mut trials[chosen] {
                 run_last_pair(trial, &asked, start.elapsed().as_secs_f64(), rounds)?;

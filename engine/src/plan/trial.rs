@@ -3,6 +3,7 @@
 //! No round has a seed or a sample in common with another one: what was low by luck when a round was decided on is not part of what it finds.
 //! Seeds and rounds decide what they find, to the bit; what a sample costs, the clock.
 
+use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 use super::judgement::Judgement;
@@ -26,6 +27,8 @@ const PILOT_SIDE: u32 = 8;
 pub const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 /// Relative MSE of a black picture, which is all that pilots without light know.
 const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
+/// How long a first pilot may take in any case, once its kernels are compiled.
+const PATIENCE: Duration = Duration::from_millis(500);
 /// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
 const SMALL: u32 = 4;
 /// Distance of the pilots' seeds from the picture's and from each other.
@@ -77,9 +80,19 @@ pub struct Asked<'a> {
     pub options: &'a RenderOptions,
     pub paths: PathSet,
     pub goal: Goal,
+    /// Whether the host lets pilots go on; see [`Asked::proceeds`].
+    pub proceed: RefCell<&'a mut dyn FnMut() -> bool>,
+    /// A first pilot did not end in time: others would not, either.
+    pub gave_up: Cell<bool>,
 }
 
 impl Asked<'_> {
+    /// Whether pilots go on.
+    pub fn proceeds(&self) -> bool {
+        let mut proceed = self.proceed.borrow_mut();
+        (*proceed)()
+    }
+
     /// Pixels of the picture itself.
     pub fn pixels(&self) -> f64 {
         f64::from(self.options.size[0]) * f64::from(self.options.size[1])
@@ -163,7 +176,13 @@ impl<'a> Trial<'a> {
         if !has_paths(&first.path_set()) {
             return Ok(None);
         }
-        run(&mut first)?;
+        if !run_first(&mut first, asked)? {
+            asked.gave_up.set(true);
+            return Err(Error::Unsupported {
+                technique: card.id.into(),
+                reasons: vec!["its first pilot picture did not end in time; render with a technique and a time budget instead of a goal".into()],
+            });
+        }
         // The second one finds its kernels compiled, as the picture itself will.
         let from = Instant::now();
         let mut second = trial.begin_pilot(asked, size, [0, 1])?;
@@ -441,6 +460,21 @@ fn round_of_another_size(mut pilot: Rendering) -> Result<f64> {
     pilot.set_spp(ROUNDS[0]);
     run(&mut pilot)?;
     Ok(from.elapsed().as_secs_f64())
+}
+
+/// Works until all samples of a first pilot are there; false where they are not after half of the time there is, or soon after a wish to stop. Scenes that are so
+/// hard have nothing to choose by.
+fn run_first(pilot: &mut Rendering, asked: &Asked<'_>) -> Result<bool> {
+    let mut begun = None;
+    while let Some(progress) = pilot.step()? {
+        // The first step compiles.
+        let worked = begun.get_or_insert_with(Instant::now).elapsed();
+        let late = asked.goal.time.is_some_and(|time| worked >= time / 2);
+        if worked >= PATIENCE && (late || !asked.proceeds()) {
+            return Ok(progress.fraction >= 1.0);
+        }
+    }
+    Ok(true)
 }
 
 /// Works until all samples that were asked for are there.

@@ -279,7 +279,8 @@ pub(crate) fn light_is_sound(kind: &LightKind) -> bool {
     }
 }
 
-fn camera_is_sound(camera: &Camera) -> bool {
+/// Whether a camera can be used.
+pub(super) fn camera_is_sound(camera: &Camera) -> bool {
     let projection = match camera.projection {
         Projection::Perspective { fov_y } => fov_y > 0.0 && fov_y < std::f32::consts::PI,
         Projection::Orthographic { half_height } => half_height > 0.0 && half_height.is_finite(),

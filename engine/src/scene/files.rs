@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
+use super::check::camera_is_sound;
 use super::{Camera, Environment, EnvironmentUse, Note, Scene, SceneProfile, builtin, gltf, obj, ply, sidecar};
 use crate::input::{AnyFile, InputFile, InputFiles, InputLimits, Resolver};
 use crate::{Error, Result};
@@ -125,7 +126,7 @@ fn load_from(address_or_path: &str, files: &InputFiles<'_>) -> Result<Scene> {
         scene
     };
     scene.source = address_or_path.into();
-    complete(&mut scene);
+    complete(&mut scene)?;
     scene.check()?;
     Ok(scene)
 }
@@ -182,7 +183,10 @@ fn model(path: &Path, files: &InputFiles<'_>) -> Result<Scene> {
 }
 
 /// Adds what a picture needs and the file did not say.
-fn complete(scene: &mut Scene) {
+///
+/// # Errors
+/// [`Error::Scene`] for geometry so large that no camera can frame it.
+fn complete(scene: &mut Scene) -> Result<()> {
     let profile = SceneProfile::of(scene);
     if profile.triangles == 0 {
         scene.notes.push(Note {
@@ -192,7 +196,17 @@ fn complete(scene: &mut Scene) {
         });
     }
     if scene.cameras.is_empty() {
-        scene.cameras.push(framing_camera(&profile));
+        let camera = framing_camera(&profile);
+        if !camera_is_sound(&camera) {
+            // Coordinates that are no numbers are faults of their own.
+            scene.check()?;
+            let [low, high] = profile.bounds.unwrap_or_default();
+            let cause = format!(
+                "reaches from {low:?} m to {high:?} m: no camera can frame that, and the file has none. Scale it, leave out what lies far away, or give a camera"
+            );
+            return Err(Error::scene(&scene.source, "geometry", cause));
+        }
+        scene.cameras.push(camera);
         scene.notes.push(Note {
             feature: "no camera in the file".into(),
             at: "cameras".into(),
@@ -210,6 +224,7 @@ fn complete(scene: &mut Scene) {
             instead: "a uniform environment of radiance 1 is used".into(),
         });
     }
+    Ok(())
 }
 
 /// A camera that sees the whole bounding sphere from the front, a little from above and from the right.

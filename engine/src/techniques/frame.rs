@@ -12,6 +12,9 @@
 //! | before | the target may be written by compute shaders: earlier uses have been waited for | barriers among its own passes |
 //! | after | what compute shaders have written to the target is made visible to whoever reads it | all that it drew is there |
 //!
+//! Bounded: a step of [`Accumulated`] is one frame at least, which is never parted. How long one takes is the method's to bound: rays of
+//! [`ambient`](super::ambient) end at a quota, and [`preview`](super::preview) draws each triangle once a view, however much of the picture it covers.
+//!
 //! Deterministic: a frame's picture depends on scene, camera, size, settings, seed and number alone.
 
 use std::collections::BTreeMap;
@@ -30,6 +33,8 @@ use crate::{Error, Result};
 const FRAMES_MAX: u32 = 32;
 /// Samples of a step on software devices, about.
 const STEP_SAMPLES: u64 = 1 << 18;
+/// Seconds of a step, about, unless one frame takes longer: hosts look at the time and at wishes to stop between two steps.
+const STEP_SECONDS: f64 = 0.25;
 
 /// What a picture is drawn of.
 #[derive(Debug, Clone, Copy)]
@@ -144,6 +149,8 @@ pub struct Accumulated<M> {
     /// What frames share has been drawn.
     begun: bool,
     pace: Pace,
+    /// Seconds of a frame of the last step.
+    seconds_a_frame: f64,
     /// Most passes of a frame so far, the film's included.
     passes_a_frame: usize,
     /// Frames since it was made.
@@ -172,6 +179,7 @@ impl<M: FrameMethod> Accumulated<M> {
             done: 0,
             begun: false,
             pace: Pace::new(gpu.caps().kind, FRAMES_MAX),
+            seconds_a_frame: 0.0,
             passes_a_frame: 0,
             frames: 0,
         })
@@ -193,14 +201,16 @@ impl<M: FrameMethod> Accumulated<M> {
         &self.method
     }
 
-    /// Frames of the next step: one at first, which compiles the kernels, then as many as a watchdog has time for.
+    /// Frames of the next step: one at first, which compiles the kernels, then as many as a watchdog, or a host that waits, has time for.
     fn frames_for_step(&self) -> u32 {
         let [width, height] = self.film.size();
         if self.frames == 0 {
             return 1;
         }
         let unwatched = STEP_SAMPLES / (u64::from(width) * u64::from(height));
-        self.pace.units(1, unwatched.min(u64::from(FRAMES_MAX)) as u32)
+        let frames = self.pace.units(1, unwatched.min(u64::from(FRAMES_MAX)) as u32);
+        let in_time = STEP_SECONDS / self.seconds_a_frame.max(f64::MIN_POSITIVE);
+        frames.min(in_time as u32).max(1)
     }
 
     /// Draws `frames` frames, or as many as one recorder has room for, and says how many these were.
@@ -245,6 +255,7 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
             .map_or(timings.seconds(), |_| clock.elapsed().as_secs_f64());
         // The first step also compiles.
         if self.frames > 0 {
+            self.seconds_a_frame = seconds / f64::from(frames);
             self.pace.submitted(seconds, u64::from(frames));
         }
         self.begun = true;

@@ -129,7 +129,9 @@ pub struct View<'a> {
 
 /// A technique at work on one view. It refines its picture step by step.
 pub trait Technique: Send {
-    /// Does a bounded piece of work towards `samples` samples per pixel; `None` when there is nothing left to do.
+    /// Does a bounded piece of work towards `samples` samples per pixel, whatever the scene; `None` when there is nothing left to do. Whoever calls looks at time and
+    /// wishes to stop between two steps, so that a step is one submission or a few; samples that it leaves under way go on with the next one, and
+    /// [`Step::done`] counts them once they are on the film.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`].

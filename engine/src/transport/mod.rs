@@ -22,6 +22,7 @@ mod surface_spec;
 pub mod warp;
 
 pub use gpu_scene::GpuScene;
+pub(crate) use gpu_scene::ray_iterations;
 pub use path_set::PathSet;
 pub use surface_spec::surface_spec;
 pub(crate) use surface_spec::{COMPENSATION, METAL_LOBES, SURFACE_FEATURES};

@@ -7,7 +7,8 @@ use crate::gpu::{BufferView, Pass, Recorder};
 /// A stage between arrival and scattering, for instance one that asks a map of photons.
 pub trait ArrivalStage {
     /// Records it for all places of the queue. Places that its quota stops stall the wave with `STALLED_ARRIVAL` and are counted in
-    /// `status.unfinished`.
+    /// `status.unfinished`. A stage of long loops counts them by `count_work`, and leaves places for later by `leave_for_later` where `has_work_left` says no;
+    /// it is then recorded again, and has to pass over what it has done, which it may say in `walk_resume`.
     ///
     /// # Errors
     /// Those of recording.

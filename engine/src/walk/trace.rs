@@ -4,12 +4,12 @@
 
 use super::wave::stage_barrier;
 use crate::Result;
-use crate::gpu::shaders::constants::{NO_MEDIUM, SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
+use crate::gpu::shaders::constants::{NO_MEDIUM, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
 use crate::gpu::shaders::walk::{extend, shadow};
-use crate::gpu::{BufferView, ComputePipeline, Gpu, Pass, PipelineInfo, SOFTWARE_LOOP_CAP};
-use crate::transport::GpuScene;
+use crate::gpu::{BufferView, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo};
+use crate::transport::{GpuScene, ray_iterations};
 
 /// Loop iterations after which a ray goes on in a later dispatch, where nothing else is asked for: at most half of what a software driver runs.
 pub const RAY_QUOTA: u32 = 32_768;
@@ -27,14 +27,14 @@ const MEDIA_ALPHA_QUOTA_MAX: u32 = 512;
 /// # Errors
 /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where a leaf of the scene's index alone takes a software driver too many.
 pub fn ray_quota(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<u32> {
-    // With media half of the iterations are for walks through grids.
-    let (most, iterations) = match (scene.profile().has_alpha(), scene.profile().media.any()) {
-        (false, false) => (u32::MAX, SOFTWARE_LOOP_CAP),
-        (true, false) => (ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP),
-        (false, true) => (MEDIA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES),
-        (true, true) => (MEDIA_ALPHA_QUOTA_MAX, SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES_ALPHA),
-    };
     let filters = scene.profile().has_alpha();
+    let most = match (filters, scene.profile().media.any()) {
+        (false, false) => u32::MAX,
+        (true, false) => ALPHA_QUOTA_MAX,
+        (false, true) => MEDIA_QUOTA_MAX,
+        (true, true) => MEDIA_ALPHA_QUOTA_MAX,
+    };
+    let iterations = ray_iterations(scene.profile());
     scene
         .index_traversal()
         .quota_within(gpu.caps(), wanted.min(most), iterations, filters)
@@ -50,6 +50,7 @@ pub(super) struct TracePipelines {
 impl TracePipelines {
     /// For rays that begin, or for those that a quota stopped.
     pub fn new(gpu: &Gpu, scene: &GpuScene, index_quota: u32, shadows: bool, resumes: bool) -> Result<Self> {
+        let work_least = work_least(gpu.caps().kind);
         let (profile, index_kind) = (scene.profile(), scene.index_traversal().kind());
         let (has_alpha, has_media) = (profile.has_alpha(), profile.media.any());
         // Attributes are read for alpha alone.
@@ -63,6 +64,7 @@ impl TracePipelines {
             index_quota,
             index_kind,
             resumes,
+            work_least,
             ..Default::default()
         };
         let shadow = shadow::Spec {
@@ -76,6 +78,7 @@ impl TracePipelines {
             index_quota,
             index_kind,
             resumes,
+            work_least,
             ..Default::default()
         };
         Ok(Self {
@@ -97,9 +100,10 @@ impl TracePipelines {
         wave: &WaveSet<'_>,
         key: WalkKey,
         items: BufferView<'_>,
+        goes_on: bool,
     ) -> Result<()> {
         let (index, set) = (scene.index_set(), scene.scene_set());
-        pass.dispatch_indirect(&self.extend, &[wave, &index, &set], &push(scene, key), items)?;
+        pass.dispatch_indirect(&self.extend, &[wave, &index, &set], &push(scene, key, goes_on), items)?;
         stage_barrier(pass);
         Ok(())
     }
@@ -112,10 +116,11 @@ impl TracePipelines {
         wave: &WaveSet<'_>,
         key: WalkKey,
         rays: BufferView<'_>,
+        goes_on: bool,
     ) -> Result<()> {
         if let Some(shadow) = &self.shadow {
             let (index, set, media) = (scene.index_set(), scene.scene_set(), scene.media_set());
-            let push = bytemuck::cast(push(scene, key));
+            let push = bytemuck::cast(push(scene, key, goes_on));
             pass.dispatch_indirect(shadow, &[wave, &index, &set, &media], &push, rays)?;
             stage_barrier(pass);
         }
@@ -123,10 +128,19 @@ impl TracePipelines {
     }
 }
 
-/// What both stages are told.
-fn push(scene: &GpuScene, key: WalkKey) -> extend::Push {
+/// Loop iterations of a ray from which on they count as work of a submission: atomics are cheap beside them on software devices, where rays are slow.
+fn work_least(kind: DeviceKind) -> u32 {
+    match kind {
+        DeviceKind::Cpu => WORK_UNIT,
+        _ => 16 * WORK_UNIT,
+    }
+}
+
+/// What both stages are told; `goes_on` where an earlier dispatch has handled a part of the places.
+fn push(scene: &GpuScene, key: WalkKey, goes_on: bool) -> extend::Push {
     extend::Push {
         key,
         surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
+        goes_on: goes_on.into(),
     }
 }

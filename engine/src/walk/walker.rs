@@ -1,4 +1,8 @@
-//! The loop that follows a wave of walks to their ends, in as many submissions as it takes.
+//! Follows a wave of walks to their ends, submission by submission, each a bounded piece of work.
+//!
+//! What bounds a submission: a place of the wave takes its quota at most, bounces are as few as the walks are many, and [`WalkOptions::work`] of long rays, walks
+//! through grids and queries of maps; once that is used up, no further place is begun. Its stage stalls, whatever is recorded behind it leaves at once, and the
+//! next submission goes on with the places that are not done. Every place does the same work in whichever submission, so that none of it shows.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -9,11 +13,21 @@ use super::stall::StallWatch;
 use super::trace::{RAY_QUOTA, TracePipelines, ray_quota};
 use super::wave::{MediumCounts, Status, WaveBuffers, group_counts, indirect};
 use crate::Result;
-use crate::gpu::shaders::constants::{STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SHADOW};
+use crate::gpu::shaders::constants::{
+    STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SCATTER, STALLED_SHADOW, WORK_UNIT,
+};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
-use crate::gpu::{Access, Gpu, Pace, Pass, PipelineInfo, Recorder, Timings, wide_counter};
+use crate::gpu::{Access, DeviceKind, Gpu, Pace, Pass, PipelineInfo, Recorder, Timings, wide_counter};
 use crate::transport::GpuScene;
+
+/// Work of a submission where nothing else is asked for, in loop iterations that count: some tenths of a second on two cores, and less on others.
+const SOFTWARE_WORK: u64 = 1 << 24;
+const DEVICE_WORK: u64 = 1 << 30;
+/// Most units of work of a submission: what the places under way take besides must not pass the least of an `i32`.
+const WORK_UNITS_MAX: u64 = 1 << 30;
+/// Rays of the bounces of a submission on software devices, about, unless one bounce has more.
+const SOFTWARE_RAYS: u32 = 1 << 18;
 
 /// How a walker goes about it. None of it changes what walks compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,8 +39,11 @@ pub struct WalkOptions {
     /// Loop iterations after which a ray goes on in a later dispatch; see [`ray_quota`].
     pub ray_quota: u32,
     /// Bounces recorded into one command buffer, at most: about as many as most walks have. Devices that a driver watches get as many as take a fraction of a
-    /// second, by what the last submission took, but one at least, of all walks: fewer slots make it shorter.
+    /// second, by what the last submission took, software devices about 2¹⁸ rays, but one at least, of all walks: fewer slots make it shorter.
     pub bounces: usize,
+    /// Loop iterations after which a submission begins nothing more: those of long rays, four times those of walks through grids of densities, and those of
+    /// queries of maps. The places under way end as their quotas say. 0 chooses by the kind of device.
+    pub work: u64,
 }
 
 impl Default for WalkOptions {
@@ -36,6 +53,7 @@ impl Default for WalkOptions {
             shadows: true,
             ray_quota: RAY_QUOTA,
             bounces: 12,
+            work: 0,
         }
     }
 }
@@ -118,8 +136,101 @@ pub struct Walked {
     pub waited: u64,
     /// Submissions that ended with rays or places stopped by a quota, which then went on.
     pub stalls: u64,
+    /// Submissions that ended with places left for later, since their work was used up.
+    pub postponed: u64,
+    /// Submissions, and the loop iterations that count as their work, rounded down ray by ray.
+    pub submissions: u64,
+    /// See `submissions`.
+    pub work: u64,
     /// What happened in media.
     pub media: MediumCounts,
+}
+
+/// A wave of walks under way: what [`Walker::begin`] makes and [`Walker::advance`] takes on.
+pub struct WaveInFlight {
+    key: WalkKey,
+    status: Status,
+    next: Next,
+    /// Some rays of the stage that goes on were stopped by a quota, rather than left for later before they began.
+    resumes: bool,
+    /// Places of the bounce at which an arrival stage was stopped by its quota.
+    stopped: u32,
+    watch: StallWatch,
+    walked: Walked,
+}
+
+/// What the next submission of a wave begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Next {
+    /// Where walks start.
+    Start,
+    /// The next bounce.
+    Bounce,
+    /// Rays of a bounce that are not at their closest hits yet.
+    Hits,
+    /// The arrival stage, at the places that it has not looked at yet.
+    Arrival,
+    /// What the arrival stage lacks where it was stopped, from this part on.
+    Stopped(u64),
+    /// Scattering, at the places where it was not done yet.
+    Scatter,
+    /// Shadow rays that are not at their ends yet.
+    Shadows,
+    /// Nothing: all walks have ended.
+    End,
+}
+
+impl Next {
+    /// Whether the closest hits of the first bounce of a submission, and then its arrival stage, are still to be recorded.
+    fn has_hits(self) -> bool {
+        !matches!(self, Self::Arrival | Self::Scatter)
+    }
+
+    fn has_arrival(self) -> bool {
+        self != Self::Scatter
+    }
+}
+
+impl WaveInFlight {
+    /// What it has taken so far.
+    pub fn walked(&self) -> &Walked {
+        &self.walked
+    }
+
+    /// The timings of the submissions since they were taken last.
+    pub fn take_timings(&mut self) -> Vec<Timings> {
+        std::mem::take(&mut self.walked.timings)
+    }
+
+    /// Whether all walks have ended and nothing waits.
+    pub fn has_ended(&self) -> bool {
+        self.next == Next::End
+    }
+
+    /// After a submission that began with `from`: what the next one begins with.
+    fn follow(&mut self, from: Next) -> Next {
+        let status = &self.status;
+        let (stops, postpones) = (status.unfinished > 0, status.unstarted > 0);
+        match status.stalled {
+            STALLED_EXTEND => {
+                self.resumes = stops || (self.resumes && from == Next::Hits);
+                Next::Hits
+            }
+            STALLED_SHADOW => {
+                self.resumes = stops || (self.resumes && from == Next::Shadows);
+                Next::Shadows
+            }
+            STALLED_ARRIVAL => {
+                self.stopped += status.unfinished;
+                if postpones { Next::Arrival } else { Next::Stopped(0) }
+            }
+            STALLED_SCATTER => Next::Scatter,
+            // The arrival stage alone has been recorded.
+            _ if self.stopped > 0 => Next::Stopped(0),
+            _ if status.active_count > 0 => Next::Bounce,
+            _ => Next::End,
+        }
+    }
 }
 
 /// Follows waves of walks through a scene.
@@ -131,6 +242,8 @@ pub struct Walker {
     bounces: u32,
     /// Loop iterations of a ray in one dispatch.
     quota: u32,
+    /// Units of work of a submission.
+    work_units: u32,
     trace: TracePipelines,
     /// The same for rays that a quota stopped; made when the first one is.
     resume: Option<TracePipelines>,
@@ -145,13 +258,13 @@ impl Bounce<'_> {
     /// # Errors
     /// Those of recording.
     pub fn record_shadow(&self, recorder: &mut Recorder) -> Result<()> {
-        self.record_shadow_by(recorder, &self.walker.trace)
+        self.record_shadow_by(recorder, &self.walker.trace, false)
     }
 
-    fn record_shadow_by(&self, recorder: &mut Recorder, trace: &TracePipelines) -> Result<()> {
+    fn record_shadow_by(&self, recorder: &mut Recorder, trace: &TracePipelines, goes_on: bool) -> Result<()> {
         let (walker, rays) = (self.walker, self.places.waiting);
         recorder.pass(&walker.pass("shadow"), |pass| {
-            trace.record_shadow(pass, &walker.scene, &self.wave, self.key, rays)
+            trace.record_shadow(pass, &walker.scene, &self.wave, self.key, rays, goes_on)
         })
     }
 }
@@ -167,6 +280,11 @@ impl Walker {
         buffers.needs().check(scene.profile().media.any(), options.shadows)?;
         let quota = ray_quota(gpu, &scene, options.ray_quota)?;
         let bounces = u32::try_from(options.bounces).unwrap_or(u32::MAX).max(1);
+        let work = match (options.work, gpu.caps().kind) {
+            (0, DeviceKind::Cpu) => SOFTWARE_WORK,
+            (0, _) => DEVICE_WORK,
+            (wanted, _) => wanted,
+        };
         Ok(Self {
             trace: TracePipelines::new(gpu, &scene, quota, options.shadows, false)?,
             resume: None,
@@ -177,6 +295,7 @@ impl Walker {
             options,
             bounces,
             quota,
+            work_units: (work / u64::from(WORK_UNIT)).clamp(1, WORK_UNITS_MAX) as u32,
             buffers,
         })
     }
@@ -196,41 +315,75 @@ impl Walker {
         self.compaction.info().into()
     }
 
-    /// Follows `walks` walks, at most as many as there are slots, until all have ended and nothing waits.
+    /// Follows `walks` walks, at most as many as there are slots, until all have ended and nothing waits, however many submissions that takes.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for more walks than slots, [`Error::DeviceLost`](crate::Error::DeviceLost),
-    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end,
-    /// and those of the stages. What failed for another reason than a lost device can be run again.
+    /// As [`Walker::begin`] and [`Walker::advance`].
     pub fn run(&mut self, key: WalkKey, walks: u32, stages: &mut dyn WalkStages) -> Result<Walked> {
+        let mut wave = self.begin(key, walks)?;
+        while !wave.has_ended() {
+            self.advance(&mut wave, stages)?;
+        }
+        Ok(wave.walked)
+    }
+
+    /// A wave of `walks` walks, at most as many as there are slots, before its first submission. A walker has the memory of one: what was under way is given up.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for more walks than slots.
+    pub fn begin(&mut self, key: WalkKey, walks: u32) -> Result<WaveInFlight> {
         if walks > self.buffers.slots() {
             let cause = format!("is more than the wave's {} slots", self.buffers.slots());
             return Err(crate::Error::setting("walks", walks, cause));
         }
-        let mut status = Status {
-            active_count: walks,
-            ..Status::default()
-        };
-        let mut walked = Walked::default();
-        let mut watch = StallWatch::new(self.quota);
-        let mut begins = true;
         self.pace.begin();
-        while begins || status.active_count > 0 || status.stalled != STALLED_NOT {
-            let (rounds, stalled) = (status.rounds, status.stalled != STALLED_NOT);
-            walked.stalls += u64::from(stalled);
-            if let Some(arrival) = stages.arrival().filter(|_| status.stalled == STALLED_ARRIVAL) {
-                self.submit_stopped(&status, arrival, &mut walked.timings)?;
+        Ok(WaveInFlight {
+            key,
+            status: Status {
+                active_count: walks,
+                ..Status::default()
+            },
+            next: Next::Start,
+            resumes: false,
+            stopped: 0,
+            watch: StallWatch::new(self.quota),
+            walked: Walked::default(),
+        })
+    }
+
+    /// One submission towards the end of a wave, the last one that was begun: a bounded piece of work, whatever the scene. The stages are those of the whole wave.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory),
+    /// [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end, and those of the stages. What failed for another reason than a lost
+    /// device can be begun again.
+    pub fn advance(&mut self, wave: &mut WaveInFlight, stages: &mut dyn WalkStages) -> Result<()> {
+        let from = wave.next;
+        wave.next = match from {
+            Next::End => return Ok(()),
+            Next::Stopped(part) => match self.submit_stopped(wave, stages, part)? {
+                Some(part) => Next::Stopped(part),
+                None => {
+                    wave.stopped = 0;
+                    Next::Scatter
+                }
+            },
+            _ => {
+                let rounds = wave.status.rounds;
+                self.submit(wave, stages)?;
+                let (stops, postpones) = (wave.status.unfinished > 0, wave.status.unstarted > 0);
+                wave.walked.stalls += u64::from(stops);
+                wave.walked.postponed += u64::from(postpones);
+                // A submission that leaves places for later says nothing of how long rays are.
+                if !postpones {
+                    let goes_on = matches!(from, Next::Hits | Next::Shadows);
+                    wave.watch.submitted(goes_on && stops && wave.status.rounds == rounds)?;
+                }
+                wave.follow(from)
             }
-            walked.timings.push(self.submit(key, &mut status, begins, stages)?);
-            begins = false;
-            watch.submitted(stalled && status.stalled != STALLED_NOT && status.rounds == rounds)?;
-        }
-        walked.rays = wide_counter(status.rays);
-        walked.waited = wide_counter(status.waited);
-        if let Some(media) = &self.buffers.media {
-            walked.media = media.counts()?;
-        }
-        Ok(walked)
+        };
+        wave.walked.submissions += 1;
+        Ok(())
     }
 
     /// The name of a pass of its own.
@@ -252,48 +405,46 @@ impl Walker {
         }
     }
 
-    /// Submits what an arrival stage lacks at the places that it has stopped at.
-    fn submit_stopped(&self, status: &Status, arrival: &dyn ArrivalStage, timings: &mut Vec<Timings>) -> Result<()> {
-        let wave = self.buffers.set(status.rounds as usize % 2);
-        let stopped = StoppedPlaces {
-            places: status.active_count,
-            stopped: status.unfinished,
+    /// Submits a part of what an arrival stage lacks at the places that it has stopped at; the part to go on with.
+    fn submit_stopped(&self, wave: &mut WaveInFlight, stages: &dyn WalkStages, part: u64) -> Result<Option<u64>> {
+        let Some(arrival) = stages.arrival() else {
+            return Ok(None);
         };
-        arrival.prepare_stopped()?;
-        let mut part = Some(0);
-        while let Some(first) = part {
-            let mut recorder = self.gpu.recorder(&format!("{} arrivals", self.options.name))?;
-            part = arrival.record_stopped(&mut recorder, &wave, stopped, first)?;
-            timings.push(recorder.submit()?.wait()?);
+        let set = self.buffers.set(wave.status.rounds as usize % 2);
+        let stopped = StoppedPlaces {
+            places: wave.status.active_count,
+            stopped: wave.stopped,
+        };
+        if part == 0 {
+            arrival.prepare_stopped()?;
         }
-        Ok(())
+        let mut recorder = self.gpu.recorder(&format!("{} arrivals", self.options.name))?;
+        let next = arrival.record_stopped(&mut recorder, &set, stopped, part)?;
+        wave.walked.timings.push(recorder.submit()?.wait()?);
+        Ok(next)
     }
 
     /// Submits some bounces of a wave, the first ones with its start, and reads how far they came.
-    fn submit(
-        &mut self,
-        key: WalkKey,
-        status: &mut Status,
-        begins: bool,
-        stages: &mut dyn WalkStages,
-    ) -> Result<Timings> {
-        let stalled = status.stalled;
-        let rays_stalled = stalled == STALLED_EXTEND || stalled == STALLED_SHADOW;
-        if rays_stalled && self.resume.is_none() {
+    fn submit(&mut self, wave: &mut WaveInFlight, stages: &mut dyn WalkStages) -> Result<()> {
+        let (from, key) = (wave.next, wave.key);
+        let resumes = wave.resumes && matches!(from, Next::Hits | Next::Shadows);
+        if resumes && self.resume.is_none() {
             let shadows = self.options.shadows;
             self.resume = Some(TracePipelines::new(&self.gpu, &self.scene, self.quota, shadows, true)?);
         }
-        let resume = self.resume.as_ref().filter(|_| rays_stalled);
+        let trace = self.resume.as_ref().filter(|_| resumes).unwrap_or(&self.trace);
         let mut recorder = self.gpu.recorder(&format!("{} wave", self.options.name))?;
         stages.record_before(&mut recorder, &self.buffers)?;
+        let mut status = wave.status;
         // A stalled round leaves no groups to dispatch.
         let groups = group_counts(status.active_count);
         (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
         status.waiting_groups = group_counts(status.waiting_count)[0];
-        (status.stalled, status.unfinished) = (STALLED_NOT, 0);
+        (status.stalled, status.unfinished, status.unstarted) = (STALLED_NOT, 0, 0);
+        status.work_left = self.work_units as i32;
         recorder.pass(&self.pass("begin"), |pass| {
-            pass.update(self.buffers.status.view(), &[*status])?;
-            if begins {
+            pass.update(self.buffers.status.view(), &[status])?;
+            if from == Next::Start {
                 if let Some(media) = &self.buffers.media {
                     media.reset(pass)?;
                 }
@@ -306,26 +457,39 @@ impl Walker {
             );
             Ok(())
         })?;
-        if begins {
+        if from == Next::Start {
             // Its output is the input of the first bounce, whose parity is 0.
             stages.record_start(&mut recorder, &self.buffers.set(1))?;
         }
-        if let Some(resume) = resume.filter(|_| stalled == STALLED_SHADOW) {
+        if from == Next::Shadows {
             let bounce = self.bounce(key, status.rounds as usize % 2);
-            bounce.record_shadow_by(&mut recorder, resume)?;
+            bounce.record_shadow_by(&mut recorder, trace, true)?;
         }
-        for index in 0..self.pace.units(status.active_count, self.bounces) as usize {
-            let bounce = self.bounce(key, (status.rounds as usize + index) % 2);
-            let resumed = resume.filter(|_| stalled == STALLED_EXTEND && index == 0);
-            // An arrival stage that was stopped has gone on already.
-            if stalled != STALLED_ARRIVAL || index > 0 {
-                self.record_arrival(&mut recorder, &bounce, resumed.unwrap_or(&self.trace), stages)?;
+        // Places at which the arrival stage was stopped come before scattering.
+        let arrival_alone = from == Next::Arrival && wave.stopped > 0;
+        let bounces = if arrival_alone {
+            1
+        } else {
+            self.bounces_of(status.active_count)
+        };
+        for index in 0..bounces {
+            let bounce = self.bounce(key, (status.rounds + index) as usize % 2);
+            let first = if index == 0 { from } else { Next::Bounce };
+            if first.has_hits() {
+                let goes_on = first == Next::Hits;
+                let trace = if goes_on { trace } else { &self.trace };
+                self.record_hits(&mut recorder, &bounce, trace, goes_on)?;
             }
-            stages.record_scatter(&mut recorder, &bounce)?;
-            recorder.pass(&self.pass("compact"), |pass| {
-                self.compaction.record(pass, &self.buffers, &bounce.wave, bounce.places)
-            })?;
-            stages.record_waiting(&mut recorder, &bounce)?;
+            if let Some(arrival) = stages.arrival().filter(|_| first.has_arrival()) {
+                arrival.record(&mut recorder, &bounce.wave, bounce.places)?;
+            }
+            if !arrival_alone {
+                stages.record_scatter(&mut recorder, &bounce)?;
+                recorder.pass(&self.pass("compact"), |pass| {
+                    self.compaction.record(pass, &self.buffers, &bounce.wave, bounce.places)
+                })?;
+                stages.record_waiting(&mut recorder, &bounce)?;
+            }
         }
         recorder.pass(&self.pass("read status"), |pass| {
             pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
@@ -347,25 +511,37 @@ impl Walker {
             .untimed
             .map_or(timings.seconds(), |_| clock.elapsed().as_secs_f64());
         let rays_before = wide_counter(status.rays);
-        *status = self.buffers.readback.read::<Status>(0, 1)?[0];
-        self.pace.submitted(seconds, wide_counter(status.rays) - rays_before);
-        Ok(timings)
+        wave.status = self.buffers.readback.read::<Status>(0, 1)?[0];
+        let walked = &mut wave.walked;
+        walked.timings.push(timings);
+        walked.rays = wide_counter(wave.status.rays);
+        walked.waited = wide_counter(wave.status.waited);
+        let units = i64::from(self.work_units) - i64::from(wave.status.work_left);
+        walked.work += units.unsigned_abs() * u64::from(WORK_UNIT);
+        if let Some(media) = &self.buffers.media {
+            walked.media = media.counts()?;
+        }
+        self.pace.submitted(seconds, walked.rays - rays_before);
+        Ok(())
     }
 
-    /// The closest hits of a bounce, and what is gathered there.
-    fn record_arrival(
+    /// Bounces of a submission that begins with so many walks.
+    fn bounces_of(&self, walks: u32) -> u32 {
+        let unwatched = (SOFTWARE_RAYS / walks.max(1)).clamp(1, self.bounces);
+        self.pace.units(walks, unwatched)
+    }
+
+    /// The closest hits of a bounce.
+    fn record_hits(
         &self,
         recorder: &mut Recorder,
         bounce: &Bounce<'_>,
         trace: &TracePipelines,
-        stages: &dyn WalkStages,
+        goes_on: bool,
     ) -> Result<()> {
         recorder.pass(&self.pass("extend"), |pass| {
-            trace.record_extend(pass, &self.scene, &bounce.wave, bounce.key, bounce.places.items)
-        })?;
-        match stages.arrival() {
-            Some(arrival) => arrival.record(recorder, &bounce.wave, bounce.places),
-            None => Ok(()),
-        }
+            let items = bounce.places.items;
+            trace.record_extend(pass, &self.scene, &bounce.wave, bounce.key, items, goes_on)
+        })
     }
 }

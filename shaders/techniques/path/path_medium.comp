@@ -123,6 +123,16 @@ void main() {
     if (status.stalled != STALLED_NOT || place >= status.active_count) {
         return;
     }
+    if (HAS_GRIDS) {
+        if (walk_resume[place] == PLACE_SCATTERED) {
+            return;
+        }
+        if (!has_work_left()) {
+            leave_for_later(STALLED_SCATTER);
+            return;
+        }
+        walk_resume[place] = PLACE_SCATTERED;
+    }
     uint slot = load_slot(place);
     WalkState path = load_walk(slot);
     uint automaton = 0u;
@@ -196,6 +206,7 @@ void main() {
             reached = resumed_start(way.start, walk.entry + walk.t);
             // The search that goes on from the surface itself would miss it.
             outcome = outcome == GRID_STOPPED && reached >= way.end ? GRID_LEFT : outcome;
+            count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
             COUNT_MEDIUM(null_collisions, walk.nulls)
             COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == GRID_COLLIDED ? 1u : 0u))
         }

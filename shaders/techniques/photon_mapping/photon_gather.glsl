@@ -4,7 +4,7 @@
 // A query is one loop, in which a step is a node or a record. With COMPACT_PACKET defined a subgroup goes through the map together,
 // wherever any of its points lies; the sums are the same bits, as each point meets its kernels in the same order. A query that its quota stops
 // leaves nothing, marks its place and stalls the wave: such places go through all records instead (LINEAR), so many a dispatch, whatever queue they
-// came from.
+// came from. Queries that are left for later, since the submission's work is used up, stall the wave before they begin.
 //
 // PM-DE-1, PM-DE-3 to PM-DE-5, PM-ST-5, PM-ST-6: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §3.4.2, §5.2, §6.2.3 and §7.4.2. Deterministic: a
 // path's sum has the order of the map's leaves, or of its records.
@@ -21,8 +21,9 @@ layout(constant_id = 43) const bool LINEAR = false;        // goes through recor
 layout(constant_id = 45) const bool NEAREST = false;       // one kernel about the point, up to its `neighbors`-th photon
 layout(constant_id = 46) const uint QUEUE = QUEUE_SLOTS;
 
-// Stands in walk_resume for a query that its quota stopped.
+// Stand in walk_resume for a query that its quota stopped, and for a place that has none or is done.
 const uint GATHER_STOPPED = 0xFFFFFFFEu;
+const uint GATHER_DONE = 0xFFFFFFFCu;
 // Photons count where their surface's normal is less than 60 degrees from that of the point: not through thin walls nor around corners.
 const float PHOTON_NORMAL_COS_MIN = 0.5;
 
@@ -221,12 +222,27 @@ void main() {
     if (!wave_has_arrived() || place >= status.active_count || (LINEAR && walk_resume[place] != GATHER_STOPPED)) {
         return;
     }
+    if (!LINEAR) {
+        uint resume = walk_resume[place];
+        if (resume == GATHER_STOPPED || resume == GATHER_DONE) {
+            return;
+        }
+        if (!has_work_left()) {
+            leave_for_later(STALLED_ARRIVAL);
+            return;
+        }
+        walk_resume[place] = GATHER_DONE;
+    }
     uint slot = load_slot(place);
     vec3 throughput;
     if (!begin_gather(slot, place, throughput)) {
         return;
     }
-    if (!gather_photons()) {
+    bool complete = gather_photons();
+    if (!LINEAR) {
+        count_work(compact_steps, WORK_UNIT);
+    }
+    if (!complete) {
         walk_resume[place] = GATHER_STOPPED;
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_ARRIVAL);

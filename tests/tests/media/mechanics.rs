@@ -44,17 +44,34 @@ fn how_the_work_is_cut_up_never_shows() {
         let truth = render(gpu, &scene, [24, 16], 8, &PathTracerSettings::default());
         assert!(truth.mean()[0].0 > 0.0);
         println!("{:?}", truth.counters);
-        for (paths_in_flight, ray_quota) in [(0, 32_768), (64, 32_768), (1000, 128)] {
+        for (paths_in_flight, ray_quota, submission_work) in [
+            (0, 32_768, 0),
+            (64, 32_768, 0),
+            (1000, 128, 0),
+            (0, 32_768, 4096),
+            (1000, 128, 4096),
+        ] {
+            let what = format!("{paths_in_flight} {ray_quota} {submission_work}");
             let settings = PathTracerSettings {
                 paths_in_flight,
                 ray_quota,
+                submission_work,
                 ..PathTracerSettings::default()
             };
             let picture = render(gpu, &scene, [24, 16], 8, &settings);
-            assert_eq!(picture.bits(), truth.bits(), "{paths_in_flight} {ray_quota}");
+            assert_eq!(picture.bits(), truth.bits(), "{what}");
+            assert_eq!(
+                picture.counters.postponed > 0,
+                submission_work > 0,
+                "{what}: {:?}",
+                picture.counters
+            );
             let (mut a, mut b) = (picture.counters, truth.counters);
-            (a.waves, a.stalls, b.waves, b.stalls) = (0, 0, 0, 0);
-            assert_eq!(a, b, "{paths_in_flight} {ray_quota}");
+            for counters in [&mut a, &mut b] {
+                (counters.waves, counters.stalls, counters.postponed) = (0, 0, 0);
+                (counters.submissions, counters.work) = (0, 0);
+            }
+            assert_eq!(a, b, "{what}");
         }
     });
 }

@@ -1,6 +1,6 @@
 //! The last look at a scene's media: indices in range, coefficients that can be, grids as long as their size says, and sizes that fit.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{DensityGrid, Medium, Phase};
 use crate::scene::{AlphaMode, Material, Scene};
@@ -9,6 +9,9 @@ use crate::scene::{AlphaMode, Material, Scene};
 pub const MAX_MEDIA: usize = 1 << 12;
 /// Most cells of all density grids of a scene together: 512 MiB.
 pub const MAX_DENSITY_CELLS: u64 = 1 << 27;
+/// Greatest optical depth of a grid: its greatest density times the extinction times its diagonal. A walk through it makes as many tentative collisions,
+/// whatever else the grid holds; with more, f32 does not tell one place of them from the next, and a path takes minutes.
+pub const MAX_GRID_DEPTH: f64 = (1u32 << 24) as f64;
 
 type Fault = (String, String);
 
@@ -75,6 +78,17 @@ fn check_medium(medium: &Medium) -> Result<(), Fault> {
     if !(medium.sigma_t() * greatest).is_finite() || !(medium.emission * greatest).is_finite() {
         return fault("sigma_t", "or emission times the greatest density is not finite");
     }
+    if let Some(grid) = &medium.density {
+        let diagonal = grid.to_world.transform_vector3(DVec3::ONE).length();
+        let depth = f64::from(medium.sigma_t().max_element()) * f64::from(greatest) * diagonal;
+        if depth.is_nan() || depth > MAX_GRID_DEPTH {
+            let cause = format!(
+                "has a greatest density of {greatest} in a grid whose diagonal is {diagonal} m: with the extinction an optical depth of {depth:.3e}, through \
+                 which no path would end in time; at most {MAX_GRID_DEPTH:.3e} is allowed. Lower the density, the extinction or the size, or take a surface instead"
+            );
+            return fault("density", cause);
+        }
+    }
     Ok(())
 }
 
@@ -130,7 +144,7 @@ fn check_use(material: &Material, media: usize) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DAffine3, DVec3};
+    use glam::DAffine3;
 
     use super::*;
     use crate::scene::builtin::generate;
@@ -223,8 +237,29 @@ mod tests {
                 "flattens",
             ),
             (grid_refusal(|g| g.to_world.translation.x = f64::NAN), "to_world"),
+            (grid_refusal(|g| g.values[5] = 1e30), "at most 1.678e7"),
+            (
+                grid_refusal(|g| g.to_world = DAffine3::from_scale(DVec3::splat(1e8))),
+                "optical depth",
+            ),
         ] {
             assert!(message.contains(expected), "{expected}: {message}");
         }
+    }
+
+    #[test]
+    fn thick_grids_are_refused_where_walks_would_not_end_and_not_before() {
+        // An extinction of 2, a diagonal of √3, and one cell that is not empty.
+        let depth = |density: f32| {
+            let mut scene = scene();
+            let grid = scene.media[0].density.as_mut().expect("grid");
+            grid.values.iter_mut().for_each(|value| *value = 0.0);
+            grid.values[0] = density;
+            scene.check()
+        };
+        let most = MAX_GRID_DEPTH / (2.0 * 3f64.sqrt());
+        depth((0.999 * most) as f32).expect("a depth just below");
+        depth((1.001 * most) as f32).expect_err("a depth just above");
+        depth(0.0).expect("nothing");
     }
 }

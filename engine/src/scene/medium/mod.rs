@@ -15,7 +15,7 @@ pub mod raw;
 pub mod vol;
 
 pub(super) use check::check;
-pub use check::{MAX_DENSITY_CELLS, MAX_MEDIA};
+pub use check::{MAX_DENSITY_CELLS, MAX_GRID_DEPTH, MAX_MEDIA};
 pub use grid::DensityGrid;
 pub use majorant::MajorantGrid;
 

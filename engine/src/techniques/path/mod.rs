@@ -38,7 +38,9 @@ use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::settings::TypedSettings;
 use crate::transport::GpuScene;
-use crate::walk::{ArrivalStage, WalkOptions, Walker, WaveBuffers, WaveNeeds, default_slots, slots_of_device};
+use crate::walk::{
+    ArrivalStage, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots, slots_of_device,
+};
 use glam::DVec3;
 
 /// Exact counts of what the device did.
@@ -61,6 +63,12 @@ pub struct PathCounters {
     pub density_lookups: u64,
     /// Submissions that ended with rays stopped by the quota, which then went on.
     pub stalls: u64,
+    /// Submissions that ended with paths left for later, since their work was used up.
+    pub postponed: u64,
+    /// Submissions of waves. Their number may differ from run to run where paths are left for later.
+    pub submissions: u64,
+    /// Loop iterations of long rays and of walks through density grids, and steps of queries of maps: what bounds a submission.
+    pub work: u64,
 }
 
 /// A progressive rendering of one view.
@@ -75,9 +83,20 @@ pub struct PathTracer {
     walker: Walker,
     aovs: Buffer,
     film: GpuFilm,
+    /// The last whole wave, until it has reached the film.
     pending: Option<Wave>,
+    /// The wave under way.
+    in_flight: Option<InFlight>,
     cursor: Cursor,
     counters: PathCounters,
+}
+
+/// A wave under way.
+struct InFlight {
+    wave: Wave,
+    /// Where the one after it begins.
+    next: Cursor,
+    walks: WaveInFlight,
 }
 
 impl PathTracer {
@@ -120,6 +139,7 @@ impl PathTracer {
             name: "path",
             shadows: needs.waiting,
             ray_quota: settings.ray_quota,
+            work: settings.submission_work,
             ..WalkOptions::default()
         };
         let walker = Walker::new(gpu, Arc::clone(&scene), buffers, options)?;
@@ -134,6 +154,7 @@ impl PathTracer {
             aovs,
             film,
             pending: None,
+            in_flight: None,
             cursor: Cursor::default(),
             counters: PathCounters::default(),
         })
@@ -151,7 +172,7 @@ impl PathTracer {
         self.pipelines.camera = pipeline;
         self.frame = frame;
         self.eye = camera.transform.translation;
-        self.pending = None;
+        (self.pending, self.in_flight) = (None, None);
         self.cursor = Cursor::default();
         Ok(())
     }
@@ -163,12 +184,13 @@ impl PathTracer {
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear()?;
         self.settings.seed = seed;
-        self.pending = None;
+        (self.pending, self.in_flight) = (None, None);
         self.cursor = Cursor::default();
         Ok(())
     }
 
-    /// Renders one more wave towards `samples` samples per pixel; `None` when all are there. The first wave also compiles the kernels.
+    /// Makes one submission towards `samples` samples per pixel, a bounded piece of work whatever the scene; `None` when all samples are there. A wave that takes
+    /// more than one goes on with the next step where it was, and its samples count once all of its paths have ended. The first wave also compiles the kernels.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end.
@@ -178,19 +200,36 @@ impl PathTracer {
 
     /// As [`PathTracer::step`], with a stage of a technique's own in each bounce.
     pub(crate) fn step_with(&mut self, samples: u32, arrival: Option<&dyn ArrivalStage>) -> Result<Option<Step>> {
+        // A wave under way goes on, whatever is asked for meanwhile; one that fails is rendered again by the next step.
+        let mut in_flight = match self.in_flight.take() {
+            Some(in_flight) => in_flight,
+            None => {
+                let Some((wave, next)) = self.cursor.next_wave(&self.film, self.slots(), samples) else {
+                    return Ok(None);
+                };
+                let walks = self.walker.begin(wave.key(self.settings.seed), wave.paths())?;
+                InFlight { wave, next, walks }
+            }
+        };
+        let timings = self.advance(&mut in_flight, arrival)?;
+        if in_flight.walks.has_ended() {
+            self.cursor = in_flight.next;
+            self.pending = Some(in_flight.wave);
+        } else {
+            self.in_flight = Some(in_flight);
+        }
+        Ok(Some(self.step_so_far(timings, samples)))
+    }
+
+    /// What is there towards `samples` samples per pixel, after submissions that took `timings`.
+    pub(crate) fn step_so_far(&self, timings: Vec<Timings>, samples: u32) -> Step {
         let [width, height] = self.film.size();
         let wanted = u64::from(samples) * u64::from(width) * u64::from(height);
-        let Some((wave, next)) = self.cursor.next_wave(&self.film, self.slots(), samples) else {
-            return Ok(None);
-        };
-        // A wave that fails is rendered again by the next step.
-        let timings = self.run(&wave, arrival)?;
-        self.cursor = next;
-        Ok(Some(Step {
+        Step {
             timings,
             done: self.cursor.done.min(wanted),
             wanted,
-        }))
+        }
     }
 
     /// Renders until every pixel has `samples` samples.
@@ -210,6 +249,11 @@ impl PathTracer {
     /// Paths under way together, at most.
     pub(crate) fn slots(&self) -> u32 {
         self.walker.buffers().slots()
+    }
+
+    /// Whether a wave is under way between two steps.
+    pub(crate) fn is_within_wave(&self) -> bool {
+        self.in_flight.is_some()
     }
 
     /// Samples that every pixel has received.
@@ -259,8 +303,9 @@ impl PathTracer {
         self.film.display(target, exposure, format)
     }
 
-    /// Renders a wave.
-    fn run(&mut self, wave: &Wave, arrival: Option<&dyn ArrivalStage>) -> Result<Vec<Timings>> {
+    /// One submission of a wave.
+    fn advance(&mut self, in_flight: &mut InFlight, arrival: Option<&dyn ArrivalStage>) -> Result<Vec<Timings>> {
+        let InFlight { wave, walks, .. } = in_flight;
         let mut stages = EyeStages {
             scene: &self.scene,
             settings: &self.settings,
@@ -273,21 +318,25 @@ impl PathTracer {
             arrival,
             pending: &mut self.pending,
         };
-        let walked = self
-            .walker
-            .run(wave.key(self.settings.seed), wave.paths(), &mut stages)?;
-        let (counters, media) = (&mut self.counters, walked.media);
-        counters.paths += u64::from(wave.paths());
-        counters.extend_rays += walked.rays;
+        let before = walks.walked().clone();
+        self.walker.advance(walks, &mut stages)?;
+        let (counters, walked) = (&mut self.counters, walks.walked());
+        let since = |count: fn(&Walked) -> u64| count(walked) - count(&before);
+        counters.extend_rays += since(|w| w.rays);
         // A place's two rays wait as one.
-        counters.shadow_rays += walked.waited + media.second_rays;
-        counters.stalls += walked.stalls;
-        counters.medium_collisions += media.collisions;
-        counters.null_collisions += media.null_collisions;
-        counters.density_lookups += media.density_lookups;
-        counters.waves += 1;
-        self.pending = Some(*wave);
-        Ok(walked.timings)
+        counters.shadow_rays += since(|w| w.waited + w.media.second_rays);
+        counters.stalls += since(|w| w.stalls);
+        counters.postponed += since(|w| w.postponed);
+        counters.submissions += since(|w| w.submissions);
+        counters.work += since(|w| w.work);
+        counters.medium_collisions += since(|w| w.media.collisions);
+        counters.null_collisions += since(|w| w.media.null_collisions);
+        counters.density_lookups += since(|w| w.media.density_lookups);
+        if walks.has_ended() {
+            counters.paths += u64::from(wave.paths());
+            counters.waves += 1;
+        }
+        Ok(walks.take_timings())
     }
 
     /// Adds the last wave to the film.

@@ -158,6 +158,7 @@ impl Technique for PhotonMapper {
             ("rays", eye.extend_rays + eye.shadow_rays + c.photons.rays),
             ("waves", eye.waves),
             ("stalls", eye.stalls),
+            ("postponed", eye.postponed),
             ("passes", c.passes),
             ("photons_emitted", c.photons.emitted),
             ("photons_escaped", c.photons.escaped),

@@ -22,7 +22,7 @@ use super::gather::{Gather, GatherCounts};
 use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
 use super::settings::{MapBuild, PhotonSettings};
-use super::tracer::{PhotonCounts, PhotonTracer, flux_scale};
+use super::tracer::{PhotonCounts, PhotonTracer, Tracing, flux_scale};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo, Submission};
@@ -90,6 +90,8 @@ struct Photons {
     tracer: PhotonTracer,
     gather: Gather,
     maker: MapMaker,
+    /// The photons of the pass under way, until all of them have landed.
+    tracing: Option<Tracing>,
     /// Of the pass under way.
     map: Option<PhotonMap>,
     /// The device's build of it, which is waited for with the eye paths behind it.
@@ -124,6 +126,7 @@ impl PhotonMapper {
             sampler: settings.sampler,
             seed: settings.seed,
             aovs: settings.aovs,
+            submission_work: settings.submission_work,
             ..PathTracerSettings::default()
         };
         let has_map = settings.needs_photons() && scene.has_lights();
@@ -136,6 +139,7 @@ impl PhotonMapper {
                 tracer,
                 gather: Gather::new(gpu, &scene, &settings, &eye_paths, eye.slots())?,
                 maker: MapMaker::new(gpu, settings.map_build)?,
+                tracing: None,
                 map: None,
                 building: None,
             }),
@@ -215,11 +219,12 @@ impl PhotonMapper {
     /// Before the first pass.
     fn begin(&mut self) {
         if let Some(photons) = &mut self.photons {
-            (photons.map, photons.building) = (None, None);
+            (photons.tracing, photons.map, photons.building) = (None, None, None);
         }
     }
 
-    /// Does a pass, or a part of its eye paths, towards `samples` samples per pixel; `None` when all are there.
+    /// Does a bounded piece of work towards `samples` samples per pixel, whatever the scene: a submission of a pass's photons, and behind their last one the map and
+    /// a submission of eye paths, or one of eye paths alone; `None` when all samples are there.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory),
@@ -239,9 +244,16 @@ impl PhotonMapper {
             && photons.map.is_none()
         {
             let clock = Instant::now();
-            let traced = photons.tracer.trace(pass, &kernel)?;
-            timings.extend(traced.timings);
+            let begun = photons.tracing.take();
+            let mut tracing = begun.unwrap_or_else(|| photons.tracer.begin(pass, &kernel));
+            let all = photons.tracer.advance(&mut tracing)?;
+            timings.append(&mut tracing.take_timings());
             self.counts.trace_seconds += clock.elapsed().as_secs_f64();
+            if !all {
+                photons.tracing = Some(tracing);
+                return Ok(Some(self.eye.step_so_far(timings, samples)));
+            }
+            let traced = tracing.into_traced();
             let clock = Instant::now();
             let area = self.scene.surface_area();
             let made = photons
@@ -282,7 +294,8 @@ impl PhotonMapper {
                 let figures = photons.maker.figures(self.scene.surface_area())?;
                 figures.into_iter().for_each(|figures| self.counts.note(figures));
             }
-            if step.is_some() {
+            // They are those of a whole wave.
+            if step.is_some() && !self.eye.is_within_wave() {
                 let counts = photons.gather.counts()?;
                 self.counts.gather.queries += counts.queries;
                 self.counts.gather.photons += counts.photons;
@@ -298,15 +311,11 @@ impl PhotonMapper {
             photons.map = None;
         }
         timings.append(&mut step.timings);
-        let pixels = self.eye.size().iter().map(|side| u64::from(*side)).product::<u64>();
-        Ok(Some(Step {
-            timings,
-            done: step.done,
-            wanted: pixels * u64::from(samples),
-        }))
+        Ok(Some(self.eye.step_so_far(timings, samples)))
     }
 
-    /// Traces the photons of a pass, and returns them in the order of waves, in each of bounces and photons. The picture is not touched, and counts go on.
+    /// Traces the photons of a pass, and returns them in the order of waves, in each of bounces and photons. The picture is not touched, and counts go on; photons of
+    /// a step that are under way begin anew.
     ///
     /// # Errors
     /// As [`PhotonMapper::step`].
@@ -316,6 +325,7 @@ impl PhotonMapper {
         let Some(photons) = &mut self.photons else {
             return Ok(Vec::new());
         };
+        photons.tracing = None;
         let traced = photons.tracer.trace(pass, &kernel)?;
         self.counts.photons += traced.counts;
         let records = photons.tracer.records().buffer().view();
@@ -343,6 +353,7 @@ impl PhotonMapper {
         let Some(photons) = &mut self.photons else {
             return Ok(None);
         };
+        photons.tracing = None;
         let traced = photons.tracer.trace(pass, &kernel)?;
         self.counts.photons += traced.counts;
         let (records, area) = (photons.tracer.records(), self.scene.surface_area());

@@ -134,6 +134,9 @@ crate::settings! {
         /// Nodes and records after which a query of the map is given up and its place goes through all records instead, which changes the order
         /// of sums only; with neighbours the area that is searched is halved instead, and they may be fewer.
         pub query_quota: u32 = QUERY_QUOTA, in 1..=QUERY_QUOTA;
+        /// Loop iterations of photons, of eye paths and of queries after which a submission begins nothing more, as
+        /// [`WalkOptions::work`](crate::walk::WalkOptions::work); 0 chooses by the kind of device. Never changes the picture.
+        pub submission_work: u64 = 0;
     }
     check PhotonSettings::sees_direct_light_once;
 }

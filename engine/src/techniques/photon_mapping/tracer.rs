@@ -6,7 +6,7 @@
 //!
 //! Guarantees: records depend on (seed, pass, number of photons) alone, and their order on the slots of a wave besides, never on the number of threads; photons that were
 //! emitted have escaped or were absorbed, to the count; records that do not fit are never lost silently, since the pass is traced again
-//! with room for them.
+//! with room for them; a submission is a bounded piece of work.
 
 use std::sync::Arc;
 
@@ -23,8 +23,8 @@ use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, Pipel
 use crate::gpu::{TexelView, Timings};
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{
-    Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveNeeds, default_slots, slots_of_device,
-    stage_barrier,
+    Bounce, WalkKey, WalkOptions, WalkStages, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
+    slots_of_device, stage_barrier,
 };
 use crate::{Error, Result};
 
@@ -74,11 +74,34 @@ pub(super) struct Stored {
 }
 
 /// Photons of one pass.
+#[derive(Default)]
 pub(super) struct Traced {
     /// Records in [`PhotonTracer::records`].
     pub records: u32,
     pub counts: PhotonCounts,
     pub timings: Vec<Timings>,
+}
+
+/// Photons of a pass under way.
+pub(super) struct Tracing {
+    pass: u32,
+    kernel: KernelSettings,
+    /// First photon of the wave under way, or of the next one.
+    first_photon: u32,
+    wave: Option<(WalkKey, WaveInFlight)>,
+    traced: Traced,
+}
+
+impl Tracing {
+    /// The timings of the submissions since they were taken last.
+    pub fn take_timings(&mut self) -> Vec<Timings> {
+        std::mem::take(&mut self.traced.timings)
+    }
+
+    /// What has been traced.
+    pub fn into_traced(self) -> Traced {
+        self.traced
+    }
 }
 
 /// Traces photons of a scene.
@@ -150,6 +173,7 @@ impl PhotonTracer {
             name: "photon",
             shadows: false,
             bounces: BOUNCES_PER_SUBMISSION,
+            work: settings.submission_work,
             ..WalkOptions::default()
         };
         let differentials = if has_differentials { slots } else { 1 };
@@ -199,76 +223,98 @@ impl PhotonTracer {
 
     /// Traces the photons of a pass with kernels so made.
     pub fn trace(&mut self, pass: u32, kernel: &KernelSettings) -> Result<Traced> {
-        loop {
-            let traced = self.trace_within(pass, kernel)?;
-            if traced.records <= self.kit.capacity {
-                return Ok(traced);
-            }
-            let (needed, most) = (u64::from(traced.records), records_of_device(&self.gpu));
-            if needed > most {
-                return Err(Error::Overflow {
-                    kernel: "photon_append".into(),
-                    what: "photon records".into(),
-                    needed,
-                    capacity: most,
-                    instead: "trace fewer photons per pass".into(),
-                });
-            }
-            let capacity = (needed + needed / 4).min(most) as u32;
-            self.kit.records = record_texels(&self.gpu, capacity)?;
-            self.kit.capacity = capacity;
+        let mut tracing = self.begin(pass, kernel);
+        while !self.advance(&mut tracing)? {}
+        Ok(tracing.traced)
+    }
+
+    /// The photons of a pass before their first submission. A tracer has the memory of one pass: what was under way is given up.
+    pub fn begin(&self, pass: u32, kernel: &KernelSettings) -> Tracing {
+        Tracing {
+            pass,
+            kernel: *kernel,
+            first_photon: 0,
+            wave: None,
+            traced: Traced::default(),
         }
     }
 
-    /// The same; records that do not fit are counted only.
-    fn trace_within(&mut self, pass: u32, kernel: &KernelSettings) -> Result<Traced> {
-        let mut traced = Traced {
-            records: 0,
-            counts: PhotonCounts::default(),
-            timings: Vec::new(),
-        };
-        let mut first_photon = 0;
-        while first_photon < self.settings.photons {
-            let photons = self.walker.buffers().slots().min(self.settings.photons - first_photon);
-            self.trace_wave(pass, first_photon, photons, kernel, &mut traced)?;
-            first_photon += photons;
+    /// One submission, a bounded piece of work; whether it was the last one of the pass.
+    pub fn advance(&mut self, tracing: &mut Tracing) -> Result<bool> {
+        if tracing.wave.is_none() {
+            let photons = self
+                .walker
+                .buffers()
+                .slots()
+                .min(self.settings.photons - tracing.first_photon);
+            let key = WalkKey {
+                first_sequence: tracing.pass,
+                first_index: tracing.first_photon,
+                indices: photons,
+                seed: self.settings.seed ^ PHOTON_SEED,
+            };
+            tracing.wave = Some((key, self.walker.begin(key, photons)?));
         }
-        traced.counts.emitted = u64::from(self.settings.photons);
-        Ok(traced)
-    }
-
-    fn trace_wave(
-        &mut self,
-        pass: u32,
-        first_photon: u32,
-        photons: u32,
-        kernel: &KernelSettings,
-        traced: &mut Traced,
-    ) -> Result<()> {
-        let key = WalkKey {
-            first_sequence: pass,
-            first_index: first_photon,
-            indices: photons,
-            seed: self.settings.seed ^ PHOTON_SEED,
+        let Some((key, wave)) = &mut tracing.wave else {
+            return Ok(true);
         };
         let mut stages = PhotonStages {
             kit: &self.kit,
-            key,
-            first: traced.records,
-            kernel,
+            key: *key,
+            first: tracing.traced.records,
+            kernel: &tracing.kernel,
         };
-        let mut walked = self.walker.run(key, photons, &mut stages)?;
+        self.walker.advance(wave, &mut stages)?;
+        tracing.traced.timings.append(&mut wave.take_timings());
+        if wave.has_ended() {
+            let photons = key.indices;
+            let walked = wave.walked().clone();
+            tracing.wave = None;
+            return self.end_wave(tracing, photons, &walked);
+        }
+        Ok(false)
+    }
+
+    /// Counts a wave; whether it was the last one of the pass. Should its records not fit, the pass begins anew with room for them.
+    fn end_wave(&mut self, tracing: &mut Tracing, photons: u32, walked: &Walked) -> Result<bool> {
         let counters = self.kit.counters_readback.read::<Counters>(0, 1)?[0];
+        let traced = &mut tracing.traced;
         // What waits are the deposits with a kernel.
         let records = u32::try_from(walked.waited).unwrap_or(u32::MAX);
-        traced.timings.append(&mut walked.timings);
         traced.records = traced.records.saturating_add(records);
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
         traced.counts.absorbed += u64::from(counters.absorbed);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
-        Ok(())
+        tracing.first_photon += photons;
+        if tracing.first_photon < self.settings.photons {
+            return Ok(false);
+        }
+        traced.counts.emitted = u64::from(self.settings.photons);
+        if traced.records <= self.kit.capacity {
+            return Ok(true);
+        }
+        let (needed, most) = (u64::from(traced.records), records_of_device(&self.gpu));
+        if needed > most {
+            return Err(Error::Overflow {
+                kernel: "photon_append".into(),
+                what: "photon records".into(),
+                needed,
+                capacity: most,
+                instead: "trace fewer photons per pass".into(),
+            });
+        }
+        let capacity = (needed + needed / 4).min(most) as u32;
+        self.kit.records = record_texels(&self.gpu, capacity)?;
+        self.kit.capacity = capacity;
+        let timings = std::mem::take(&mut traced.timings);
+        *traced = Traced {
+            timings,
+            ..Traced::default()
+        };
+        tracing.first_photon = 0;
+        Ok(false)
     }
 }
 

@@ -26,14 +26,15 @@ use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
-use crate::Result;
 use crate::accel::{DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
+use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::sets::{IndexSet, MediaSet, SceneSet};
 use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
-use crate::gpu::{Category, Gpu, TexelView};
+use crate::gpu::{Category, Gpu, SOFTWARE_LOOP_CAP, TexelView};
 use crate::raster::{ObjectTriangles, SurfaceFeatures, Surfaces};
 use crate::scene::{Environment, LightKind, Material, Scene, SceneProfile};
+use crate::{Error, Result};
 
 /// A scene in device memory. Make it once and render it with any technique.
 #[derive(Debug)]
@@ -76,6 +77,43 @@ struct SceneBuffers {
     albedo_table: TexelView,
 }
 
+/// Loop iterations that a ray of a scene may take in one dispatch on a software device: with media half of [`SOFTWARE_LOOP_CAP`] is for walks through grids, and the
+/// rest for all surfaces that a shadow ray passes.
+pub(crate) fn ray_iterations(profile: &SceneProfile) -> u32 {
+    match (profile.has_alpha(), profile.media.any()) {
+        (_, false) => SOFTWARE_LOOP_CAP,
+        (false, true) => SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES,
+        (true, true) => SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES_ALPHA,
+    }
+}
+
+/// The index that was asked for, or the default one where rays in that could not be stopped in time.
+fn index_for(
+    gpu: &Gpu,
+    geometry: &Geometry,
+    profile: &SceneProfile,
+    kind: &IndexKind,
+    folder: Option<&Path>,
+) -> Result<IndexOnDevice> {
+    let corners = geometry.corners();
+    let asked = kind.build_or_read_for(gpu, &corners, folder)?;
+    // Techniques may trace two rays in a dispatch.
+    let iterations = ray_iterations(profile).min(SOFTWARE_LOOP_CAP / 2);
+    match asked
+        .traversal
+        .quota_within(gpu.caps(), 1, iterations, profile.has_alpha())
+    {
+        Ok(_) => Ok(asked),
+        Err(Error::LimitExceeded { .. }) => {
+            drop(asked);
+            let mut index = IndexKind::default().build_for(gpu, &corners)?;
+            index.report.instead_because = Some("a leaf of the kd-tree is longer than the loops of a software device");
+            Ok(index)
+        }
+        Err(error) => Err(error),
+    }
+}
+
 impl GpuScene {
     /// Checks the scene, builds its index by the binned surface area heuristic on the host's threads and uploads everything.
     ///
@@ -86,7 +124,8 @@ impl GpuScene {
         Self::with_index(gpu, scene, &IndexKind::default())
     }
 
-    /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it.
+    /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it. A kd-tree with a leaf that is too long for a software device's loops,
+    /// as where thousands of triangles lie in one place, is replaced by the binned hierarchy, and the report says so ([`IndexReport::instead_because`]).
     ///
     /// # Errors
     /// As [`GpuScene::new`], and [`Error::Setting`](crate::Error::Setting) for settings of the index that are out of range.
@@ -104,7 +143,7 @@ impl GpuScene {
         let mut geometry = Geometry::flatten(scene, &profile)?;
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
-        let index = kind.build_or_read_for(gpu, &geometry.corners(), folder)?;
+        let index = index_for(gpu, &geometry, &profile, kind, folder)?;
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
         let placed = materials

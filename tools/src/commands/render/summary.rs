@@ -187,6 +187,8 @@ fn notes(report: &FrameReport) -> String {
             .host_because
             .map(|cause| output::one_line(&format!("index built on the host: {cause}"))),
     );
+    let instead = report.index.instead_because;
+    notes.extend(instead.map(|cause| output::one_line(&format!("another index than asked for: {cause}"))));
     match report.notes.len() {
         0 => {}
         1 => notes.push("1 thing of the scene could not be carried over".into()),

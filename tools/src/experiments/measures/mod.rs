@@ -147,6 +147,7 @@ measures! {
     on_device "shadow-maps" preview::shadow_maps.of_any_scenes();
     on_host "shading-normals" surfaces::shading_normals;
     on_host "sphere-tests" rays::sphere_tests;
+    on_device "stops" rendering::stops;
     on_host "tangents" surfaces::tangents;
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;

@@ -169,9 +169,13 @@ fn passes(gpu: &Gpu, address: &str, (size, samples): (u32, u32)) -> Result<Vec<P
     let camera = scene.require_camera(None)?;
     let uploaded = Arc::new(GpuScene::new(gpu, &scene)?);
     let mut tracer = PathTracer::new(gpu, uploaded, camera, [size; 2], PathTracerSettings::default())?;
-    let Some(step) = tracer.step(samples)? else {
-        return Ok(Vec::new());
-    };
+    // Its wave may take several submissions, a step each.
+    let mut submissions = Vec::new();
+    while tracer.counters().waves == 0
+        && let Some(step) = tracer.step(samples)?
+    {
+        submissions.extend(step.timings);
+    }
     let row = |pass: &str| Passes {
         scene: short_name(address).into(),
         pass: pass.into(),
@@ -180,7 +184,7 @@ fn passes(gpu: &Gpu, address: &str, (size, samples): (u32, u32)) -> Result<Vec<P
         ..Passes::default()
     };
     let (mut rows, mut all): (Vec<Passes>, Passes) = (Vec::new(), row("all"));
-    for pass in step.timings.iter().flat_map(|timings| &timings.passes) {
+    for pass in submissions.iter().flat_map(|timings| &timings.passes) {
         let at = rows.iter().position(|row| row.pass == pass.name);
         let at = at.unwrap_or_else(|| {
             rows.push(row(&pass.name));

@@ -1,4 +1,4 @@
-//! Whole pictures: whether they are what was asked for, how their lights are chosen, what they cost, their sums and files, and agreement with
+//! Whole pictures: whether they are what was asked for, how their lights are chosen, what they cost, how they stop, their sums and files, and agreement with
 //! Mitsuba 3.
 
 pub mod automatic_choice;
@@ -8,5 +8,6 @@ pub mod path_sets;
 pub mod picture_formats;
 pub mod sample_sums;
 pub mod scene_profile;
+pub mod stops;
 mod sums;
 mod unseen_features;
