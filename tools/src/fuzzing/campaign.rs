@@ -110,7 +110,7 @@ impl Campaign {
             chosen => chosen.to_vec(),
         };
         let begun = Instant::now();
-        let left = || self.seconds - begun.elapsed().as_secs_f64();
+        let left = || (self.seconds - begun.elapsed().as_secs_f64()).max(0.0);
         let is_over = || left() <= 0.0;
         let (mut reading, mut stepping, mut next_step) = (0.0, 0.0, 0);
         let steps: Vec<&Reader> = readers.iter().copied().filter(|reader| reader.has_step()).collect();

@@ -12,8 +12,8 @@ const PART: usize = 256;
 /// Most mutations of a case.
 const MOST: usize = 8;
 
-/// Numbers that stand at edges of types, of limits and of sense. None lies between 100 and 512, so that grids that the engine makes
-/// itself stay small enough to be made a thousand times a second.
+/// Numbers that stand at edges of types, of limits and of sense. Few lie between 100 and 512, so that grids that the engine makes itself are
+/// seldom large ones, which take it seconds.
 const NUMBERS: [&str; 30] = [
     "0",
     "1",

@@ -355,9 +355,11 @@ fn settings(case: &Case, _: &Path) -> Result<()> {
 
 fn path_set(case: &Case, _: &Path) -> Result<()> {
     let set: PathSet = text(case)?.trim_end().parse()?;
-    // What it prints has to read back as the same.
-    let again: PathSet = set.to_string().parse()?;
-    assert_eq!(set, again, "{set} does not read back");
+    let again = set.to_string().parse::<PathSet>();
+    assert!(
+        again.is_ok_and(|again| again == set),
+        "{set} does not read back as the same"
+    );
     Ok(())
 }
 

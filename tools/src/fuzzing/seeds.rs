@@ -214,14 +214,14 @@ pub fn ply(_: &Path) -> Result<Vec<Case>> {
     let head = |format: &str| {
         let axes = ["x", "y", "z", "nx", "ny", "nz"].map(|axis| format!("property float {axis}\n"));
         format!(
-            "ply\nformat {format} 1.0\ncomment made here\nelement vertex 4\n{}property uchar red\nelement face 2\n\
+            "ply\nformat {format} 1.0\ncomment made here\nelement vertex 4\n{}property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2\n\
              property list uchar int vertex_indices\nend_header\n",
             axes.concat()
         )
     };
     let mut text = head("ascii");
     for vertex in &vertices {
-        text += &format!("{} 200\n", vertex.map(|value| value.to_string()).join(" "));
+        text += &format!("{} 200 100 50\n", vertex.map(|value| value.to_string()).join(" "));
     }
     for face in faces {
         let indices: Vec<String> = face.iter().map(i32::to_string).collect();
@@ -239,7 +239,7 @@ pub fn ply(_: &Path) -> Result<Vec<Case>> {
         let mut bytes = head(format).into_bytes();
         for vertex in &vertices {
             bytes.extend(vertex.iter().flat_map(|value| word(value.to_bits())));
-            bytes.push(200);
+            bytes.extend([200, 100, 50]);
         }
         for face in faces {
             bytes.push(face.len() as u8);
