@@ -129,7 +129,13 @@ impl Campaign {
             while self.steps && waiting > 0 && stepping <= STEP_SHARE * reading && !is_over() {
                 let reader = steps[next_step % steps.len()];
                 next_step += 1;
-                let way = &mut totals.readers.entry(reader.name.into()).or_default().step;
+                let all = totals.readers.entry(reader.name.into()).or_default();
+                // What only a device reads is read, and renders nothing.
+                let way = if reader.is_on_device() {
+                    &mut all.read
+                } else {
+                    &mut all.step
+                };
                 match self.batch(reader, way, STEP_BATCH, true, left(), say)? {
                     Some(seconds) => {
                         stepping += seconds;
