@@ -2,6 +2,7 @@
 
 pub mod agreement;
 pub mod experiments;
+pub mod fuzzing;
 pub mod geometry;
 pub mod least_squares;
 pub mod machine;

@@ -5,6 +5,7 @@ mod clock;
 mod context;
 mod device;
 pub(super) mod errors;
+mod files;
 mod kd;
 mod maps;
 mod media;
@@ -103,6 +104,7 @@ measures! {
     on_host "coupled-reflection" surfaces::coupled_reflection;
     on_device "device-model" device::device_model;
     on_host "free-flight" media::free_flight;
+    on_host "fuzzing" files::fuzzing;
     on_device "kd-caches" kd::kd_caches.of_any_scenes();
     on_device "kd-heuristics" kd::kd_heuristics.of_any_scenes();
     on_device "kd-hosts" kd::kd_hosts.of_any_scenes();

@@ -1,0 +1,3 @@
+//! Files that others wrote.
+
+pub mod fuzzing;
