@@ -12,7 +12,8 @@ use std::time::{Duration, Instant, SystemTime};
 use clap::Args;
 use clerestory::film::{atomic, mark};
 use clerestory::fingerprint::Fingerprint;
-use clerestory::scene::{Scene, builtin};
+use clerestory::input::InputFile;
+use clerestory::scene::builtin;
 use clerestory::{Error, Result};
 use serde_json::Value;
 
@@ -54,15 +55,11 @@ impl Inputs {
         }
     }
 
-    /// As [`Inputs::add_address`], with the files that the scene names its images and its environment by.
-    pub fn add_scene(&mut self, address: &str, scene: &Scene) {
+    /// As [`Inputs::add_address`], with all files that the scene was read from.
+    pub fn add_scene(&mut self, address: &str, files: &[InputFile]) {
         self.add_address(address);
-        let folder = Path::new(address).parent().unwrap_or(Path::new(""));
-        for image in &scene.images {
-            self.add(folder.join(&image.name));
-        }
-        if let Some(environment) = &scene.environment {
-            self.add(&environment.name);
+        for file in files {
+            self.add(&file.path);
         }
     }
 

@@ -14,10 +14,10 @@ use clerestory::Error;
 use clerestory::accel::IndexKind;
 use clerestory::film::picture::{ALBEDO, DEPTH, NORMAL, SAMPLES, VARIANCE};
 use clerestory::film::{CompareOptions, Picture, ToneCurve, ToneMap, compare};
-use clerestory::input::read_text;
+use clerestory::input::{InputFile, read_text};
 use clerestory::plan::Goal;
 use clerestory::render::{RenderOptions, Rendered, Renderer, RendererDesc};
-use clerestory::scene::{self, Scene};
+use clerestory::scene::{self, LoadOptions, Scene};
 use clerestory::settings::Settings;
 use clerestory::techniques;
 use clerestory::transport::PathSet;
@@ -239,7 +239,8 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             "--index-cache keeps only kd-trees; use it with --index kd",
         ));
     }
-    let scene = scene::load(&arguments.scene).map_err(Failure::scene)?;
+    let loaded = scene::load_with(&arguments.scene, &LoadOptions::default()).map_err(Failure::scene)?;
+    let scene = loaded.scene;
     for note in &scene.notes {
         output::warn(&format!("{} ({}): {}", note.feature, note.at, note.instead));
     }
@@ -248,7 +249,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let files = Files::choose(arguments.output.as_deref(), &scene.name)?;
     let outputs = Outputs::plan(
         &files.all(),
-        &inputs(arguments, &scene),
+        &inputs(arguments, &loaded.files),
         arguments.overwriting.overwrite,
     )?;
     let gpu = arguments.device.open()?;
@@ -313,9 +314,9 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
 }
 
 /// All files that are read.
-fn inputs(arguments: &Arguments, scene: &Scene) -> Inputs {
+fn inputs(arguments: &Arguments, files: &[InputFile]) -> Inputs {
     let mut inputs = Inputs::of(&arguments.reference);
-    inputs.add_scene(&arguments.scene, scene);
+    inputs.add_scene(&arguments.scene, files);
     if let Some(file) = arguments.settings.as_deref().and_then(|text| text.strip_prefix('@')) {
         inputs.add(file);
     }
