@@ -74,15 +74,20 @@ pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Re
     let pixels = width * height;
     let all = means_of_halves(pairs, pixels)?;
     let epsilon = relative_mse_epsilon(all.iter().flatten().flatten().map(|value| *value as f32), offset);
-    let levels_of_all = levels(&all, width, kind);
+    // One truth for all, or one of the others for each.
+    let shared = (kind == Truth::Pixel || pairs.len() == 1).then(|| levels(&all, width, kind));
     let estimate = |at: usize| -> Result<NoiseEstimate> {
         let (_, pair) = pairs[at];
-        let others = [&pairs[..at], &pairs[at + 1..]].concat();
-        if kind == Truth::Pixel || others.is_empty() {
-            return noise_of_pair(pair, &levels_of_all, epsilon, kind);
+        if let Some(levels) = &shared {
+            return noise_of_pair(pair, levels, epsilon, kind);
         }
-        let levels_of_others = levels(&means_of_halves(&others, pixels)?, width, kind);
-        noise_of_pair(pair, &levels_of_others, epsilon, kind)
+        let others = [&pairs[..at], &pairs[at + 1..]].concat();
+        noise_of_pair(
+            pair,
+            &levels(&means_of_halves(&others, pixels)?, width, kind),
+            epsilon,
+            kind,
+        )
     };
     (0..pairs.len()).map(estimate).collect()
 }

@@ -3,9 +3,9 @@
 use clerestory::Error;
 use clerestory::gpu::{Buffer, Gpu, transfer_to_compute};
 use clerestory::kernels::{
-    BoxElements, Count, Direction, Histogram, Keep, MAX_BINS, Operation, Partition, PartitionBuffers, PartitionOptions,
-    Permute, PermuteBuffers, ReduceBox, ReduceWords, Scan, ScanBuffers, ScanOptions, StreamStatus, compact, gather,
-    histogram, ordered_float, reduce_box, reduce_words, scan, scatter, split,
+    BoxElements, Count, Direction, Form, Histogram, Keep, MAX_BINS, Operation, Partition, PartitionBuffers,
+    PartitionOptions, Permute, PermuteBuffers, ReduceBox, ReduceWords, Scan, ScanBuffers, ScanOptions, StreamStatus,
+    compact, gather, histogram, ordered_float, reduce_box, reduce_words, scan, scatter, split,
 };
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
@@ -188,6 +188,15 @@ fn splits_by_bits_sort() {
     });
 }
 
+/// A scan by sums.
+fn sums(gpu: &Gpu, form: Form) -> Scan {
+    let options = ScanOptions {
+        form,
+        ..ScanOptions::default()
+    };
+    Scan::new(gpu, options).unwrap()
+}
+
 /// Many blocks, the last of three elements.
 #[test]
 fn a_million_words_and_three_are_as_by_the_twins() {
@@ -201,14 +210,7 @@ fn a_million_words_and_three_are_as_by_the_twins() {
         let [input, flag_words] = [words(gpu, "input", &values), words(gpu, "flags", &flags)];
         for form in FORMS {
             let output = words(gpu, "output", &values);
-            let kernel = Scan::new(
-                gpu,
-                ScanOptions {
-                    form,
-                    ..ScanOptions::default()
-                },
-            )
-            .unwrap();
+            let kernel = sums(gpu, form);
             let scratch = empty(gpu, "scratch", kernel.scratch_bytes(COUNT));
             let buffers = ScanBuffers {
                 input: input.view(),
@@ -247,14 +249,7 @@ fn more_elements_than_the_capacity_are_reported_and_left() {
             capacity: CAPACITY,
         };
         for form in FORMS {
-            let kernel = Scan::new(
-                gpu,
-                ScanOptions {
-                    form,
-                    ..ScanOptions::default()
-                },
-            )
-            .unwrap();
+            let kernel = sums(gpu, form);
             let of_scan = empty(gpu, "scratch", kernel.scratch_bytes(CAPACITY));
             let buffers = ScanBuffers {
                 input: ones.view(),

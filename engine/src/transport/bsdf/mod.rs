@@ -53,7 +53,7 @@ pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
 /// ωo is where particles come from: refraction is not scaled by 1/η².
 pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
 /// The metal is a modified Phong lobe of constant reflectance `base_color`, of the exponent that `alpha` stands for
-/// ([`phong_exponent`](super::phong::phong_exponent)).
+/// ([`phong_exponent`]).
 pub const BSDF_PHONG: u32 = constants::BSDF_PHONG;
 
 /// A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
