@@ -210,7 +210,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
             binding
                 .view
                 .map_or("None".into(), |view| format!("Some(ViewKind::{view})")),
-            binding.resource.fixed_bytes()
+            fixed_bytes(&binding.resource)
         );
     }
     text += "    ],\n    spec_constants: &[\n";
@@ -265,6 +265,18 @@ fn access(resource: &Resource) -> (bool, bool) {
         Resource::Storage { reads, writes, .. } | Resource::StorageImage { reads, writes } => (*reads, *writes),
         _ => (true, false),
     }
+}
+
+/// Bytes of a block up to the end of its last member that has a size; 0 for what is no block.
+fn fixed_bytes(resource: &Resource) -> u32 {
+    let (Resource::Storage { block, .. } | Resource::Uniform { block }) = resource else {
+        return 0;
+    };
+    let fixed = block.members.iter().filter(|m| !matches!(m.kind, Type::Runtime(..)));
+    fixed
+        .map(|member| member.offset + member.kind.size())
+        .max()
+        .unwrap_or(0)
 }
 
 /// The fixed part of a block: the whole block when it has no runtime array.

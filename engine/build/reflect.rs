@@ -85,20 +85,6 @@ pub enum Resource {
     TexelBuffer,
 }
 
-impl Resource {
-    /// Bytes of a block up to the end of its last member that has a size; 0 for what is no block.
-    pub fn fixed_bytes(&self) -> u32 {
-        let (Self::Storage { block, .. } | Self::Uniform { block }) = self else {
-            return 0;
-        };
-        let fixed = block.members.iter().filter(|m| !matches!(m.kind, Type::Runtime(..)));
-        fixed
-            .map(|member| member.offset + member.kind.size())
-            .max()
-            .unwrap_or(0)
-    }
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub struct Binding {
     pub set: u32,

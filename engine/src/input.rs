@@ -322,10 +322,12 @@ pub struct InputFiles<'o> {
     state: RefCell<State>,
 }
 
+/// A file's bytes; of what cannot be read the kind and the words, so that it is not tried again.
+type Opened = Result<Arc<Vec<u8>>, (ErrorKind, String)>;
+
 #[derive(Default)]
 struct State {
-    /// Of files that cannot be read the kind and the words, so that they are not tried again.
-    known: HashMap<PathBuf, Result<Arc<Vec<u8>>, (ErrorKind, String)>>,
+    known: HashMap<PathBuf, Opened>,
     list: Vec<InputFile>,
     /// Bytes of files and of what was given in memory.
     read: u64,

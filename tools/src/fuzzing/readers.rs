@@ -18,6 +18,7 @@ use super::seeds;
 const SIZE: [u32; 2] = [12, 8];
 
 /// What becomes of a case.
+#[derive(Debug)]
 pub enum Takes {
     /// It is a scene, which a step of a render goes on with.
     Scene,
@@ -28,6 +29,7 @@ pub enum Takes {
 }
 
 /// A reader.
+#[derive(Debug)]
 pub struct Reader {
     /// Its name, in tables and on command lines.
     pub name: &'static str,
