@@ -64,7 +64,7 @@ impl InputLimits {
             return Ok(());
         }
         Err(format!(
-            "decoded, takes {wanted} bytes of memory, more than the {allowed} that {read} bytes of files may take (InputLimits)"
+            "decoded, takes {wanted} bytes of memory, more than the {allowed} that {read} bytes of files may take"
         ))
     }
 }
@@ -252,7 +252,7 @@ fn check_length(length: u64, most: u64) -> io::Result<()> {
     if length <= most {
         return Ok(());
     }
-    let text = format!("has {length} bytes; at most {most} can be read (InputLimits)");
+    let text = format!("has {length} bytes; at most {most} can be read");
     Err(io::Error::new(ErrorKind::FileTooLarge, text))
 }
 
@@ -275,7 +275,7 @@ fn open_at_once(path: &Path) -> io::Result<File> {
 }
 
 /// All bytes of a regular file, as many as it had when it was opened.
-fn read_regular(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+pub(crate) fn read_regular(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let (file, length) = open_regular(path, most)?;
     let mut bytes = Vec::new();
     let wanted = usize::try_from(length).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
@@ -363,11 +363,15 @@ impl<'o> InputFiles<'o> {
             Ok(bytes)
         });
         let read = read.map_err(|cause| {
-            if cause.kind() == ErrorKind::FileTooLarge && left < self.limits.file {
-                let text = format!("{cause}; {} bytes were read before it", state.read);
-                return io::Error::new(ErrorKind::FileTooLarge, text);
+            if cause.kind() != ErrorKind::FileTooLarge {
+                return cause;
             }
-            cause
+            let text = if left < self.limits.file {
+                format!("{cause}; {} bytes were read before it (InputLimits::total)", state.read)
+            } else {
+                format!("{cause} (InputLimits::file)")
+            };
+            io::Error::new(ErrorKind::FileTooLarge, text)
         });
         match read {
             Ok(bytes) => {
@@ -412,8 +416,9 @@ impl<'o> InputFiles<'o> {
     /// The cause, in words, when it is more than [`InputLimits::decoded`] of the bytes read so far; nothing is counted then.
     pub fn reserve(&self, peak: u64, kept: u64) -> Result<(), String> {
         let mut state = self.state.borrow_mut();
-        self.limits
-            .check_decoded(state.kept.saturating_add(peak.max(kept)), state.read)?;
+        let wanted = state.kept.saturating_add(peak.max(kept));
+        let checked = self.limits.check_decoded(wanted, state.read);
+        checked.map_err(|cause| format!("{cause} (InputLimits)"))?;
         state.kept = state.kept.saturating_add(kept);
         Ok(())
     }

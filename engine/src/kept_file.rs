@@ -1,39 +1,20 @@
 //! Files that keep what can be made again: read whole and within a bound, written whole, and complained about once.
 
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+
+use crate::input::read_regular;
 
 /// The bytes of a regular file, `most` at most; `None` where there is no file.
 ///
 /// # Errors
 /// Why there is a file, but none that can be read, in words.
 pub fn read(path: &Path, most: u64) -> Result<Option<Vec<u8>>, String> {
-    let metadata = match std::fs::metadata(path) {
-        Ok(metadata) => metadata,
-        Err(error) if is_absent(&error) => return Ok(None),
-        Err(error) => return Err(error.to_string()),
-    };
-    // Opening a pipe would wait for somebody to write into it.
-    if !metadata.is_file() {
-        return Err("is not a regular file".into());
-    }
-    let too_long = || Err(format!("has more than {most} bytes"));
-    if metadata.len() > most {
-        return too_long();
-    }
-    let file = match File::open(path) {
-        Ok(file) => file,
-        Err(error) if is_absent(&error) => return Ok(None),
-        Err(error) => return Err(error.to_string()),
-    };
-    let mut bytes = Vec::new();
-    // It may grow meanwhile.
-    match file.take(most.saturating_add(1)).read_to_end(&mut bytes) {
-        Ok(_) if bytes.len() as u64 > most => too_long(),
-        Ok(_) => Ok(Some(bytes)),
+    match read_regular(path, most) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(error) if is_absent(&error) => Ok(None),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -66,6 +47,12 @@ pub fn complain(path: &Path, why: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs::File;
+
+    /// Whether a file is refused with these words.
+    fn is_refused(path: &Path, most: u64, words: &str) -> bool {
+        read(path, most).is_err_and(|why| why.contains(words))
+    }
 
     #[test]
     fn files_are_read_within_their_bound() {
@@ -74,9 +61,9 @@ mod tests {
         assert_eq!(read(&path, 4), Ok(None));
         std::fs::write(&path, [1, 2, 3, 4]).unwrap();
         assert_eq!(read(&path, 4), Ok(Some(vec![1, 2, 3, 4])));
-        assert_eq!(read(&path, 3), Err("has more than 3 bytes".to_owned()));
+        assert!(is_refused(&path, 3, "has 4 bytes; at most 3"));
         assert_eq!(read(&path.join("below a file"), 4), Ok(None));
-        assert_eq!(read(folder.path(), 4), Err("is not a regular file".to_owned()));
+        assert!(is_refused(folder.path(), 4, "is a folder"));
         // As long as a terabyte, of which the disk holds nothing.
         let sparse = File::create(&path).and_then(|file| file.set_len(1 << 40));
         if sparse.is_ok() {
@@ -91,7 +78,7 @@ mod tests {
         let path = folder.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&path).status();
         assert!(made.is_ok_and(|status| status.success()), "mkfifo");
-        assert_eq!(read(&path, 4), Err("is not a regular file".to_owned()));
+        assert!(is_refused(&path, 4, "is not a regular file"));
     }
 
     #[test]

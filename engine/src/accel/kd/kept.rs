@@ -301,7 +301,7 @@ mod tests {
             ("not as long", whole[..HEADER].to_vec()),
             ("not as long", whole[..whole.len() - 1].to_vec()),
             ("not as long", [&whole[..], &[0]].concat()),
-            ("more than", vec![0; most_bytes(triangles.len()) as usize + 1]),
+            ("at most", vec![0; most_bytes(triangles.len()) as usize + 1]),
             ("no kd-tree", with(0, 1)),
             ("another version", with(LETTERS.len(), 3)),
             ("other triangles", with(LETTERS.len() + 4, 1)),
