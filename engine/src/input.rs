@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 use crate::{Error, Result};
 
-/// How much a scene may read and decode. All are in bytes; a host that knows its scenes may raise them.
+/// How much a scene may read and decode, in bytes. A host that knows its scenes may raise each of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InputLimits {
     /// Most bytes of one file.
@@ -30,9 +30,9 @@ pub struct InputLimits {
     /// Most bytes of all files of a scene together; each counts once.
     pub total: u64,
     /// Bytes that decoded contents (texels, densities, materials) may take whatever the files' size is.
-    pub free: u64,
-    /// Bytes that decoded contents may take beyond [`InputLimits::free`], for each byte that was read.
-    pub per_byte: u64,
+    pub decoded_base: u64,
+    /// Bytes that decoded contents may take beyond [`InputLimits::decoded_base`], for each byte that was read.
+    pub decoded_per_byte: u64,
 }
 
 impl Default for InputLimits {
@@ -42,8 +42,8 @@ impl Default for InputLimits {
         Self {
             file: 2 << 30,
             total: 4 << 30,
-            free: 512 << 20,
-            per_byte: 128,
+            decoded_base: 512 << 20,
+            decoded_per_byte: 128,
         }
     }
 }
@@ -51,7 +51,8 @@ impl Default for InputLimits {
 impl InputLimits {
     /// Bytes that decoded contents of files of `read` bytes in all may take.
     pub fn decoded(&self, read: u64) -> u64 {
-        self.free.saturating_add(self.per_byte.saturating_mul(read))
+        self.decoded_base
+            .saturating_add(self.decoded_per_byte.saturating_mul(read))
     }
 
     /// Whether contents of `wanted` bytes may be decoded from files of `read` bytes in all.
@@ -168,7 +169,29 @@ impl Resolver for Folder {
     }
 }
 
-/// Files in memory by their paths.
+/// Files in memory by their paths, as of an archive that a host has unpacked.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use clerestory::input::Memory;
+/// use clerestory::scene::{LoadOptions, load_with};
+///
+/// # fn main() -> clerestory::Result<()> {
+/// let mut files = Memory::default();
+/// files
+///     .add("models/a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
+///     .add("models/a.mtl", "newmtl red\nKd 1 0 0\n");
+/// let options = LoadOptions {
+///     resolver: Arc::new(files),
+///     ..LoadOptions::default()
+/// };
+/// // What the model names is looked for beside it.
+/// let loaded = load_with("models/a.obj", &options)?;
+/// assert_eq!(loaded.files.len(), 2);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Memory {
     files: BTreeMap<PathBuf, Arc<Vec<u8>>>,
@@ -470,8 +493,8 @@ mod tests {
         InputLimits {
             file: 100,
             total: 250,
-            free: 64,
-            per_byte: 2,
+            decoded_base: 64,
+            decoded_per_byte: 2,
         }
     }
 

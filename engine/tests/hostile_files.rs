@@ -173,9 +173,9 @@ fn totals_are_bounded_before_anything_is_read_or_made() {
         .add("m.obj", TRIANGLE)
         .add("m.scene.toml", grid)
         .add("d.raw", [1u8; 4096]);
-    let limits = |free| InputLimits {
-        free,
-        per_byte: 0,
+    let limits = |decoded_base| InputLimits {
+        decoded_base,
+        decoded_per_byte: 0,
         ..InputLimits::default()
     };
     let loaded = load(files.clone(), "m.obj", limits(4 * 4096)).0.expect("scene");

@@ -35,7 +35,7 @@ pub fn read(path: &Path) -> Result<Picture> {
     }
 }
 
-/// Bytes in memory for each byte of a file, beyond what is free: the deflate format packs no more than 1032 into one, and f32 values take four
+/// Bytes in memory for each byte of a file, beyond [`InputLimits::decoded_base`]: the deflate format packs no more than 1032 into one, and f32 values take four
 /// times the file's bytes.
 const MEMORY_PER_BYTE: u64 = 8192;
 
@@ -45,7 +45,7 @@ fn read_png(path: &Path) -> Result<Picture> {
         cause,
     };
     let limits = InputLimits {
-        per_byte: MEMORY_PER_BYTE,
+        decoded_per_byte: MEMORY_PER_BYTE,
         ..InputLimits::default()
     };
     let bytes = read_file(path, limits.file)?;

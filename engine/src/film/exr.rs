@@ -24,7 +24,7 @@ use crate::input::{InputLimits, open_regular};
 /// Samples (values, not pixels) that a file may hold in all; a header asking for more is refused before anything is allocated.
 const MAX_SAMPLES: usize = 1 << 29;
 
-/// Bytes in memory for each byte of a file, beyond what is free: the deflate format packs no more than 1032 into one.
+/// Bytes in memory for each byte of a file, beyond [`InputLimits::decoded_base`]: the deflate format packs no more than 1032 into one.
 const MEMORY_PER_BYTE: u64 = 1024;
 
 /// Attributes that writing sets and that are not metadata of a picture's making.
@@ -198,7 +198,7 @@ pub fn read_from(mut source: impl BufRead + Seek + Send, name: &str) -> EngineRe
         return Err(wrong(format!("holds {samples} values; {MAX_SAMPLES} can be read")));
     }
     let limits = InputLimits {
-        per_byte: MEMORY_PER_BYTE,
+        decoded_per_byte: MEMORY_PER_BYTE,
         ..InputLimits::default()
     };
     limits.check_decoded(memory, length).map_err(wrong)?;

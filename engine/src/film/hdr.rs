@@ -15,7 +15,7 @@ use crate::{Error, Result};
 
 /// The largest file content read, in pixels: 16384 × 8192, the largest environment maps in use.
 const MAX_PIXELS: u64 = 1 << 27;
-/// Bytes in memory for each byte of a file, beyond what is free: runs of up to 127 pixels take eight bytes in the file, and are 12 bytes each.
+/// Bytes in memory for each byte of a file, beyond [`InputLimits::decoded_base`]: runs of up to 127 pixels take eight bytes in the file, and are 12 bytes each.
 const MEMORY_PER_BYTE: u64 = 256;
 
 /// Reads a Radiance HDR picture as the `radiance` layer.
@@ -46,7 +46,7 @@ pub fn read_from(mut source: impl BufRead + Seek, name: &str) -> Result<Picture>
         return Err(wrong(format!("{width}×{height} pixels are more than {MAX_PIXELS}")));
     }
     let limits = InputLimits {
-        per_byte: MEMORY_PER_BYTE,
+        decoded_per_byte: MEMORY_PER_BYTE,
         ..InputLimits::default()
     };
     let memory = decoder.total_bytes();

@@ -474,8 +474,8 @@ mod tests {
         let mut memory = Memory::default();
         memory.add("a.mtl", "newmtl a\n".repeat(1000));
         let limits = InputLimits {
-            free: 0,
-            per_byte: 1,
+            decoded_base: 0,
+            decoded_per_byte: 1,
             ..InputLimits::default()
         };
         let read = InputFiles::new(&memory, limits);
