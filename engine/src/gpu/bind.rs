@@ -72,7 +72,7 @@ impl Slot<'_> {
         Err(Error::Shader {
             name: self.shader.into(),
             message: format!(
-                "{} is seen as {wanted:?}, and {:?} is {found:?}",
+                "{} is seen as {wanted:?}, and {:?} is {found:?}; Image::part makes a view of another kind",
                 self.name,
                 image.name()
             ),

@@ -14,7 +14,7 @@
 //! |---|---|---|
 //! | [`Gpu::headless`], [`Gpu::for_window`], [`Gpu::list`], [`Gpu::surface`] | handles of windows that are gone | borrowed while they are used; a [`Surface`] keeps its window. `robustBufferAccess` is enabled on every device made here, whatever [`Lesser`] says |
 //! | [`GpuOptions::fault`] | trampolines of one driver called with another's handles | one device at a time has a plan |
-//! | [`GpuOptions::cache_folder`] | a pipeline cache that somebody else wrote reaches the driver | the driver's own check of it: name a folder that only its user writes |
+//! | [`GpuOptions::cache_folder`] | a pipeline cache that is damaged or of another device reaches the driver | length, version, device and hash are checked before. They do not find what somebody has forged: name a folder that only its user writes |
 //! | [`Gpu::buffer`], [`Gpu::buffer_with`], [`Gpu::storage_texels`], [`Gpu::texels_with`] | sizes that wrap, uses and formats without their features | sizes are checked before they are rounded; uses are Vulkan 1.0's; formats have known texels and the device's word |
 //! | [`Gpu::image`], [`Image::part`], [`Gpu::sampler`] | sizes, layers, formats, filters that the device lacks | asked of the device, or from a list |
 //! | [`Gpu::texel_view_of`] | a view past its buffer's end, or of another device's | whole texels of the buffer; device, use, alignment and limits |

@@ -41,8 +41,8 @@ pub struct WalkOptions {
     /// Bounces recorded into one command buffer, at most: about as many as most walks have. Devices that a driver watches get as many as take a fraction of a
     /// second, by what the last submission took, software devices about 2¹⁸ rays, but one at least, of all walks: fewer slots make it shorter.
     pub bounces: usize,
-    /// Loop iterations after which a submission begins nothing more: those of long rays, four times those of walks through grids of densities, and those of
-    /// queries of maps. The places under way end as their quotas say. 0 chooses by the kind of device.
+    /// Work, in loop iterations, after which a submission begins no further place: those of long rays, four times those of walks through grids of densities, and those
+    /// of queries of maps. The places under way end as their quotas say. 0 chooses by the kind of device.
     pub work: u64,
 }
 
@@ -138,9 +138,9 @@ pub struct Walked {
     pub stalls: u64,
     /// Submissions that ended with places left for later, since their work was used up.
     pub postponed: u64,
-    /// Submissions, and the loop iterations that count as their work, rounded down ray by ray.
+    /// Submissions.
     pub submissions: u64,
-    /// See `submissions`.
+    /// Loop iterations that count as their work ([`WalkOptions::work`]), rounded down ray by ray.
     pub work: u64,
     /// What happened in media.
     pub media: MediumCounts,
@@ -181,11 +181,12 @@ enum Next {
 }
 
 impl Next {
-    /// Whether the closest hits of the first bounce of a submission, and then its arrival stage, are still to be recorded.
+    /// Whether the first bounce of a submission begins with its closest hits.
     fn has_hits(self) -> bool {
         !matches!(self, Self::Arrival | Self::Scatter)
     }
 
+    /// Whether the arrival stage of the first bounce is still to be recorded.
     fn has_arrival(self) -> bool {
         self != Self::Scatter
     }

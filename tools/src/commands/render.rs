@@ -117,6 +117,8 @@ pub struct Arguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,…")]
     aov: Vec<Aov>,
     /// Stops after about this time with the samples taken so far: 10s, 500ms, 2min
+    ///
+    /// Samples under way have half a second more. A scene so hard that no path ends in that time gives a black picture; the report's `samples` tells.
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time_budget: Option<Duration>,
     /// What to print about the run to standard output

@@ -42,8 +42,8 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
-        /// Loop iterations that count as work of a submission after which it begins nothing more, as
-        /// [`WalkOptions::work`](crate::walk::WalkOptions::work); 0 chooses by the kind of device. Never changes the picture.
+        /// Work, in loop iterations, after which a submission begins no further place, as [`WalkOptions::work`](crate::walk::WalkOptions::work);
+        /// 0 chooses by the kind of device. Never changes the picture.
         pub submission_work: u64 = 0;
     }
 }

@@ -134,7 +134,7 @@ crate::settings! {
         /// Nodes and records after which a query of the map is given up and its place goes through all records instead, which changes the order
         /// of sums only; with neighbours the area that is searched is halved instead, and they may be fewer.
         pub query_quota: u32 = QUERY_QUOTA, in 1..=QUERY_QUOTA;
-        /// Loop iterations of photons, of eye paths and of queries after which a submission begins nothing more, as
+        /// Work of photons, of eye paths and of queries, in loop iterations, after which a submission begins no further place, as
         /// [`WalkOptions::work`](crate::walk::WalkOptions::work); 0 chooses by the kind of device. Never changes the picture.
         pub submission_work: u64 = 0;
     }
