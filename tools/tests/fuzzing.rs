@@ -86,6 +86,8 @@ fn planted_faults_are_found_small_and_counted() -> Tested {
 
     let wrong = fuzz(&["run", "--seed", "2", "--reader", "planted faults"], folder.path())?;
     assert!(text(&wrong).contains("seed"), "{}", text(&wrong));
+    let unknown = fuzz(&["run", "--reader", "no such"], folder.path())?;
+    assert_eq!(unknown.status.code(), Some(2), "{}", text(&unknown));
     Ok(())
 }
 

@@ -46,7 +46,7 @@ struct Place {
 struct Run {
     #[command(flatten)]
     place: Place,
-    /// About how long
+    /// About how long, without the time in which findings are made small
     #[arg(long, default_value_t = 1.0, value_parser = positive)]
     minutes: f64,
     /// The seed of all files; one folder has the totals of one seed
@@ -55,8 +55,8 @@ struct Run {
     /// Ends when each reader has had so many files in all runs together
     #[arg(long, value_name = "N")]
     inputs: Option<u32>,
-    /// Only this reader; may be given several times
-    #[arg(long = "reader", value_name = "NAME")]
+    /// Only this reader, one of those that `list` names; may be given several times
+    #[arg(long = "reader", value_name = "NAME", value_parser = reader_name)]
     readers: Vec<String>,
     /// Reads alone: no device is opened
     #[arg(long)]
@@ -67,8 +67,8 @@ struct Run {
 struct OfCase {
     /// Folder with the files, `main…` first
     case: PathBuf,
-    /// The reader
-    #[arg(long)]
+    /// The reader, one of those that `list` names
+    #[arg(long, value_name = "NAME", value_parser = reader_name)]
     reader: String,
     /// Also one step of a render
     #[arg(long)]
@@ -109,6 +109,12 @@ fn positive(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
+fn reader_name(text: &str) -> std::result::Result<String, String> {
+    let reader = readers::by_name(text).map_err(|error| error.to_string())?;
+    Ok(reader.name.to_owned())
+}
+
+/// A campaign of all readers that reads alone, until something else is said.
 fn campaign(folder: PathBuf) -> Result<Campaign> {
     let program = std::env::current_exe().map_err(|error| Error::io("fuzz", error))?;
     Ok(Campaign {

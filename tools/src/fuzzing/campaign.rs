@@ -98,7 +98,7 @@ impl Campaign {
         });
         if totals.seed != self.seed {
             let cause = format!(
-                "is not that of the totals in {}, {}",
+                "is not that of the totals in {}, which is {}; give another seed a --folder of its own",
                 self.folder.display(),
                 totals.seed
             );
