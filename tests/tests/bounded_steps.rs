@@ -5,10 +5,11 @@ use std::time::Duration;
 use clerestory::gpu::{DeviceKind, Gpu};
 use clerestory::plan::{self, Goal};
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Camera, DensityGrid, Environment, LightKind, Material, Medium, Mesh, Scene};
+use clerestory::scene::{Camera, Environment, Material, Scene};
 use clerestory::settings::Settings;
 use clerestory::techniques::photon_mapping::{MapQueue, PhotonMapper, PhotonSettings};
 use clerestory::techniques::{self, PathTracerSettings, View};
+use clerestory_hard_cases::scenes::{equal_triangles, place_sparse_grid};
 use clerestory_tests::render::{builtin, cuboid, independent, tracer, upload};
 use clerestory_tests::with_gpu;
 use glam::{DVec3, Vec3};
@@ -17,37 +18,14 @@ use glam::{DVec3, Vec3};
 /// surface, 2048 each.
 const PLACE_WORK: u64 = 4 * 2048 + 8 * 2048;
 
-/// A grid with one dense cell in each block of 4³ and nothing elsewhere: a majorant of 10⁶ m⁻¹ everywhere, and next to no real collisions. A path's way through it
-/// takes a million tentative ones.
+/// A grid of which next to nothing is dense, above a floor and under a uniform sky. A path's way through one of density 10⁶ takes a million tentative collisions.
 fn sparse_grid(density: f32) -> Scene {
-    let (low, high) = (Vec3::ZERO, Vec3::ONE);
-    let dense = |place: f64| (place * 32.0) as u32 % 4 == 1;
-    let cells = DensityGrid::from_fn([32, 32, 32], |p| {
-        if dense(p.x) && dense(p.y) && dense(p.z) {
-            density
-        } else {
-            0.0
-        }
-    });
     let mut scene = Scene {
         name: "sparse grid".into(),
         environment: Some(Environment::uniform(Vec3::ONE)),
         ..Scene::default()
     };
-    scene.media.push(Medium {
-        name: "sparse".into(),
-        sigma_a: Vec3::splat(0.5),
-        sigma_s: Vec3::splat(0.5),
-        density: Some(cells.in_box(low.as_dvec3(), high.as_dvec3())),
-        ..Medium::default()
-    });
-    let boundary = scene.add_material(Material {
-        name: "boundary".into(),
-        boundary: true,
-        interior: Some(0),
-        ..Material::default()
-    });
-    scene.place(cuboid("box", boundary, low, high));
+    place_sparse_grid(&mut scene, density);
     let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
     scene.place(cuboid(
         "floor",
@@ -55,8 +33,6 @@ fn sparse_grid(density: f32) -> Scene {
         Vec3::new(-1.0, -0.2, -1.0),
         Vec3::new(2.0, -0.1, 2.0),
     ));
-    let (position, intensity) = (Vec3::new(0.4, 1.5, 0.6), Vec3::ONE);
-    scene.add_light("point", LightKind::Point { position, intensity });
     let (eye, target) = (DVec3::new(0.5, 0.6, 2.5), DVec3::splat(0.45));
     scene.cameras.push(Camera::look_at("main", eye, target, DVec3::Y, 0.6));
     scene
@@ -185,10 +161,7 @@ fn photon_maps_in_parts_have_the_same_picture() {
 fn a_step_of_every_technique_is_a_few_submissions() {
     with_gpu(|gpu| {
         // Light that is reflected for long, and a sky over surfaces alone for the technique that knows nothing else.
-        let scenes = [
-            builtin("builtin:furnace-box?rho=0.9&emission=0.1"),
-            triangles_over_a_floor(2),
-        ];
+        let scenes = [builtin("builtin:furnace-box?rho=0.9&emission=0.1"), equal_triangles(2)];
         for card in techniques::all() {
             let scene = &scenes[usize::from(card.id == "ambient")];
             let view = View {
@@ -259,38 +232,10 @@ fn automatic_choices_end_where_first_pilots_do_not() {
     });
 }
 
-/// Equal triangles, which no index can part, before a floor under a uniform sky: a ray that crosses their box beside them meets none, and tests all.
-fn triangles_over_a_floor(count: usize) -> Scene {
-    let mut scene = Scene {
-        name: "equal triangles".into(),
-        environment: Some(Environment::uniform(Vec3::ONE)),
-        ..Scene::default()
-    };
-    let material = scene.add_material(Material::lambert("grey", Vec3::splat(0.5)));
-    scene.place(Mesh {
-        name: "triangles".into(),
-        positions: vec![
-            Vec3::new(-1.0, -1.0, 0.0),
-            Vec3::new(1.0, -1.0, 0.0),
-            Vec3::new(0.0, 1.0, 0.0),
-        ],
-        triangles: vec![[0, 1, 2]; count],
-        material: Some(material),
-        ..Mesh::default()
-    });
-    let (low, high) = (Vec3::new(-2.0, -2.0, -1.1), Vec3::new(2.0, 2.0, -1.0));
-    scene.place(cuboid("floor", material, low, high));
-    let eye = DVec3::new(0.0, 0.0, 3.0);
-    scene
-        .cameras
-        .push(Camera::look_at("main", eye, DVec3::ZERO, DVec3::Y, 0.8));
-    scene
-}
-
 #[test]
 fn rays_through_equal_triangles_are_parted_and_none_is_lost() {
     with_gpu(|gpu| {
-        let scene = triangles_over_a_floor(10_000);
+        let scene = equal_triangles(10_000);
         let of = |submission_work, ray_quota| {
             let settings = PathTracerSettings {
                 submission_work,

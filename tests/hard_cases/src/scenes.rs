@@ -1,7 +1,7 @@
 //! Scenes whose picture is known, and the parts that they are made of.
 
 use clerestory::Result;
-use clerestory::scene::{Camera, Environment, Material, Mesh, Projection, Scene, load};
+use clerestory::scene::{Camera, DensityGrid, Environment, LightKind, Material, Medium, Mesh, Projection, Scene, load};
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::random::Random;
@@ -86,6 +86,61 @@ pub fn point_triangle(scene: &mut Scene, material: Material, place: Vec3) {
         material: Some(material),
         ..Mesh::default()
     });
+}
+
+/// Places a grid of 32³ cells in the unit cube, one in each block of 4³ as dense as this in m⁻¹ and the others empty, and a point light above it. A path makes as many
+/// tentative collisions as if all were dense, and next to none of them is real.
+pub fn place_sparse_grid(scene: &mut Scene, density: f32) {
+    let dense = |place: f64| (place * 32.0) as u32 % 4 == 1;
+    let cells = DensityGrid::from_fn([32; 3], |p| {
+        let full = dense(p.x) && dense(p.y) && dense(p.z);
+        if full { density } else { 0.0 }
+    });
+    let inside = scene.media.len() as u32;
+    scene.media.push(Medium {
+        name: "sparse".into(),
+        sigma_a: Vec3::splat(0.5),
+        sigma_s: Vec3::splat(0.5),
+        density: Some(cells.in_box(DVec3::ZERO, DVec3::ONE)),
+        ..Medium::default()
+    });
+    let boundary = scene.add_material(Material {
+        name: "boundary".into(),
+        boundary: true,
+        interior: Some(inside),
+        ..Material::default()
+    });
+    scene.place(cuboid("grid", boundary, Vec3::ZERO, Vec3::ONE));
+    let (position, intensity) = (Vec3::new(0.4, 1.5, 0.6), Vec3::ONE);
+    scene.add_light("point", LightKind::Point { position, intensity });
+}
+
+/// Equal triangles, which no index can part, before a floor under a uniform sky: a ray that crosses their box beside them meets none, and tests all.
+pub fn equal_triangles(count: usize) -> Scene {
+    let mut scene = Scene {
+        name: "equal triangles".into(),
+        environment: Some(Environment::uniform(Vec3::ONE)),
+        ..Scene::default()
+    };
+    let grey = scene.add_material(Material::lambert("grey", Vec3::splat(0.5)));
+    scene.place(Mesh {
+        name: "triangles".into(),
+        positions: vec![
+            Vec3::new(-1.0, -1.0, 0.0),
+            Vec3::new(1.0, -1.0, 0.0),
+            Vec3::new(0.0, 1.0, 0.0),
+        ],
+        triangles: vec![[0, 1, 2]; count],
+        material: Some(grey),
+        ..Mesh::default()
+    });
+    let (low, high) = (Vec3::new(-2.0, -2.0, -1.1), Vec3::new(2.0, 2.0, -1.0));
+    scene.place(cuboid("floor", grey, low, high));
+    let eye = DVec3::new(0.0, 0.0, 3.0);
+    scene
+        .cameras
+        .push(Camera::look_at("main", eye, DVec3::ZERO, DVec3::Y, 0.8));
+    scene
 }
 
 /// A floor of a material seen from straight above over 2 m × 2 m; nothing shines.

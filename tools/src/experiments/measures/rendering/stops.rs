@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Camera, DensityGrid, Environment, LightKind, Material, Medium, Mesh, Scene};
+use clerestory::scene::{Camera, Environment, Scene};
 use clerestory::techniques;
 use clerestory::{Error, Result};
-use clerestory_hard_cases::scenes::cuboid;
+use clerestory_hard_cases::scenes::{equal_triangles, place_sparse_grid};
 use glam::{DVec3, Vec3};
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, rows};
@@ -26,59 +26,14 @@ struct Case {
     scene: fn() -> Result<Scene>,
 }
 
-/// A cube of 32³ cells with a dense one in each block of 4³ and nothing elsewhere: next to all of a path's tentative collisions are none.
+/// A grid of which next to nothing is dense, under a uniform sky.
 fn sparse_grid(density: f32) -> Scene {
-    let dense = |place: f64| (place * 32.0) as u32 % 4 == 1;
-    let cells = DensityGrid::from_fn([32; 3], |p| {
-        let full = dense(p.x) && dense(p.y) && dense(p.z);
-        if full { density } else { 0.0 }
-    });
-    let mut scene = under_sky(DVec3::new(0.5, 0.6, 2.5), DVec3::splat(0.5));
-    scene.media.push(Medium {
-        name: "sparse".into(),
-        sigma_a: Vec3::splat(0.5),
-        sigma_s: Vec3::splat(0.5),
-        density: Some(cells.in_box(DVec3::ZERO, DVec3::ONE)),
-        ..Medium::default()
-    });
-    let boundary = scene.add_material(Material {
-        name: "boundary".into(),
-        boundary: true,
-        interior: Some(0),
-        ..Material::default()
-    });
-    scene.place(cuboid("grid", boundary, Vec3::ZERO, Vec3::ONE));
-    let (position, intensity) = (Vec3::new(0.4, 1.5, 0.6), Vec3::ONE);
-    scene.add_light("point", LightKind::Point { position, intensity });
-    scene
-}
-
-/// Triangles in one place, which no index can part, before a floor: rays that cross their box beside them test all.
-fn equal_triangles(count: usize) -> Scene {
-    let mut scene = under_sky(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO);
-    let grey = scene.add_material(Material::lambert("grey", Vec3::splat(0.5)));
-    scene.place(Mesh {
-        name: "triangles".into(),
-        positions: vec![
-            Vec3::new(-1.0, -1.0, 0.0),
-            Vec3::new(1.0, -1.0, 0.0),
-            Vec3::new(0.0, 1.0, 0.0),
-        ],
-        triangles: vec![[0, 1, 2]; count],
-        material: Some(grey),
-        ..Mesh::default()
-    });
-    let (low, high) = (Vec3::new(-2.0, -2.0, -1.1), Vec3::new(2.0, 2.0, -1.0));
-    scene.place(cuboid("floor", grey, low, high));
-    scene
-}
-
-/// Nothing but a sky and a camera.
-fn under_sky(eye: DVec3, target: DVec3) -> Scene {
     let mut scene = Scene {
         environment: Some(Environment::uniform(Vec3::ONE)),
         ..Scene::default()
     };
+    place_sparse_grid(&mut scene, density);
+    let (eye, target) = (DVec3::new(0.5, 0.6, 2.5), DVec3::splat(0.5));
     scene.cameras.push(Camera::look_at("main", eye, target, DVec3::Y, 0.8));
     scene
 }
