@@ -4,19 +4,21 @@
 //! `--overwrite` alone. The same holds for what came to the place while the command worked, and for better pictures: the new files are written
 //! beside them then. What cannot be written at its place in the end goes to the system's temporary folder, which is an error that says where.
 
-use std::fs::{DirBuilder, File, OpenOptions};
+mod lock;
+
+use std::fs::{DirBuilder, File};
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::SystemTime;
 
 use clap::Args;
 use clerestory::film::{atomic, mark};
-use clerestory::fingerprint::Fingerprint;
 use clerestory::input::InputFile;
 use clerestory::scene::builtin;
 use clerestory::{Error, Result};
 use serde_json::Value;
 
+use self::lock::Lock;
 use crate::failure::{Code, Failure, Outcome};
 use crate::{output, pictures};
 
@@ -105,7 +107,7 @@ impl Written {
         }
     }
 
-    /// The failure as one.
+    /// Fails where the files are not where they should be.
     pub fn check(self) -> Outcome {
         self.failure.map_or(Ok(()), Err)
     }
@@ -396,53 +398,6 @@ fn close_to_others(builder: &mut DirBuilder) {
 #[cfg(not(unix))]
 fn close_to_others(_: &mut DirBuilder) {}
 
-/// The right to write the files of one name, until it is dropped: a file that only one process can make.
-struct Lock(PathBuf);
-
-impl Lock {
-    /// A lock this old was left behind by a process that was ended while it wrote.
-    const STALE: Duration = Duration::from_secs(60);
-    /// Longer than a lock can become without being stale.
-    const PATIENCE: Duration = Duration::from_secs(90);
-    /// Between two tries.
-    const PAUSE: Duration = Duration::from_millis(10);
-
-    /// Waits for it. Files that differ only in their endings share it.
-    fn of(path: &Path) -> io::Result<Self> {
-        let end = atomic::end_of_links(path)?;
-        // By a hash: the name with anything added might be too long.
-        let print = Fingerprint::of(end.file_stem().unwrap_or_default().as_encoded_bytes());
-        let lock = end.with_file_name(format!(".clerestory-{}.lock", &print[..16]));
-        let begun = Instant::now();
-        loop {
-            match OpenOptions::new().write(true).create_new(true).open(&lock) {
-                Ok(_) => return Ok(Self(lock)),
-                Err(cause) if cause.kind() != ErrorKind::AlreadyExists => return Err(cause),
-                Err(cause) if begun.elapsed() > Self::PATIENCE => return Err(cause),
-                Err(_) => {
-                    if is_older(&lock, Self::STALE) {
-                        // Another process may have taken it away already.
-                        let _ = std::fs::remove_file(&lock);
-                    }
-                    std::thread::sleep(Self::PAUSE);
-                }
-            }
-        }
-    }
-}
-
-impl Drop for Lock {
-    fn drop(&mut self) {
-        // A lock that stays is taken for stale after a while.
-        let _ = std::fs::remove_file(&self.0);
-    }
-}
-
-fn is_older(path: &Path, age: Duration) -> bool {
-    let changed = path.symlink_metadata().and_then(|found| found.modified()).ok();
-    changed.is_some_and(|time| time.elapsed().is_ok_and(|elapsed| elapsed > age))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -617,20 +572,6 @@ mod tests {
         assert_eq!((failure.code, std::fs::read(kept)?), (Code::Run, mine(1.0)?));
         assert!(hint.contains(&inside.display().to_string()), "{hint}");
         std::fs::remove_dir_all(inside)?;
-        Ok(())
-    }
-
-    #[test]
-    fn a_lock_left_behind_is_taken_for_stale() -> Tested {
-        let folder = tempfile::tempdir()?;
-        let path = folder.path().join("a.exr");
-        let lock = Lock::of(&path)?;
-        assert!(lock.0.exists() && !is_older(&lock.0, Lock::STALE));
-        let long_ago = SystemTime::now() - 2 * Lock::STALE;
-        File::options().write(true).open(&lock.0)?.set_modified(long_ago)?;
-        assert!(is_older(&lock.0, Lock::STALE));
-        let other = Lock::of(&path.with_extension("png"))?;
-        assert_eq!(other.0, lock.0);
         Ok(())
     }
 }
