@@ -14,14 +14,16 @@
 
 mod arrival;
 mod compaction;
+mod in_flight;
 mod stall;
 mod trace;
 mod walker;
 mod wave;
 
 pub use arrival::{ArrivalStage, Places, StoppedPlaces};
+pub use in_flight::{Walked, WaveInFlight};
 pub use trace::{RAY_QUOTA, ray_quota};
-pub use walker::{Bounce, WalkOptions, WalkStages, Walked, Walker, WaveInFlight};
+pub use walker::{Bounce, WalkOptions, WalkStages, Walker};
 pub use wave::{MediumCounts, SLOTS_MAX, WaveBuffers, WaveNeeds, default_slots, slots_of_device, stage_barrier};
 
 pub use crate::gpu::shaders::sets::WaveSet;

@@ -5,20 +5,20 @@
 //! next submission goes on with the places that are not done. Every place does the same work in whichever submission, so that none of it shows.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use super::arrival::{ArrivalStage, Places, StoppedPlaces};
 use super::compaction::Compaction;
+use super::in_flight::{Next, Walked, WaveInFlight};
 use super::stall::StallWatch;
 use super::trace::{RAY_QUOTA, TracePipelines, ray_quota};
-use super::wave::{MediumCounts, Status, WaveBuffers, group_counts, indirect};
+use super::wave::{Status, WaveBuffers, group_counts, indirect};
 use crate::Result;
-use crate::gpu::shaders::constants::{
-    STALLED_ARRIVAL, STALLED_EXTEND, STALLED_NOT, STALLED_SCATTER, STALLED_SHADOW, WORK_UNIT,
-};
+use crate::gpu::shaders::constants::{STALLED_NOT, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
-use crate::gpu::{Access, DeviceKind, Gpu, Pace, Pass, PipelineInfo, Recorder, Timings, wide_counter};
+use crate::gpu::{Access, DeviceKind, Gpu, Pace, Pass, PipelineInfo, Recorder, wide_counter};
 use crate::transport::GpuScene;
 
 /// Work of a submission where nothing else is asked for, in loop iterations that count: some tenths of a second on two cores, and less on others.
@@ -28,6 +28,11 @@ const DEVICE_WORK: u64 = 1 << 30;
 const WORK_UNITS_MAX: u64 = 1 << 30;
 /// Rays of the bounces of a submission on software devices, about, unless one bounce has more.
 const SOFTWARE_RAYS: u32 = 1 << 18;
+
+/// The number of a walker's wave before the first one.
+const NO_WAVE: u64 = 0;
+/// Numbers of waves, for a walker to know its own.
+static NEXT_WAVE: AtomicU64 = AtomicU64::new(NO_WAVE + 1);
 
 /// How a walker goes about it. None of it changes what walks compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,115 +130,6 @@ pub struct Bounce<'a> {
     key: WalkKey,
 }
 
-/// What a wave took.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Walked {
-    /// Of its submissions.
-    pub timings: Vec<Timings>,
-    /// Rays followed to their closest hits.
-    pub rays: u64,
-    /// Places that something waited at, of all bounces.
-    pub waited: u64,
-    /// Submissions that ended with rays or places stopped by a quota, which then went on.
-    pub stalls: u64,
-    /// Submissions that ended with places left for later, since their work was used up.
-    pub postponed: u64,
-    /// Submissions.
-    pub submissions: u64,
-    /// Loop iterations that count as their work ([`WalkOptions::work`]), rounded down ray by ray.
-    pub work: u64,
-    /// What happened in media.
-    pub media: MediumCounts,
-}
-
-/// A wave of walks under way: what [`Walker::begin`] makes and [`Walker::advance`] takes on.
-pub struct WaveInFlight {
-    key: WalkKey,
-    status: Status,
-    next: Next,
-    /// Some rays of the stage that goes on were stopped by a quota, rather than left for later before they began.
-    resumes: bool,
-    /// Places of the bounce at which an arrival stage was stopped by its quota.
-    stopped: u32,
-    watch: StallWatch,
-    walked: Walked,
-}
-
-/// What the next submission of a wave begins with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Next {
-    /// Where walks start.
-    Start,
-    /// The next bounce.
-    Bounce,
-    /// Rays of a bounce that are not at their closest hits yet.
-    Hits,
-    /// The arrival stage, at the places that it has not looked at yet.
-    Arrival,
-    /// What the arrival stage lacks where it was stopped, from this part on.
-    Stopped(u64),
-    /// Scattering, at the places where it was not done yet.
-    Scatter,
-    /// Shadow rays that are not at their ends yet.
-    Shadows,
-    /// Nothing: all walks have ended.
-    End,
-}
-
-impl Next {
-    /// Whether the first bounce of a submission begins with its closest hits.
-    fn has_hits(self) -> bool {
-        !matches!(self, Self::Arrival | Self::Scatter)
-    }
-
-    /// Whether the arrival stage of the first bounce is still to be recorded.
-    fn has_arrival(self) -> bool {
-        self != Self::Scatter
-    }
-}
-
-impl WaveInFlight {
-    /// What it has taken so far.
-    pub fn walked(&self) -> &Walked {
-        &self.walked
-    }
-
-    /// The timings of the submissions since they were taken last.
-    pub fn take_timings(&mut self) -> Vec<Timings> {
-        std::mem::take(&mut self.walked.timings)
-    }
-
-    /// Whether all walks have ended and nothing waits.
-    pub fn has_ended(&self) -> bool {
-        self.next == Next::End
-    }
-
-    /// After a submission that began with `from`: what the next one begins with.
-    fn follow(&mut self, from: Next) -> Next {
-        let status = &self.status;
-        let (stops, postpones) = (status.unfinished > 0, status.unstarted > 0);
-        match status.stalled {
-            STALLED_EXTEND => {
-                self.resumes = stops || (self.resumes && from == Next::Hits);
-                Next::Hits
-            }
-            STALLED_SHADOW => {
-                self.resumes = stops || (self.resumes && from == Next::Shadows);
-                Next::Shadows
-            }
-            STALLED_ARRIVAL => {
-                self.stopped += status.unfinished;
-                if postpones { Next::Arrival } else { Next::Stopped(0) }
-            }
-            STALLED_SCATTER => Next::Scatter,
-            // The arrival stage alone has been recorded.
-            _ if self.stopped > 0 => Next::Stopped(0),
-            _ if status.active_count > 0 => Next::Bounce,
-            _ => Next::End,
-        }
-    }
-}
-
 /// Follows waves of walks through a scene.
 pub struct Walker {
     gpu: Gpu,
@@ -251,6 +147,8 @@ pub struct Walker {
     compaction: Compaction,
     buffers: WaveBuffers,
     pace: Pace,
+    /// The number of the wave that was begun last, whose walks are in the buffers.
+    wave: u64,
 }
 
 impl Bounce<'_> {
@@ -298,6 +196,7 @@ impl Walker {
             quota,
             work_units: (work / u64::from(WORK_UNIT)).clamp(1, WORK_UNITS_MAX) as u32,
             buffers,
+            wave: NO_WAVE,
         })
     }
 
@@ -338,7 +237,9 @@ impl Walker {
             return Err(crate::Error::setting("walks", walks, cause));
         }
         self.pace.begin();
+        self.wave = NEXT_WAVE.fetch_add(1, Ordering::Relaxed);
         Ok(WaveInFlight {
+            number: self.wave,
             key,
             status: Status {
                 active_count: walks,
@@ -355,10 +256,14 @@ impl Walker {
     /// One submission towards the end of a wave, the last one that was begun: a bounded piece of work, whatever the scene. The stages are those of the whole wave.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory),
-    /// [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end, and those of the stages. What failed for another reason than a lost
-    /// device can be begun again.
+    /// [`Error::Setting`](crate::Error::Setting) for a wave of another walker, or one that was given up; [`Error::DeviceLost`](crate::Error::DeviceLost),
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end, and those of the
+    /// stages. What failed for another reason than a lost device can be begun again.
     pub fn advance(&mut self, wave: &mut WaveInFlight, stages: &mut dyn WalkStages) -> Result<()> {
+        if wave.number != self.wave {
+            let cause = "is not the one that this walker has begun last; begin it again";
+            return Err(crate::Error::setting("wave", wave.number, cause));
+        }
         let from = wave.next;
         wave.next = match from {
             Next::End => return Ok(()),
@@ -427,8 +332,7 @@ impl Walker {
 
     /// Submits some bounces of a wave, the first ones with its start, and reads how far they came.
     fn submit(&mut self, wave: &mut WaveInFlight, stages: &mut dyn WalkStages) -> Result<()> {
-        let (from, key) = (wave.next, wave.key);
-        let resumes = wave.resumes && matches!(from, Next::Hits | Next::Shadows);
+        let resumes = wave.resumes && matches!(wave.next, Next::Hits | Next::Shadows);
         if resumes && self.resume.is_none() {
             let shadows = self.options.shadows;
             self.resume = Some(TracePipelines::new(&self.gpu, &self.scene, self.quota, shadows, true)?);
@@ -436,74 +340,9 @@ impl Walker {
         let trace = self.resume.as_ref().filter(|_| resumes).unwrap_or(&self.trace);
         let mut recorder = self.gpu.recorder(&format!("{} wave", self.options.name))?;
         stages.record_before(&mut recorder, &self.buffers)?;
-        let mut status = wave.status;
-        // A stalled round leaves no groups to dispatch.
-        let groups = group_counts(status.active_count);
-        (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
-        status.waiting_groups = group_counts(status.waiting_count)[0];
-        (status.stalled, status.unfinished, status.unstarted) = (STALLED_NOT, 0, 0);
-        status.work_left = self.work_units as i32;
-        recorder.pass(&self.pass("begin"), |pass| {
-            pass.update(self.buffers.status.view(), &[status])?;
-            if from == Next::Start {
-                if let Some(media) = &self.buffers.media {
-                    media.reset(pass)?;
-                }
-                stages.reset(pass)?;
-                stages.arrival().map_or(Ok(()), |arrival| arrival.reset(pass))?;
-            }
-            pass.memory_barrier(
-                Access::TRANSFER_WRITE | Access::COMPUTE,
-                Access::COMPUTE | Access::INDIRECT_READ,
-            );
-            Ok(())
-        })?;
-        if from == Next::Start {
-            // Its output is the input of the first bounce, whose parity is 0.
-            stages.record_start(&mut recorder, &self.buffers.set(1))?;
-        }
-        if from == Next::Shadows {
-            let bounce = self.bounce(key, status.rounds as usize % 2);
-            bounce.record_shadow_by(&mut recorder, trace, true)?;
-        }
-        // Places at which the arrival stage was stopped come before scattering.
-        let arrival_alone = from == Next::Arrival && wave.stopped > 0;
-        let bounces = if arrival_alone {
-            1
-        } else {
-            self.bounces_of(status.active_count)
-        };
-        for index in 0..bounces {
-            let bounce = self.bounce(key, (status.rounds + index) as usize % 2);
-            let first = if index == 0 { from } else { Next::Bounce };
-            if first.has_hits() {
-                let goes_on = first == Next::Hits;
-                let trace = if goes_on { trace } else { &self.trace };
-                self.record_hits(&mut recorder, &bounce, trace, goes_on)?;
-            }
-            if let Some(arrival) = stages.arrival().filter(|_| first.has_arrival()) {
-                arrival.record(&mut recorder, &bounce.wave, bounce.places)?;
-            }
-            if !arrival_alone {
-                stages.record_scatter(&mut recorder, &bounce)?;
-                recorder.pass(&self.pass("compact"), |pass| {
-                    self.compaction.record(pass, &self.buffers, &bounce.wave, bounce.places)
-                })?;
-                stages.record_waiting(&mut recorder, &bounce)?;
-            }
-        }
-        recorder.pass(&self.pass("read status"), |pass| {
-            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
-            pass.copy(
-                self.buffers.status.slice(0, size_of::<Status>() as u64),
-                self.buffers.readback.view(),
-            )?;
-            if let Some(media) = &self.buffers.media {
-                pass.copy(media.counters.view(), media.readback.view())?;
-            }
-            stages.arrival().map_or(Ok(()), |arrival| arrival.read_back(pass))?;
-            stages.read_back(pass)
-        })?;
+        self.record_begin(&mut recorder, wave, stages)?;
+        self.record_bounces(&mut recorder, wave, trace, stages)?;
+        self.record_read_back(&mut recorder, stages)?;
         let clock = Instant::now();
         let submission = recorder.submit()?;
         stages.submitted();
@@ -511,7 +350,7 @@ impl Walker {
         let seconds = timings
             .untimed
             .map_or(timings.seconds(), |_| clock.elapsed().as_secs_f64());
-        let rays_before = wide_counter(status.rays);
+        let rays_before = wide_counter(wave.status.rays);
         wave.status = self.buffers.readback.read::<Status>(0, 1)?[0];
         let walked = &mut wave.walked;
         walked.timings.push(timings);
@@ -524,6 +363,97 @@ impl Walker {
         }
         self.pace.submitted(seconds, walked.rays - rays_before);
         Ok(())
+    }
+
+    /// Records the status that a submission begins with, and where walks start.
+    fn record_begin(&self, recorder: &mut Recorder, wave: &WaveInFlight, stages: &dyn WalkStages) -> Result<()> {
+        let starts = wave.next == Next::Start;
+        let mut status = wave.status;
+        // A stalled round leaves no groups to dispatch.
+        let groups = group_counts(status.active_count);
+        (status.item_groups, status.chunk_groups, status.scatter_groups) = (groups[0], groups[1], groups[1]);
+        status.waiting_groups = group_counts(status.waiting_count)[0];
+        (status.stalled, status.unfinished, status.unstarted) = (STALLED_NOT, 0, 0);
+        status.work_left = self.work_units as i32;
+        recorder.pass(&self.pass("begin"), |pass| {
+            pass.update(self.buffers.status.view(), &[status])?;
+            if starts {
+                if let Some(media) = &self.buffers.media {
+                    media.reset(pass)?;
+                }
+                stages.reset(pass)?;
+                stages.arrival().map_or(Ok(()), |arrival| arrival.reset(pass))?;
+            }
+            pass.memory_barrier(
+                Access::TRANSFER_WRITE | Access::COMPUTE,
+                Access::COMPUTE | Access::INDIRECT_READ,
+            );
+            Ok(())
+        })?;
+        if starts {
+            // Its output is the input of the first bounce, whose parity is 0.
+            stages.record_start(recorder, &self.buffers.set(1))?;
+        }
+        Ok(())
+    }
+
+    /// Records the bounces of a submission, the first one from where the last submission left it.
+    fn record_bounces(
+        &self,
+        recorder: &mut Recorder,
+        wave: &WaveInFlight,
+        trace: &TracePipelines,
+        stages: &dyn WalkStages,
+    ) -> Result<()> {
+        let WaveInFlight { next: from, key, .. } = *wave;
+        let rounds = wave.status.rounds;
+        if from == Next::Shadows {
+            let bounce = self.bounce(key, rounds as usize % 2);
+            bounce.record_shadow_by(recorder, trace, true)?;
+        }
+        // Places at which the arrival stage was stopped come before scattering.
+        let arrival_alone = from == Next::Arrival && wave.stopped > 0;
+        let bounces = if arrival_alone {
+            1
+        } else {
+            self.bounces_of(wave.status.active_count)
+        };
+        for index in 0..bounces {
+            let bounce = self.bounce(key, (rounds + index) as usize % 2);
+            let first = if index == 0 { from } else { Next::Bounce };
+            if first.has_hits() {
+                let goes_on = first == Next::Hits;
+                let trace = if goes_on { trace } else { &self.trace };
+                self.record_hits(recorder, &bounce, trace, goes_on)?;
+            }
+            if let Some(arrival) = stages.arrival().filter(|_| first.has_arrival()) {
+                arrival.record(recorder, &bounce.wave, bounce.places)?;
+            }
+            if !arrival_alone {
+                stages.record_scatter(recorder, &bounce)?;
+                recorder.pass(&self.pass("compact"), |pass| {
+                    self.compaction.record(pass, &self.buffers, &bounce.wave, bounce.places)
+                })?;
+                stages.record_waiting(recorder, &bounce)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Records the copies that the host reads after a submission.
+    fn record_read_back(&self, recorder: &mut Recorder, stages: &dyn WalkStages) -> Result<()> {
+        recorder.pass(&self.pass("read status"), |pass| {
+            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
+            pass.copy(
+                self.buffers.status.slice(0, size_of::<Status>() as u64),
+                self.buffers.readback.view(),
+            )?;
+            if let Some(media) = &self.buffers.media {
+                pass.copy(media.counters.view(), media.readback.view())?;
+            }
+            stages.arrival().map_or(Ok(()), |arrival| arrival.read_back(pass))?;
+            stages.read_back(pass)
+        })
     }
 
     /// Bounces of a submission that begins with so many walks.

@@ -167,6 +167,12 @@ fn gather(gpu: &Gpu, scene: &Arc<GpuScene>, bounces: usize) -> Vec<[f32; 3]> {
     let gathered = gpu.read::<GatheredLight>(walker.buffers().gathered(), walks as usize);
     let refused = walker.run(key, walks + 1, &mut stages).unwrap_err();
     assert!(matches!(&refused, Error::Setting { .. }), "{refused}");
+    // The memory is that of the wave that was begun last.
+    let mut given_up = walker.begin(key, walks).unwrap();
+    let mut last = walker.begin(key, walks).unwrap();
+    let refused = walker.advance(&mut given_up, &mut stages).unwrap_err();
+    assert!(matches!(&refused, Error::Setting { .. }), "{refused}");
+    walker.advance(&mut last, &mut stages).unwrap();
     gathered.unwrap().iter().map(|light| light.radiance).collect()
 }
 

@@ -1,0 +1,118 @@
+//! A wave under way between two submissions: how far it is, and what the next one begins with.
+
+use super::stall::StallWatch;
+use super::wave::{MediumCounts, Status};
+use crate::gpu::Timings;
+use crate::gpu::shaders::constants::{STALLED_ARRIVAL, STALLED_EXTEND, STALLED_SCATTER, STALLED_SHADOW};
+use crate::gpu::shaders::types::WalkKey;
+
+/// What a wave took.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Walked {
+    /// Of its submissions.
+    pub timings: Vec<Timings>,
+    /// Rays followed to their closest hits.
+    pub rays: u64,
+    /// Places that something waited at, of all bounces.
+    pub waited: u64,
+    /// Submissions that ended with rays or places stopped by a quota, which then went on.
+    pub stalls: u64,
+    /// Submissions that ended with places left for later, since their work was used up.
+    pub postponed: u64,
+    /// Submissions.
+    pub submissions: u64,
+    /// Loop iterations that count as their work ([`WalkOptions::work`](super::WalkOptions::work)), rounded down ray by ray.
+    pub work: u64,
+    /// What happened in media.
+    pub media: MediumCounts,
+}
+
+/// A wave of walks under way: what [`Walker::begin`](super::Walker::begin) makes and [`Walker::advance`](super::Walker::advance) takes on.
+pub struct WaveInFlight {
+    /// No other wave of any walker has it.
+    pub(super) number: u64,
+    pub(super) key: WalkKey,
+    pub(super) status: Status,
+    pub(super) next: Next,
+    /// Some rays of the stage that goes on were stopped by a quota, rather than left for later before they began.
+    pub(super) resumes: bool,
+    /// Places of the bounce at which an arrival stage was stopped by its quota.
+    pub(super) stopped: u32,
+    pub(super) watch: StallWatch,
+    pub(super) walked: Walked,
+}
+
+/// What the next submission of a wave begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Next {
+    /// Where walks start.
+    Start,
+    /// The next bounce.
+    Bounce,
+    /// Rays of a bounce that are not at their closest hits yet.
+    Hits,
+    /// The arrival stage, at the places that it has not looked at yet.
+    Arrival,
+    /// What the arrival stage lacks where it was stopped, from this part on.
+    Stopped(u64),
+    /// Scattering, at the places where it was not done yet.
+    Scatter,
+    /// Shadow rays that are not at their ends yet.
+    Shadows,
+    /// Nothing: all walks have ended.
+    End,
+}
+
+impl Next {
+    /// Whether the first bounce of a submission begins with its closest hits.
+    pub fn has_hits(self) -> bool {
+        !matches!(self, Self::Arrival | Self::Scatter)
+    }
+
+    /// Whether the arrival stage of the first bounce is still to be recorded.
+    pub fn has_arrival(self) -> bool {
+        self != Self::Scatter
+    }
+}
+
+impl WaveInFlight {
+    /// What it has taken so far.
+    pub fn walked(&self) -> &Walked {
+        &self.walked
+    }
+
+    /// The timings of the submissions since they were taken last.
+    pub fn take_timings(&mut self) -> Vec<Timings> {
+        std::mem::take(&mut self.walked.timings)
+    }
+
+    /// Whether all walks have ended and nothing waits.
+    pub fn has_ended(&self) -> bool {
+        self.next == Next::End
+    }
+
+    /// After a submission that began with `from`: what the next one begins with.
+    pub(super) fn follow(&mut self, from: Next) -> Next {
+        let status = &self.status;
+        let (stops, postpones) = (status.unfinished > 0, status.unstarted > 0);
+        match status.stalled {
+            STALLED_EXTEND => {
+                self.resumes = stops || (self.resumes && from == Next::Hits);
+                Next::Hits
+            }
+            STALLED_SHADOW => {
+                self.resumes = stops || (self.resumes && from == Next::Shadows);
+                Next::Shadows
+            }
+            STALLED_ARRIVAL => {
+                self.stopped += status.unfinished;
+                if postpones { Next::Arrival } else { Next::Stopped(0) }
+            }
+            STALLED_SCATTER => Next::Scatter,
+            // The arrival stage alone has been recorded.
+            _ if self.stopped > 0 => Next::Stopped(0),
+            _ if status.active_count > 0 => Next::Bounce,
+            _ => Next::End,
+        }
+    }
+}
