@@ -26,7 +26,7 @@ fn text(output: &Output) -> String {
 #[test]
 fn planted_faults_are_found_small_and_counted() -> Tested {
     let folder = tempfile::tempdir()?;
-    let run = |inputs: &str| {
+    let run_in = |folder: &Path, inputs: &str| {
         let arguments = [
             "run",
             "--minutes",
@@ -37,8 +37,9 @@ fn planted_faults_are_found_small_and_counted() -> Tested {
             "--inputs",
             inputs,
         ];
-        fuzz(&arguments, folder.path())
+        fuzz(&arguments, folder)
     };
+    let run = |inputs: &str| run_in(folder.path(), inputs);
     let first = run("250")?;
     assert_eq!(first.status.code(), Some(1), "{}", text(&first));
     let totals = Totals::read(folder.path())?.ok_or("no totals")?;
@@ -68,17 +69,7 @@ fn planted_faults_are_found_small_and_counted() -> Tested {
     // More files go on behind the last, and find the same as in one run.
     run("300")?;
     let other = tempfile::tempdir()?;
-    let arguments = [
-        "run",
-        "--minutes",
-        "9",
-        "--no-steps",
-        "--reader",
-        "planted faults",
-        "--inputs",
-        "300",
-    ];
-    fuzz(&arguments, other.path())?;
+    run_in(other.path(), "300")?;
     let [ours, theirs] = [folder.path(), other.path()].map(Totals::read);
     let found = |totals: Totals| totals.readers["planted faults"].read.found.clone();
     let [ours, theirs] = [ours?, theirs?].map(|totals| totals.map(found));

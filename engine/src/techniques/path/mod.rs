@@ -63,9 +63,10 @@ pub struct PathCounters {
     pub density_lookups: u64,
     /// Submissions that ended with rays stopped by the quota, which then went on.
     pub stalls: u64,
-    /// Submissions that ended with paths left for later, since their work was used up.
+    /// Submissions that ended with paths left for later, since their work was used up. Where there are some, their number and those of stalls, of submissions
+    /// and of their work may differ from run to run.
     pub postponed: u64,
-    /// Submissions of waves. Their number may differ from run to run where paths are left for later.
+    /// Submissions of waves.
     pub submissions: u64,
     /// Loop iterations of long rays and of walks through density grids, and steps of queries of maps: what bounds a submission.
     pub work: u64,
