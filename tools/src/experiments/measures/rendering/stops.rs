@@ -38,8 +38,10 @@ fn sparse_grid(density: f32) -> Scene {
     scene
 }
 
+type MakeScene = fn() -> Result<Scene>;
+
 /// Scenes made to go on for ever.
-const HOSTILE: [(&str, fn() -> Result<Scene>); 4] = [
+const HOSTILE: [(&str, MakeScene); 4] = [
     ("a thousand equal triangles", || Ok(equal_triangles(1000))),
     ("a million equal triangles", || Ok(equal_triangles(1_000_000))),
     ("sparse grid, 10⁴ collisions a way", || Ok(sparse_grid(1e4))),
