@@ -20,10 +20,13 @@ const BUDGETS: [f64; 2] = [2.0, 0.2];
 /// Pixels along a side.
 const SIDES: [u32; 2] = [512, 16];
 
+/// Makes a scene.
+type MakeScene = fn() -> Result<Scene>;
+
 /// A scene by its name.
 struct Case {
     name: String,
-    scene: fn() -> Result<Scene>,
+    scene: MakeScene,
 }
 
 /// A grid of which next to nothing is dense, under a uniform sky.
@@ -37,8 +40,6 @@ fn sparse_grid(density: f32) -> Scene {
     scene.cameras.push(Camera::look_at("main", eye, target, DVec3::Y, 0.8));
     scene
 }
-
-type MakeScene = fn() -> Result<Scene>;
 
 /// Scenes made to go on for ever.
 const HOSTILE: [(&str, MakeScene); 4] = [
