@@ -85,7 +85,7 @@ fn predictions_come_true() {
 #[test]
 fn pictures_have_the_error_that_was_predicted() {
     with_gpu(|gpu| {
-        for (address, asked) in [("builtin:cornell-box", 0.3), ("builtin:box-room", 0.3)] {
+        for (address, asked) in [("builtin:cornell-box", 0.45), ("builtin:box-room", 0.45)] {
             let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
             let of = |spp, seed| RenderOptions {
                 size: [48, 48],

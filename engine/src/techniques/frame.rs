@@ -12,8 +12,8 @@
 //! | before | the target may be written by compute shaders: earlier uses have been waited for | barriers among its own passes |
 //! | after | what compute shaders have written to the target is made visible to whoever reads it | all that it drew is there |
 //!
-//! Bounded: a step of [`Accumulated`] is one frame at least, which is never parted. How long one takes is the method's to bound: rays of
-//! [`ambient`](super::ambient) end at a quota, and [`preview`](super::preview) draws each triangle once a view, however much of the picture it covers.
+//! Bounded: a step of [`Accumulated`] is one frame at least, which is never parted. How long one takes is the method's to bound: rays may end
+//! at a quota, and [`preview`](super::preview) draws each triangle once a view, however much of the picture it covers.
 //!
 //! Deterministic: a frame's picture depends on scene, camera, size, settings, seed and number alone.
 

@@ -47,7 +47,8 @@ pub const CLOUD: Entry = Entry {
     name: "cloud",
     summary: "A bright cloud of 300 m over a plain under sun and sky.",
     parameters: &[
-        coefficient("sigma_t", "0.1", "extinction coefficient at density 1, 1/m"),
+        // More, through its 640 m, no path would come to the end of in time.
+        Parameter::color("sigma_t", "0.1", 0.0, 1e4, "extinction coefficient at density 1, 1/m"),
         Parameter::color("albedo", "1", 0.0, 1.0, ALBEDO),
         PHASE,
         Parameter::real(
