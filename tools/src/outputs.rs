@@ -5,7 +5,7 @@
 //! beside them then. What cannot be written at its place in the end goes to the system's temporary folder, which is an error that says where.
 
 use std::fs::{DirBuilder, File, OpenOptions};
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -120,6 +120,7 @@ impl Outputs {
         for path in &paths {
             refuse_input(path, inputs)?;
         }
+        refuse_one_twice(&paths)?;
         let mut files = Vec::new();
         for path in &paths {
             check_old(path, &paths, overwrite)?;
@@ -201,23 +202,31 @@ impl Outputs {
     /// Writes all files to a new folder of the system's folder for temporary files; the failure says why, and where.
     fn write_aside(&self, contents: &[Vec<u8>], cause: &Error) -> Written {
         let folder = std::env::temp_dir().join(format!("clerestory-{:016x}", atomic::random()));
-        let write = || -> Result<Vec<PathBuf>> {
+        let mut paths = Vec::new();
+        let mut write = || -> Result<()> {
             private_folder(&folder).map_err(|cause| Error::io(&folder, cause))?;
-            let mut paths = Vec::new();
             for (file, bytes) in self.files.iter().zip(contents) {
                 let path = folder.join(file.path.file_name().unwrap_or_default());
                 atomic::write_new(&path, bytes)?;
                 paths.push(path);
             }
-            Ok(paths)
+            Ok(())
         };
-        let (paths, hint) = match write() {
-            Ok(paths) => (paths, format!("what was to be written is kept in {}", folder.display())),
-            Err(second) => {
-                // Parts of it are of no use.
-                let _ = std::fs::remove_dir_all(&folder);
-                (Vec::new(), format!("nor could it be kept elsewhere: {second}"))
+        let written = write();
+        let hint = match written {
+            Ok(()) => format!("what was to be written is kept in {}", folder.display()),
+            Err(second) if paths.is_empty() => {
+                // It is empty, or was not made.
+                let _ = std::fs::remove_dir(&folder);
+                format!("nor could it be kept elsewhere: {second}")
             }
+            // The first of them is the picture with all that is known, which is worth more than what goes with it.
+            Err(second) => format!(
+                "{} of {} files are kept in {}; the others could not be: {second}",
+                paths.len(),
+                self.files.len(),
+                folder.display()
+            ),
         };
         let failure = Failure {
             code: Code::Run,
@@ -263,6 +272,41 @@ fn refuse_input(path: &Path, inputs: &Inputs) -> Outcome {
         );
     }
     Ok(())
+}
+
+/// Refuses outputs that links lead to one file: the second would take the first one's place.
+fn refuse_one_twice(paths: &[&Path]) -> Outcome {
+    let places: Vec<PathBuf> = paths.iter().map(|path| place(path)).collect();
+    for (later, place) in places.iter().enumerate() {
+        if let Some(earlier) = places[..later].iter().position(|other| other == place) {
+            let [one, other] = [earlier, later].map(|index| paths[index].display().to_string());
+            return Err(
+                Failure::usage(format!("{one} and {other} are one file, and both would be written"))
+                    .hint("remove the link, or name another output"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Where a file would be written: behind its links, and in its folder without any, as far as these are there.
+fn place(path: &Path) -> PathBuf {
+    let end = atomic::end_of_links(path).unwrap_or_else(|_| path.to_owned());
+    if let Ok(there) = end.canonicalize() {
+        return there;
+    }
+    let folder = end.parent().and_then(|folder| named(folder).canonicalize().ok());
+    let beside = folder.zip(end.file_name()).map(|(folder, name)| folder.join(name));
+    beside.unwrap_or(end)
+}
+
+/// A folder by a name that is not empty.
+fn named(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    }
 }
 
 /// Refuses to replace what is no file, or should not be replaced unasked.
@@ -338,13 +382,6 @@ fn seen(path: &Path) -> Option<Seen> {
 
 /// Finds out whether a file can be written, or a folder be made for it in the nearest one that is there.
 fn probe(path: &Path) -> Outcome {
-    fn named(folder: &Path) -> &Path {
-        if folder.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            folder
-        }
-    }
     let mut above = path.ancestors().skip(1).map(named);
     let nearest = above.find(|folder| folder.symlink_metadata().is_ok());
     let probed = match nearest {
@@ -397,7 +434,11 @@ fn close_to_others(builder: &mut DirBuilder) {
 fn close_to_others(_: &mut DirBuilder) {}
 
 /// The right to write the files of one name, until it is dropped: a file that only one process can make.
-struct Lock(PathBuf);
+struct Lock {
+    path: PathBuf,
+    /// What stands in the file: nobody else's lock has it.
+    token: String,
+}
 
 impl Lock {
     /// A lock this old was left behind by a process that was ended while it wrote.
@@ -413,28 +454,53 @@ impl Lock {
         // By a hash: the name with anything added might be too long.
         let print = Fingerprint::of(end.file_stem().unwrap_or_default().as_encoded_bytes());
         let lock = end.with_file_name(format!(".clerestory-{}.lock", &print[..16]));
+        let token = format!("{:016x}", atomic::random());
         let begun = Instant::now();
         loop {
             match OpenOptions::new().write(true).create_new(true).open(&lock) {
-                Ok(_) => return Ok(Self(lock)),
+                Ok(mut file) => {
+                    return match file.write_all(token.as_bytes()) {
+                        Ok(()) => Ok(Self { path: lock, token }),
+                        Err(cause) => {
+                            // The first failure is the one to report.
+                            let _ = std::fs::remove_file(&lock);
+                            Err(cause)
+                        }
+                    };
+                }
                 Err(cause) if cause.kind() != ErrorKind::AlreadyExists => return Err(cause),
                 Err(cause) if begun.elapsed() > Self::PATIENCE => return Err(cause),
                 Err(_) => {
                     if is_older(&lock, Self::STALE) {
-                        // Another process may have taken it away already.
-                        let _ = std::fs::remove_file(&lock);
+                        Self::take_away(&lock);
                     }
                     std::thread::sleep(Self::PAUSE);
                 }
             }
         }
     }
+
+    /// Takes a stale lock away. Another process may have done so, and have made its own, since it was looked at: it is set aside first, looked at
+    /// again, and put back if it is not stale.
+    fn take_away(lock: &Path) {
+        let aside = lock.with_extension(format!("{:016x}.old", atomic::random()));
+        if std::fs::rename(lock, &aside).is_err() {
+            return;
+        }
+        if !is_older(&aside, Self::STALE) {
+            // Where a third process has its own by now, both write, as without a lock.
+            let _ = std::fs::hard_link(&aside, lock);
+        }
+        let _ = std::fs::remove_file(&aside);
+    }
 }
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // A lock that stays is taken for stale after a while.
-        let _ = std::fs::remove_file(&self.0);
+        // One that took so long that it was taken for stale may be another process's by now. A lock that stays is taken for stale after a while.
+        if std::fs::read(&self.path).is_ok_and(|found| found == self.token.as_bytes()) {
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 
@@ -516,6 +582,29 @@ mod tests {
             let (code, message) = said(Outputs::one(written, &Inputs::of([read]), true));
             assert!(code == Some(Code::Usage) && message.contains("reads it"), "{message}");
         }
+        Ok(())
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn outputs_that_are_one_file_by_links_are_refused() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        std::os::unix::fs::symlink("a.exr", at("a.png"))?;
+        let paths = [at("a.exr"), at("a.png")];
+        // Before there is a file, and with one.
+        for there in [false, true] {
+            if there {
+                std::fs::write(&paths[0], mine(1.0)?)?;
+            }
+            let (code, message) = said(Outputs::plan(&paths, &Inputs::default(), true));
+            assert!(code == Some(Code::Usage) && message.contains("one file"), "{message}");
+        }
+        std::fs::create_dir(at("folder"))?;
+        let same = [at("b.exr"), at("folder/../b.exr")];
+        let (code, message) = said(Outputs::plan(&same, &Inputs::default(), true));
+        assert!(code == Some(Code::Usage) && message.contains("one file"), "{message}");
+        assert!(Outputs::plan(&[at("b.exr"), at("b.png")], &Inputs::default(), true).is_ok());
         Ok(())
     }
 
@@ -621,16 +710,42 @@ mod tests {
     }
 
     #[test]
+    fn what_can_be_kept_elsewhere_is_kept_if_the_rest_cannot_be() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        // Files of one name, of which a folder has one.
+        let paths = [at("new/a.exr"), at("other/a.exr")];
+        let plan = Outputs::plan(&paths, &Inputs::default(), false).map_err(|failure| failure.message)?;
+        std::fs::write(at("new"), "a file in place of the folder")?;
+        let written = plan.write(&[mine(1.0)?, mine(2.0)?], never);
+        let failure = written.failure.as_ref().ok_or("no failure")?;
+        let hint = failure.hint.clone().unwrap_or_default();
+        assert!(failure.code == Code::Run && hint.contains("1 of 2 files"), "{hint}");
+        let kept = written.paths.first().ok_or("no file")?;
+        assert_eq!((written.paths.len(), std::fs::read(kept)?), (1, mine(1.0)?));
+        std::fs::remove_dir_all(kept.parent().ok_or("no folder")?)?;
+        Ok(())
+    }
+
+    #[test]
     fn a_lock_left_behind_is_taken_for_stale() -> Tested {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("a.exr");
         let lock = Lock::of(&path)?;
-        assert!(lock.0.exists() && !is_older(&lock.0, Lock::STALE));
+        assert!(lock.path.exists() && !is_older(&lock.path, Lock::STALE));
+        // Somebody who found another one to be stale does not take this one away.
+        Lock::take_away(&lock.path);
+        assert_eq!(std::fs::read(&lock.path)?, lock.token.as_bytes());
         let long_ago = SystemTime::now() - 2 * Lock::STALE;
-        File::options().write(true).open(&lock.0)?.set_modified(long_ago)?;
-        assert!(is_older(&lock.0, Lock::STALE));
+        File::options().write(true).open(&lock.path)?.set_modified(long_ago)?;
+        assert!(is_older(&lock.path, Lock::STALE));
         let other = Lock::of(&path.with_extension("png"))?;
-        assert_eq!(other.0, lock.0);
+        assert_eq!(other.path, lock.path);
+        // Nor does the one that was too slow take away what is another's by now.
+        drop(lock);
+        assert_eq!(std::fs::read(&other.path)?, other.token.as_bytes());
+        drop(other);
+        assert_eq!(std::fs::read_dir(folder.path())?.count(), 0);
         Ok(())
     }
 }
