@@ -4,7 +4,7 @@
 //! `--overwrite` alone. The same holds for what came to the place while the command worked, and for better pictures: the new files are written
 //! beside them then. What cannot be written at its place in the end goes to the system's temporary folder, which is an error that says where.
 
-use std::fs::{DirBuilder, File, OpenOptions};
+use std::fs::{DirBuilder, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant, SystemTime};
 use clap::Args;
 use clerestory::film::{atomic, mark};
 use clerestory::fingerprint::Fingerprint;
-use clerestory::input::InputFile;
+use clerestory::input::{InputFile, open_regular};
 use clerestory::scene::builtin;
 use clerestory::{Error, Result};
 use serde_json::Value;
@@ -359,7 +359,7 @@ fn is_ours(path: &Path, all: &[&Path]) -> Result<bool> {
 fn json_is_ours(path: &Path) -> Result<bool> {
     const MOST_BYTES: u64 = 1 << 28;
     let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(MOST_BYTES).read_to_end(&mut bytes));
+    let read = open_regular(path, u64::MAX).and_then(|(file, _)| file.take(MOST_BYTES).read_to_end(&mut bytes));
     read.map_err(|cause| Error::io(path, cause))?;
     let Ok(document) = serde_json::from_slice::<Value>(&bytes) else {
         return Ok(false);
@@ -737,7 +737,10 @@ mod tests {
         Lock::take_away(&lock.path);
         assert_eq!(std::fs::read(&lock.path)?, lock.token.as_bytes());
         let long_ago = SystemTime::now() - 2 * Lock::STALE;
-        File::options().write(true).open(&lock.path)?.set_modified(long_ago)?;
+        OpenOptions::new()
+            .write(true)
+            .open(&lock.path)?
+            .set_modified(long_ago)?;
         assert!(is_older(&lock.path, Lock::STALE));
         let other = Lock::of(&path.with_extension("png"))?;
         assert_eq!(other.path, lock.path);

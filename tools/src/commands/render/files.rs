@@ -4,12 +4,16 @@ use std::path::{Path, PathBuf};
 
 use clerestory::film::picture::RADIANCE;
 use clerestory::film::{ErrorReport, Picture, ToneMap, exr, png};
+use clerestory::input::read_file;
 use clerestory::render::FrameReport;
 
 use super::choice::ChoiceReport;
 use crate::failure::{Failure, Outcome};
 use crate::outputs::{Outputs, Written};
 use crate::{output, pictures};
+
+/// Most bytes of a report that is looked at. A longer one counts as better, as whatever cannot be read does.
+const MOST_REPORT: u64 = 1 << 28;
 
 /// The JSON file: the frame report with what the program adds.
 #[derive(serde::Serialize)]
@@ -122,7 +126,7 @@ impl Files {
         });
         // The report may be of a later picture, which was written without an EXR.
         let report = (exr.is_none() || self.json.exists()).then(|| {
-            let text = std::fs::read(&self.json).ok();
+            let text = read_file(&self.json, MOST_REPORT).ok();
             (&self.png, text.and_then(|text| Facts::of_json(&text)))
         });
         let mut old = exr.into_iter().chain(report);
