@@ -178,7 +178,7 @@ impl Campaign {
             case: None,
         };
         let start = Instant::now();
-        let Batch { progress, mut found } = self.work(&task, &limits)?;
+        let Batch { progress, found } = self.work(&task, &limits)?;
         let seconds = start.elapsed().as_secs_f64();
         way.inputs += u64::from(progress.next.saturating_sub(way.next));
         way.next = progress.next;
@@ -186,14 +186,11 @@ impl Campaign {
         way.seconds += seconds;
         way.slowest = way.slowest.max(progress.slowest as f64 * 1e-6);
         way.peak = way.peak.max(progress.peak);
-        // One slow moment of the machine is no finding: what takes too long does so alone, too.
-        found.retain(|found| {
-            found.kind != Kind::Time || self.keep(reader, found, steps, &limits, say).is_ok_and(|is| is)
-        });
         for found in &found {
-            *way.found.entry(found.kind).or_default() += 1;
-            if found.kind != Kind::Time {
-                self.keep(reader, found, steps, &limits, say)?;
+            let breaks_alone = self.keep(reader, found, steps, &limits, say)?;
+            // One slow moment of the machine is no finding: what takes too long does so alone, too.
+            if found.kind != Kind::Time || breaks_alone {
+                *way.found.entry(found.kind).or_default() += 1;
             }
         }
         Ok(Some(seconds))
