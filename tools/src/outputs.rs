@@ -6,14 +6,14 @@
 
 mod lock;
 
-use std::fs::{DirBuilder, File};
+use std::fs::DirBuilder;
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
 use clerestory::film::{atomic, mark};
-use clerestory::input::InputFile;
+use clerestory::input::{InputFile, open_regular};
 use clerestory::scene::builtin;
 use clerestory::{Error, Result};
 use serde_json::Value;
@@ -122,6 +122,7 @@ impl Outputs {
         for path in &paths {
             refuse_input(path, inputs)?;
         }
+        refuse_one_twice(&paths)?;
         let mut files = Vec::new();
         for path in &paths {
             check_old(path, &paths, overwrite)?;
@@ -203,23 +204,31 @@ impl Outputs {
     /// Writes all files to a new folder of the system's folder for temporary files; the failure says why, and where.
     fn write_aside(&self, contents: &[Vec<u8>], cause: &Error) -> Written {
         let folder = std::env::temp_dir().join(format!("clerestory-{:016x}", atomic::random()));
-        let write = || -> Result<Vec<PathBuf>> {
+        let mut paths = Vec::new();
+        let mut write = || -> Result<()> {
             private_folder(&folder).map_err(|cause| Error::io(&folder, cause))?;
-            let mut paths = Vec::new();
             for (file, bytes) in self.files.iter().zip(contents) {
                 let path = folder.join(file.path.file_name().unwrap_or_default());
                 atomic::write_new(&path, bytes)?;
                 paths.push(path);
             }
-            Ok(paths)
+            Ok(())
         };
-        let (paths, hint) = match write() {
-            Ok(paths) => (paths, format!("what was to be written is kept in {}", folder.display())),
-            Err(second) => {
-                // Parts of it are of no use.
-                let _ = std::fs::remove_dir_all(&folder);
-                (Vec::new(), format!("nor could it be kept elsewhere: {second}"))
+        let written = write();
+        let hint = match written {
+            Ok(()) => format!("what was to be written is kept in {}", folder.display()),
+            Err(second) if paths.is_empty() => {
+                // It is empty, or was not made.
+                let _ = std::fs::remove_dir(&folder);
+                format!("nor could it be kept elsewhere: {second}")
             }
+            // The first of them is the picture with all that is known, which is worth more than what goes with it.
+            Err(second) => format!(
+                "{} of {} files are kept in {}; the others could not be: {second}",
+                paths.len(),
+                self.files.len(),
+                folder.display()
+            ),
         };
         let failure = Failure {
             code: Code::Run,
@@ -265,6 +274,41 @@ fn refuse_input(path: &Path, inputs: &Inputs) -> Outcome {
         );
     }
     Ok(())
+}
+
+/// Refuses outputs that links lead to one file: the second would take the first one's place.
+fn refuse_one_twice(paths: &[&Path]) -> Outcome {
+    let places: Vec<PathBuf> = paths.iter().map(|path| place(path)).collect();
+    for (later, place) in places.iter().enumerate() {
+        if let Some(earlier) = places[..later].iter().position(|other| other == place) {
+            let [one, other] = [earlier, later].map(|index| paths[index].display().to_string());
+            return Err(
+                Failure::usage(format!("{one} and {other} are one file, and both would be written"))
+                    .hint("remove the link, or name another output"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Where a file would be written: behind its links, and in its folder without any, as far as these are there.
+fn place(path: &Path) -> PathBuf {
+    let end = atomic::end_of_links(path).unwrap_or_else(|_| path.to_owned());
+    if let Ok(there) = end.canonicalize() {
+        return there;
+    }
+    let folder = end.parent().and_then(|folder| named(folder).canonicalize().ok());
+    let beside = folder.zip(end.file_name()).map(|(folder, name)| folder.join(name));
+    beside.unwrap_or(end)
+}
+
+/// A folder by a name that is not empty.
+fn named(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    }
 }
 
 /// Refuses to replace what is no file, or should not be replaced unasked.
@@ -317,7 +361,7 @@ fn is_ours(path: &Path, all: &[&Path]) -> Result<bool> {
 fn json_is_ours(path: &Path) -> Result<bool> {
     const MOST_BYTES: u64 = 1 << 28;
     let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(MOST_BYTES).read_to_end(&mut bytes));
+    let read = open_regular(path, u64::MAX).and_then(|(file, _)| file.take(MOST_BYTES).read_to_end(&mut bytes));
     read.map_err(|cause| Error::io(path, cause))?;
     let Ok(document) = serde_json::from_slice::<Value>(&bytes) else {
         return Ok(false);
@@ -340,13 +384,6 @@ fn seen(path: &Path) -> Option<Seen> {
 
 /// Finds out whether a file can be written, or a folder be made for it in the nearest one that is there.
 fn probe(path: &Path) -> Outcome {
-    fn named(folder: &Path) -> &Path {
-        if folder.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            folder
-        }
-    }
     let mut above = path.ancestors().skip(1).map(named);
     let nearest = above.find(|folder| folder.symlink_metadata().is_ok());
     let probed = match nearest {
@@ -474,6 +511,29 @@ mod tests {
         Ok(())
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn outputs_that_are_one_file_by_links_are_refused() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        std::os::unix::fs::symlink("a.exr", at("a.png"))?;
+        let paths = [at("a.exr"), at("a.png")];
+        // Before there is a file, and with one.
+        for there in [false, true] {
+            if there {
+                std::fs::write(&paths[0], mine(1.0)?)?;
+            }
+            let (code, message) = said(Outputs::plan(&paths, &Inputs::default(), true));
+            assert!(code == Some(Code::Usage) && message.contains("one file"), "{message}");
+        }
+        std::fs::create_dir(at("folder"))?;
+        let same = [at("b.exr"), at("folder/../b.exr")];
+        let (code, message) = said(Outputs::plan(&same, &Inputs::default(), true));
+        assert!(code == Some(Code::Usage) && message.contains("one file"), "{message}");
+        assert!(Outputs::plan(&[at("b.exr"), at("b.png")], &Inputs::default(), true).is_ok());
+        Ok(())
+    }
+
     #[test]
     fn reports_are_known_by_what_they_say() -> Tested {
         let folder = tempfile::tempdir()?;
@@ -572,6 +632,24 @@ mod tests {
         assert_eq!((failure.code, std::fs::read(kept)?), (Code::Run, mine(1.0)?));
         assert!(hint.contains(&inside.display().to_string()), "{hint}");
         std::fs::remove_dir_all(inside)?;
+        Ok(())
+    }
+
+    #[test]
+    fn what_can_be_kept_elsewhere_is_kept_if_the_rest_cannot_be() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let at = |name: &str| folder.path().join(name);
+        // Files of one name, of which a folder has one.
+        let paths = [at("new/a.exr"), at("other/a.exr")];
+        let plan = Outputs::plan(&paths, &Inputs::default(), false).map_err(|failure| failure.message)?;
+        std::fs::write(at("new"), "a file in place of the folder")?;
+        let written = plan.write(&[mine(1.0)?, mine(2.0)?], never);
+        let failure = written.failure.as_ref().ok_or("no failure")?;
+        let hint = failure.hint.clone().unwrap_or_default();
+        assert!(failure.code == Code::Run && hint.contains("1 of 2 files"), "{hint}");
+        let kept = written.paths.first().ok_or("no file")?;
+        assert_eq!((written.paths.len(), std::fs::read(kept)?), (1, mine(1.0)?));
+        std::fs::remove_dir_all(kept.parent().ok_or("no folder")?)?;
         Ok(())
     }
 }

@@ -57,8 +57,7 @@ fn read_png(path: &Path) -> Result<Picture> {
     let decoder = reader.into_decoder().map_err(|cause| wrong(cause.to_string()))?;
     let (width, height) = decoder.dimensions();
     // The values as f32 beside the decoder's, and once more as linear ones.
-    let pixels = u64::from(width) * u64::from(height);
-    let floats = pixels * 12;
+    let floats = (u64::from(width) * u64::from(height)).saturating_mul(12);
     let memory = decoder.total_bytes().max(floats).saturating_add(floats);
     limits.check_decoded(memory, length).map_err(wrong)?;
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(|cause| wrong(cause.to_string()))?;
@@ -112,6 +111,12 @@ mod tests {
         bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
         let message = with(&bytes).map(|_| ()).expect_err("huge").to_string();
         assert!(message.contains("takes 6442450944 bytes of memory"), "{message}");
+        // The largest that the format knows, of one bit each, so that a row fits; the values would be more bytes than a number holds.
+        bytes[16..24].copy_from_slice(&[0x7F, 0xFF, 0xFF, 0xFF, 0x7F, 0xFF, 0xFF, 0xFF]);
+        bytes[24] = 1;
+        let checksum = crc(&bytes[12..29]);
+        bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
+        assert!(matches!(with(&bytes), Err(Error::Picture { .. })));
         Ok(())
     }
 

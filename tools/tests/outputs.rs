@@ -79,6 +79,8 @@ fn fill(folder: &Path) -> Tested {
     std::fs::write(at("package.json"), "{\"name\": \"package\", \"version\": \"1.0.0\"}")?;
     std::fs::write(at("duck.gltf"), duck())?;
     std::fs::create_dir_all(at("tables/tiny"))?;
+    std::fs::create_dir_all(at("pages/samplers"))?;
+    std::fs::write(at("pages/samplers/report.md"), "# Somebody's report\n")?;
     std::fs::write(at("tables/index.csv"), "somebody's,table\n")?;
     std::fs::write(at("tables/sort.json"), "[1, 2]")?;
     std::fs::write(at("tables/notes.md"), "# Notes\n")?;
@@ -124,7 +126,7 @@ fn duck() -> String {
 }
 
 /// Each command that writes, with each of its own inputs as output, or with a file there that is not the program's.
-const REFUSED: [(&str, &str); 23] = [
+const REFUSED: [(&str, &str); 24] = [
     ("render --spp 1 --reference a.exr -o a.exr", "reads it"),
     ("render --spp 1 --reference a.exr -o a.exr --overwrite", "reads it"),
     ("render --size 4 --spp 1 --reference c.png -o c.exr", "reads it"),
@@ -150,6 +152,7 @@ const REFUSED: [(&str, &str); 23] = [
     ("bench --sort --folder tables", "did not write it"),
     ("bench --sort --page package.json", "pages are .md files"),
     ("report tables/tiny/tiny.toml --folder tables", "lies in the folder"),
+    ("report samplers --folder pages", "did not write it"),
     ("stability empty-scene --pictures tables", "did not write it"),
 ];
 

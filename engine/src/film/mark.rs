@@ -21,11 +21,11 @@ const HEAD: u64 = 1 << 20;
 /// Whether a picture bears the mark. A file that is no EXR, PNG or Radiance HDR picture, or a damaged one, bears none.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read or is not a regular file.
+/// [`Error::Io`] when the file cannot be read or is not a regular one.
 pub fn is_marked(path: &Path) -> Result<bool> {
     let mut head = Vec::new();
-    let opened = open_regular(path, u64::MAX);
-    let read = opened.and_then(|(file, _)| file.take(HEAD).read_to_end(&mut head));
+    // Its length does not matter: the mark stands at its beginning.
+    let read = open_regular(path, u64::MAX).and_then(|(file, _)| file.take(HEAD).read_to_end(&mut head));
     read.map_err(|cause| Error::io(path, cause))?;
     Ok(says_so(&head))
 }
@@ -127,10 +127,13 @@ mod tests {
             std::fs::write(&path, &bytes).map_err(|e| Error::io(&path, e))?;
             assert!(is_marked(&path)?);
         }
-        assert!(matches!(
-            is_marked(&folder.path().join("absent")),
-            Err(Error::Io { .. })
-        ));
+        for wrong in [folder.path().join("absent"), folder.path().to_owned()] {
+            assert!(
+                matches!(is_marked(&wrong), Err(Error::Io { .. })),
+                "{}",
+                wrong.display()
+            );
+        }
         Ok(())
     }
 

@@ -167,7 +167,8 @@ impl Plan {
 
 /// Renders pilots and chooses among the engine's techniques. `options` is the picture as asked for: view, size, seed, and what of technique and
 /// settings is not free; its samples are not looked at. `proceed` is called between pieces of work; when it says no, pilots end and the choice
-/// is made among what is known. A scene whose first pilot has not ended half a second later, or in half of the time that the goal gives, is refused.
+/// is made among what is known. A scene whose first pilot has not ended half a second later, or in half of the time that the goal gives, is refused, and so is one
+/// whose first round is that late after a no in the middle of it.
 ///
 /// # Errors
 /// [`Error::Setting`] for a goal that is none; [`Error::Unsupported`] when no technique can render the scene as asked, with every
@@ -200,6 +201,7 @@ pub fn plan_among(
     let start = Instant::now();
     check(goal)?;
     let fixed = options.settings.to_json();
+    let patience = trial::patience(proceed());
     let proceed: &mut dyn FnMut() -> bool = &mut || proceed();
     let asked = Asked {
         renderer,
@@ -208,6 +210,7 @@ pub fn plan_among(
         goal,
         proceed: RefCell::new(proceed),
         gave_up: Cell::new(false),
+        patience,
     };
     let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) = candidates(cards, &fixed).into_iter().unzip();
     let mut trials: Vec<Option<Trial<'_>>> = Vec::new();

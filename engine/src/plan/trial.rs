@@ -27,8 +27,10 @@ const PILOT_SIDE: u32 = 8;
 pub const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 /// Relative MSE of a black picture, which is all that pilots without light know.
 const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
-/// How long a first pilot may take in any case, once its kernels are compiled.
+/// How long a pilot may take in any case, once its kernels are compiled, whoever waits.
 const PATIENCE: Duration = Duration::from_millis(500);
+/// The same of the pilots behind the first one, where the wish to stop was there before any of them: the least that a choice takes is then done.
+const LEAST_PATIENCE: Duration = Duration::from_secs(10);
 /// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
 const SMALL: u32 = 4;
 /// Distance of the pilots' seeds from the picture's and from each other.
@@ -82,8 +84,15 @@ pub struct Asked<'a> {
     pub goal: Goal,
     /// Whether the host lets pilots go on; see [`Asked::proceeds`].
     pub proceed: RefCell<&'a mut dyn FnMut() -> bool>,
-    /// A first pilot did not end in time: others would not, either.
+    /// Pilots that have to be did not end in time: others would not, either.
     pub gave_up: Cell<bool>,
+    /// How long pilots behind the first one go on after a wish to stop; see [`patience`].
+    pub patience: Duration,
+}
+
+/// How long pilots behind a technique's first one go on after a wish to stop, by whether the host lets them go on when they begin.
+pub fn patience(proceeds: bool) -> Duration {
+    if proceeds { PATIENCE } else { LEAST_PATIENCE }
 }
 
 impl Asked<'_> {
@@ -172,28 +181,38 @@ impl<'a> Trial<'a> {
             round_seconds: 0.0,
             all_seconds: 0.0,
         };
+        let gave_up = |which: &str| {
+            asked.gave_up.set(true);
+            let reason =
+                format!("its {which} did not end in time; render with a technique and a time budget instead of a goal");
+            Error::Unsupported {
+                technique: card.id.into(),
+                reasons: vec![reason],
+            }
+        };
         let mut first = trial.begin_pilot(asked, size, [0, 0])?;
         if !has_paths(&first.path_set()) {
             return Ok(None);
         }
         if !run_first(&mut first, asked)? {
-            asked.gave_up.set(true);
-            return Err(Error::Unsupported {
-                technique: card.id.into(),
-                reasons: vec!["its first pilot picture did not end in time; render with a technique and a time budget instead of a goal".into()],
-            });
+            return Err(gave_up("first pilot picture"));
         }
+        let not_first = "pilot pictures";
         // The second one finds its kernels compiled, as the picture itself will.
         let from = Instant::now();
         let mut second = trial.begin_pilot(asked, size, [0, 1])?;
-        run(&mut second)?;
+        if !run(&mut second, asked)? {
+            return Err(gave_up(not_first));
+        }
         trial.cost.start = from.elapsed().as_secs_f64();
         let small = size.map(|side| (side / SMALL).max(1));
         let alike = card.bias == Bias::Unbiased || size == options.size;
         let small_seconds = if alike {
             None
         } else {
-            Some(round_of_another_size(trial.begin_pilot(asked, small, [0, 0])?)?)
+            let pilot = trial.begin_pilot(asked, small, [0, 0])?;
+            let seconds = round_of_another_size(pilot, asked)?;
+            Some(seconds.ok_or_else(|| gave_up(not_first))?)
         };
         // How far a picture moves as it goes on shows from the first sample.
         if matches!(card.bias, Bias::Consistent(_)) {
@@ -201,7 +220,9 @@ impl<'a> Trial<'a> {
             trial.stages.push(Stage { spp: 1, pictures });
         }
         drop((first, second));
-        trial.round(asked, ROUNDS[0])?;
+        if !trial.round(asked, ROUNDS[0])? {
+            return Err(gave_up(not_first));
+        }
         if let Some(small_seconds) = small_seconds {
             let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
             trial.fixed = fixed_share([area(small), small_seconds], [area(size), trial.round_seconds / 2.0]);
@@ -227,30 +248,42 @@ impl<'a> Trial<'a> {
         asked.renderer.start_technique(self.card, &pilot)
     }
 
-    /// Two pictures of `spp` samples per pixel with a pair's seeds. What beyond their first samples they take tells what a sample costs.
-    fn pair(&mut self, asked: &Asked<'_>, spp: u32, pair: u32) -> Result<[Picture; 2]> {
+    /// Two pictures of `spp` samples per pixel with a pair's seeds; `None` where they are given up. What beyond their first samples they take tells what a
+    /// sample costs.
+    fn pair(&mut self, asked: &Asked<'_>, spp: u32, pair: u32) -> Result<Option<[Picture; 2]>> {
         let from = Instant::now();
         let mut seconds = 0.0;
-        let mut picture = |which: u32| -> Result<Picture> {
+        let mut picture = |which: u32| -> Result<Option<Picture>> {
             let mut pilot = self.begin_pilot(asked, self.size, [pair, which])?;
-            run(&mut pilot)?;
+            if !run(&mut pilot, asked)? {
+                return Ok(None);
+            }
             let begun = Instant::now();
             pilot.set_spp(spp);
-            run(&mut pilot)?;
+            if !run(&mut pilot, asked)? {
+                return Ok(None);
+            }
             seconds += begun.elapsed().as_secs_f64();
-            pilot.picture()
+            pilot.picture().map(Some)
         };
-        let pictures = [picture(0)?, picture(1)?];
+        let Some(one) = picture(0)? else {
+            return Ok(None);
+        };
+        let Some(other) = picture(1)? else {
+            return Ok(None);
+        };
+        let pictures = [one, other];
         self.all_seconds += from.elapsed().as_secs_f64();
         // The more samples, the better it is known.
         if spp > self.spp {
             self.round_seconds = seconds;
             self.cost.sample = self.seconds_a_sample(spp, asked.pixels());
         }
-        Ok(pictures)
+        Ok(Some(pictures))
     }
 
-    /// A further round of two pictures of `spp` samples per pixel; what keeps them from it is [`failure`](Self::failure) from then on.
+    /// A further round of two pictures of `spp` samples per pixel; what keeps them from it is [`failure`](Self::failure) from then on. One that is given up changes
+    /// nothing.
     pub fn go_on(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
         if let Err(error) = self.round(asked, spp) {
             self.failure = reason_of(error)?;
@@ -258,21 +291,28 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    fn round(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
+    /// False where it is given up.
+    fn round(&mut self, asked: &Asked<'_>, spp: u32) -> Result<bool> {
         let round = ROUNDS.iter().take_while(|samples| **samples < spp).count() as u32;
-        let pictures = self.pair(asked, spp, 1 + round)?;
+        let Some(pictures) = self.pair(asked, spp, 1 + round)? else {
+            return Ok(false);
+        };
         for picture in &pictures {
             self.lit |= picture.main_layer()?.values().iter().any(|value| *value != 0.0);
         }
         self.stages.push(Stage { spp, pictures });
         self.spp = spp;
-        self.measure(None)
+        self.measure(None)?;
+        Ok(true)
     }
 
     /// The last pair, of `spp` samples per pixel: from now on it alone says how large the error is. What keeps it from that is
-    /// [`failure`](Self::failure).
+    /// [`failure`](Self::failure); where it is given up, what the rounds have found stands.
     pub fn conclude(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
         let concluded = self.pair(asked, spp, SEED_PAIRS - 1).and_then(|pictures| {
+            let Some(pictures) = pictures else {
+                return Ok(());
+            };
             self.last_spp = spp;
             self.measure(Some(&Stage { spp, pictures }))
         });
@@ -453,39 +493,53 @@ fn fixed_share([small, small_seconds]: [f64; 2], [large, seconds]: [f64; 2]) -> 
     (1.0 - each * large / seconds).clamp(0.0, 1.0)
 }
 
-/// Seconds of the first round of a pilot of another size.
-fn round_of_another_size(mut pilot: Rendering) -> Result<f64> {
-    run(&mut pilot)?;
+/// Seconds of the first round of a pilot of another size; `None` where it is given up.
+fn round_of_another_size(mut pilot: Rendering, asked: &Asked<'_>) -> Result<Option<f64>> {
+    if !run(&mut pilot, asked)? {
+        return Ok(None);
+    }
     let from = Instant::now();
     pilot.set_spp(ROUNDS[0]);
-    run(&mut pilot)?;
-    Ok(from.elapsed().as_secs_f64())
+    let ended = run(&mut pilot, asked)?;
+    Ok(ended.then(|| from.elapsed().as_secs_f64()))
 }
 
 /// Works until all samples of a first pilot are there; false where they are not after half of the time there is, or soon after a wish to stop. Scenes that are so
 /// hard have nothing to choose by.
 fn run_first(pilot: &mut Rendering, asked: &Asked<'_>) -> Result<bool> {
+    run_while(pilot, PATIENCE, |worked| {
+        let late = asked.goal.time.is_some_and(|time| worked >= time / 2);
+        !late && asked.proceeds()
+    })
+}
+
+/// Works until all samples that were asked for are there; false where they are not soon after a wish to stop.
+fn run(pilot: &mut Rendering, asked: &Asked<'_>) -> Result<bool> {
+    run_while(pilot, asked.patience, |_| asked.proceeds())
+}
+
+/// Works until all samples are there; false where they are not when `goes_on`, which is asked once the patience is over, says no.
+fn run_while(pilot: &mut Rendering, patience: Duration, goes_on: impl Fn(Duration) -> bool) -> Result<bool> {
     let mut begun = None;
     while let Some(progress) = pilot.step()? {
         // The first step compiles.
         let worked = begun.get_or_insert_with(Instant::now).elapsed();
-        let late = asked.goal.time.is_some_and(|time| worked >= time / 2);
-        if worked >= PATIENCE && (late || !asked.proceeds()) {
+        if worked >= patience && !goes_on(worked) {
             return Ok(progress.fraction >= 1.0);
         }
     }
     Ok(true)
 }
 
-/// Works until all samples that were asked for are there.
-fn run(rendering: &mut Rendering) -> Result<()> {
-    while rendering.step()?.is_some() {}
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pilots_have_more_time_where_the_least_is_asked_for_from_the_start() {
+        assert_eq!([true, false].map(patience), [PATIENCE, LEAST_PATIENCE]);
+        assert!(PATIENCE < LEAST_PATIENCE);
+    }
 
     #[test]
     fn pilots_keep_the_aspect_and_are_no_larger_than_the_picture() {

@@ -79,7 +79,15 @@ fn check_medium(medium: &Medium) -> Result<(), Fault> {
         return fault("sigma_t", "or emission times the greatest density is not finite");
     }
     if let Some(grid) = &medium.density {
-        let diagonal = grid.to_world.transform_vector3(DVec3::ONE).length();
+        // A grid that is sheared has diagonals of several lengths.
+        let corners = [
+            DVec3::ONE,
+            DVec3::new(-1.0, 1.0, 1.0),
+            DVec3::new(1.0, -1.0, 1.0),
+            DVec3::new(1.0, 1.0, -1.0),
+        ];
+        let diagonals = corners.map(|corner| grid.to_world.transform_vector3(corner).length());
+        let diagonal = diagonals.into_iter().fold(0.0, f64::max);
         let depth = f64::from(medium.sigma_t().max_element()) * f64::from(greatest) * diagonal;
         if depth.is_nan() || depth > MAX_GRID_DEPTH {
             let cause = format!(
@@ -144,7 +152,7 @@ fn check_use(material: &Material, media: usize) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DAffine3;
+    use glam::{DAffine3, DMat3};
 
     use super::*;
     use crate::scene::builtin::generate;
@@ -261,5 +269,18 @@ mod tests {
         depth((0.999 * most) as f32).expect("a depth just below");
         depth((1.001 * most) as f32).expect_err("a depth just above");
         depth(0.0).expect("nothing");
+        // Flat along one diagonal, and as long as before along the others.
+        let mut scene = scene();
+        let grid = scene.media[0].density.as_mut().expect("grid");
+        grid.values.iter_mut().for_each(|value| *value = 0.0);
+        grid.values[0] = 1.0;
+        let side = 2.0 * MAX_GRID_DEPTH;
+        grid.to_world.matrix3 = DMat3::from_cols(
+            DVec3::new(side, 0.0, 0.0),
+            DVec3::new(-side, 1.0, 0.0),
+            DVec3::new(0.0, 0.0, 1.0),
+        );
+        let refusal = scene.check().expect_err("a long diagonal beside a short one");
+        assert!(refusal.to_string().contains("optical depth"), "{refusal}");
     }
 }

@@ -4,12 +4,16 @@ use std::path::{Path, PathBuf};
 
 use clerestory::film::picture::RADIANCE;
 use clerestory::film::{ErrorReport, Picture, ToneMap, exr, png};
+use clerestory::input::read_file;
 use clerestory::render::FrameReport;
 
 use super::choice::ChoiceReport;
 use crate::failure::{Failure, Outcome};
 use crate::outputs::{Outputs, Written};
 use crate::{output, pictures};
+
+/// Most bytes of a report that is looked at. A longer one counts as better, as whatever cannot be read does.
+const MOST_REPORT: u64 = 1 << 28;
 
 /// The JSON file: the frame report with what the program adds.
 #[derive(serde::Serialize)]
@@ -116,12 +120,22 @@ impl Files {
 
     /// Why the picture that is there is worth more than one of these facts.
     fn better_than(&self, new: &Facts) -> Option<String> {
-        let name = self.exr.as_ref().unwrap_or(&self.png).display();
-        let exr = self.exr.as_ref().filter(|path| path.exists());
-        let old = match exr {
-            Some(path) => exr::read(path).ok().and_then(|picture| Facts::of_picture(&picture)),
-            None => std::fs::read(&self.json).ok().and_then(|text| Facts::of_json(&text)),
-        };
+        let exr = self.exr.as_ref().filter(|path| path.exists()).map(|path| {
+            let picture = exr::read(path).ok();
+            (path, picture.and_then(|picture| Facts::of_picture(&picture)))
+        });
+        // The report may be of a later picture, which was written without an EXR.
+        let report = (exr.is_none() || self.json.exists()).then(|| {
+            let text = read_file(&self.json, MOST_REPORT).ok();
+            (&self.png, text.and_then(|text| Facts::of_json(&text)))
+        });
+        let mut old = exr.into_iter().chain(report);
+        old.find_map(|(path, old)| Self::better_old(path, old, new))
+    }
+
+    /// Why an old picture, by what is known of it, is worth more than a new one.
+    fn better_old(path: &Path, old: Option<Facts>, new: &Facts) -> Option<String> {
+        let name = path.display();
         match old {
             None => Some(format!("{name} may be better: it does not say how many samples it has")),
             Some(old) if !old.same_picture(new) => Some(format!("{name} is another picture")),
@@ -251,11 +265,19 @@ mod tests {
         assert!(reason(facts(1000)).contains("does not say how many samples"));
         // Without an EXR the report counts.
         std::fs::remove_file(&path)?;
-        let report = serde_json::json!({
-            "scene": "builtin:ring", "camera": "main", "technique": "path", "path_set": "all", "size": [1, 1], "samples": [3, 4],
-        });
-        std::fs::write(path.with_extension("json"), report.to_string())?;
+        let report = |samples: [u64; 2]| {
+            serde_json::json!({
+                "scene": "builtin:ring", "camera": "main", "technique": "path", "path_set": "all", "size": [1, 1], "samples": samples,
+            })
+            .to_string()
+        };
+        std::fs::write(path.with_extension("json"), report([3, 4]))?;
         assert!(reason(facts(3)).contains("4 samples per pixel") && reason(facts(4)).is_empty());
+        // Beside an EXR it may be that of a better PNG.
+        exr::write(&path, &old)?;
+        assert!(reason(facts(16)).is_empty());
+        std::fs::write(path.with_extension("json"), report([1000, 1000]))?;
+        assert!(reason(facts(16)).contains("a.png has 1000 samples per pixel"));
         Ok(())
     }
 }

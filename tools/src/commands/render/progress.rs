@@ -27,7 +27,7 @@ impl Interruptible {
         Ok(Self { bar, stop })
     }
 
-    /// Renders pilots and chooses. A wish to stop ends the pilots after the one at hand, and the picture after its first step.
+    /// Renders pilots and chooses. A wish to stop ends the pilots half a second later at most, and the picture after its first step.
     pub fn plan(&self, renderer: &Renderer, options: &RenderOptions, goal: Goal) -> Outcome<Plan> {
         self.bar.set_message("pilot pictures…");
         self.bar.enable_steady_tick(output::TICK);

@@ -14,6 +14,10 @@ use clerestory_tools::experiments::{Experiment, summary, sweep_criteria, web_pag
 use crate::failure::Outcome;
 use crate::output;
 
+/// The files at the top of every experiment's folder that others could have, too. The first one says that the folder is an experiment's, and is written before
+/// the others.
+pub const NAMES: [&str; 4] = ["report.json", "report.md", "measurements.csv", "index.html"];
+
 fn write(path: &Path, text: &str) -> Outcome {
     Ok(atomic::write(path, text.as_bytes())?)
 }
@@ -25,6 +29,10 @@ fn make(folder: &Path) -> Outcome {
 /// Writes what a measure found: a page with the verdicts first, JSON, a CSV for each table, plots and rows. Returns the page.
 pub fn measure(folder: &Path, experiment: &Experiment, findings: &Findings, rows: &str) -> Outcome<String> {
     make(folder)?;
+    write(
+        &folder.join("report.json"),
+        &output::json_text("report.json", findings)?,
+    )?;
     let Findings { tables, plots, .. } = findings;
     let mut page = format!(
         "# {}: {}\n\n{}{}\n",
@@ -43,10 +51,6 @@ pub fn measure(folder: &Path, experiment: &Experiment, findings: &Findings, rows
         write(&folder.join(format!("{}.csv", index + 1)), &table.csv())?;
     }
     write(&folder.join("report.md"), &page)?;
-    write(
-        &folder.join("report.json"),
-        &output::json_text("report.json", findings)?,
-    )?;
     write(&folder.join("rows.json"), rows)?;
     Ok(page)
 }
@@ -86,8 +90,6 @@ pub fn sweep(folder: &Path, experiment: &Experiment, results: &Results) -> Outco
         "# {}: {}\n\n{verdicts}{}\n\n{text}",
         results.experiment, results.title, results.about
     );
-    write(&folder.join("report.md"), &page)?;
-    write(&folder.join("measurements.csv"), &summary::measurements(results).csv())?;
     let document = serde_json::json!({
         "verdicts": findings.verdicts,
         "headline": findings.headline,
@@ -98,6 +100,8 @@ pub fn sweep(folder: &Path, experiment: &Experiment, results: &Results) -> Outco
         &folder.join("report.json"),
         &output::json_text("report.json", &document)?,
     )?;
+    write(&folder.join("report.md"), &page)?;
+    write(&folder.join("measurements.csv"), &summary::measurements(results).csv())?;
     // Last, so that a page that is there has all that stands beside it.
     write(
         &folder.join("index.html"),

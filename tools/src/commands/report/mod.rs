@@ -155,7 +155,7 @@ fn check_outputs(arguments: &Arguments, found: &[Experiment]) -> Outcome {
     for experiment in found {
         let folder = folder(arguments, experiment);
         outputs::check_folder(&folder, &inputs)?;
-        Outputs::one(&folder.join("report.json"), &inputs, overwrite)?;
+        Outputs::plan(&files::NAMES.map(|name| folder.join(name)), &inputs, overwrite)?;
     }
     Ok(())
 }
