@@ -335,7 +335,7 @@ mod tests {
         std::fs::remove_file(&first.path).expect("removed");
         std::fs::create_dir(&first.path).expect("a folder in its place");
         let beside = KdTree::kept(&triangles, &settings, folder.path()).expect("built");
-        assert!(beside.refused.is_some_and(|why| why.contains("regular")) && beside.not_kept.is_some());
+        assert!(beside.refused.is_some_and(|why| why.contains("not a file")) && beside.not_kept.is_some());
         assert_eq!(beside.tree.texels(), first.tree.texels());
     }
 
