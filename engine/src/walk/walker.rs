@@ -27,7 +27,7 @@ const DEVICE_WORK: u64 = 1 << 30;
 /// Most units of work of a submission: what the places under way take besides must not pass the least of an `i32`.
 const WORK_UNITS_MAX: u64 = 1 << 30;
 /// Rays of the bounces of a submission on software devices, about, unless one bounce has more.
-const SOFTWARE_RAYS: u32 = 1 << 18;
+const SOFTWARE_RAYS: u32 = 1 << 19;
 
 /// The number of a walker's wave before the first one.
 const NO_WAVE: u64 = 0;
