@@ -20,11 +20,7 @@ void main() {
     if (resume == INDEX_FINISHED) {
         return;
     }
-    if (!has_work_left()) {
-        walk_resume[place] = resume;
-        leave_for_later(STALLED_EXTEND);
-        return;
-    }
+    bool begun = has_work_left();
     uint slot = load_slot(place);
     WalkState walk = load_walk(slot);
     begin_candidates(slot, walk.bounce, CANDIDATES_EXTEND);
@@ -37,12 +33,14 @@ void main() {
         // Behind the boundaries that the walk has passed.
         t_min = status.rounds > 0u ? search_start(walk_medium_states[slot].start) : 0.0;
     }
-    resume = closest_hit(Ray(walk.origin, t_min, walk.direction, FAR_AWAY), RESUMES ? resume : INDEX_START, hit);
+    // One that is left for later has no direction, which ends its traversal at once.
+    vec3 direction = begun ? walk.direction : vec3(0.0);
+    uint next = closest_hit(Ray(walk.origin, t_min, direction, FAR_AWAY), RESUMES ? resume : INDEX_START, hit);
+    resume = begun ? next : resume;
     walk_hits_out[place] = hit;
     walk_resume[place] = resume;
     count_work(index_iterations, WORK_LEAST);
     if (resume != INDEX_FINISHED) {
-        atomicAdd(status.unfinished, 1u);
-        atomicMax(status.stalled, STALLED_EXTEND);
+        stall_place(STALLED_EXTEND, begun);
     }
 }

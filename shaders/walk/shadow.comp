@@ -12,15 +12,17 @@ layout(local_size_x = 64) in;
 #include "walk/shadow_media.glsl"
 
 // Whether light passes, and nothing else.
-void trace_shadow_ray(uint place, uint resume) {
+void trace_shadow_ray(uint place, uint resume, bool begun) {
     ShadowRay s = load_shadow_ray(texelFetch(walk_waiting_queue_in, int(place)).x);
     begin_candidates(s.slot, s.bounce, CANDIDATES_SHADOW);
     Hit hit = no_hit(s.t_max);
-    resume = any_hit(Ray(s.origin, 0.0, s.direction, s.t_max), RESUMES ? resume : INDEX_START, hit);
+    // One that is left for later has no direction, which ends its traversal at once.
+    vec3 direction = begun ? s.direction : vec3(0.0);
+    uint next = any_hit(Ray(s.origin, 0.0, direction, s.t_max), RESUMES ? resume : INDEX_START, hit);
+    resume = begun ? next : resume;
     walk_resume[place] = resume;
     if (resume != INDEX_FINISHED) {
-        atomicAdd(status.unfinished, 1u);
-        atomicMax(status.stalled, STALLED_SHADOW);
+        stall_place(STALLED_SHADOW, begun);
     } else if (hit.triangle == NO_HIT) {
         walk_gathered[s.slot].radiance += s.contribution;
     }
@@ -35,18 +37,11 @@ void main() {
     if (resume == INDEX_FINISHED) {
         return;
     }
-    if (!has_work_left()) {
-        walk_resume[place] = resume;
-        if (HAS_MEDIA && push.goes_on == 0u) {
-            store_unbegun_rays(place);
-        }
-        leave_for_later(STALLED_SHADOW);
-        return;
-    }
+    bool begun = has_work_left();
     if (HAS_MEDIA) {
-        trace_shadow_rays_through_media(place, resume);
+        trace_shadow_rays_through_media(place, resume, begun);
     } else {
-        trace_shadow_ray(place, resume);
+        trace_shadow_ray(place, resume, begun);
     }
     count_work(index_iterations + GRID_ITERATION_WORK * grid_iterations, WORK_LEAST);
 }

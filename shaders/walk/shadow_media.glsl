@@ -82,22 +82,11 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
     return ended;
 }
 
-// Rays to follow from a place, by its flags.
-uint rays_of_place(uint place) {
-    return texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
-}
-
-// Of a place whose rays are left for later.
-void store_unbegun_rays(uint queue_place) {
-    uint place = texelFetch(walk_waiting_queue_in, int(queue_place)).x;
-    uint rays = rays_of_place(place);
-    walk_shadow_states[queue_place] = begin_ray(place, rays, first_ray(place, rays).t_max, 0u);
-}
-
-void trace_shadow_rays_through_media(uint queue_place, uint from) {
+// Of a place that is left for later only the state is stored that it begins with.
+void trace_shadow_rays_through_media(uint queue_place, uint from, bool begun) {
     uint resume = RESUMES ? from : INDEX_START;
     uint place = texelFetch(walk_waiting_queue_in, int(queue_place)).x;
-    uint rays = rays_of_place(place);
+    uint rays = texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
     if (RESUMES) {
         rays = walk_shadow_states[queue_place].rays;
     }
@@ -107,7 +96,7 @@ void trace_shadow_rays_through_media(uint queue_place, uint from) {
         state = walk_shadow_states[queue_place];
     }
     begin_candidates(s.slot, s.bounce, CANDIDATES_SHADOW);
-    bool stopped = false;
+    bool stopped = !begun;
     uint iterations = GRID_WALK_QUOTA;
     uint surfaces = HAS_ALPHA ? SHADOW_SURFACES_ALPHA : SHADOW_SURFACES;
     for (uint surface = 0u; surface < surfaces && state.rays != 0u && !stopped; ++surface) {
@@ -137,8 +126,7 @@ void trace_shadow_rays_through_media(uint queue_place, uint from) {
     }
     walk_resume[queue_place] = resume;
     walk_shadow_states[queue_place] = state;
-    atomicAdd(status.unfinished, 1u);
-    atomicMax(status.stalled, STALLED_SHADOW);
+    stall_place(STALLED_SHADOW, begun);
 }
 
 #endif

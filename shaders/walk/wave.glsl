@@ -182,6 +182,17 @@ void leave_for_later(uint stage) {
     }
 }
 
+// Notes a place that a ray stage goes on with in a later dispatch: its quota stopped it, or it has not begun. One masked block for both, since some drivers
+// run through all of them.
+void stall_place(uint stage, bool begun) {
+    if (begun) {
+        atomicAdd(status.unfinished, 1u);
+    } else {
+        status.unstarted = 1u;
+    }
+    atomicMax(status.stalled, stage);
+}
+
 WalkState load_walk(uint slot) {
     int first = int(WALK_STATE_QUARTERS * slot);
     vec4 q0 = uintBitsToFloat(texelFetch(walk_states_in, first));

@@ -47,9 +47,9 @@ impl Limits {
 /// Cases of a worker that reads, times the reader's share.
 const READ_BATCH: u32 = 50;
 /// Cases of a worker that renders, times the reader's share.
-const STEP_BATCH: u32 = 10;
+const STEP_BATCH: u32 = 50;
 /// Seconds of steps for each of reading.
-const STEP_SHARE: f64 = 0.5;
+const STEP_SHARE: f64 = 1.0;
 /// Smaller cases tried of one that breaks.
 const TRIALS: usize = 400;
 /// As many where each takes long.
