@@ -28,11 +28,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     written.map_err(|cause| Error::io(path, cause))
 }
 
-/// As [`write`], for names that a program chose by itself, such as those of caches: a link is replaced, not followed, since nobody who asked
+/// As [`write()`], for names that a program chose by itself, such as those of caches: a link is replaced, not followed, since nobody who asked
 /// for the file has put it there.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_unlinked(path: &Path, bytes: &[u8]) -> Result<()> {
     replace_at(path, bytes).map_err(|cause| Error::io(path, cause))
 }
@@ -53,10 +53,10 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
     written.map_err(|cause| Error::io(path, cause))
 }
 
-/// Finds out whether [`write`] could write there now, by a temporary file that is removed again. The old file is not touched.
+/// Finds out whether [`write()`] could write there now, by a temporary file that is removed again. The old file is not touched.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn probe(path: &Path) -> Result<()> {
     let probed = end_of_links(path).and_then(|end| {
         let old = regular(&end)?;

@@ -118,8 +118,8 @@ impl GpuScene {
     /// Checks the scene, builds its index by the binned surface area heuristic on the host's threads and uploads everything.
     ///
     /// # Errors
-    /// [`Error::Scene`](crate::Error::Scene) for a scene that does not pass [`Scene::check`],
-    /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for one that does not fit the device.
+    /// [`Error::Scene`] for a scene that does not pass [`Scene::check`],
+    /// [`Error::LimitExceeded`] for one that does not fit the device.
     pub fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         Self::with_index(gpu, scene, &IndexKind::default())
     }
@@ -128,7 +128,7 @@ impl GpuScene {
     /// as where thousands of triangles lie in one place, is replaced by the binned hierarchy, and the report says so ([`IndexReport::instead_because`]).
     ///
     /// # Errors
-    /// As [`GpuScene::new`], and [`Error::Setting`](crate::Error::Setting) for settings of the index that are out of range.
+    /// As [`GpuScene::new`], and [`Error::Setting`] for settings of the index that are out of range.
     pub fn with_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind) -> Result<Self> {
         Self::with_kept_index(gpu, scene, kind, None)
     }
@@ -254,8 +254,8 @@ impl GpuScene {
     /// [`Technique::set_camera`](crate::techniques::Technique::set_camera)), or they mix both; none of the scene's may be in the middle of a step.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for a light that does not exist or has no power, for one of another kind or another power, and for
-    /// numbers that [`Scene::check`] refuses; [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::Setting`] for a light that does not exist or has no power, for one of another kind or another power, and for
+    /// numbers that [`Scene::check`] refuses; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn move_light(&self, gpu: &Gpu, light: usize, kind: &LightKind) -> Result<()> {
         let (record, index) = self.punctual_lights.moved(light, kind)?;
         let offset = u64::from(index) * size_of::<SceneLight>() as u64;
@@ -272,7 +272,7 @@ impl GpuScene {
     /// The environment as it is on the device, its strength multiplied in; `None` without one.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn read_environment(&self, gpu: &Gpu) -> Result<Option<Environment>> {
         if !self.profile.has_environment() {
             return Ok(None);
