@@ -545,10 +545,10 @@ fn an_interrupt_leaves_complete_files() -> Tested {
     );
     let report = json_file(&path.with_extension("json"))?;
     assert_eq!(report["interrupted"], Value::Bool(true));
-    // None, where the wish came before the first wave had ended.
+    // Black, where the wish came before the first wave had ended.
     let picture = exr::read(&path)?;
-    let most = picture.require("samples")?.values().iter().copied().fold(0.0, f32::max);
-    assert_eq!(report["samples"][1].as_u64(), Some(most as u64));
+    let most = report["samples"][1].as_u64().ok_or("no count of samples")?;
+    assert_eq!(picture.main_layer()?.values().iter().any(|value| *value > 0.0), most > 0);
     assert_eq!(picture.pixel_count(), 1024);
     assert_eq!(image::open(path.with_extension("png"))?.width(), 32);
     Ok(())
