@@ -17,7 +17,6 @@ layout(constant_id = 18) const bool RESUMES = false;
 // Loop iterations of a ray from which on they count as work of the submission.
 layout(constant_id = 27) const uint WORK_LEAST = WORK_UNIT;
 
-
 layout(push_constant, scalar) uniform Push {
     WalkKey key;
     uint surrounding;  // index of the medium outside all bodies, or NO_MEDIUM

@@ -12,7 +12,7 @@ use clerestory::gpu::shaders::film::display;
 use clerestory::gpu::shaders::kernels::histogram;
 use clerestory::gpu::{
     Access, Buffer, BufferDesc, BufferView, Category, ColorTarget, Gpu, GpuOptions, GraphicsDesc, Image, ImageBarrier,
-    ImageDesc, Lesser, OptionalFeatures, Pass, Residency, SamplerDesc, Targets, rw_compute_to_compute,
+    ImageDesc, Lesser, OptionalFeatures, Pass, Residency, Sampler, SamplerDesc, Targets, rw_compute_to_compute,
 };
 use clerestory_tests::shaders::{cube_probe, out_of_bounds, quad_frag, quad_vert};
 use clerestory_tests::{gpu, gpu_with, with_gpu};
@@ -35,6 +35,14 @@ fn image_desc(usage: vk::ImageUsageFlags) -> ImageDesc<'static> {
 
 fn image(gpu: &Gpu, usage: vk::ImageUsageFlags) -> Image {
     gpu.image(&image_desc(usage)).unwrap()
+}
+
+/// What is looked up in an image as if it were a cube.
+fn probed<'a>(image: &'a Image, sampler: &'a Sampler, seen: &'a Buffer) -> cube_probe::Set0<'a> {
+    cube_probe::Set0 {
+        cube: SampledView { image, sampler },
+        seen: seen.view(),
+    }
 }
 
 fn to_layout(image: &Image, new_layout: vk::ImageLayout) -> ImageBarrier<'_> {
@@ -320,25 +328,13 @@ fn images_are_used_as_they_were_made_to_be() {
         let plane = image(gpu, vk::ImageUsageFlags::SAMPLED);
         let mut recorder = gpu.recorder("plane").unwrap();
         let looked_up = recorder.pass("a plane as a cube", |pass| {
-            let set = cube_probe::Set0 {
-                cube: SampledView {
-                    image: &plane,
-                    sampler: &sampler,
-                },
-                seen: rows.view(),
-            };
+            let set = probed(&plane, &sampler, &rows);
             pass.dispatch(&probe, &[&set], &(), [1, 1, 1])
         });
         assert!(matches!(&looked_up, Err(Error::Shader { .. })), "{looked_up:?}");
         drop(recorder);
         refused(gpu, words, "sampled", |pass| {
-            let set = cube_probe::Set0 {
-                cube: SampledView {
-                    image: &copied,
-                    sampler: &sampler,
-                },
-                seen: rows.view(),
-            };
+            let set = probed(&copied, &sampler, &rows);
             pass.dispatch(&probe, &[&set], &(), [1, 1, 1])
         });
     });

@@ -4,6 +4,7 @@ pub mod agreement;
 pub mod experiments;
 pub mod fuzzing;
 pub mod geometry;
+mod json_file;
 pub mod least_squares;
 pub mod machine;
 pub mod mitsuba;

@@ -548,7 +548,10 @@ fn an_interrupt_leaves_complete_files() -> Tested {
     // Black, where the wish came before the first wave had ended.
     let picture = exr::read(&path)?;
     let most = report["samples"][1].as_u64().ok_or("no count of samples")?;
-    assert_eq!(picture.main_layer()?.values().iter().any(|value| *value > 0.0), most > 0);
+    assert_eq!(
+        picture.main_layer()?.values().iter().any(|value| *value > 0.0),
+        most > 0
+    );
     assert_eq!(picture.pixel_count(), 1024);
     assert_eq!(image::open(path.with_extension("png"))?.width(), 32);
     Ok(())

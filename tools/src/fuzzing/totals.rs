@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use clerestory::film::atomic;
-use clerestory::{Error, Result};
+use clerestory::Result;
+
+use crate::json_file;
 
 /// How a file broke something.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -83,32 +84,24 @@ pub struct Totals {
 
 /// The file in the folder of a run.
 pub const FILE: &str = "totals.json";
+/// What errors call it.
+const KIND: &str = "totals";
 
 impl Totals {
     /// Those of a folder; none yet of a folder without.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Setting`] where the file is of another form.
+    /// [`Error::Io`](clerestory::Error::Io); [`Error::Setting`](clerestory::Error::Setting) where the file is of another form.
     pub fn read(folder: &Path) -> Result<Option<Self>> {
-        let path = folder.join(FILE);
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Error::io(&path, error)),
-        };
-        let totals = serde_json::from_str(&text);
-        totals.map(Some).map_err(|cause| wrong(&path, &cause))
+        json_file::read(&folder.join(FILE), KIND)
     }
 
     /// Writes them into a folder, which is made.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`](clerestory::Error::Io).
     pub fn write(&self, folder: &Path) -> Result<()> {
-        std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-        let path = folder.join(FILE);
-        let text = serde_json::to_string_pretty(self).map_err(|cause| wrong(&path, &cause))?;
-        atomic::write(&path, (text + "\n").as_bytes())
+        json_file::write(&folder.join(FILE), KIND, serde_json::to_string_pretty(self))
     }
 
     /// Files that broke something.
@@ -122,10 +115,6 @@ impl Totals {
         let sum = |of: fn(&OfReader) -> u64| self.readers.values().map(of).sum();
         [sum(|reader| reader.read.inputs), sum(|reader| reader.step.accepted)]
     }
-}
-
-fn wrong(path: &Path, cause: &serde_json::Error) -> Error {
-    Error::setting("totals", path.display().to_string(), cause.to_string())
 }
 
 #[cfg(test)]

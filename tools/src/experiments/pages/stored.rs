@@ -4,16 +4,17 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use clerestory::film::atomic;
 use clerestory::{Error, Result};
 
 use crate::experiments::findings::Findings;
 use crate::experiments::results::Results;
 use crate::experiments::{Experiment, Kind, measures, series, sweep_criteria};
-use crate::machine;
+use crate::{json_file, machine};
 
 /// The file of an experiment's folder that all others are made of.
 pub const FILE: &str = "found.json";
+/// What errors call it.
+const KIND: &str = "results";
 const SECONDS_OF_A_DAY: u64 = 86_400;
 
 /// How an experiment was run.
@@ -125,15 +126,7 @@ impl Stored {
     /// # Errors
     /// [`Error::Io`], and [`Error::Setting`] where the file is of another form.
     pub fn read(folder: &Path) -> Result<Option<Self>> {
-        let path = folder.join(FILE);
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Error::io(&path, error)),
-        };
-        serde_json::from_str(&text)
-            .map(Some)
-            .map_err(|cause| unreadable(&path, &cause))
+        json_file::read(&folder.join(FILE), KIND)
     }
 
     /// Writes it into an experiment's folder, which is made.
@@ -141,10 +134,7 @@ impl Stored {
     /// # Errors
     /// [`Error::Io`].
     pub fn write(&self, folder: &Path) -> Result<()> {
-        std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-        let path = folder.join(FILE);
-        let text = serde_json::to_string(self).map_err(|cause| unreadable(&path, &cause))?;
-        atomic::write(&path, (text + "\n").as_bytes())
+        json_file::write(&folder.join(FILE), KIND, serde_json::to_string(self))
     }
 }
 
@@ -158,8 +148,8 @@ pub fn findings(experiment: &Experiment, stored: Option<&Stored>) -> Result<Find
         (Kind::Measure(name), Some(stored)) => (measures::find(name)?.read)(&stored.found.to_string()),
         (Kind::Sweep(_), None) => Ok(sweep_criteria::declared(experiment)),
         (Kind::Sweep(sweep), Some(stored)) => {
-            let results =
-                Results::deserialize(&stored.found).map_err(|cause| unreadable(Path::new(&experiment.name), &cause))?;
+            let results = Results::deserialize(&stored.found)
+                .map_err(|cause| json_file::malformed(Path::new(&experiment.name), KIND, &cause))?;
             if results.sweep != *sweep {
                 let cause = "are of other pictures than the experiment's now: run it again";
                 return Err(Error::setting("results", &experiment.name, cause));
@@ -170,10 +160,6 @@ pub fn findings(experiment: &Experiment, stored: Option<&Stored>) -> Result<Find
 }
 
 use serde::Deserialize;
-
-fn unreadable(path: &Path, cause: &serde_json::Error) -> Error {
-    Error::setting("results", path.display().to_string(), cause.to_string())
-}
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,39 @@
+//! Values that are kept as JSON files.
+
+use std::io::ErrorKind;
+use std::path::Path;
+
+use clerestory::film::atomic;
+use clerestory::{Error, Result};
+use serde::de::DeserializeOwned;
+
+/// The value of a file; `None` where there is none. `what` names its kind in errors.
+///
+/// # Errors
+/// [`Error::Io`], and [`Error::Setting`] where the file is of another form.
+pub fn read<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<Option<T>> {
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(Error::io(path, error)),
+    };
+    let value = serde_json::from_str(&text);
+    value.map(Some).map_err(|cause| malformed(path, what, &cause))
+}
+
+/// Writes a value's text, and makes the folder.
+///
+/// # Errors
+/// [`Error::Io`], and [`Error::Setting`] for a value that JSON cannot hold.
+pub fn write(path: &Path, what: &'static str, text: serde_json::Result<String>) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+    }
+    let text = text.map_err(|cause| malformed(path, what, &cause))?;
+    atomic::write(path, (text + "\n").as_bytes())
+}
+
+/// The error of a value that has not the form of its kind.
+pub fn malformed(path: &Path, what: &'static str, cause: &serde_json::Error) -> Error {
+    Error::setting(what, path.display().to_string(), cause.to_string())
+}
