@@ -18,8 +18,8 @@ use crate::techniques::{self, Card, Skipped, Technique, View};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
-/// How long samples that are under way when the time is used up may go on.
-const GRACE: Duration = Duration::from_millis(500);
+/// How long samples that are under way when the time is used up may go on: no step is begun that, taking as long as the longest before it, would end later.
+const GRACE: Duration = Duration::from_millis(800);
 
 /// What to render and how.
 ///
@@ -52,7 +52,7 @@ pub struct RenderOptions {
     pub seed: u32,
     /// Also gathers albedo, normal and depth of what is seen first.
     pub aovs: bool,
-    /// Stops after about this long, with what is there: after the step at hand, or half a second later at most where samples are under way; never before the first
+    /// Stops after about this long, with what is there: after the step at hand, or up to 0.8 seconds later where samples are under way; never before the first
     /// step, which compiles the kernels. A scene that is too hard may leave pixels without a sample, as the report's `samples` says.
     pub time_budget: Option<Duration>,
     /// The technique's settings: its struct, or JSON. Seed and AOVs are those above, whatever a struct says.
@@ -313,6 +313,7 @@ impl Renderer {
             within_samples: false,
             first_samples: None,
             passes: BTreeMap::new(),
+            longest: Duration::ZERO,
             finished: false,
         })
     }
@@ -334,6 +335,8 @@ pub struct Rendering {
     /// When the first step ended that had samples, and the counters then.
     first_samples: Option<(Instant, BTreeMap<&'static str, u64>)>,
     passes: BTreeMap<String, (u64, Option<u64>)>,
+    /// The longest step behind the first one, which also compiles.
+    longest: Duration,
     finished: bool,
 }
 
@@ -346,10 +349,14 @@ impl Rendering {
         if self.is_out_of_time() {
             return Ok(None);
         }
+        let clock = Instant::now();
         let Some(step) = self.technique.step(self.options.spp)? else {
             self.finished = true;
             return Ok(None);
         };
+        if self.begun.is_some() {
+            self.longest = self.longest.max(clock.elapsed());
+        }
         for pass in step.timings.iter().flat_map(|timings| &timings.passes) {
             let entry = self.passes.entry(pass.name.clone()).or_insert((0, Some(0)));
             entry.0 += 1;
@@ -383,7 +390,7 @@ impl Rendering {
             return false;
         };
         let late = self.start.elapsed().checked_sub(budget);
-        late.is_some_and(|late| !self.within_samples || late.min(begun.elapsed()) >= GRACE)
+        late.is_some_and(|late| !self.within_samples || late.min(begun.elapsed()) + self.longest >= GRACE)
     }
 
     /// Asks for another number of samples per pixel; those that are there stay.

@@ -7,14 +7,15 @@ use std::sync::Arc;
 use clerestory::Error;
 use clerestory::film::PixelFormat;
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
-use clerestory::gpu::{BufferDesc, Category, Gpu};
+use clerestory::gpu::{BufferDesc, Category, DeviceKind, Gpu};
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{Camera, Environment, Material, Scene};
 use clerestory::settings::Settings;
 use clerestory::techniques::ambient::Ambient;
 use clerestory::techniques::preview::PreviewSettings;
-use clerestory::techniques::{Frame, FrameMethod, FrameTarget, by_id};
+use clerestory::techniques::{Frame, FrameMethod, FrameTarget, Part, View, by_id};
 use clerestory::transport::GpuScene;
+use clerestory_hard_cases::scenes::equal_triangles;
 use clerestory_hard_cases::{Subject, subjects};
 use clerestory_samples::progressive::Progressive;
 use clerestory_tests::render::{builtin, camera_aslant, cuboid, floor, floor_from_above, pixel_averages};
@@ -187,34 +188,42 @@ fn frames_are_recorded_by_themselves() {
         let scene = blocks();
         let on_device = Arc::new(GpuScene::new(gpu, &scene).expect("scene"));
         let mut method = Ambient::new(gpu, on_device).expect("method");
+        let falls_in = |method: &mut Ambient, size| method.parts(gpu, &scene.cameras[0], size).expect("parts");
+        assert_eq!(falls_in(&mut method, SIZE), 1);
         let bytes = FrameTarget::bytes(SIZE);
         let buffer = gpu
             .buffer(&BufferDesc::storage("picture", bytes, Category::Film))
             .expect("buffer");
-        let mut picture = |number: u32| {
-            let mut recorder = gpu.recorder("host").expect("recorder");
-            let frame = Frame {
-                camera: &scene.cameras[0],
-                seed: 3,
-                number,
-            };
-            let target = FrameTarget {
-                radiance: &buffer,
-                size: SIZE,
-            };
-            method.begin(&mut recorder).expect("begin");
-            method.record(&mut recorder, &frame, &target).expect("record");
-            recorder
-                .submit()
-                .and_then(|submission| submission.wait())
-                .expect("device");
+        let mut picture_of = |number: u32, parts: u32| {
+            for part in (0..parts).map(|number| Part { number, of: parts }) {
+                let mut recorder = gpu.recorder("host").expect("recorder");
+                let frame = Frame {
+                    camera: &scene.cameras[0],
+                    seed: 3,
+                    number,
+                    part,
+                };
+                let target = FrameTarget {
+                    radiance: &buffer,
+                    size: SIZE,
+                };
+                method.begin(&mut recorder).expect("begin");
+                method.record(&mut recorder, &frame, &target).expect("record");
+                recorder
+                    .submit()
+                    .and_then(|submission| submission.wait())
+                    .expect("device");
+            }
             gpu.read::<f32>(buffer.view(), bytes as usize / 4).expect("pixels")
         };
+        let mut picture = |number: u32| picture_of(number, 1);
         let first = picture(0);
         let own = rendered(gpu, &scene, "ambient", serde_json::Value::Null, 1);
         assert_eq!(values(&own, "radiance"), first);
         assert_ne!(picture(1), first);
         assert_eq!(picture(0), first);
+        assert_ne!(picture(1), first);
+        assert_eq!(picture_of(0, 7), first);
         // What would be written past its end is refused, whatever the numbers.
         for size in [[SIZE[0], SIZE[1] + 1], [1 << 16, 1 << 16], [u32::MAX, 2], [0, 7]] {
             let mut recorder = gpu.recorder("host").expect("recorder");
@@ -222,6 +231,7 @@ fn frames_are_recorded_by_themselves() {
                 camera: &scene.cameras[0],
                 seed: 3,
                 number: 0,
+                part: Part::WHOLE,
             };
             let target = FrameTarget {
                 radiance: &buffer,
@@ -230,6 +240,39 @@ fn frames_are_recorded_by_themselves() {
             let refused = method.record(&mut recorder, &frame, &target);
             assert!(matches!(refused, Err(Error::Setting { .. })), "{size:?}: {refused:?}");
         }
+    });
+}
+
+/// Where rays may test many triangles, a frame falls into parts of bounded work, and a step ends within a frame.
+#[test]
+fn frames_of_rays_that_take_long_are_parted() {
+    with_gpu(|gpu| {
+        let scene = equal_triangles(4000);
+        let size = [128, 128];
+        let on_device = Arc::new(GpuScene::new(gpu, &scene).expect("scene"));
+        let mut method = Ambient::new(gpu, Arc::clone(&on_device)).expect("method");
+        let parts = method.parts(gpu, &scene.cameras[0], size).expect("parts");
+        // Two rays of a pixel, and a step for each triangle, in parts of 2^26 steps or more on a faster device.
+        let steps = 2 * 4000 * u64::from(size[0] * size[1]);
+        assert!(
+            gpu.caps().kind != DeviceKind::Cpu || u64::from(parts) >= steps >> 26,
+            "{parts}"
+        );
+        let card = by_id("ambient").expect("technique");
+        let view = View {
+            camera: &scene.cameras[0],
+            size,
+            seed: 1,
+            aovs: false,
+        };
+        let mut technique = card
+            .prepare(gpu, on_device, &view, &Settings::default())
+            .expect("technique");
+        let mut submissions = 0;
+        while let Some(step) = technique.step(1).expect("step") {
+            submissions += step.timings.len();
+        }
+        assert_eq!(submissions, parts as usize);
     });
 }
 

@@ -1,14 +1,20 @@
 //! A step is a bounded piece of work, whatever the scene: a host looks at its time and at wishes to stop between two of them. Work is counted, never timed.
 
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use clerestory::gpu::{DeviceKind, Gpu};
+use clerestory::gpu::{BufferDesc, Category, DeviceKind, Gpu, PipelineInfo, Recorder};
 use clerestory::plan::{self, Goal};
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Camera, Environment, Material, Scene, SceneProfile};
+use clerestory::scene::{Camera, Environment, LightKind, Material, Scene, SceneProfile};
 use clerestory::settings::Settings;
 use clerestory::techniques::photon_mapping::{MapQueue, PhotonMapper, PhotonSettings};
-use clerestory::techniques::{self, PathTracerSettings, View};
+use clerestory::techniques::preview::{PreviewMethod, PreviewSettings};
+use clerestory::techniques::{
+    self, Accumulated, Frame, FrameMethod, FrameTarget, Part, PathTracerSettings, Technique, View,
+};
+use clerestory::transport::PathSet;
+use clerestory::{Error, Result};
 use clerestory_hard_cases::scenes::{equal_triangles, place_sparse_grid};
 use clerestory_tests::render::{builtin, cuboid, independent, tracer, upload};
 use clerestory_tests::with_gpu;
@@ -136,8 +142,8 @@ fn photon_maps_in_parts_have_the_same_picture() {
             while let Some(step) = mapper.step(2).unwrap() {
                 (steps, most) = (steps + 1, most.max(step.timings.len()));
             }
-            // Photons, the device's build of their map, eye paths.
-            assert!(most <= 3, "{most} submissions in a step");
+            // Photons, and the device's build of their map.
+            assert!(most <= 2, "{most} submissions in a step");
             let (picture, _) = mapper.picture().unwrap();
             let radiance = picture.require("radiance").unwrap().values().to_vec();
             let bits: Vec<u32> = radiance.iter().map(|value| value.to_bits()).collect();
@@ -180,13 +186,185 @@ fn a_step_of_every_technique_is_a_few_submissions() {
             let (mut steps, mut submissions) = (0, 0);
             while let Some(step) = technique.step(2).unwrap() {
                 let count = step.timings.len();
-                // Photons, the device's build of their map, eye paths; others have one.
-                assert!(count <= 3, "{}: {count} submissions in a step", card.id);
+                // Photons, and the device's build of their map; others have one.
+                assert!(count <= 2, "{}: {count} submissions in a step", card.id);
                 (steps, submissions) = (steps + 1, submissions + count);
             }
             println!("{}: {submissions} submissions in {steps} steps", card.id);
             assert!(submissions > 0, "{}", card.id);
         }
+    });
+}
+
+/// What a frame method of a host was asked for: a part of what frames share, or of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Asked {
+    Begin(Part),
+    Frame(u32, Part),
+}
+
+/// A frame method that falls into parts, fails once, and writes nothing.
+struct Parted {
+    asked: Arc<Mutex<Vec<Asked>>>,
+    parts: [u32; 2],
+    fails_at: Option<Asked>,
+}
+
+impl Parted {
+    fn note(&mut self, asked: Asked) -> Result<()> {
+        if self.fails_at == Some(asked) {
+            self.fails_at = None;
+            return Err(Error::setting("part", "asked for", "fails once"));
+        }
+        self.asked.lock().unwrap().push(asked);
+        Ok(())
+    }
+}
+
+impl FrameMethod for Parted {
+    fn begin_parts(&mut self, _: &Gpu) -> Result<u32> {
+        Ok(self.parts[0])
+    }
+
+    fn begin(&mut self, recorder: &mut Recorder) -> Result<()> {
+        self.begin_part(recorder, Part::WHOLE)
+    }
+
+    fn begin_part(&mut self, _: &mut Recorder, part: Part) -> Result<()> {
+        self.note(Asked::Begin(part))
+    }
+
+    fn parts(&mut self, _: &Gpu, _: &Camera, _: [u32; 2]) -> Result<u32> {
+        Ok(self.parts[1])
+    }
+
+    fn record(&mut self, _: &mut Recorder, frame: &Frame<'_>, _: &FrameTarget<'_>) -> Result<()> {
+        self.note(Asked::Frame(frame.number, frame.part))
+    }
+
+    fn path_set(&self) -> PathSet {
+        PathSet::EMITTED
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        Vec::new()
+    }
+}
+
+#[test]
+fn parts_of_frames_are_asked_for_in_order_each_in_a_submission_of_its_own() {
+    with_gpu(|gpu| {
+        let scene = equal_triangles(2);
+        let view = View {
+            camera: &scene.cameras[0],
+            size: [4, 4],
+            seed: 1,
+            aovs: false,
+        };
+        for parts in [[1, 1], [1, 3], [3, 1], [2, 4]] {
+            let all = |of| (0..of).map(move |number| Part { number, of });
+            let frame = |number| all(parts[1]).map(move |part| Asked::Frame(number, part));
+            let begin = || all(parts[0]).map(Asked::Begin);
+            let expected: Vec<_> = begin().chain(frame(0)).chain(frame(1)).collect();
+            for fails_at in std::iter::once(None).chain(expected.iter().copied().map(Some)) {
+                let asked = Arc::new(Mutex::new(Vec::new()));
+                let method = Parted {
+                    asked: Arc::clone(&asked),
+                    parts,
+                    fails_at,
+                };
+                let mut technique = Accumulated::new(gpu, &view, method).unwrap();
+                let (mut submissions, mut failures) = (0, 0);
+                loop {
+                    match technique.step(2) {
+                        Ok(Some(step)) => submissions += step.timings.len(),
+                        Ok(None) => break,
+                        Err(_) => failures += 1,
+                    }
+                }
+                assert_eq!(failures, fails_at.iter().count(), "{parts:?}");
+                let mut found = std::mem::take(&mut *asked.lock().unwrap());
+                // Of a submission that failed, what came before is asked for again.
+                found.dedup();
+                assert_eq!(found, expected, "{parts:?}, fails at {fails_at:?}");
+                let begun = if parts[0] > 1 { parts[0] } else { 0 };
+                // Those before one that fails are not told of.
+                let all_told = fails_at.is_some() || submissions as u32 >= begun + parts[1];
+                assert!(all_told, "{parts:?}: {submissions}");
+                // Another camera begins anew in the middle of a frame.
+                technique.set_camera(view.camera).unwrap();
+                technique.step(1).unwrap();
+                technique.set_camera(view.camera).unwrap();
+                asked.lock().unwrap().clear();
+                while technique.step(1).unwrap().is_some() {}
+                let expected: Vec<_> = begin().chain(frame(0)).collect();
+                assert_eq!(*asked.lock().unwrap(), expected, "{parts:?}");
+            }
+        }
+    });
+}
+
+/// A frame by `method`, recorded as a whole and part by part: the same bits, and how many parts there are.
+fn frame_parts(gpu: &Gpu, scene: &Scene, size: [u32; 2], mut method: impl FrameMethod, least: [u32; 2]) {
+    let camera = &scene.cameras[0];
+    let radiance = gpu
+        .buffer(&BufferDesc::storage("frame", FrameTarget::bytes(size), Category::Film))
+        .unwrap();
+    let target = FrameTarget {
+        radiance: &radiance,
+        size,
+    };
+    let mut of = |begin: u32, frames: u32| {
+        gpu.upload(&radiance, 0, &vec![[f32::NAN; 3]; (size[0] * size[1]) as usize])
+            .unwrap();
+        for number in 0..begin {
+            let mut recorder = gpu.recorder("begin").unwrap();
+            match begin {
+                1 => method.begin(&mut recorder),
+                of => method.begin_part(&mut recorder, Part { number, of }),
+            }
+            .unwrap();
+            recorder.submit().unwrap().wait().unwrap();
+        }
+        for number in 0..frames {
+            let mut recorder = gpu.recorder("frame").unwrap();
+            let part = Part { number, of: frames };
+            let frame = Frame {
+                camera,
+                seed: 3,
+                number: 5,
+                part,
+            };
+            method.record(&mut recorder, &frame, &target).unwrap();
+            recorder.submit().unwrap().wait().unwrap();
+        }
+        let parts = [
+            method.begin_parts(gpu).unwrap(),
+            method.parts(gpu, camera, size).unwrap(),
+        ];
+        let values = gpu.read::<u32>(radiance.view(), 3 * (size[0] * size[1]) as usize);
+        (values.unwrap(), parts)
+    };
+    let (whole, parts) = of(1, 1);
+    assert!(parts[0] >= least[0] && parts[1] >= least[1], "{parts:?}");
+    let (parted, _) = of(parts[0], parts[1]);
+    assert!(whole == parted, "{parts:?} parts show");
+    assert!(whole.iter().any(|bits| f32::from_bits(*bits) > 0.0), "nothing is seen");
+}
+
+#[test]
+fn draws_of_triangles_that_cover_all_are_parted_and_the_same() {
+    with_gpu(|gpu| {
+        let mut scene = equal_triangles(6000);
+        let size = [320, 320];
+        let (position, intensity) = (Vec3::new(0.5, 0.5, 1.5), Vec3::ONE);
+        scene.add_light("lamp", LightKind::Point { position, intensity });
+        let settings = PreviewSettings {
+            shadow_side: 256,
+            ..PreviewSettings::default()
+        };
+        let preview = PreviewMethod::new(gpu, upload(gpu, &scene), size, settings).unwrap();
+        frame_parts(gpu, &scene, size, preview, [3, 4]);
     });
 }
 

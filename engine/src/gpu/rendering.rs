@@ -3,6 +3,7 @@
 //! A rendering has targets of one size: whole images or parts of them ([`Image::part`]), of one layer, of several that shaders choose
 //! among by `gl_Layer`, or of several views that each primitive goes to. Attachments are images, whose barriers and layouts are the author's.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use ash::vk;
@@ -301,11 +302,27 @@ impl Render<'_, '_> {
         vertices: u32,
         instances: u32,
     ) -> Result<()> {
+        self.draw_range(pipeline, sets, push, 0..vertices, instances)
+    }
+
+    /// As [`Render::draw`], of the vertices with these numbers; none for a range that ends before it begins.
+    ///
+    /// # Errors
+    /// As [`Render::draw`].
+    pub fn draw_range<V: VertexShader, F: FragmentShader, G: GeometryStage>(
+        &mut self,
+        pipeline: &GraphicsPipeline<V, F, G>,
+        sets: &[&dyn BindingSet<'_>],
+        push: &V::Push,
+        vertices: Range<u32>,
+        instances: u32,
+    ) -> Result<()> {
         self.pass.recorder.next_command();
         self.bind(pipeline, sets, push)?;
         let device = &self.pass.recorder.gpu.inner.device;
+        let count = vertices.end.saturating_sub(vertices.start);
         // SAFETY: pipeline, sets and push constants are bound.
-        unsafe { device.cmd_draw(self.pass.command_buffer, vertices, instances, 0, 0) };
+        unsafe { device.cmd_draw(self.pass.command_buffer, count, instances, vertices.start, 0) };
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! Pictures of the nearest surfaces: their triangles, distances, normals, whatever is asked for.
 
+use super::coverage::DrawPart;
 use super::output::Output;
 use super::pipelines::{DEPTH, Layering, Pipeline, PipelineDesc, used_locations};
 use super::surfaces::{SurfaceFeatures, Surfaces};
@@ -53,10 +54,10 @@ impl Picture {
     }
 }
 
-fn target((output, picture): &(Output, Picture), rendering: u32) -> ColorTarget<'_> {
+fn target((output, picture): &(Output, Picture), rendering: u32, begins: bool) -> ColorTarget<'_> {
     ColorTarget {
         image: picture.target(rendering),
-        clear: Some(output.nothing()),
+        clear: begins.then(|| output.nothing()),
     }
 }
 
@@ -169,14 +170,33 @@ impl GBuffer {
     /// features than those it was made for; [`Error::LimitExceeded`] for more pieces of triangles than can be numbered;
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn record(&self, recorder: &mut Recorder, surfaces: &Surfaces<'_>, views: &[View]) -> Result<()> {
+        let whole = DrawPart::whole(surfaces);
+        self.record_part(recorder, surfaces, views, &whole)
+    }
+
+    /// As [`GBuffer::record`], a part of the triangles: the first part empties the pictures, and later ones, of the same surfaces and views, draw over what is there.
+    ///
+    /// # Errors
+    /// As [`GBuffer::record`].
+    pub(crate) fn record_part(
+        &self,
+        recorder: &mut Recorder,
+        surfaces: &Surfaces<'_>,
+        views: &[View],
+        part: &DrawPart,
+    ) -> Result<()> {
         self.layering.check_views(views)?;
         if surfaces.features != self.features {
             let cause = format!("is not {:?}, which the G-buffer was made for", self.features);
             return Err(Error::setting("surfaces", format!("{:?}", surfaces.features), cause));
         }
         recorder.pass("raster: surfaces", |pass| {
-            self.upload(pass, views)?;
-            self.to_attachments(pass);
+            if part.begins {
+                self.upload(pass, views)?;
+                self.to_attachments(pass);
+            } else {
+                self.keep_attachments(pass);
+            }
             let raster = RasterSet {
                 raster_views: self.views.view(),
                 // Without objects no kernel reads it.
@@ -186,19 +206,20 @@ impl GBuffer {
                 let colors: Vec<_> = self
                     .pictures
                     .iter()
-                    .map(|slot| slot.as_ref().map(|slot| target(slot, rendering)))
+                    .map(|slot| slot.as_ref().map(|slot| target(slot, rendering, part.begins)))
                     .collect();
                 let targets = Targets {
                     colors: &colors,
                     depth: Some(DepthTarget {
                         image: self.depth.target(rendering),
-                        clear: Some(0.0),
+                        clear: part.begins.then_some(0.0),
                     }),
                     area: None,
                     view_mask: self.layering.view_mask(),
                 };
                 pass.render(&targets, |render| {
-                    self.pipeline.draw(render, &raster, surfaces, views, rendering)
+                    let drawn = (surfaces, &part.triangles);
+                    self.pipeline.draw(render, &raster, drawn, views, rendering)
                 })?;
             }
             Ok(())
@@ -279,6 +300,27 @@ impl GBuffer {
         pass.update(self.views.view(), &records)?;
         pass.barrier(&[barrier(Access::TRANSFER_WRITE, VIEW_READ)]);
         Ok(())
+    }
+
+    /// What was drawn before is there when more is drawn.
+    fn keep_attachments(&self, pass: &mut Pass<'_>) {
+        let again = |image, access, layout| ImageBarrier {
+            image,
+            from: access,
+            to: access,
+            old_layout: layout,
+            new_layout: layout,
+        };
+        let (color, depth) = (
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
+        );
+        let mut barriers: Vec<_> = self
+            .pictures()
+            .map(|(_, picture)| again(&picture.image, Access::COLOR_WRITE, color))
+            .collect();
+        barriers.push(again(&self.depth.image, Access::DEPTH_WRITE, depth));
+        pass.image_barrier(&barriers);
     }
 
     fn to_attachments(&self, pass: &mut Pass<'_>) {

@@ -13,6 +13,7 @@
 //! own. Deterministic, and equal bits in every way to several layers of linear views. Cuts that are not exact ([`OctantCut::is_exact`]) and
 //! paraboloids guarantee nothing of this: they are here to be compared.
 
+pub mod coverage;
 mod gbuffer;
 pub(crate) mod octahedron;
 pub mod octants;
@@ -24,6 +25,7 @@ mod surfaces;
 pub mod tessellation;
 mod view;
 
+pub(crate) use coverage::{Coverage, DrawPart};
 pub use gbuffer::{GBuffer, GBufferDesc};
 pub use octahedron::OCTANTS;
 pub use octants::OctantCut;

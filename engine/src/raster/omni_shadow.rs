@@ -38,6 +38,7 @@
 
 use glam::{DVec3, IVec2, UVec2, Vec3};
 
+use super::coverage::DrawPart;
 use super::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::ash::vk;
@@ -254,31 +255,51 @@ impl OmniShadowMaps {
             let cause = format!("are more than the {} shadow maps", self.desc.maps);
             return Err(Error::setting("lights", lights.len(), cause));
         }
-        for (map, light) in (0u64..).zip(lights) {
-            self.gbuffer
-                .record(recorder, surfaces, &self.views(surfaces, *light)?)?;
-            let bytes = self.desc.texels() * size_of::<f32>() as u64;
-            let barrier = |from, to| BufferBarrier {
-                buffer: &self.distances,
-                from,
-                to,
-            };
-            recorder.pass("shadow maps: distances", |pass| {
-                let Some(image) = self.gbuffer.image(Output::Distance) else {
-                    return Ok(());
-                };
-                pass.barrier(&[barrier(Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
-                let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-                self.gbuffer.barrier_to(pass, Access::TRANSFER_READ, source);
-                pass.copy_image_to_buffer(image, self.distances.slice(map * bytes, bytes))?;
-                pass.barrier(&[barrier(Access::TRANSFER_WRITE, Access::COMPUTE_READ)]);
-                Ok(())
-            })?;
+        for (map, light) in (0..).zip(lights) {
+            let views = self.views(surfaces, *light)?;
+            self.record_part(recorder, surfaces, map, &views, &DrawPart::whole(surfaces))?;
         }
         Ok(())
     }
 
-    fn views(&self, surfaces: &Surfaces<'_>, light: Vec3) -> Result<Vec<View>> {
+    /// As [`OmniShadowMaps::record`], a part of the triangles into the map of one light, which has its distances with the last part.
+    ///
+    /// # Errors
+    /// As [`OmniShadowMaps::record`].
+    pub(crate) fn record_part(
+        &self,
+        recorder: &mut Recorder,
+        surfaces: &Surfaces<'_>,
+        map: u32,
+        views: &[View],
+        part: &DrawPart,
+    ) -> Result<()> {
+        self.check(map)?;
+        self.gbuffer.record_part(recorder, surfaces, views, part)?;
+        if !part.ends {
+            return Ok(());
+        }
+        let bytes = self.desc.texels() * size_of::<f32>() as u64;
+        let barrier = |from, to| BufferBarrier {
+            buffer: &self.distances,
+            from,
+            to,
+        };
+        recorder.pass("shadow maps: distances", |pass| {
+            let Some(image) = self.gbuffer.image(Output::Distance) else {
+                return Ok(());
+            };
+            pass.barrier(&[barrier(Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
+            let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+            self.gbuffer.barrier_to(pass, Access::TRANSFER_READ, source);
+            pass.copy_image_to_buffer(image, self.distances.slice(u64::from(map) * bytes, bytes))?;
+            pass.barrier(&[barrier(Access::TRANSFER_WRITE, Access::COMPUTE_READ)]);
+            Ok(())
+        })
+    }
+
+    /// From a light's place, as its map is drawn.
+    pub(crate) fn views(&self, surfaces: &Surfaces<'_>, light: Vec3) -> Result<Vec<View>> {
         let near = View::near_plane(light, surfaces);
         let area = Area::whole([self.desc.side; 2]);
         match self.desc.layout {

@@ -1,5 +1,7 @@
 //! The pipelines of surfaces, one for each way to several views.
 
+use std::ops::Range;
+
 use super::octahedron::OCTANTS;
 use super::octants::OctantCut;
 use super::output::Output;
@@ -216,24 +218,24 @@ impl Pipeline {
         }
     }
 
-    /// Draws all triangles in the views from `first_view` on.
+    /// Draws triangles in the views from `first_view` on.
     pub fn draw(
         &self,
         render: &mut Render<'_, '_>,
         raster: &RasterSet<'_>,
-        surfaces: &Surfaces<'_>,
+        (surfaces, triangles): (&Surfaces<'_>, &Range<u32>),
         views: &[View],
         first_view: u32,
     ) -> Result<()> {
         macro_rules! draw {
             ($shader:ident, $pipeline:expr, $pieces:expr, $instances:expr, $first_view:expr) => {
-                render.draw(
+                render.draw_range(
                     $pipeline,
                     &[raster, &surfaces.set],
                     &$shader::Push {
                         first_view: $first_view,
                     },
-                    corners(surfaces.triangles, $pieces)?,
+                    corners(triangles, $pieces)?,
                     $instances,
                 )
             };
@@ -266,14 +268,17 @@ impl Pipeline {
 }
 
 /// Vertices of all pieces.
-fn corners(triangles: u32, pieces: u32) -> Result<u32> {
-    let corners = 3 * u64::from(triangles) * u64::from(pieces);
-    u32::try_from(corners).map_err(|_| Error::LimitExceeded {
-        name: "surfaces".into(),
-        value: corners,
-        limit_name: "vertices of a draw",
-        limit: u64::from(u32::MAX),
-    })
+fn corners(triangles: &Range<u32>, pieces: u32) -> Result<Range<u32>> {
+    let corners = |triangles: u32| {
+        let corners = 3 * u64::from(triangles) * u64::from(pieces);
+        u32::try_from(corners).map_err(|_| Error::LimitExceeded {
+            name: "surfaces".into(),
+            value: corners,
+            limit_name: "vertices of a draw",
+            limit: u64::from(u32::MAX),
+        })
+    };
+    Ok(corners(triangles.start)?..corners(triangles.end)?)
 }
 
 /// What a pipeline is made for.

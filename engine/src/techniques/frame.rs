@@ -12,18 +12,20 @@
 //! | before | the target may be written by compute shaders: earlier uses have been waited for | barriers among its own passes |
 //! | after | what compute shaders have written to the target is made visible to whoever reads it | all that it drew is there |
 //!
-//! Bounded: a step of [`Accumulated`] is one frame at least, which is never parted. How long one takes is the method's to bound: rays may end
-//! at a quota, and [`preview`](super::preview) draws each triangle once a view, however much of the picture it covers.
+//! Bounded: a method says in how many [`Part`]s of bounded work a frame falls, and what frames share. [`Accumulated`] submits each by itself, so that a step of it
+//! ends after some tenths of a second whatever the scene. A host that records whole frames waits for whole frames.
 //!
 //! Deterministic: a frame's picture depends on scene, camera, size, settings, seed and number alone.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
+use std::time::Instant;
 
 use super::foresight::frame_fits;
 use super::{Skipped, Technique, View};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu, Pace, PipelineInfo, Recorder, Timings};
+use crate::gpu::{Buffer, BufferDesc, Category, DeviceKind, Gpu, Pace, PipelineInfo, Recorder, Timings};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::PathSet;
@@ -33,7 +35,7 @@ use crate::{Error, Result};
 const FRAMES_MAX: u32 = 32;
 /// Samples of a step on software devices, about.
 const STEP_SAMPLES: u64 = 1 << 18;
-/// Seconds of a step, about, unless one frame takes longer: hosts look at the time and at wishes to stop between two steps.
+/// Seconds of a step, about, unless one part of a frame takes longer: hosts look at the time and at wishes to stop between two steps.
 const STEP_SECONDS: f64 = 0.25;
 
 /// What a picture is drawn of.
@@ -45,6 +47,54 @@ pub struct Frame<'a> {
     pub seed: u32,
     /// Counts pictures of one seed from 0 on. Each is another sample of the same expected picture.
     pub number: u32,
+    /// What of it is recorded: [`Part::WHOLE`], or each part in turn.
+    pub part: Part,
+}
+
+/// A part of a frame, or of what frames share: a bounded piece of work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// Its number, from 0 on.
+    pub number: u32,
+    /// How many there are.
+    pub of: u32,
+}
+
+/// Work of a part, in steps of rays through an index: some tenths of a second, on software devices on two cores.
+const SOFTWARE_WORK: u64 = 1 << 26;
+const DEVICE_WORK: u64 = 1 << 32;
+
+impl Part {
+    /// All at once.
+    pub const WHOLE: Self = Self { number: 0, of: 1 };
+
+    /// How many parts work on such a device falls in: one or more. Work is counted in steps of rays through an index, at most.
+    pub fn count(gpu: &Gpu, work: u64) -> u32 {
+        let most = if gpu.caps().kind == DeviceKind::Cpu {
+            SOFTWARE_WORK
+        } else {
+            DEVICE_WORK
+        };
+        work.div_ceil(most).clamp(1, u64::from(u32::MAX)) as u32
+    }
+
+    /// What it has of `count` pieces: each part about as many.
+    pub fn range(self, count: u32) -> Range<u32> {
+        let end = |number: u32| (u64::from(count) * u64::from(number) / u64::from(self.of.max(1))) as u32;
+        end(self.number)..end(self.number.saturating_add(1)).min(count)
+    }
+
+    /// The one behind it.
+    fn next(self) -> Self {
+        Self {
+            number: self.number + 1,
+            ..self
+        }
+    }
+
+    fn is_last(self) -> bool {
+        self.number + 1 >= self.of
+    }
 }
 
 /// Where a picture goes: three f32 per pixel, linear RGB radiance, row by row from the top without gaps.
@@ -106,8 +156,36 @@ pub trait FrameMethod: Send {
         Ok(())
     }
 
+    /// In how many parts what frames share falls, now: those of [`FrameMethod::begin_part`]. May wait for the device.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
+    fn begin_parts(&mut self, gpu: &Gpu) -> Result<u32> {
+        let _ = gpu;
+        Ok(1)
+    }
+
+    /// As [`FrameMethod::begin`], one of the parts that [`FrameMethod::begin_parts`] has told last. One that failed is recorded again.
+    ///
+    /// # Errors
+    /// As [`FrameMethod::begin`].
+    fn begin_part(&mut self, recorder: &mut Recorder, part: Part) -> Result<()> {
+        let _ = part;
+        self.begin(recorder)
+    }
+
+    /// In how many parts frames of a camera and of that size fall. May wait for the device.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a camera that cannot be used; [`Error::OutOfMemory`], [`Error::DeviceLost`].
+    fn parts(&mut self, gpu: &Gpu, camera: &Camera, size: [u32; 2]) -> Result<u32> {
+        let _ = (gpu, camera, size);
+        Ok(1)
+    }
+
     /// Records one picture: one sample of every pixel. Barriers before and after: see the [module](self). [`FrameTarget::pixels`] or
-    /// [`FrameTarget::check`] refuses targets that it must not write.
+    /// [`FrameTarget::check`] refuses targets that it must not write. Of a part, what it adds to those before it, which [`FrameMethod::parts`] has counted for the
+    /// camera; one that failed is recorded again.
     ///
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used or a target of a wrong size; [`Error::MissingBarrier`] in debug builds.
@@ -148,6 +226,10 @@ pub struct Accumulated<M> {
     done: u32,
     /// What frames share has been drawn.
     begun: bool,
+    /// What of that comes next; `None` before it has been counted.
+    begin_part: Option<Part>,
+    /// What of a frame comes next; `None` before its parts have been counted.
+    frame_part: Option<Part>,
     pace: Pace,
     /// Seconds of a frame of the last step.
     seconds_a_frame: f64,
@@ -178,6 +260,8 @@ impl<M: FrameMethod> Accumulated<M> {
             radiance: gpu.buffer(&BufferDesc::storage("frame", bytes, Category::Film))?,
             done: 0,
             begun: false,
+            begin_part: None,
+            frame_part: None,
             pace: Pace::new(gpu.caps().kind, FRAMES_MAX),
             seconds_a_frame: 0.0,
             passes_a_frame: 0,
@@ -230,6 +314,7 @@ impl<M: FrameMethod> Accumulated<M> {
                 camera: &self.camera,
                 seed: self.seed,
                 number: self.done + drawn,
+                part: Part::WHOLE,
             };
             self.method.record(&mut recorder, &frame, &target)?;
             // Waits for the frame, and leaves the target to the next one.
@@ -239,6 +324,91 @@ impl<M: FrameMethod> Accumulated<M> {
         }
         Ok((drawn, recorder.submit()?.wait()?))
     }
+
+    /// What comes next of what frames share; `None` when it is there, or goes with the first frame.
+    fn next_begin_part(&mut self) -> Result<Option<Part>> {
+        if self.begun {
+            return Ok(None);
+        }
+        let part = match self.begin_part {
+            Some(part) => part,
+            None => Part {
+                number: 0,
+                of: self.method.begin_parts(&self.gpu)?,
+            },
+        };
+        self.begin_part = Some(part);
+        Ok((part.of > 1).then_some(part))
+    }
+
+    /// What comes next of a frame that falls in parts; `None` for frames that do not.
+    fn next_frame_part(&mut self) -> Result<Option<Part>> {
+        let part = match self.frame_part {
+            Some(part) => part,
+            None => Part {
+                number: 0,
+                of: self.method.parts(&self.gpu, &self.camera, self.film.size())?,
+            },
+        };
+        self.frame_part = Some(part);
+        Ok((part.of > 1).then_some(part))
+    }
+
+    /// Draws parts, each a submission, until the time of a step is over, or what frames share is there, or a frame is; whether there was any.
+    fn submit_parts(&mut self, timings: &mut Vec<Timings>) -> Result<bool> {
+        let clock = Instant::now();
+        while let Some(part) = self.next_begin_part()? {
+            let mut recorder = self.gpu.recorder("what frames share")?;
+            self.method.begin_part(&mut recorder, part)?;
+            timings.push(recorder.submit()?.wait()?);
+            (self.begin_part, self.begun) = (Some(part.next()), part.is_last());
+            if self.begun || clock.elapsed().as_secs_f64() >= STEP_SECONDS {
+                return Ok(true);
+            }
+        }
+        while let Some(part) = self.next_frame_part()? {
+            let target = FrameTarget {
+                radiance: &self.radiance,
+                size: self.film.size(),
+            };
+            let mut recorder = self.gpu.recorder("part of a frame")?;
+            if !self.begun {
+                self.method.begin(&mut recorder)?;
+            }
+            let frame = Frame {
+                camera: &self.camera,
+                seed: self.seed,
+                number: self.done,
+                part,
+            };
+            self.method.record(&mut recorder, &frame, &target)?;
+            if part.is_last() {
+                self.film.record_frame(&mut recorder, &self.radiance)?;
+            }
+            timings.push(recorder.submit()?.wait()?);
+            self.begun = true;
+            if part.is_last() {
+                self.frame_part = Some(Part { number: 0, ..part });
+                (self.done, self.frames) = (self.done + 1, self.frames + 1);
+                return Ok(true);
+            }
+            self.frame_part = Some(part.next());
+            if clock.elapsed().as_secs_f64() >= STEP_SECONDS {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// What is there towards `samples` samples of each pixel.
+    fn step_so_far(&self, timings: Vec<Timings>, samples: u32) -> Step {
+        let [width, height] = self.film.size().map(u64::from);
+        Step {
+            timings,
+            done: width * height * u64::from(self.done),
+            wanted: width * height * u64::from(samples),
+        }
+    }
 }
 
 impl<M: FrameMethod> Technique for Accumulated<M> {
@@ -246,8 +416,12 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
         if self.done >= samples {
             return Ok(None);
         }
+        let mut parts = Vec::new();
+        if self.submit_parts(&mut parts)? {
+            return Ok(Some(self.step_so_far(parts, samples)));
+        }
         let wanted = self.frames_for_step().min(samples - self.done);
-        let clock = std::time::Instant::now();
+        let clock = Instant::now();
         let (frames, timings) = self.submit(wanted)?;
         let seconds = timings
             .untimed
@@ -261,12 +435,7 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
         self.begun = true;
         self.done += frames;
         self.frames += u64::from(frames);
-        let [width, height] = self.film.size().map(u64::from);
-        Ok(Some(Step {
-            timings: vec![timings],
-            done: width * height * u64::from(self.done),
-            wanted: width * height * u64::from(samples),
-        }))
+        Ok(Some(self.step_so_far(vec![timings], samples)))
     }
 
     fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
@@ -282,6 +451,7 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
         self.film.clear()?;
         self.camera = camera.clone();
         (self.done, self.begun) = (0, false);
+        (self.begin_part, self.frame_part) = (None, None);
         Ok(())
     }
 
@@ -318,5 +488,25 @@ impl<M: FrameMethod> Technique for Accumulated<M> {
             },
         });
         skipped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_have_every_piece_once() {
+        for (count, of) in [(0, 3), (7, 7), (100, 7), (3, 8), (u32::MAX, 5), (262_144, 256)] {
+            let mut end = 0;
+            for number in 0..of {
+                let range = Part { number, of }.range(count);
+                assert_eq!(range.start, end, "{number} of {of}");
+                assert!(range.len() as u32 <= count / of + 1, "{number} of {of}");
+                end = range.end;
+            }
+            assert_eq!(end, count);
+        }
+        assert_eq!(Part::WHOLE.range(9), 0..9);
     }
 }

@@ -54,7 +54,7 @@ use crate::{Error, Result};
 pub use crate::catalogue::row::Bias;
 pub use device_needs::{Lack, lacks, offers};
 pub use foresight::{Foresight, Law};
-pub use frame::{Accumulated, Frame, FrameMethod, FrameTarget};
+pub use frame::{Accumulated, Frame, FrameMethod, FrameTarget, Part};
 pub use path::{PathTracer, PathTracerSettings};
 
 /// A technique as the catalogue knows it.

@@ -17,10 +17,9 @@ layout(set = 0, binding = 0, scalar) restrict writeonly buffer Radiance { vec3 r
 
 layout(push_constant, scalar) uniform Push {
     CameraRays camera;
-    uint frame;
-    uint seed;
-    vec3 lower;  // corners of the scene
-    vec3 upper;
+    uint frame, seed;
+    uint first;  // pixel of the part
+    vec3 lower, upper;  // corners of the scene
 } push;
 
 // Turns the ray to where light may come from at what it has met; the share of that light that comes back along it.
@@ -29,14 +28,13 @@ vec3 scatter(Hit hit, inout Ray ray, vec2 u) {
     ScatteringFrame f = scattering_frame(a, arrival_normal(a));
     vec3 local = square_to_cosine_hemisphere(u);
     vec3 wi = frame_to_world(f, local);
-    // Over the density, cos / pi.
-    vec3 share = PI * cosine_lobes_eval(a.bsdf, cosine_lobes(a.bsdf, f.wo.z, false, LOBE_DIFFUSE), local.z);
+    vec3 share = PI * cosine_lobes_eval(a.bsdf, cosine_lobes(a.bsdf, f.wo.z, false, LOBE_DIFFUSE), local.z);  // over cos / pi
     ray = Ray(departure(a, wi, share), 0.0, wi, FAR_AWAY);
     return sides_agree(f.z, f.outward, wi) ? share : vec3(0.0);
 }
 
 void main() {
-    uint pixel = invocation_index();
+    uint pixel = push.first + invocation_index();
     if (pixel >= push.camera.width * push.camera.height) {
         return;
     }

@@ -29,7 +29,10 @@ layout(set = 0, binding = 2, scalar) restrict readonly buffer Frames { PreviewFr
 layout(set = 0, binding = 3, scalar) restrict readonly buffer Lights { SceneLight lights[]; };
 layout(set = 0, binding = 4, scalar) restrict writeonly buffer Radiance { vec3 radiance[]; };
 
-layout(push_constant, scalar) uniform Push { uint frame; } push;
+layout(push_constant, scalar) uniform Push {
+    uint frame;
+    uint first_pixel;  // of those that are shaded together
+} push;
 
 // Radiance from a unit direction of the map's axes, filtered by a lobe of width alpha.
 vec3 probe_look_up(vec3 d, float alpha) {
@@ -103,7 +106,7 @@ vec3 preview_surface(uint triangle, vec2 weights, vec3 origin, vec3 direction) {
 
 void main() {
     PreviewFrame frame = frames[push.frame];
-    uint i = invocation_index();
+    uint i = push.first_pixel + invocation_index();
     if (i >= frame.width * frame.height) {
         return;
     }

@@ -1,6 +1,7 @@
 //! Rendering: exact coverage, depth, kept contents, refused mistakes, and barriers of what vertex and fragment shaders read. The rest of the
 //! raster floor has files of its own.
 
+mod coverage;
 mod cuts;
 mod directions;
 mod gbuffer;

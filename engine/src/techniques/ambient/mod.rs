@@ -7,9 +7,9 @@ use crate::Result;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::techniques::ambient::ambient as kernel;
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP};
-use crate::scene::{EnvironmentUse, camera_frame::CameraFrame};
+use crate::scene::{Camera, EnvironmentUse, camera_frame::CameraFrame};
 use crate::settings::SettingsDecl;
-use crate::techniques::{Accumulated, Bias, Card, Foresight, Frame, FrameMethod, FrameTarget, Variant, reasons};
+use crate::techniques::{Accumulated, Bias, Card, Foresight, Frame, FrameMethod, FrameTarget, Part, Variant, reasons};
 use crate::transport::{GpuScene, PathSet, surface_spec};
 
 const ROW: Row = Row {
@@ -48,9 +48,9 @@ pub(super) const CARD: Card = Card {
     create: |gpu, scene, view, _| Accumulated::boxed(gpu, view, Ambient::new(gpu, scene)?),
 };
 
-/// The kernel, for a scene.
+/// The kernel, for a scene, and the steps that a ray takes at most.
 #[derive(Debug)]
-pub struct Ambient(Arc<GpuScene>, ComputePipeline<kernel::Kernel>);
+pub struct Ambient(Arc<GpuScene>, ComputePipeline<kernel::Kernel>, u64);
 
 impl Ambient {
     /// Specializes the kernel.
@@ -58,26 +58,28 @@ impl Ambient {
     /// # Errors
     /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for an index whose leaves are too long for a software device.
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>) -> Result<Self> {
-        let (index, most) = (scene.index_traversal(), SOFTWARE_LOOP_CAP / 2); // each of the two rays
+        let index = scene.index_within(gpu, SOFTWARE_LOOP_CAP / 2)?; // each of the two rays
         let pipeline = gpu.compute_pipeline(&surface_spec!(kernel, scene, {
-            index_quota: index.quota_within(gpu.caps(), most, most, false)?,
-            index_kind: index.kind(),
-            ..Default::default()
+            index_quota: index.quota, index_kind: index.kind, ..Default::default()
         }))?;
-        Ok(Self(scene, pipeline))
+        Ok(Self(scene, pipeline, index.steps))
     }
 }
 
 impl FrameMethod for Ambient {
+    fn parts(&mut self, gpu: &Gpu, _: &Camera, [width, height]: [u32; 2]) -> Result<u32> {
+        Ok(Part::count(gpu, 2 * self.2 * u64::from(width) * u64::from(height)))
+    }
+
     fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
         let [lower, upper] = self.0.bounds().map(|corner| corner.to_array());
         let camera = CameraFrame::new(frame.camera, target.size)?.rays(target.size);
-        let (frame, seed, radiance, pixels) = (frame.number, frame.seed, target.radiance.view(), target.pixels()?);
+        let (part, seed, radiance) = (frame.part.range(target.pixels()?), frame.seed, target.radiance.view());
         #[rustfmt::skip]
-        let push = kernel::Push { camera, frame, seed, lower, upper };
+        let push = kernel::Push { camera, frame: frame.number, seed, first: part.start, lower, upper };
         recorder.pass("ambient: shade", |pass| {
             let (set, index, scene) = (kernel::Set0 { radiance }, self.0.index_set(), self.0.scene_set());
-            pass.dispatch(&self.1, &[&set, &index, &scene], &push, self.1.groups_over(pixels))
+            pass.dispatch(&self.1, &[&set, &index, &scene], &push, self.1.groups_over(part.len() as u32))
         })
     }
 

@@ -25,7 +25,7 @@ use super::settings::{MapBuild, PhotonSettings};
 use super::tracer::{PhotonCounts, PhotonTracer, Tracing, flux_scale};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
-use crate::gpu::{Buffer, Gpu, PipelineInfo, Submission};
+use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
 use crate::techniques::path::PathCounters;
@@ -94,8 +94,6 @@ struct Photons {
     tracing: Option<Tracing>,
     /// Of the pass under way.
     map: Option<PhotonMap>,
-    /// The device's build of it, which is waited for with the eye paths behind it.
-    building: Option<Submission>,
 }
 
 impl PhotonMapper {
@@ -141,7 +139,6 @@ impl PhotonMapper {
                 maker: MapMaker::new(gpu, settings.map_build)?,
                 tracing: None,
                 map: None,
-                building: None,
             }),
             None => None,
         };
@@ -219,12 +216,12 @@ impl PhotonMapper {
     /// Before the first pass.
     fn begin(&mut self) {
         if let Some(photons) = &mut self.photons {
-            (photons.tracing, photons.map, photons.building) = (None, None, None);
+            (photons.tracing, photons.map) = (None, None);
         }
     }
 
-    /// Does a bounded piece of work towards `samples` samples per pixel, whatever the scene: a submission of a pass's photons, and behind their last one the map and
-    /// a submission of eye paths, or one of eye paths alone; `None` when all samples are there.
+    /// Does a bounded piece of work towards `samples` samples per pixel, whatever the scene: a submission of a pass's photons, the last one with the map that is
+    /// made of them, or a submission of eye paths; `None` when all samples are there.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory),
@@ -259,21 +256,23 @@ impl PhotonMapper {
             let made = photons
                 .maker
                 .make(&self.gpu, photons.tracer.records(), traced.records, area)?;
-            let map = match made {
-                Made::ByHost(map, figures) => {
-                    self.counts.note(figures);
-                    map
-                }
+            let mut seconds = clock.elapsed().as_secs_f64();
+            let (map, figures) = match made {
+                Made::ByHost(map, figures) => (map, Some(figures)),
                 Made::ByDevice(map, building) => {
-                    photons.building = Some(*building);
-                    map
+                    let built = building.wait()?;
+                    seconds += seconds_of(&built);
+                    timings.push(built);
+                    (map, photons.maker.figures(area)?)
                 }
             };
+            figures.into_iter().for_each(|figures| self.counts.note(figures));
             photons.map = Some(map);
-            self.counts.map_seconds += clock.elapsed().as_secs_f64();
+            self.counts.map_seconds += seconds;
             self.counts.passes += 1;
             self.counts.photons += traced.counts;
             self.counts.records += u64::from(traced.records);
+            return Ok(Some(self.eye.step_so_far(timings, samples)));
         }
         let stage = match &self.photons {
             Some(Photons {
@@ -287,13 +286,6 @@ impl PhotonMapper {
         let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
         let step = self.eye.step_with(end, arrival)?;
         if let Some(photons) = &mut self.photons {
-            if let Some(building) = photons.building.take() {
-                let built = building.wait()?;
-                self.counts.map_seconds += seconds_of(&built);
-                timings.push(built);
-                let figures = photons.maker.figures(self.scene.surface_area())?;
-                figures.into_iter().for_each(|figures| self.counts.note(figures));
-            }
             // They are those of a whole wave.
             if step.is_some() && !self.eye.is_within_wave() {
                 let counts = photons.gather.counts()?;

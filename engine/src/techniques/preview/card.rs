@@ -100,7 +100,11 @@ const ROWS: &[Row] = &[Row {
         sources::KAUTZ_2000.whole(),
         sources::KARIS_2013.whole(),
     ],
-    shaders: &["shaders/techniques/preview/", "shaders/raster/surface.vert"],
+    shaders: &[
+        "shaders/techniques/preview/",
+        "shaders/raster/coverage.comp",
+        "shaders/raster/surface.vert",
+    ],
     path_set: Some("bounces=0..1"),
     bias: Some(BIAS),
     needs: NEEDS,

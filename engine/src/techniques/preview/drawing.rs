@@ -1,10 +1,12 @@
 //! What draws a picture of a scene: a G-buffer, lights, and the kernel that shades what is seen.
 
+use std::ops::Range;
+
 use super::card::{NO_MEDIA, NO_PHONG};
 use super::lights::{LightRoom, PreviewLights, PreviewShadows};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use crate::gpu::{Area, Gpu, PipelineInfo, Recorder};
-use crate::raster::{GBuffer, GBufferDesc, Layering, OmniShadowMaps, Surfaces, View};
+use crate::raster::{DrawPart, GBuffer, GBufferDesc, Layering, OmniShadowMaps, Surfaces, View};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
 use crate::{Error, Result};
@@ -77,8 +79,37 @@ impl Drawing {
         target: Target<'_>,
         parts: &[PreviewPart<'_>],
     ) -> Result<()> {
-        let view = View::of_frame(frame, surfaces, Area::whole(self.size()))?;
-        self.gbuffer.record(recorder, surfaces, &[view])?;
+        let [width, height] = self.size();
+        self.record_surfaces(recorder, surfaces, frame, &DrawPart::whole(surfaces))?;
+        self.record_shading(recorder, scene, frame, target, (parts, 0..width * height))
+    }
+
+    /// What is seen through a frame.
+    pub fn view(&self, surfaces: &Surfaces<'_>, frame: &CameraFrame) -> Result<View> {
+        View::of_frame(frame, surfaces, Area::whole(self.size()))
+    }
+
+    /// The first of the two passes, of a part of the triangles.
+    pub fn record_surfaces(
+        &self,
+        recorder: &mut Recorder,
+        surfaces: &Surfaces<'_>,
+        frame: &CameraFrame,
+        part: &DrawPart,
+    ) -> Result<()> {
+        let view = self.view(surfaces, frame)?;
+        self.gbuffer.record_part(recorder, surfaces, &[view], part)
+    }
+
+    /// The second one, of these pixels.
+    pub fn record_shading(
+        &self,
+        recorder: &mut Recorder,
+        scene: &GpuScene,
+        frame: &CameraFrame,
+        target: Target<'_>,
+        (parts, pixels): (&[PreviewPart<'_>], Range<u32>),
+    ) -> Result<()> {
         recorder.pass("preview: shade", |pass| {
             let seen = Seen {
                 scene,
@@ -87,7 +118,7 @@ impl Drawing {
                 eye: Eye::Camera(frame),
                 target,
             };
-            self.shade.record(pass, &seen, parts)
+            self.shade.record_pixels(pass, &seen, parts, pixels)
         })
     }
 

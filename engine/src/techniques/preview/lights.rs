@@ -43,9 +43,7 @@ impl PreviewShadows {
             let cause = format!("are more than the {SHADOW_MAPS_MAX} that may have shadow maps");
             return Err(Error::setting("lights", placed, cause));
         }
-        // All loops of an invocation count together.
-        let filters = u64::from(placed) * filter_iterations(self.width);
-        let iterations = u64::from(lights) + filters + PROBE_ITERATIONS;
+        let iterations = room.iterations(self.width);
         if gpu.caps().kind == DeviceKind::Cpu && iterations > u64::from(SOFTWARE_LOOP_CAP) {
             let width = self.width;
             let cause = format!(
@@ -66,6 +64,11 @@ pub(super) struct LightRoom {
 }
 
 impl LightRoom {
+    /// Loop iterations of a pixel with shadows' filters of that width, all loops together.
+    fn iterations(self, width: u32) -> u64 {
+        u64::from(self.all) + u64::from(self.placed) * filter_iterations(width) + PROBE_ITERATIONS
+    }
+
     /// For these lights, in whatever order and place.
     pub fn of(lights: &[LightKind]) -> Self {
         let placed = lights.iter().filter(|light| place_of(light).is_some());
@@ -87,7 +90,7 @@ fn place_of(light: &LightKind) -> Option<Vec3> {
 /// Records of lights on the device, and shadow maps of those that have a place.
 #[derive(Debug)]
 pub struct PreviewLights {
-    most: u32,
+    most: LightRoom,
     count: u32,
     records: Buffer,
     shadows: Option<OmniShadowMaps>,
@@ -114,7 +117,7 @@ impl PreviewLights {
         };
         let bytes = u64::from(room.all.max(1)) * size_of::<SceneLight>() as u64;
         Ok(Self {
-            most: room.all,
+            most: room,
             count: 0,
             records: gpu.buffer(&BufferDesc::storage("preview lights", bytes, Category::Light))?,
             shadows: shadows.filter(|_| room.placed > 0).map(maps).transpose()?,
@@ -142,6 +145,11 @@ impl PreviewLights {
         &self.records
     }
 
+    /// Loop iterations of a pixel, at most.
+    pub(super) fn iterations(&self) -> u64 {
+        self.most.iterations(self.width)
+    }
+
     /// Records shadow maps and records of these lights. Afterwards all is visible to compute shaders.
     pub(super) fn record(
         &mut self,
@@ -149,9 +157,24 @@ impl PreviewLights {
         surfaces: &Surfaces<'_>,
         lights: &[LightKind],
     ) -> Result<()> {
+        let places = self.record_lights(recorder, lights)?;
+        match &self.shadows {
+            Some(shadows) => shadows.record(recorder, surfaces, &places),
+            None => Ok(()),
+        }
+    }
+
+    /// Where each map is seen from, for these lights.
+    pub(super) fn places(&self, lights: &[LightKind]) -> Vec<Vec3> {
+        let places = lights.iter().filter_map(place_of);
+        places.filter(|_| self.shadows.is_some()).collect()
+    }
+
+    /// As [`PreviewLights::record`] without the shadow maps; from where these are seen.
+    pub(super) fn record_lights(&mut self, recorder: &mut Recorder, lights: &[LightKind]) -> Result<Vec<Vec3>> {
         let refuse = |value: usize, cause: String| Err(Error::setting("lights", value, cause));
-        if lights.len() > self.most as usize {
-            return refuse(lights.len(), format!("are more than the preview's {}", self.most));
+        if lights.len() > self.most.all as usize {
+            return refuse(lights.len(), format!("are more than the preview's {}", self.most.all));
         }
         if let Some(wrong) = lights.iter().position(|light| !light_is_sound(light)) {
             return refuse(
@@ -160,14 +183,15 @@ impl PreviewLights {
                     .into(),
             );
         }
-        let mut places: Vec<Vec3> = Vec::new();
+        let places = self.places(lights);
+        let mut maps = 0;
         let mut records = Vec::with_capacity(lights.len());
         for light in lights {
             let mut record = light_record(light);
             record.spare = [PREVIEW_NO_SHADOW, 0];
-            if let (Some(place), Some(_)) = (place_of(light), &self.shadows) {
-                record.spare[0] = places.len() as u32;
-                places.push(place);
+            if self.shadows.is_some() && place_of(light).is_some() {
+                record.spare[0] = maps;
+                maps += 1;
             }
             records.push(record);
         }
@@ -183,9 +207,6 @@ impl PreviewLights {
             pass.barrier(&[barrier(Access::TRANSFER_WRITE, Access::COMPUTE_READ)]);
             Ok(())
         })?;
-        match &self.shadows {
-            Some(shadows) => shadows.record(recorder, surfaces, &places),
-            None => Ok(()),
-        }
+        Ok(places)
     }
 }

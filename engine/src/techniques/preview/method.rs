@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DVec2, Vec3};
 
 use super::drawing::Drawing;
 use super::lights::{LightRoom, PreviewShadows};
@@ -11,10 +11,11 @@ use super::probe::{LightProbe, LightProbeDesc};
 use super::shade::{PreviewPart, Target};
 use crate::Result;
 use crate::gpu::{Gpu, PipelineInfo, Recorder};
-use crate::raster::{SHADOW_WIDTH_MAX, ShadowLayout};
+use crate::raster::{Coverage, DrawPart, SHADOW_WIDTH_MAX, ShadowLayout};
+use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::settings::TypedSettings;
-use crate::techniques::{Frame, FrameMethod, FrameTarget, Skipped};
+use crate::techniques::{Frame, FrameMethod, FrameTarget, Part, Skipped};
 use crate::transport::random::{Sampler, SamplerKind, sample_2d};
 use crate::transport::warp::square_to_disk;
 use crate::transport::{GpuScene, PathSet};
@@ -68,6 +69,11 @@ pub struct PreviewMethod {
     /// The environment.
     probe: Option<LightProbe>,
     lights_drawn: u64,
+    coverage: Coverage,
+    /// Parts of what frames share: maps by number and where they are seen from.
+    shadow_parts: Vec<(u32, Vec3, DrawPart)>,
+    /// Parts of a frame that draw; further ones shade.
+    draw_parts: Vec<DrawPart>,
 }
 
 impl PreviewMethod {
@@ -89,15 +95,66 @@ impl PreviewMethod {
             settings,
             probe,
             lights_drawn: 0,
+            coverage: Coverage::new(gpu)?,
+            shadow_parts: Vec::new(),
+            draw_parts: Vec::new(),
         })
     }
+
+    /// Parts that pixels are shaded in.
+    fn shading_parts(&self, gpu: &Gpu) -> u32 {
+        let pixels: u64 = self.drawing.size().map(u64::from).iter().product();
+        let work = pixels * self.drawing.lights.iterations() * SHADING_WORK;
+        Part::count(gpu, work)
+    }
 }
+
+/// What an iteration of shading takes, as so many steps of a ray through an index.
+const SHADING_WORK: u64 = 4;
 
 impl FrameMethod for PreviewMethod {
     fn begin(&mut self, recorder: &mut Recorder) -> Result<()> {
         let lights = self.scene.lights_without_area();
         self.lights_drawn += lights.len() as u64;
         self.drawing.lights.record(recorder, &self.scene.surfaces(), &lights)
+    }
+
+    fn begin_parts(&mut self, _: &Gpu) -> Result<u32> {
+        let (surfaces, lights) = (self.scene.surfaces(), self.scene.lights_without_area());
+        self.shadow_parts.clear();
+        if let Some(shadows) = self.drawing.lights.shadows() {
+            let size = [shadows.desc().side; 2];
+            for (map, place) in (0..).zip(self.drawing.lights.places(&lights)) {
+                let parts = self.coverage.parts(&surfaces, &shadows.views(&surfaces, place)?, size)?;
+                self.shadow_parts.extend(parts.into_iter().map(|part| (map, place, part)));
+            }
+        }
+        Ok(self.shadow_parts.len().max(1) as u32)
+    }
+
+    fn begin_part(&mut self, recorder: &mut Recorder, part: Part) -> Result<()> {
+        let (surfaces, lights) = (self.scene.surfaces(), self.scene.lights_without_area());
+        if part.number == 0 {
+            self.lights_drawn += lights.len() as u64;
+            self.drawing.lights.record_lights(recorder, &lights)?;
+        }
+        let shadows = self.drawing.lights.shadows();
+        match (shadows, self.shadow_parts.get(part.number as usize)) {
+            (Some(shadows), Some((map, place, part))) => {
+                let views = shadows.views(&surfaces, *place)?;
+                shadows.record_part(recorder, &surfaces, *map, &views, part)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn parts(&mut self, gpu: &Gpu, camera: &Camera, size: [u32; 2]) -> Result<u32> {
+        let surfaces = self.scene.surfaces();
+        // Neither the lens nor the place in a pixel changes how much is seen by much.
+        let view = self.drawing.view(&surfaces, &CameraFrame::new(camera, size)?)?;
+        self.draw_parts = self.coverage.parts(&surfaces, &[view], size)?;
+        let (drawing, shading) = (self.draw_parts.len() as u32, self.shading_parts(gpu));
+        Ok(if drawing == 1 && shading == 1 { 1 } else { drawing + shading })
     }
 
     fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
@@ -114,7 +171,7 @@ impl FrameMethod for PreviewMethod {
         let (place, lens): (DVec2, DVec2) = (numbers(), square_to_disk(numbers()));
         let camera = CameraFrame::new(frame.camera, size)?.seen_through(size, place, lens);
         let surfaces = self.scene.surfaces();
-        let part = PreviewPart {
+        let of_all = PreviewPart {
             triangles: 0..surfaces.triangles,
             background: true,
             probe: self.probe.as_ref(),
@@ -124,8 +181,20 @@ impl FrameMethod for PreviewMethod {
             first: 0,
             stride: size[0],
         };
-        self.drawing
-            .record(recorder, &self.scene, &surfaces, &camera, target, &[part])
+        let (part, scene, drawing) = (frame.part, &self.scene, &self.drawing);
+        if part == Part::WHOLE {
+            return drawing.record(recorder, scene, &surfaces, &camera, target, &[of_all]);
+        }
+        if let Some(part) = self.draw_parts.get(part.number as usize) {
+            return drawing.record_surfaces(recorder, &surfaces, &camera, part);
+        }
+        let drawn = self.draw_parts.len() as u32;
+        let shading = Part {
+            number: part.number - drawn,
+            of: part.of - drawn,
+        };
+        let pixels = shading.range(size[0] * size[1]);
+        drawing.record_shading(recorder, scene, &camera, target, (&[of_all], pixels))
     }
 
     fn path_set(&self) -> PathSet {

@@ -114,6 +114,18 @@ impl Shade {
     /// Records the shading of a G-buffer that was just drawn. Earlier uses of the target by compute shaders are waited for; afterwards it is
     /// visible to them.
     pub fn record(&self, pass: &mut Pass<'_>, seen: &Seen<'_>, parts: &[PreviewPart<'_>]) -> Result<()> {
+        let [width, height] = seen.gbuffer.size();
+        self.record_pixels(pass, seen, parts, 0..width * height)
+    }
+
+    /// As [`Shade::record`], of these pixels alone, row by row; those from 0 on come first.
+    pub fn record_pixels(
+        &self,
+        pass: &mut Pass<'_>,
+        seen: &Seen<'_>,
+        parts: &[PreviewPart<'_>],
+        pixels: Range<u32>,
+    ) -> Result<()> {
         let Seen {
             scene,
             gbuffer,
@@ -154,7 +166,10 @@ impl Shade {
             barrier(&self.frames, Access::TRANSFER_WRITE, Access::COMPUTE_READ),
             barrier(target.buffer, Access::COMPUTE, Access::COMPUTE),
         ]);
-        gbuffer.barrier_to(pass, Access::COMPUTE_READ, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
+        // Further pixels find the pictures so.
+        if pixels.start == 0 {
+            gbuffer.barrier_to(pass, Access::COMPUTE_READ, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
+        }
         let (Some(triangles), Some(weights)) = (gbuffer.image(Output::Triangle), gbuffer.image(Output::Weights)) else {
             return Ok(());
         };
@@ -168,7 +183,6 @@ impl Shade {
         if let Some(maps) = lights.shadows() {
             shadows = maps.set();
         }
-        let [width, height] = gbuffer.size();
         for (frame, part) in (0..).zip(parts) {
             let set = kernel::Set0 {
                 seen_triangles: view(triangles),
@@ -178,10 +192,14 @@ impl Shade {
                 radiance: target.buffer.view(),
             };
             let map = part.probe.map_or(&self.dark, LightProbe::filtered);
-            let groups = self.pipeline.groups_over(width * height);
+            let groups = self.pipeline.groups_over(pixels.len() as u32);
+            let push = kernel::Push {
+                frame,
+                first_pixel: pixels.start,
+            };
             let sets: [&dyn crate::gpu::interface::BindingSet<'_>; 4] =
                 [&set, &map.set(), &scene.scene_set(), &shadows];
-            pass.dispatch(&self.pipeline, &sets, &kernel::Push { frame }, groups)?;
+            pass.dispatch(&self.pipeline, &sets, &push, groups)?;
             pass.barrier(&[barrier(target.buffer, Access::COMPUTE, Access::COMPUTE)]);
         }
         Ok(())

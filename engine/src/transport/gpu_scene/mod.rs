@@ -77,6 +77,17 @@ struct SceneBuffers {
     albedo_table: TexelView,
 }
 
+/// How kernels trace rays that stop for good at a quota.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct IndexWithin {
+    /// What kernels are specialized by, as the quota.
+    pub kind: u32,
+    /// Steps after which a ray stops.
+    pub quota: u32,
+    /// Steps that a ray takes, at most.
+    pub steps: u64,
+}
+
 /// Loop iterations that a ray of a scene may take in one dispatch on a software device: with media half of [`SOFTWARE_LOOP_CAP`] is for walks through grids, and the
 /// rest for all surfaces that a shadow ray passes.
 pub(crate) fn ray_iterations(profile: &SceneProfile) -> u32 {
@@ -201,6 +212,25 @@ impl GpuScene {
     /// How kernels traverse its ray index.
     pub fn index_traversal(&self) -> DeviceTraversal {
         self.index.traversal
+    }
+
+    /// How kernels trace rays of at most so many steps each, which do not go on elsewhere when they stop.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] for an index whose leaves are too long for a software device.
+    pub fn index_within(&self, gpu: &Gpu, steps: u32) -> Result<IndexWithin> {
+        let traversal = self.index.traversal;
+        let quota = traversal.quota_within(gpu.caps(), steps, steps, false)?;
+        let texels = self.index.texels.buffer().bytes() / size_of::<[u32; 4]>() as u64;
+        Ok(IndexWithin {
+            kind: traversal.kind(),
+            quota,
+            steps: match traversal {
+                // A step is a node or a triangle, of a texel or more, and none is met twice.
+                DeviceTraversal::Bvh2 => texels.min(quota.into()),
+                DeviceTraversal::Kd { .. } => quota.into(),
+            },
+        })
     }
 
     /// Least and greatest corner, world space, metres.
