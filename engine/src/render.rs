@@ -19,7 +19,7 @@ use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
 
 /// How long samples that are under way when the time is used up may go on: no step is begun that, taking as long as the longest before it, would end later.
-const GRACE: Duration = Duration::from_millis(800);
+const GRACE: Duration = Duration::from_millis(500);
 
 /// What to render and how.
 ///
@@ -52,7 +52,7 @@ pub struct RenderOptions {
     pub seed: u32,
     /// Also gathers albedo, normal and depth of what is seen first.
     pub aovs: bool,
-    /// Stops after about this long, with what is there: after the step at hand, or up to 0.8 seconds later where samples are under way; never before the first
+    /// Stops after about this long, with what is there: after the step at hand, or up to half a second later where samples are under way; never before the first
     /// step, which compiles the kernels. A scene that is too hard may leave pixels without a sample, as the report's `samples` says.
     pub time_budget: Option<Duration>,
     /// The technique's settings: its struct, or JSON. Seed and AOVs are those above, whatever a struct says.

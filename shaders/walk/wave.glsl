@@ -30,6 +30,8 @@ const uint PLACE_SCATTERED = 0xFFFFFFFDu;
 const uint WORK_UNIT = 64u;
 // Units of work of an iteration of a walk through a grid: it draws numbers and looks up densities.
 const uint GRID_ITERATION_WORK = 4u;
+// And of one of a query of a map, where photons are weighed.
+const uint QUERY_STEP_WORK = 2u;
 
 const uint FLAG_ALIVE = 1u;
 const uint FLAG_WAITING = 2u;  // something waits at the place

@@ -240,7 +240,7 @@ void main() {
     }
     bool complete = gather_photons();
     if (!LINEAR) {
-        count_work(compact_steps, WORK_UNIT);
+        count_work(QUERY_STEP_WORK * compact_steps, QUERY_STEP_WORK * WORK_UNIT);
     }
     if (!complete) {
         walk_resume[place] = GATHER_STOPPED;

@@ -118,7 +118,7 @@ pub struct Arguments {
     aov: Vec<Aov>,
     /// Stops after about this time with the samples taken so far: 10s, 500ms, 2min
     ///
-    /// Samples under way have up to 0.8 seconds more. A scene so hard that no path ends in that time gives a black picture; the report's `samples` tells.
+    /// Samples under way have up to half a second more. A scene so hard that no path ends in that time gives a black picture; the report's `samples` tells.
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     time_budget: Option<Duration>,
     /// What to print about the run to standard output
