@@ -33,7 +33,11 @@ def settings(scene, described, samples):
     cycles = scene.cycles
     scene.render.engine = "CYCLES"
     cycles.device = "CPU"
-    cycles.samples = samples
+    # A pixel's first sample lies in its middle, which would shrink the pixel that the others spread over: it is left out.
+    cycles.samples = samples + 1
+    cycles.use_sample_subset = True
+    cycles.sample_offset = 1
+    cycles.sample_subset_length = samples
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False
     cycles.use_light_tree = False
