@@ -99,7 +99,7 @@ pub const PYTHON_VARIABLE: &str = "CLERESTORY_MITSUBA_PYTHON";
 /// First bounce of Russian roulette: that of Mitsuba's path integrator with `rr_depth` 5.
 const ROULETTE_START: u32 = 5;
 /// Edge of the blocks whose means are tested too, pixels.
-const BLOCK: u32 = 8;
+pub(crate) const BLOCK: u32 = 8;
 /// Radiance difference shown as full white in the difference pictures, in units of its standard deviation.
 const FULL_SCALE_Z: f32 = 5.0;
 
@@ -405,7 +405,7 @@ fn z_values(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> Vec<f64> {
 
 /// Mean of z² over the values that have noise: 1 for pictures that differ by noise alone, above 1 where differences are many but small, below 1
 /// where a variance is over-estimated. NaN without noise.
-fn mean_squared_z(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> f64 {
+pub(crate) fn mean_squared_z(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> f64 {
     let z = z_values(a, a_var, b, b_var);
     let noisy = |i: &usize| {
         let floor = RELATIVE_DEVIATION_FLOOR * f64::from(a[*i].abs().max(b[*i].abs()));
@@ -416,7 +416,7 @@ fn mean_squared_z(a: &[f32], a_var: &[f32], b: &[f32], b_var: &[f32]) -> f64 {
 }
 
 /// Means of an RGB picture's blocks (`power` 1), or the variances of such means (`power` 2).
-fn block_means(values: &[f32], size: u32, power: i32) -> Vec<f32> {
+pub(crate) fn block_means(values: &[f32], size: u32, power: i32) -> Vec<f32> {
     let blocks = size / BLOCK;
     let mut sums = vec![0.0f64; (blocks * blocks * 3) as usize];
     for (i, value) in values.iter().enumerate() {

@@ -1,6 +1,7 @@
 //! What the command line program and its tests share.
 
 pub mod agreement;
+pub mod cycles;
 pub mod experiments;
 pub mod fuzzing;
 pub mod geometry;

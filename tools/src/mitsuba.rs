@@ -7,9 +7,9 @@
 //! Guarantees: deterministic files; no file is written for a scene that is refused.
 
 mod medium;
-mod mesh;
+pub(crate) mod mesh;
 pub mod scenes;
-mod surface;
+pub(crate) mod surface;
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -182,7 +182,7 @@ fn mesh_file(index: usize) -> String {
     format!("mesh_{index:04}.ply")
 }
 
-fn find_camera<'a>(scene: &'a Scene, name: &str) -> Result<&'a Camera> {
+pub(crate) fn find_camera<'a>(scene: &'a Scene, name: &str) -> Result<&'a Camera> {
     let found = if name.is_empty() {
         scene.cameras.first()
     } else {

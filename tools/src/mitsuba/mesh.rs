@@ -7,17 +7,17 @@ use glam::{DMat3, Vec3};
 const FLAT_TOLERANCE: f64 = 1e-5;
 
 /// One instance in world space.
-pub(super) struct WorldMesh {
-    pub(super) positions: Vec<Vec3>,
+pub(crate) struct WorldMesh {
+    pub(crate) positions: Vec<Vec3>,
     /// Empty for flat shading.
     pub(super) normals: Vec<Vec3>,
     /// Counter-clockwise seen from the front; none without area.
-    pub(super) triangles: Vec<[u32; 3]>,
-    pub(super) material: Material,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) material: Material,
 }
 
 /// An instance's mesh in world space, or why it cannot be exported.
-pub(super) fn world_mesh(scene: &Scene, instance: &Instance, shading_normals: bool) -> Result<WorldMesh, String> {
+pub(crate) fn world_mesh(scene: &Scene, instance: &Instance, shading_normals: bool) -> Result<WorldMesh, String> {
     let mesh = scene
         .meshes
         .get(instance.mesh as usize)

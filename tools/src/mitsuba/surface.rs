@@ -46,7 +46,8 @@ pub(super) fn describe(material: &Material, notes: &mut Vec<String>) -> Result<S
     Ok(format!("    {bsdf}\n{emitter}"))
 }
 
-fn refuse_common(material: &Material) -> Result<(), String> {
+/// What no other renderer models in exactly the same way, of any kind of surface.
+pub(crate) fn refuse_common(material: &Material) -> Result<(), String> {
     let textures = [
         ("base colour", material.base_color_texture.is_some()),
         ("metallic-roughness", material.metallic_roughness_texture.is_some()),
@@ -82,7 +83,8 @@ fn refuse_common(material: &Material) -> Result<(), String> {
     }
 }
 
-fn base_color(material: &Material) -> Result<Vec3, String> {
+/// The base colour of a surface that gains no light.
+pub(crate) fn base_color(material: &Material) -> Result<Vec3, String> {
     let color = material.base_color.truncate();
     if color.cmpge(Vec3::ZERO).all() && color.cmple(Vec3::ONE).all() {
         Ok(color)
@@ -108,7 +110,8 @@ fn metal(material: &Material, alpha: f32) -> Result<String, String> {
     Ok(microfacet("conductor", alpha, &index))
 }
 
-fn solid(material: &Material, alpha: f32) -> Result<String, String> {
+/// Refuses bodies that are not solid, clear and colourless.
+pub(crate) fn refuse_unclear(material: &Material) -> Result<(), String> {
     let wanted = [
         (material.transmission == 1.0, "transmission below 1"),
         (material.thickness > 0.0, "a thin wall"),
@@ -126,9 +129,14 @@ fn solid(material: &Material, alpha: f32) -> Result<String, String> {
         ),
         (material.ior > 1.0, "an index of refraction of 1 or less, or infinite"),
     ];
-    if let Some((_, reason)) = wanted.iter().find(|(fits, _)| !fits) {
-        return Err(format!("{reason} has no exact counterpart"));
+    match wanted.iter().find(|(fits, _)| !fits) {
+        Some((_, reason)) => Err(format!("{reason} has no exact counterpart")),
+        None => Ok(()),
     }
+}
+
+fn solid(material: &Material, alpha: f32) -> Result<String, String> {
+    refuse_unclear(material)?;
     let index = format!(
         "<float name=\"int_ior\" value=\"{}\"/><float name=\"ext_ior\" value=\"1\"/>",
         material.ior

@@ -102,6 +102,7 @@ measures! {
     on_device "compact-map" photon_maps::compact_map;
     on_host "compact-rays" photon_maps::compact_rays;
     on_host "coupled-reflection" surfaces::coupled_reflection;
+    on_device "cycles" rendering::cycles;
     on_device "device-model" device::device_model;
     on_host "free-flight" media::free_flight;
     on_host "fuzzing" files::fuzzing;

@@ -22,5 +22,5 @@ mod meridians;
 mod needs;
 mod seam_levels;
 mod seams;
-mod sphere;
+pub(super) mod sphere;
 mod stated_densities;

@@ -1,7 +1,8 @@
 //! Whole pictures: whether they are what was asked for, how their lights are chosen, what they cost, how they stop, their sums and files, and agreement with
-//! Mitsuba 3.
+//! Mitsuba 3 and with Cycles.
 
 pub mod automatic_choice;
+pub mod cycles;
 pub mod light_choice;
 pub mod mitsuba;
 pub mod path_sets;
