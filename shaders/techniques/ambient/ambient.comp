@@ -17,8 +17,7 @@ layout(set = 0, binding = 0, scalar) restrict writeonly buffer Radiance { vec3 r
 
 layout(push_constant, scalar) uniform Push {
     CameraRays camera;
-    uint frame, seed;
-    uint first;  // pixel of the part
+    uint frame, seed, first;  // the last one is the part's first pixel
     vec3 lower, upper;  // corners of the scene
 } push;
 

@@ -77,9 +77,10 @@ impl FrameMethod for Ambient {
         let (part, seed, radiance) = (frame.part.range(target.pixels()?), frame.seed, target.radiance.view());
         #[rustfmt::skip]
         let push = kernel::Push { camera, frame: frame.number, seed, first: part.start, lower, upper };
+        let groups = self.1.groups_over(part.len() as u32);
         recorder.pass("ambient: shade", |pass| {
             let (set, index, scene) = (kernel::Set0 { radiance }, self.0.index_set(), self.0.scene_set());
-            pass.dispatch(&self.1, &[&set, &index, &scene], &push, self.1.groups_over(part.len() as u32))
+            pass.dispatch(&self.1, &[&set, &index, &scene], &push, groups)
         })
     }
 

@@ -125,8 +125,11 @@ impl FrameMethod for PreviewMethod {
         if let Some(shadows) = self.drawing.lights.shadows() {
             let size = [shadows.desc().side; 2];
             for (map, place) in (0..).zip(self.drawing.lights.places(&lights)) {
-                let parts = self.coverage.parts(&surfaces, &shadows.views(&surfaces, place)?, size)?;
-                self.shadow_parts.extend(parts.into_iter().map(|part| (map, place, part)));
+                let parts = self
+                    .coverage
+                    .parts(&surfaces, &shadows.views(&surfaces, place)?, size)?;
+                self.shadow_parts
+                    .extend(parts.into_iter().map(|part| (map, place, part)));
             }
         }
         Ok(self.shadow_parts.len().max(1) as u32)
@@ -154,7 +157,11 @@ impl FrameMethod for PreviewMethod {
         let view = self.drawing.view(&surfaces, &CameraFrame::new(camera, size)?)?;
         self.draw_parts = self.coverage.parts(&surfaces, &[view], size)?;
         let (drawing, shading) = (self.draw_parts.len() as u32, self.shading_parts(gpu));
-        Ok(if drawing == 1 && shading == 1 { 1 } else { drawing + shading })
+        Ok(if drawing == 1 && shading == 1 {
+            1
+        } else {
+            drawing + shading
+        })
     }
 
     fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
