@@ -17,6 +17,8 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 import tomllib
 from pathlib import Path
 
@@ -277,6 +279,22 @@ def cargo(*arguments, **options):
     return subprocess.run(["cargo", *arguments], cwd=TREE, stdin=subprocess.DEVNULL, text=True, **options)
 
 
+def take_dependencies(built, folder):
+    """Copies what the checkout has built of other crates, so that only the workspace's own are built. The tree cannot share the whole folder: cargo
+    takes two checkouts of one workspace for the same, and would find what the other one has built fresh."""
+    if folder.exists() or not built.exists():
+        return
+
+    def of_workspace(parent, names):
+        # Test programs have names of their own.
+        libraries = {".rlib", ".rmeta", ".so"} if Path(parent).name == "deps" else None
+        return [name for name in names if "clerestory" in name or libraries and Path(name).suffix not in libraries]
+
+    for part in ["deps", "build", ".fingerprint"]:
+        if (built / part).is_dir():
+            shutil.copytree(built / part, folder / part, ignore=of_workspace)
+
+
 def write_tree(mutants, sound):
     """Puts the switches in; lines of each fault by its file."""
     places = {}
@@ -343,7 +361,7 @@ def prepare(commit):
 
 
 def read_rows():
-    """Of each row its tests: the options that build them, the program's name to nextest, and the function's."""
+    """Of each row its tests: the options that build them, the program's name, and the function's."""
     run = cargo("run", "-q", "--package=clerestory-tests", "--bin=mutants", capture_output=True)
     if run.returncode != 0:
         die(run.stderr)
@@ -364,58 +382,89 @@ def tests_of(mutant, rows):
     return tests
 
 
-def expression(tests):
-    """Tests as a filter of cargo-nextest."""
-    programs = {}
-    for program, function in tests:
-        programs.setdefault(program, set()).add(function)
-    parts = [f"(binary_id(={program}) & test(/(^|::)({'|'.join(sorted(names))})$/))" for program, names in sorted(programs.items())]
-    return " | ".join(parts)
-
-
 class Programs:
-    """Test programs that are built, which are not looked for again with each fault."""
+    """Test programs that are built, by the names that rows' tests have."""
 
     def __init__(self, options):
-        self.files = [WORK / "binaries.json", WORK / "metadata.json"]
         say("building the tests")
-        build = cargo("nextest", "run", "--no-run", "--color=never", *options, capture_output=True)
-        (WORK / "build.log").write_text(build.stdout + build.stderr)
+        build = cargo("test", "--no-run", "--message-format=json", "--color=never", *options, capture_output=True)
+        (WORK / "build.log").write_text(build.stderr)
         if build.returncode != 0:
             die(f"the tests do not build: see {WORK}/build.log")
-        binaries = cargo("nextest", "list", "--list-type=binaries-only", "--message-format=json", *options, capture_output=True, check=True)
-        metadata = cargo("metadata", "--format-version=1", capture_output=True, check=True)
-        for file, text in zip(self.files, [binaries.stdout, metadata.stdout]):
-            file.write_text(text)
+        self.files, self.folders = {}, {}
+        for line in build.stdout.splitlines():
+            message = json.loads(line)
+            if message["reason"] == "compiler-artifact" and message["profile"]["test"] and message["executable"]:
+                program = program_name(message)
+                self.files[program] = message["executable"]
+                self.folders[program] = Path(message["manifest_path"]).parent
+        self.names = {}
 
-    def run(self, tests, number, limit, *options):
-        """Runs tests with a fault (0 for none): nextest's exit code and output; no code where they do not end."""
-        binaries, metadata = self.files
-        command = ["cargo", "nextest", "run", f"--binaries-metadata={binaries}", f"--cargo-metadata={metadata}", "--color=never"]
+    def names_of(self, program, function):
+        """Whole names of the tests that a function's name stands for; none where the program has no such test, or ignores it."""
+        if program not in self.names:
+            lists = [
+                subprocess.run([self.files[program], "--list", "--format=terse", *more], capture_output=True, check=True, text=True).stdout
+                for more in ([], ["--ignored"])
+            ]
+            all_of, ignored = [{line.removesuffix(": test") for line in text.splitlines() if line.endswith(": test")} for text in lists]
+            self.names[program] = all_of - ignored
+        return sorted(name for name in self.names[program] if name.rsplit("::", 1)[-1] == function)
+
+    def start(self, test, number):
+        """Starts a test with a fault (0 for none), as the leader of a group of its own."""
+        program, function = test
         environment = {**os.environ, "CLERESTORY_MUTANT": str(number), "CLERESTORY_MUTANT_MODULES": str(MODULES)}
-        child = subprocess.Popen(
-            [*command, *options, "-E", expression(tests)],
-            cwd=TREE, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        environment["CARGO_MANIFEST_DIR"] = str(self.folders[program])
+        return subprocess.Popen(
+            [self.files[program], "--exact", *self.names_of(program, function), "--color=never"],
+            cwd=self.folders[program], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             start_new_session=True,
         )
-        try:
-            output, _ = child.communicate(timeout=limit)
-            return child.returncode, output
-        except subprocess.TimeoutExpired:
-            return None, ended(child)
+
+    def run(self, tests, number, limit):
+        """Runs tests with a fault, as many at once as there are processors, to the first that fails. That one with what it said, `None` where all
+        pass, and whether they ended in time."""
+        end = time.monotonic() + limit
+        waiting, failed, late = list(tests), [], []
+
+        def work():
+            while waiting and not failed and not late:
+                test = waiting.pop(0)
+                child = self.start(test, number)
+                while True:
+                    try:
+                        output, _ = child.communicate(timeout=0.2)
+                        if child.returncode != 0:
+                            failed.append((test, output))
+                        break
+                    except subprocess.TimeoutExpired:
+                        if failed or late or time.monotonic() > end:
+                            ended(child)
+                            late.append(test)
+                            break
+
+        workers = [threading.Thread(target=work) for _ in range(os.cpu_count() or 1)]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        return (failed[0] if failed else None), bool(failed) or not late
+
+
+def program_name(message):
+    """A test program's name, as `mutants` of the tests' crate prints it."""
+    package = re.search(r'(?m)^name\s*=\s*"([^"]+)"', Path(message["manifest_path"]).read_text())[1]
+    target = message["target"]
+    if "test" in target["kind"]:
+        return f"{package}::{target['name']}"
+    return f"{package}::bin/{target['name']}" if "bin" in target["kind"] else package
 
 
 def ended(child):
-    """Ends a run with all its tests, each of which leads a group of its own, and gives what it had said."""
-    os.killpg(child.pid, signal.SIGTERM)
-    try:
-        return child.communicate(timeout=20)[0]
-    except subprocess.TimeoutExpired:
-        os.killpg(child.pid, signal.SIGKILL)
-        return child.communicate()[0]
-
-
-TEST_LINE = re.compile(r"^\s*(PASS|FAIL|SIG\w+|ABORT)\s+\[\s*([\d.]+)s\]\s+(?:\([^)]*\)\s+)?(\S+)\s+(\S+)", re.M)
+    """Ends a test with all that it started."""
+    os.killpg(child.pid, signal.SIGKILL)
+    child.communicate()
 
 
 def durations(programs, wanted, stamp):
@@ -428,16 +477,24 @@ def durations(programs, wanted, stamp):
     missing = [test for test in wanted if " ".join(test) not in seconds]
     if missing:
         say(f"running {len(missing)} tests without faults")
-        code, output = programs.run(missing, 0, None, "--no-fail-fast", "--status-level=pass")
-        (WORK / "sound.log").write_text(output)
-        if code != 0:
-            die(f"tests fail without faults: see {WORK}/sound.log")
-        for _, time, program, name in TEST_LINE.findall(output):
-            seconds[f"{program} {name.rsplit('::', 1)[-1]}"] = float(time)
-        for test in missing:
-            if " ".join(test) not in seconds:
-                say(f"{' '.join(test)}: is left out, since it did not run: it is no test, or ignored")
-        file.write_text(json.dumps(known, indent=1))
+
+        def timed(test):
+            if not programs.names_of(*test):
+                say(f"{' '.join(test)}: is left out, since it is no test, or ignored")
+                return
+            start = time.monotonic()
+            child = programs.start(test, 0)
+            output, _ = child.communicate()
+            if child.returncode != 0:
+                (WORK / "sound.log").write_text(output)
+                raise Unsound(f"{' '.join(test)} fails without faults: see {WORK}/sound.log")
+            seconds[" ".join(test)] = time.monotonic() - start
+
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+            try:
+                list(pool.map(timed, missing))
+            finally:
+                file.write_text(json.dumps(known, indent=1))
     return seconds
 
 
@@ -479,24 +536,19 @@ class State:
 
 def judged(programs, mutant, tests, limit):
     """What the tests say of a fault."""
-    code, output = programs.run(tests, mutant.number, limit, "--fail-fast", "--status-level=fail")
-    if code is None:
-        code, output = programs.run(tests, mutant.number, PATIENCE * limit, "--fail-fast", "--status-level=fail")
-        if code is None:
+    failed, in_time = programs.run(tests, mutant.number, limit)
+    if not in_time:
+        failed, in_time = programs.run(tests, mutant.number, PATIENCE * limit)
+        if not in_time:
             return "found: its tests do not end"
-    if code == 0:
-        return "NOT FOUND"
-    if code != 100:
-        die(f"{mutant}: exit code {code} instead of an answer:\n{output}")
-    failed = next((name for word, _, _, name in TEST_LINE.findall(output) if word != "PASS"), "a test")
-    return f"found by {failed}"
+    return f"found by {failed[0][1]}" if failed else "NOT FOUND"
 
 
 def options_of_command_line():
     """The options, with the shard as a slice of the list of faults."""
     parser = argparse.ArgumentParser(prog="tools/mutants", description="Puts faults into the code, and says which of them no test finds.")
     parser.add_argument("--shard", default="1/1", metavar="k/n", help="every n-th fault, from the k-th on (1 to n)")
-    parser.add_argument("--few", action="store_true", help="three faults alone, in two minutes once all is built")
+    parser.add_argument("--few", action="store_true", help="three faults alone, in two minutes once the tests are built")
     parser.add_argument("--limit", type=float, default=30.0, metavar="SECONDS", help="that the tests of a fault may take (default: 30)")
     parser.add_argument("--list", action="store_true", help="only shows what would be done")
     parser.add_argument("--check", action="store_true", help="only checks that the old text of each fault is there, once")
@@ -535,6 +587,7 @@ def look(options):
 def try_all(options):
     """Builds the last commit with its faults, and judges each that is asked for. The exit code."""
     WORK.mkdir(parents=True, exist_ok=True)
+    take_dependencies(Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug", WORK / "target" / "debug")
     os.environ.update(CARGO_TARGET_DIR=str(WORK / "target"), CLERESTORY_VALIDATION="off")
     commit = git("rev-parse", "HEAD")
     mutants, left_out = prepare(commit)

@@ -516,7 +516,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-X-2",
         name: "closest hits of a buffer of rays: persistent threads on a queue with quotas",
         role: Role::Kernel,
-        limits: "Which workgroup traces which ray differs from run to run, and shows only in the time.",
+        limits: "Which workgroup traces which ray differs from run to run, and shows only in the time; on the software driver kd-trees are slower by the queue than by one thread per ray.",
         sources: &[
             sources::AILA_LAINE_2009.whole(),
             sources::FABIANOWSKI_2011.at("§2.2.3.4"),

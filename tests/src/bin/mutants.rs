@@ -1,11 +1,11 @@
 //! What tools/mutants asks of the catalogue: the tests of each row, a line each.
 //!
 //! Fields are divided by tabs: the row's id; `host` for tests of the engine's own, which see no shader, and `device` for all others; options that build
-//! the test's program, divided by spaces; the program as cargo-nextest calls it; the test's function.
+//! the test's program, divided by spaces; the program's name, `package` for the engine's own and `package::program` for others; the test's function.
 
 use clerestory::catalogue::{self, Row};
 
-/// Of a test's file: the options that build its program, and that program's name to cargo-nextest; `None` for files whose tests tools/mutants does not run.
+/// Of a test's file: the options that build its program, and that program's name; `None` for files whose tests tools/mutants does not run.
 fn place(file: &str) -> Option<[String; 2]> {
     let parts: Vec<&str> = file.split('/').collect();
     let package = match parts.first() {

@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 
 /// Automatic lengths as shares of the diagonal of the scene's box: the radius of fixed kernels, the greatest axis of others, and the unit of
 /// the dampening. A room of 6 m × 6 m × 3 m has a diagonal of 9 m; the source's unit and greatest axis are 1 m.
-const RADIUS_SHARE: f64 = 1.0 / 100.0;
+const RADIUS_SHARE: f64 = 1.0 / 50.0;
 const UNIT_SHARE: f64 = 1.0 / 9.0;
 /// Least photons under a kernel about a point: the last one only says how wide it is.
 const NEIGHBORS_MIN: u32 = 2;
@@ -83,11 +83,11 @@ crate::settings! {
         /// Radius of fixed kernels, greatest axis of others, farthest neighbour, in the first pass; 0 chooses by the size of the scene, for
         /// neighbours by its area and the photons.
         ///
-        /// 0 stands for a hundredth of the scene's diagonal for fixed kernels, a ninth for others, and four times the neighbours' area if
+        /// 0 stands for a fiftieth of the scene's diagonal for fixed kernels, a ninth for others, and four times the neighbours' area if
         /// photons were spread evenly.
         pub radius: f32 = 0.0, in 0.0.., unit "m";
         /// Size of kernels that follow footprints, in the first pass: multiples of the footprints' axes.
-        pub spread: f32 = 20.0, in Above(0.0), unit "footprints";
+        pub spread: f32 = 10.0, in Above(0.0), unit "footprints";
         /// Evens out the sizes of footprints, for kernels that follow them; 1 leaves them as they are.
         pub dampening: f32 = 0.25, in AboveTo(0.0, 1.0), unit "exponent";
         /// Size that the dampening leaves as it is; 0 for a ninth of the scene's diagonal.

@@ -56,7 +56,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         "in a corner",
         point(Vec3::new(-0.4, 0.7, -0.3) + Vec3::new(1.0, -1.0, 1.0) * 1e-4),
     );
-    // Kernels of a hundredth of the scene reach a tenth of a metre around the box.
+    // Kernels of a fiftieth of the scene reach a fifth of a metre around the box.
     judgement.exactly_unless_biased("light in a box", &easel.paint(&boxed, SMALL, 64)?, [0.0; 3], 0.5);
 
     let mut in_plane = grey_floor();

@@ -134,6 +134,7 @@ measures! {
     on_device "parallel-blocks" device::parallel_blocks;
     on_host "path-differentials" photons::path_differentials;
     on_device "path-sets" rendering::path_sets;
+    on_device "path-stages" rendering::path_stages;
     on_device "persistent-threads" rays::persistent_threads;
     on_host "phase-functions" media::phase_functions;
     on_device "photon-defaults" photons::photon_defaults;

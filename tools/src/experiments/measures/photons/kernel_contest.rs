@@ -10,8 +10,8 @@ use crate::experiments::measures::rendering::automatic_choice::render;
 use crate::experiments::reference::SEED;
 use crate::experiments::unbiased;
 
-/// Pixels on a side, and samples a pixel of references; in a smoke run.
-const PICTURE: (u32, u32) = (20, 32_768);
+/// Pixels on a side; in a smoke run, also the samples per pixel of references.
+const SIDE: u32 = 20;
 const SMOKE_PICTURE: (u32, u32) = (8, 256);
 const TURNS: usize = 5;
 /// Passes that say how long one takes.
@@ -101,13 +101,13 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Renders the reference; `None` when it was stopped.
+    /// Renders the reference with so many samples per pixel; `None` when it was stopped.
     ///
     /// # Errors
     /// Those of scenes and techniques.
-    pub fn new(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Option<Self>> {
+    pub fn new(context: &Context<'_>, gpu: &Gpu, address: &str, reference_spp: u32) -> Result<Option<Self>> {
         let renderer = Renderer::new(gpu, &scene::load(address)?)?;
-        let (side, spp) = context.pick(PICTURE, SMOKE_PICTURE);
+        let (side, spp) = context.pick((SIDE, reference_spp), SMOKE_PICTURE);
         let base = RenderOptions {
             size: [side; 2],
             ..RenderOptions::default()

@@ -29,6 +29,9 @@ const JUDGED_ON: [&str; 6] = [
 /// Seconds of a picture where settings are found, and budgets of those that judge.
 const SECONDS: f64 = 0.25;
 const BUDGETS: [f64; 3] = [0.1, 0.4, 1.2];
+/// Samples per pixel of references: fewer where settings are only found.
+const FINDING_SPP: u32 = 32_768;
+const JUDGING_SPP: u32 = 262_144;
 const FOUND: &str = "found";
 
 rows! {
@@ -142,7 +145,7 @@ impl Found {
             context
                 .watch
                 .begin(short_name(address), done, FOUND_ON.len() + JUDGED_ON.len());
-            let Some(stage) = Stage::new(context, gpu, address)? else {
+            let Some(stage) = Stage::new(context, gpu, address, FINDING_SPP)? else {
                 return Ok(None);
             };
             let Some(pictures) = stage.pictures(context, &candidates.iter().collect::<Vec<_>>(), &[SECONDS])? else {
@@ -186,7 +189,7 @@ impl Found {
 
     /// Adds one of the other scenes; false when it was stopped.
     fn judge(&mut self, context: &Context<'_>, gpu: &Gpu, address: &str, found: &[Candidate; 2]) -> Result<bool> {
-        let Some(stage) = Stage::new(context, gpu, address)? else {
+        let Some(stage) = Stage::new(context, gpu, address, JUDGING_SPP)? else {
             return Ok(false);
         };
         let defaults = [FIXED, FOOTPRINTS].map(Candidate::defaults);

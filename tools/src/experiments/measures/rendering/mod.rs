@@ -1,4 +1,4 @@
-//! Whole pictures: whether they are what was asked for, how their lights are chosen, what they cost, how they stop, their sums and files, and agreement with
+//! Whole pictures: whether they are what was asked for, how their lights are chosen, what they cost and where, how they stop, their sums and files, and agreement with
 //! Mitsuba 3 and with Cycles.
 
 pub mod automatic_choice;
@@ -6,6 +6,7 @@ pub mod cycles;
 pub mod light_choice;
 pub mod mitsuba;
 pub mod path_sets;
+pub mod path_stages;
 pub mod picture_formats;
 pub mod sample_sums;
 pub mod scene_profile;
