@@ -78,6 +78,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     ],
     tests: &[
         "engine/src/accel/optimise/tests.rs::every_step_gives_valid_trees_that_cost_no_more",
+        "engine/src/accel/optimise/tests.rs::two_clusters_that_are_paired_crosswise_come_apart",
         "engine/src/accel/optimise/tests.rs::trees_do_not_depend_on_the_number_of_threads",
         "engine/src/accel/lbvh/tests.rs::restructured_trees_are_valid_and_cost_no_more",
         "engine/src/accel/lbvh/tests.rs::bytes_do_not_depend_on_the_number_of_threads",

@@ -447,6 +447,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/directional_maps.rs::look_ups_are_seamless",
         "tests/tests/directional_maps.rs::seams_hold_no_energy",
         "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+        "tests/tests/twins/maps.rs::levels_borders_and_words_agree_with_their_twins",
         "engine/src/maps/tests/levels.rs::the_mirrored_direction_repairs_the_lower_seams",
         "engine/src/maps/tests/levels.rs::the_octants_own_map_has_no_seams",
         "engine/src/maps/tests/seams.rs::border_texels_touch_what_they_repeat",

@@ -215,6 +215,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/bsdf/tests.rs::rough_metals_reflect_as_walks_among_their_microfacets",
         "engine/src/transport/bsdf/tests.rs::albedo_table_interpolates_within_its_bound",
         "tests/tests/twins/tables.rs::albedos_agree_with_their_twins",
+        "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
     ],
     settings: &["multiple_scattering"],
     api: &["clerestory::transport::albedo"],

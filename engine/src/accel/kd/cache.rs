@@ -140,6 +140,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "engine/src/accel/kd/tests.rs::bytes_are_eight_for_each_node_and_entry_that_memory_serves",
             "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
             "tests/tests/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
         ],
@@ -202,6 +203,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
+            "engine/src/accel/kd/tests.rs::a_leaf_that_waits_lets_its_ray_go_on_to_the_next",
             "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],

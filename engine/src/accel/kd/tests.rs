@@ -158,9 +158,41 @@ fn caches_change_where_work_is_done_and_no_hit() {
         assert_eq!((nodes.pushes, nodes.register_pushes), (none.pushes, 0));
         assert_eq!(head.register_pushes, none.pushes);
         assert!(head.pushes < none.pushes && bytes.pushes + bytes.register_pushes == none.pushes);
-        assert!(postpone.nodes >= none.nodes && postpone.triangles >= none.triangles);
+        // Rays whose hit lies in the first of two leaves go on to the second, which it then spares them.
+        assert!(postpone.nodes > none.nodes && postpone.leaves > none.leaves);
+        assert!(postpone.triangles >= none.triangles);
         assert_eq!(postpone.nodes, nodes_postpone.nodes);
         assert!(nodes_head.bytes() < nodes.bytes().min(head.bytes()) && nodes.bytes().max(head.bytes()) < none.bytes());
+    }
+}
+
+#[test]
+fn a_leaf_that_waits_lets_its_ray_go_on_to_the_next() {
+    // Along the axis each leaf lies behind one plane more; against it the last leaf lies behind all of them, and the others beside the way.
+    let (tree, _) = chain(32);
+    let along = ray(Vec3::new(-1.0, 0.1, 0.1), Vec3::X);
+    let against = ray(Vec3::new(34.0, 0.1, 0.1), -Vec3::X);
+    let waits = KdCaches {
+        postpone: true,
+        ..KdCaches::default()
+    };
+    let visits = |ray: &Ray, caches, accepts: bool| {
+        let mut work = KdCounters::default();
+        let traversal = KdTraversal::closest(Scheme::Stack, ray).with_caches(caches);
+        let mut traversal = traversal.expect("caches");
+        traversal.run(&tree, ray, u64::MAX, &mut |_, _| accepts, &mut work);
+        let nearest = if ray.direction[0] > 0.0 { 0 } else { 32 };
+        assert_eq!(traversal.hit.is_hit(), accepts);
+        assert!(!accepts || traversal.hit.triangle == nearest, "{ray:?}");
+        (work.nodes, work.leaves, work.triangles)
+    };
+    for (ray, at_once, later) in [(along, (1, 1, 1), (2, 2, 1)), (against, (32, 1, 1), (32, 2, 1))] {
+        assert_eq!(visits(&ray, KdCaches::default(), true), at_once);
+        assert_eq!(visits(&ray, waits, true), later);
+        // Without a hit all leaves are gone to, and the last, which is left alone, is tested as well.
+        for caches in [KdCaches::default(), waits] {
+            assert_eq!(visits(&ray, caches, false), (32, 33, 33));
+        }
     }
 }
 

@@ -1,10 +1,10 @@
-//! Scans, compactions, splits and sorts over random words, each with what it must give.
+//! Scans, reductions, compactions, splits and sorts over random words, each with what it must give.
 
 use clerestory::Result;
 use clerestory::gpu::{Access, Buffer, BufferDesc, Category, Gpu, Pass};
 use clerestory::kernels::{
-    Count, Keep, KeyWidth, Operation, Partition, PartitionBuffers, PartitionOptions, RadixSort, RadixSortOptions, Scan,
-    ScanBuffers, ScanOptions, SortBuffers, compact, scan, split,
+    Count, Form, Keep, KeyWidth, Operation, Partition, PartitionBuffers, PartitionOptions, RadixSort, RadixSortOptions,
+    ReduceWords, Scan, ScanBuffers, ScanOptions, SortBuffers, compact, reduce_words, scan, split,
 };
 
 use crate::random::Random;
@@ -134,6 +134,7 @@ pub fn all(gpu: &Gpu, inputs: &Inputs) -> Result<Vec<Block>> {
     for (name, is_segmented) in [("scan", false), ("segmented scan", true)] {
         all.push(of_scan(gpu, inputs, name, is_segmented)?);
     }
+    all.push(of_reduction(gpu, inputs)?);
     for (name, keep, numbers) in [
         ("compaction", Keep::Flagged, false),
         ("compaction of numbers", Keep::Flagged, true),
@@ -187,6 +188,24 @@ fn of_scan(gpu: &Gpu, inputs: &Inputs, name: &'static str, segmented: bool) -> R
             };
             kernel.record(pass, &buffers, Count::Host(count), &scratch)
         }),
+        input: None,
+    })
+}
+
+/// The sum of all words, in 64 bits.
+fn of_reduction(gpu: &Gpu, inputs: &Inputs) -> Result<Block> {
+    let kernel = ReduceWords::new(gpu, Operation::Sum, Form::default())?;
+    let count = inputs.count();
+    let scratch = bytes(gpu, "scratch", kernel.scratch_bytes(count))?;
+    let (input, result) = (inputs.key_words.clone(), bytes(gpu, "sum", 8)?);
+    let sum = reduce_words(&inputs.keys, Operation::Sum);
+    // The low word first.
+    let expected = vec![sum as u32, (sum >> u32::BITS) as u32];
+    Ok(Block {
+        system: "PM-B-1",
+        name: "reduction",
+        expected: vec![(result.clone(), expected)],
+        record: Box::new(move |pass| kernel.record(pass, input.view(), result.view(), Count::Host(count), &scratch)),
         input: None,
     })
 }

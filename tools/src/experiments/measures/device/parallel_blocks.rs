@@ -1,4 +1,5 @@
-//! Scans, compactions, splits and sorts on the device, beside copies of as many words: results against the twins, times by the number of words.
+//! Scans, reductions, compactions, splits and sorts on the device, beside copies of as many words: results against the twins, times by the number of
+//! words.
 //!
 //! Source of what is measured: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §2.2.4, whose radix
 //! sort is compared with one split a bit (G. E. Blelloch, "Prefix sums and their applications", 1990, §1.3.1).
