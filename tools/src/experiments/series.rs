@@ -126,7 +126,7 @@ pub struct SceneSeries {
     pub address: String,
     /// Triangles.
     pub triangles: u64,
-    /// The reference's file.
+    /// Name of the reference's file, in the folder of references.
     pub reference: String,
     /// Relative RMSE that every variant reaches, at which costs are compared.
     pub common_error: Option<f64>,
