@@ -844,7 +844,7 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
         "breaks",
         "expects",
         "path (sobol), path (pcg), photon, ",
-        ", bvh2, lbvh, kd",
+        ", bvh2, lbvh, lbvh-high, kd",
         "degrades",
     ] {
         assert!(list.contains(word), "{word}: {list}");

@@ -3,7 +3,7 @@
 use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::kd::{KdSettings, KdTree};
-use clerestory::accel::lbvh::{self, LbvhSettings};
+use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
 use clerestory::accel::yardstick::moller_trumbore;
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
@@ -14,26 +14,36 @@ use crate::Judgement;
 /// Builds a ray index with default settings.
 type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
 
-/// A kind of ray index.
+/// A kind of ray index, as a subject of the cases.
 #[derive(Debug, Clone, Copy)]
-pub struct IndexKind {
-    /// Its name, as [`RayIndex::name`] has it.
+pub struct IndexCase {
+    /// Its name, as [`IndexKind::name`](clerestory::accel::IndexKind::name) has it.
     pub name: &'static str,
     /// Builds one with default settings.
     pub build: Build,
 }
 
-/// Every ray index of the engine.
-pub const INDEXES: &[IndexKind] = &[
-    IndexKind {
+/// Every ray index of the engine; what the device builds is the tree of `lbvh`, which the tests of the builder hold it to.
+pub const INDEXES: &[IndexCase] = &[
+    IndexCase {
         name: "bvh2",
         build: |triangles| Ok(Box::new(Bvh2::build(triangles, &Bvh2Settings::default())?)),
     },
-    IndexKind {
+    IndexCase {
         name: "lbvh",
+        build: |triangles| {
+            let settings = LbvhSettings {
+                quality: BuildQuality::Fast,
+                ..LbvhSettings::default()
+            };
+            Ok(Box::new(lbvh::build(triangles, &settings)?))
+        },
+    },
+    IndexCase {
+        name: "lbvh-high",
         build: |triangles| Ok(Box::new(lbvh::build(triangles, &LbvhSettings::default())?)),
     },
-    IndexKind {
+    IndexCase {
         name: "kd",
         build: |triangles| Ok(Box::new(KdTree::build(triangles, &KdSettings::default())?)),
     },
@@ -129,7 +139,7 @@ fn reach(triangles: &[[Vec3; 3]], ray: &Ray) -> f64 {
 }
 
 /// Judges an index on sets of rays.
-pub(crate) fn judge(kind: &IndexKind, sets: &[RaySet]) -> Result<Judgement> {
+pub(crate) fn judge(kind: &IndexCase, sets: &[RaySet]) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     for RaySet { what, triangles, rays } in sets {
         let index = (kind.build)(triangles)?;
