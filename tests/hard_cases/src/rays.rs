@@ -60,16 +60,6 @@ pub struct RaySet {
     pub rays: Vec<Ray>,
 }
 
-/// A ray without bounds.
-pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
-    }
-}
-
 /// Whether rays can meet a triangle: in range, and of an area in f64.
 fn can_be_met(triangle: &[Vec3; 3]) -> bool {
     let in_range = triangle
@@ -195,15 +185,15 @@ pub fn awkward_rays(seed: u64, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray
             let outside = b[1] + random.vector() * size;
             let axis = random.choose(&Vec3::AXES) * random.choose(&[1.0, -1.0]);
             match i % 10 {
-                0 => ray(outside, random.vector()),
-                1 => ray(outside, a[0] - outside),
-                2 => ray(outside, (a[0] + a[1]) * 0.5 - outside),
-                3 => ray(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
-                4 => ray(a[0] - axis * size, axis),
-                5 => ray((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
-                6 => ray(a[0].with_x(b[0].x), axis),
-                7 => ray(a[0], random.vector()),
-                8 => ray(a[0], a[1] - a[0]),
+                0 => Ray::new(outside, random.vector()),
+                1 => Ray::new(outside, a[0] - outside),
+                2 => Ray::new(outside, (a[0] + a[1]) * 0.5 - outside),
+                3 => Ray::new(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
+                4 => Ray::new(a[0] - axis * size, axis),
+                5 => Ray::new((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
+                6 => Ray::new(a[0].with_x(b[0].x), axis),
+                7 => Ray::new(a[0], random.vector()),
+                8 => Ray::new(a[0], a[1] - a[0]),
                 _ => Ray {
                     t_min: 0.25,
                     t_max: 1.0,
