@@ -545,7 +545,7 @@ fn an_interrupt_leaves_complete_files() -> Tested {
     );
     let report = json_file(&path.with_extension("json"))?;
     assert_eq!(report["interrupted"], Value::Bool(true));
-    // Black, where the wish came before the first wave had ended.
+    // Black, where the request came before the first wave had ended.
     let picture = exr::read(&path)?;
     let most = report["samples"][1].as_u64().ok_or("no count of samples")?;
     assert_eq!(
