@@ -59,7 +59,7 @@ impl InputLimits {
     ///
     /// # Errors
     /// The cause, in words.
-    pub fn check_decoded(&self, wanted: u64, read: u64) -> Result<(), String> {
+    pub(crate) fn check_decoded(&self, wanted: u64, read: u64) -> Result<(), String> {
         let allowed = self.decoded(read);
         if wanted <= allowed {
             return Ok(());
@@ -437,7 +437,7 @@ impl<'o> InputFiles<'o> {
     ///
     /// # Errors
     /// The cause, in words, when it is more than [`InputLimits::decoded`] of the bytes read so far; nothing is counted then.
-    pub fn reserve(&self, peak: u64, kept: u64) -> Result<(), String> {
+    pub(crate) fn reserve(&self, peak: u64, kept: u64) -> Result<(), String> {
         let mut state = self.state.borrow_mut();
         let wanted = state.kept.saturating_add(peak.max(kept));
         let checked = self.limits.check_decoded(wanted, state.read);

@@ -136,11 +136,11 @@ pub struct FrameReport {
     pub steady_seconds: f64,
     /// Work units (see the technique's counters) per second of steady time.
     pub steady_rates: BTreeMap<String, f64>,
-    /// Seconds of GPU time in all passes.
+    /// Seconds of GPU time in all passes; 0 without timestamps.
     pub gpu_seconds: f64,
     /// GPU time by pass.
     pub passes: Vec<PassReport>,
-    /// Exact counts of work.
+    /// Exact counts of work since the rendering was prepared, earlier cameras included.
     pub counters: BTreeMap<String, u64>,
     /// Device memory in use.
     pub memory: MemoryReport,
@@ -166,7 +166,7 @@ pub struct Progress {
     pub fraction: f64,
     /// Seconds since it began.
     pub seconds: f64,
-    /// Rays traced so far.
+    /// Rays traced so far, earlier cameras included; 0 where the technique counts none.
     pub rays: u64,
 }
 
@@ -288,7 +288,7 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::start`].
-    pub fn start_technique(&self, info: &Card, options: &RenderOptions) -> Result<Rendering> {
+    pub fn start_technique(&self, card: &Card, options: &RenderOptions) -> Result<Rendering> {
         if options.spp == 0 {
             return Err(Error::setting("spp", 0, "is not at least 1"));
         }
@@ -300,11 +300,11 @@ impl Renderer {
             aovs: options.aovs,
         };
         let start = Instant::now();
-        let technique = info.prepare(&self.gpu, Arc::clone(&self.gpu_scene), &view, &options.settings)?;
+        let technique = card.prepare(&self.gpu, Arc::clone(&self.gpu_scene), &view, &options.settings)?;
         Ok(Rendering {
             renderer: self.clone(),
             options: options.clone(),
-            technique_id: info.id,
+            technique_id: card.id,
             camera: camera.name.clone(),
             technique,
             start,
@@ -393,9 +393,9 @@ impl Rendering {
         late.is_some_and(|late| !self.within_samples || late.min(begun.elapsed()) + self.longest >= GRACE)
     }
 
-    /// Asks for another number of samples per pixel; those that are there stay.
+    /// Asks for another number of samples per pixel, of which 0 is taken as 1; those that are there stay.
     pub fn set_spp(&mut self, spp: u32) {
-        self.options.spp = spp;
+        self.options.spp = spp.max(1);
         self.finished = false;
     }
 
@@ -412,13 +412,14 @@ impl Rendering {
     /// Looks through another camera, starting again from the first sample and second.
     ///
     /// # Errors
-    /// [`Error::Setting`], [`Error::DeviceLost`].
+    /// [`Error::Setting`] for a camera that cannot be used, with which nothing changes; [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        self.technique.set_camera(camera)?;
         self.camera.clone_from(&camera.name);
         (self.start, self.begun, self.finished) = (Instant::now(), None, false);
         (self.first_samples, self.done, self.within_samples) = (None, 0, false);
         self.passes.clear();
-        self.technique.set_camera(camera)
+        Ok(())
     }
 
     /// Writes the picture as it is now to a buffer on the device; see [`Technique::display`].

@@ -114,18 +114,21 @@ fn the_sidecar_of_the_reference_is_understood() {
         .and_then(|rest| rest.split("```").next());
     let folder = folder(block.expect("a TOML block"));
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("file");
-    write("m.obj", &format!("{OBJ}usemtl bowl\nf 1 3 2\nusemtl floor\nf 2 3 1\n"));
-    write(
-        "m.mtl",
-        &format!("{MTL}newmtl bowl\nKd 0.5 0.5 0.5\nnewmtl floor\nKd 0.5 0.5 0.5\n"),
-    );
+    let more = ["bowl", "floor", "bounds"];
+    let faces = more.map(|name| format!("usemtl {name}\nf 1 3 2\n")).concat();
+    let materials = more.map(|name| format!("newmtl {name}\nKd 0.5 0.5 0.5\n")).concat();
+    write("m.obj", &format!("{OBJ}{faces}"));
+    write("m.mtl", &format!("{MTL}{materials}"));
     exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, |_, _| (1.0, 1.0, 1.0)).expect("EXR");
     let scene = load(folder.path(), "m.obj").expect("scene");
     assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
     assert!(scene.materials[2].phong && scene.materials[2].metallic == 0.4);
     assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
+    assert_eq!(scene.defaults.aspect, Some(1.5));
     assert!(scene.notes.is_empty(), "{:?}", scene.notes);
-    assert!(SceneProfile::of(&scene).media.surrounding);
+    let media = SceneProfile::of(&scene).media;
+    assert!(media.surrounding && media.boundaries && media.heterogeneous && media.count == 2);
+    assert!(scene.materials[3].interior == Some(1) && scene.media[1].density.is_some());
 }
 
 #[test]

@@ -296,7 +296,6 @@ vec4 bsdf_eval_part(Bsdf b, vec3 wo, vec3 wi, uint mask, uint part) {
 vec4 bsdf_eval_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_part(b, wo, wi, mask, mask); }
 
 vec3 bsdf_eval(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).rgb; }
-float bsdf_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).a; }
 
 BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
     BsdfSample s = BsdfSample(vec3(0.0), 0.0, 1.0, vec3(0.0), 0u);

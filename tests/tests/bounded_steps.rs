@@ -1,4 +1,4 @@
-//! A step is a bounded piece of work, whatever the scene: a host looks at its time and at wishes to stop between two of them. Work is counted, never timed.
+//! A step is a bounded piece of work, whatever the scene: a host looks at its time and at stop requests between two of them. Work is counted, never timed.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -402,7 +402,7 @@ fn automatic_choices_end_where_first_pilots_do_not() {
             ..RenderOptions::default()
         };
         let [error, time] = [(Some(0.1), None), (None, Some(Duration::from_millis(1)))];
-        // A wish to stop, and a time that is over.
+        // A stop request, and a time that is over.
         for ((error, time), goes_on) in [(error, false), (time, true)] {
             let refused = plan::plan(&renderer, &options, Goal { error, time }, &mut || goes_on);
             let message = refused.map(|plan| plan.chosen).unwrap_err().to_string();

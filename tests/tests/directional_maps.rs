@@ -566,12 +566,7 @@ fn shadows_by_octahedron_and_cube_are_as_good() {
         .collect();
     let index = Bvh2::build(&occluders, &Default::default()).unwrap();
     let depth = |d: Vec3| {
-        let hit = index.closest_hit(&Ray {
-            origin: [0.0; 3],
-            t_min: 0.0,
-            direction: d.to_array(),
-            t_max: f32::INFINITY,
-        });
+        let hit = index.closest_hit(&Ray::new(Vec3::ZERO, d));
         if hit.triangle == NO_HIT { f32::INFINITY } else { hit.t }
     };
     let receivers: Vec<(Vec3, f32)> = (0..60_000)

@@ -49,15 +49,6 @@ impl Case {
     }
 }
 
-fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
-    }
-}
-
 /// A triangle across the x axis between each two of `levels` planes, every plane cutting off one: ways of as many inner nodes. Along the axis
 /// rays meet triangles that are in their way, and, beside them, boxes alone.
 fn chain(levels: u32) -> Case {
@@ -108,7 +99,7 @@ fn soup() -> (Vec<[Vec3; 3]>, Vec<Ray>) {
         .collect();
     let rays = (0..1200)
         .map(|i| {
-            let mut r = ray(
+            let mut r = Ray::new(
                 12.0 * random.vector(),
                 random.direction() * random.choose(&[1.0, 1e-3, 1e4]),
             );
@@ -399,8 +390,8 @@ fn rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none() {
         const LEVELS: u32 = 32;
         let case = chain(LEVELS);
         // Along the axis the first leaf lies behind one plane, and against it behind all of them.
-        let short = ray(Vec3::new(-1.0, 0.1, 0.1), Vec3::X);
-        let long = ray(Vec3::new(LEVELS as f32 + 2.0, 0.1, 0.1), -Vec3::X);
+        let short = Ray::new(Vec3::new(-1.0, 0.1, 0.1), Vec3::X);
+        let long = Ray::new(Vec3::new(LEVELS as f32 + 2.0, 0.1, 0.1), -Vec3::X);
         let lanes = gpu.caps().subgroup_size;
         let settings = TraceSettings {
             execution: Execution::Persistent(PersistentThreads {

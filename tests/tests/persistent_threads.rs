@@ -28,12 +28,7 @@ fn soup(count: u32, random: &mut Random) -> Vec<[Vec3; 3]> {
 }
 
 fn rays(count: u32, random: &mut Random) -> Vec<Ray> {
-    let mut ray = || Ray {
-        origin: (12.0 * random.vector()).into(),
-        t_min: 0.0,
-        direction: random.direction().into(),
-        t_max: f32::INFINITY,
-    };
+    let mut ray = || Ray::new(12.0 * random.vector(), random.direction());
     (0..count).map(|_| ray()).collect()
 }
 

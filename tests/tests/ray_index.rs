@@ -181,15 +181,6 @@ fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[Ray], quotas: &
     }
 }
 
-fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
-    }
-}
-
 #[test]
 fn kernels_are_their_twins_on_soups() {
     with_gpu(|gpu| {
@@ -202,7 +193,7 @@ fn kernels_are_their_twins_on_soups() {
             .collect();
         let rays: Vec<Ray> = (0..2048)
             .map(|i| {
-                let mut r = ray(
+                let mut r = Ray::new(
                     12.0 * random.vector(),
                     random.direction() * random.choose(&[1.0, 1e-3, 1e4]),
                 );

@@ -85,7 +85,7 @@ impl Mesh {
                     _ => Vec3::new(random.signed(), random.signed(), 0.0),
                 };
                 let origin = target + beside + 4.0 * Vec3::Z;
-                return ray(origin, target - origin);
+                return Ray::new(origin, target - origin);
             };
             let axis = random.below(3);
             // Below the target on an axis, where that is inside.
@@ -94,24 +94,15 @@ impl Mesh {
             let is_inside = (beneath - centre).length() < 0.7 * radius;
             let along = Vec3::AXES[axis] * (target - centre)[axis].signum();
             match i % 4 {
-                0 => ray(centre, target - centre),
-                1 if is_inside => ray(beneath, along),
+                0 => Ray::new(centre, target - centre),
+                1 if is_inside => Ray::new(beneath, along),
                 _ => {
                     let origin = centre + 0.5 * radius * random.vector();
-                    ray(origin, target - origin)
+                    Ray::new(origin, target - origin)
                 }
             }
         };
         (0..count).map(&mut towards).collect()
-    }
-}
-
-fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
     }
 }
 

@@ -106,7 +106,7 @@ const FULL_SCALE_Z: f32 = 5.0;
 /// Why a scene was not compared.
 #[derive(Debug)]
 enum Fault {
-    /// Somebody wished to stop.
+    /// Somebody asked to stop.
     Stopped,
     /// A picture of Mitsuba's has values that are not finite: the scene's own fault, others can be compared.
     NotFinite(String),
@@ -140,7 +140,7 @@ impl Fault {
 /// # Errors
 /// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the
 /// exporter and the files. A picture that disagrees and one that is not finite are not errors: see [`AgreementReport::passes`]; nor is what
-/// fails after a wish to stop.
+/// fails after a stop request.
 pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Result<AgreementReport> {
     let wanted = selected(options)?;
     let machine = Machine::read(gpu.caps(), &format!("mitsuba {}", mitsuba_version(&options.python)?));
@@ -167,7 +167,7 @@ pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Res
             Ok(scene) => Ok(scene),
             Err(Fault::NotFinite(cause)) => Err(cause),
             Err(Fault::Stopped) => break,
-            // A wish to stop may reach what works here by other ways too.
+            // A stop request may reach what works here by other ways too.
             Err(Fault::Other(_)) if watch.stopped() => break,
             Err(Fault::Other(error)) => return Err(error),
         };

@@ -12,7 +12,7 @@ pub mod scenes;
 
 use std::path::Path;
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::scene::{Camera, Environment, LightKind, Material, Projection, Scene};
 use clerestory::{Error, Result};
 use glam::{DMat4, Vec3};

@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::{Error, Result};
 use serde::de::DeserializeOwned;
 

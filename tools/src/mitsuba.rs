@@ -14,7 +14,8 @@ pub(crate) mod surface;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use clerestory::film::{Picture, atomic, exr};
+use clerestory::atomic;
+use clerestory::film::{Picture, exr};
 use clerestory::scene::{Camera, Environment, LightKind, Projection, Scene};
 use clerestory::{Error, Result};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};

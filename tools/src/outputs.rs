@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
-use clerestory::film::{atomic, mark};
+use clerestory::atomic;
+use clerestory::film::mark;
 use clerestory::input::{InputFile, open_regular};
 use clerestory::scene::builtin;
 use clerestory::{Error, Result};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::{Error, Result};
 
 /// A measured part of a page, between two marks.

@@ -59,7 +59,12 @@ fn read_png(path: &Path) -> Result<Picture> {
     // The values as f32 beside the decoder's, and once more as linear ones.
     let floats = (u64::from(width) * u64::from(height)).saturating_mul(12);
     let memory = decoder.total_bytes().max(floats).saturating_add(floats);
-    limits.check_decoded(memory, length).map_err(wrong)?;
+    let allowed = limits.decoded(length);
+    if memory > allowed {
+        return Err(wrong(format!(
+            "decoded, takes {memory} bytes of memory, more than the {allowed} that a file of {length} bytes may take"
+        )));
+    }
     let decoded = image::DynamicImage::from_decoder(decoder).map_err(|cause| wrong(cause.to_string()))?;
     let values = decoded
         .into_rgb32f()

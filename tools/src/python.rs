@@ -1,4 +1,4 @@
-//! Scripts in Python, in a process of their own, which a wish to stop ends.
+//! Scripts in Python, in a process of their own, which a stop request ends.
 
 use std::io::Read;
 use std::path::Path;
@@ -78,8 +78,8 @@ mod tests {
     use crate::experiments::watch::Unwatched;
 
     #[test]
-    fn a_wish_to_stop_ends_the_child() {
-        /// Wishes to stop from the first question on.
+    fn a_stop_request_ends_the_child() {
+        /// Asks to stop from the first question on.
         struct Stopping;
         impl Watch for Stopping {
             fn begin(&self, _what: &str, _done: usize, _all: usize) {}

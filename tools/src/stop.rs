@@ -9,11 +9,11 @@ use indicatif::ProgressBar;
 use crate::failure::{Code, Failure, Outcome};
 use crate::output;
 
-/// The wish to stop.
+/// The stop request.
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Begins to listen; possible once in a run of the program. The first wish is answered with `line`, beside the bar.
+    /// Begins to listen; possible once in a run of the program. The first request is answered with `line`, beside the bar.
     pub fn listen(bar: &ProgressBar, line: &'static str) -> Outcome<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         let (raised, bar) = (Arc::clone(&flag), bar.clone());
@@ -31,8 +31,8 @@ impl Stop {
         Ok(Self(flag))
     }
 
-    /// Whether somebody wishes to stop.
-    pub fn wished(&self) -> bool {
+    /// Whether somebody has asked to stop.
+    pub fn requested(&self) -> bool {
         self.0.load(Ordering::SeqCst)
     }
 }

@@ -545,7 +545,7 @@ fn an_interrupt_leaves_complete_files() -> Tested {
     );
     let report = json_file(&path.with_extension("json"))?;
     assert_eq!(report["interrupted"], Value::Bool(true));
-    // Black, where the wish came before the first wave had ended.
+    // Black, where the request came before the first wave had ended.
     let picture = exr::read(&path)?;
     let most = report["samples"][1].as_u64().ok_or("no count of samples")?;
     assert_eq!(
@@ -844,7 +844,7 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
         "breaks",
         "expects",
         "path (sobol), path (pcg), photon, ",
-        ", bvh2, lbvh, kd",
+        ", bvh2, lbvh, lbvh-high, kd",
         "degrades",
     ] {
         assert!(list.contains(word), "{word}: {list}");

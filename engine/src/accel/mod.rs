@@ -53,6 +53,7 @@ pub use stages::BuildStages;
 
 use crate::gpu::shaders::constants;
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// [`Hit::triangle`] of a ray that met nothing.
 pub const NO_HIT: u32 = constants::NO_HIT;
@@ -88,6 +89,16 @@ pub struct Ray {
 }
 
 impl Ray {
+    /// The ray from `origin`, metres, along `direction`, of any length: `t` from 0 to infinity.
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self {
+            origin: origin.to_array(),
+            t_min: 0.0,
+            direction: direction.to_array(),
+            t_max: f32::INFINITY,
+        }
+    }
+
     /// Whether the ray can meet anything: finite and in range.
     pub fn is_traceable(&self) -> bool {
         let largest = |v: &[f32; 3]| v.iter().fold(0.0f32, |m, x| if x.abs() > m { x.abs() } else { m });

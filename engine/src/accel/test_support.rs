@@ -8,15 +8,6 @@ use glam::{DVec3, Vec3};
 /// Unit roundoff of f32.
 pub const U: f64 = 1.0 / 16_777_216.0;
 
-pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
-    }
-}
-
 /// Tries all triangles in index order with the kernels' test.
 pub fn brute_force(triangles: &[[Vec3; 3]], usable: impl Fn(usize) -> bool, ray: &Ray) -> Hit {
     let mut hit = Hit::none(ray.t_max);

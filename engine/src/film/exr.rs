@@ -37,7 +37,7 @@ const LIBRARY_ATTRIBUTES: [&str; 1] = ["software"];
 pub fn write(path: impl AsRef<Path>, picture: &Picture) -> EngineResult<()> {
     let path = path.as_ref();
     let bytes = to_bytes(picture, &path.display().to_string())?;
-    super::atomic::write(path, &bytes)
+    crate::atomic::write(path, &bytes)
 }
 
 /// The file's bytes; `name` is for messages.

@@ -62,7 +62,7 @@ pub fn read_from(mut source: impl BufRead + Seek, name: &str) -> Result<Picture>
 pub fn write(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
     let path = path.as_ref();
     let bytes = to_bytes(picture, &path.display().to_string())?;
-    super::atomic::write(path, &bytes)
+    crate::atomic::write(path, &bytes)
 }
 
 /// The first line of files, the signature.

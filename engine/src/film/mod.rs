@@ -23,7 +23,6 @@ pub mod png;
 pub mod tone;
 pub mod z_test;
 
-pub use crate::atomic;
 pub use accumulate::{Accumulator, TwoFloat};
 pub use gpu_film::{FilmBand, GpuFilm, Step};
 pub use metrics::{CompareOptions, ErrorReport, PIXELS_PER_DEGREE, compare};

@@ -108,7 +108,7 @@ fn from_pixels(width: u32, pixels: impl ExactSizeIterator<Item = [u8; 3]>) -> Rg
 pub fn write(path: impl AsRef<Path>, picture: &Rgb8) -> Result<()> {
     let path = path.as_ref();
     let bytes = to_bytes(picture, &path.display().to_string())?;
-    super::atomic::write(path, &bytes)
+    crate::atomic::write(path, &bytes)
 }
 
 /// Bytes of the signature and of the first chunk, IHDR, with its length, name and check sum (PNG specification, third edition, §5.2 and §11.2.1).

@@ -29,7 +29,7 @@ pub const ROUNDS: [u32; 4] = [4, 16, 64, 256];
 const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
 /// How long a pilot may take in any case, once its kernels are compiled, whoever waits.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// The same of the pilots behind the first one, where the wish to stop was there before any of them: the least that a choice takes is then done.
+/// The same of the pilots behind the first one, where the stop request was there before any of them: the least that a choice takes is then done.
 const LEAST_PATIENCE: Duration = Duration::from_secs(10);
 /// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
 const SMALL: u32 = 4;
@@ -86,11 +86,11 @@ pub struct Asked<'a> {
     pub proceed: RefCell<&'a mut dyn FnMut() -> bool>,
     /// Pilots that have to be did not end in time: others would not, either.
     pub gave_up: Cell<bool>,
-    /// How long pilots behind the first one go on after a wish to stop; see [`patience`].
+    /// How long pilots behind the first one go on after a stop request; see [`patience`].
     pub patience: Duration,
 }
 
-/// How long pilots behind a technique's first one go on after a wish to stop, by whether the host lets them go on when they begin.
+/// How long pilots behind a technique's first one go on after a stop request, by whether the host lets them go on when they begin.
 pub fn patience(proceeds: bool) -> Duration {
     if proceeds { PATIENCE } else { LEAST_PATIENCE }
 }
@@ -504,7 +504,7 @@ fn round_of_another_size(mut pilot: Rendering, asked: &Asked<'_>) -> Result<Opti
     Ok(ended.then(|| from.elapsed().as_secs_f64()))
 }
 
-/// Works until all samples of a first pilot are there; false where they are not after half of the time there is, or soon after a wish to stop. Scenes that are so
+/// Works until all samples of a first pilot are there; false where they are not after half of the time there is, or soon after a stop request. Scenes that are so
 /// hard have nothing to choose by.
 fn run_first(pilot: &mut Rendering, asked: &Asked<'_>) -> Result<bool> {
     run_while(pilot, PATIENCE, |worked| {
@@ -513,7 +513,7 @@ fn run_first(pilot: &mut Rendering, asked: &Asked<'_>) -> Result<bool> {
     })
 }
 
-/// Works until all samples that were asked for are there; false where they are not soon after a wish to stop.
+/// Works until all samples that were asked for are there; false where they are not soon after a stop request.
 fn run(pilot: &mut Rendering, asked: &Asked<'_>) -> Result<bool> {
     run_while(pilot, asked.patience, |_| asked.proceeds())
 }

@@ -35,7 +35,7 @@ use crate::{Error, Result};
 const FRAMES_MAX: u32 = 32;
 /// Samples of a step on software devices, about.
 const STEP_SAMPLES: u64 = 1 << 18;
-/// Seconds of a step, about, unless one part of a frame takes longer: hosts look at the time and at wishes to stop between two steps.
+/// Seconds of a step, about, unless one part of a frame takes longer: hosts look at the time and at stop requests between two steps.
 const STEP_SECONDS: f64 = 0.25;
 
 /// What a picture is drawn of.

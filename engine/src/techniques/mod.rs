@@ -130,7 +130,7 @@ pub struct View<'a> {
 /// A technique at work on one view. It refines its picture step by step.
 pub trait Technique: Send {
     /// Does a bounded piece of work towards `samples` samples per pixel, whatever the scene; `None` when there is nothing left to do. Whoever calls looks at time and
-    /// wishes to stop between two steps, so that a step is one submission or a few; samples that it leaves under way go on with the next one, and
+    /// stop requests between two steps, so that a step is one submission or a few; samples that it leaves under way go on with the next one, and
     /// [`Step::done`] counts them once they are on the film.
     ///
     /// # Errors
@@ -152,7 +152,7 @@ pub trait Technique: Send {
     /// Begins anew through another camera.
     ///
     /// # Errors
-    /// [`Error::Setting`], [`Error::DeviceLost`].
+    /// [`Error::Setting`] for a camera that cannot be used, with which nothing changes; [`Error::DeviceLost`].
     fn set_camera(&mut self, camera: &Camera) -> Result<()>;
 
     /// The light paths of the picture.
@@ -161,7 +161,7 @@ pub trait Technique: Send {
     /// The settings in force.
     fn settings(&self) -> serde_json::Value;
 
-    /// Exact counts of work by name.
+    /// Exact counts of work by name since it was made, earlier cameras included.
     fn counters(&self) -> BTreeMap<&'static str, u64>;
 
     /// The kernels and their specialization.

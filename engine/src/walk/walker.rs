@@ -44,7 +44,7 @@ pub struct WalkOptions {
     /// Loop iterations after which a ray goes on in a later dispatch; see [`ray_quota`].
     pub ray_quota: u32,
     /// Bounces recorded into one command buffer, at most: about as many as most walks have. Devices that a driver watches get as many as take a fraction of a
-    /// second, by what the last submission took, software devices about 2¹⁸ rays, but one at least, of all walks: fewer slots make it shorter.
+    /// second, by what the last submission took, software devices about 2¹⁹ rays, but one at least, of all walks: fewer slots make it shorter.
     pub bounces: usize,
     /// Work, in loop iterations, after which a submission begins no further place: those of long rays, four times those of walks through grids of densities, and twice
     /// those of queries of maps. The places under way end as their quotas say. 0 chooses by the kind of device.

@@ -3,7 +3,7 @@
 use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::kd::{KdSettings, KdTree};
-use clerestory::accel::lbvh::{self, LbvhSettings};
+use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
 use clerestory::accel::yardstick::moller_trumbore;
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
@@ -14,26 +14,36 @@ use crate::Judgement;
 /// Builds a ray index with default settings.
 type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
 
-/// A kind of ray index.
+/// A kind of ray index, as a subject of the cases.
 #[derive(Debug, Clone, Copy)]
-pub struct IndexKind {
-    /// Its name, as [`RayIndex::name`] has it.
+pub struct IndexCase {
+    /// Its name, as [`IndexKind::name`](clerestory::accel::IndexKind::name) has it.
     pub name: &'static str,
     /// Builds one with default settings.
     pub build: Build,
 }
 
-/// Every ray index of the engine.
-pub const INDEXES: &[IndexKind] = &[
-    IndexKind {
+/// Every ray index of the engine; what the device builds is the tree of `lbvh`, which the tests of the builder hold it to.
+pub const INDEXES: &[IndexCase] = &[
+    IndexCase {
         name: "bvh2",
         build: |triangles| Ok(Box::new(Bvh2::build(triangles, &Bvh2Settings::default())?)),
     },
-    IndexKind {
+    IndexCase {
         name: "lbvh",
+        build: |triangles| {
+            let settings = LbvhSettings {
+                quality: BuildQuality::Fast,
+                ..LbvhSettings::default()
+            };
+            Ok(Box::new(lbvh::build(triangles, &settings)?))
+        },
+    },
+    IndexCase {
+        name: "lbvh-high",
         build: |triangles| Ok(Box::new(lbvh::build(triangles, &LbvhSettings::default())?)),
     },
-    IndexKind {
+    IndexCase {
         name: "kd",
         build: |triangles| Ok(Box::new(KdTree::build(triangles, &KdSettings::default())?)),
     },
@@ -48,16 +58,6 @@ pub struct RaySet {
     pub triangles: Vec<[Vec3; 3]>,
     /// The rays.
     pub rays: Vec<Ray>,
-}
-
-/// A ray without bounds.
-pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
-    }
 }
 
 /// Whether rays can meet a triangle: in range, and of an area in f64.
@@ -129,7 +129,7 @@ fn reach(triangles: &[[Vec3; 3]], ray: &Ray) -> f64 {
 }
 
 /// Judges an index on sets of rays.
-pub(crate) fn judge(kind: &IndexKind, sets: &[RaySet]) -> Result<Judgement> {
+pub(crate) fn judge(kind: &IndexCase, sets: &[RaySet]) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     for RaySet { what, triangles, rays } in sets {
         let index = (kind.build)(triangles)?;
@@ -185,15 +185,15 @@ pub fn awkward_rays(seed: u64, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray
             let outside = b[1] + random.vector() * size;
             let axis = random.choose(&Vec3::AXES) * random.choose(&[1.0, -1.0]);
             match i % 10 {
-                0 => ray(outside, random.vector()),
-                1 => ray(outside, a[0] - outside),
-                2 => ray(outside, (a[0] + a[1]) * 0.5 - outside),
-                3 => ray(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
-                4 => ray(a[0] - axis * size, axis),
-                5 => ray((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
-                6 => ray(a[0].with_x(b[0].x), axis),
-                7 => ray(a[0], random.vector()),
-                8 => ray(a[0], a[1] - a[0]),
+                0 => Ray::new(outside, random.vector()),
+                1 => Ray::new(outside, a[0] - outside),
+                2 => Ray::new(outside, (a[0] + a[1]) * 0.5 - outside),
+                3 => Ray::new(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
+                4 => Ray::new(a[0] - axis * size, axis),
+                5 => Ray::new((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
+                6 => Ray::new(a[0].with_x(b[0].x), axis),
+                7 => Ray::new(a[0], random.vector()),
+                8 => Ray::new(a[0], a[1] - a[0]),
                 _ => Ray {
                     t_min: 0.25,
                     t_max: 1.0,

@@ -6,7 +6,7 @@ use clerestory::transport::PathSet;
 use clerestory::{Error, Result};
 
 use crate::easel::{OTHER_TOLERANCE, photon_tolerance};
-use crate::{Easel, Figure, HardCase, INDEXES, IndexKind, Judgement, LOBES};
+use crate::{Easel, Figure, HardCase, INDEXES, IndexCase, Judgement, LOBES};
 
 /// Photons of a pass, of techniques that have them, and samples of a pixel that ask them: one pass for nearly all pictures, whose noise is a
 /// hundredth in closed rooms.
@@ -32,7 +32,7 @@ pub enum Subject {
         sampler: Option<&'static str>,
     },
     /// A ray index, by the twin of its kernels; the tests of the kernels hold them to it bit for bit.
-    Index(&'static IndexKind),
+    Index(&'static IndexCase),
     /// All of [`LOBES`].
     Lobes,
 }

@@ -213,7 +213,7 @@ fn the_worst_figure_decides() {
 #[test]
 fn an_index_that_loses_triangles_is_found_out() {
     use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
-    let lossy = IndexKind {
+    let lossy = IndexCase {
         name: "lossy",
         build: |triangles| {
             let half = &triangles[..triangles.len() / 2];

@@ -243,12 +243,7 @@ fn a_frame_of_a_host(gpu: &Gpu, opening_barrier: bool) {
         })
         .collect();
     let rays: Vec<Ray> = (0..200)
-        .map(|_| Ray {
-            origin: (20.0 * random.vector()).to_array(),
-            t_min: 0.0,
-            direction: random.vector().to_array(),
-            t_max: f32::INFINITY,
-        })
+        .map(|_| Ray::new(20.0 * random.vector(), random.vector()))
         .collect();
     let scene = scene();
     let settings = LbvhSettings {

@@ -297,7 +297,8 @@ fn a_frame_method_of_the_hosts_own_is_a_technique_like_others() {
     assert_eq!(steps, 3);
     // Anew through another camera, and shown.
     rendering.set_camera(&scene.cameras[0].clone()).unwrap();
-    rendering.set_spp(1);
+    // None is as good as one.
+    rendering.set_spp(0);
     while rendering.step().unwrap().is_some() {}
     let screen = gpu
         .buffer(&BufferDesc::storage("screen", 4 * 30, Category::Film))
@@ -310,9 +311,19 @@ fn a_frame_method_of_the_hosts_own_is_a_technique_like_others() {
         shown.windows(2).take(5).all(|pair| pair[0][0] < pair[1][0]),
         "{shown:?}"
     );
+    // A camera that cannot be used leaves name, passes and picture as they are.
+    let blind = Camera {
+        name: "blind".into(),
+        lens_radius: f32::NAN,
+        ..scene.cameras[0].clone()
+    };
+    let refused = rendering.set_camera(&blind).unwrap_err();
+    assert!(matches!(refused, Error::Setting { .. }), "{refused}");
     let rendered = rendering.finish().unwrap();
     let report = &rendered.report;
     assert_eq!((report.technique.as_str(), report.samples), ("places", [1, 1]));
+    assert_eq!((&report.camera, report.spp), (&scene.cameras[0].name, 1));
+    assert!(!report.stopped_early);
     let expected = [("begun", 2), ("drawn", 41), ("frames", 41), ("samples", 41 * 30)];
     assert_eq!(
         report.counters,

@@ -111,12 +111,7 @@ impl Subject {
 
     /// Distance of what a light sees first in a direction; infinite for nothing.
     pub fn seen(&self, light: Vec3, direction: Vec3) -> f64 {
-        let hit = self.index.closest_hit(&Ray {
-            origin: light.to_array(),
-            t_min: 0.0,
-            direction: direction.to_array(),
-            t_max: f32::INFINITY,
-        });
+        let hit = self.index.closest_hit(&Ray::new(light, direction));
         f64::from(hit.t) * f64::from(direction.length())
     }
 }

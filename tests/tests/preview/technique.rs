@@ -173,7 +173,7 @@ fn lights_that_move_and_other_cameras_begin_anew() {
 fn scenes_whose_light_it_would_leave_out_are_refused() {
     with_gpu(|gpu| {
         for (address, word) in [
-            ("builtin:cornell-box", "surfaces shine"),
+            ("builtin:cornell-box", "surfaces emit light"),
             ("builtin:slab", "transmit"),
             ("builtin:cornell-box?sphere=phong&source=point", "modified Phong"),
             ("builtin:point-in-fog", "media"),

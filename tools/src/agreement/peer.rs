@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::scene::{Medium, Scene};
 use clerestory::{Error, Result};
 

@@ -3,8 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use clerestory::atomic;
+use clerestory::film::ZTest;
 use clerestory::film::z_test::{ACCEPTED_FRACTION, Verdict};
-use clerestory::film::{ZTest, atomic};
 use clerestory::gpu::Caps;
 use clerestory::{Error, Result};
 

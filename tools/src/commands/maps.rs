@@ -135,7 +135,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
 /// Steps of the bar.
 const STEPS: u64 = 1000;
 
-/// Converts under a bar, which shows itself on a terminal alone; `None` when somebody wished it to stop.
+/// Converts under a bar, which shows itself on a terminal alone; `None` when somebody has asked to stop.
 fn convert(
     source: &MapImage,
     to: Parametrization,
@@ -150,7 +150,7 @@ fn convert(
     bar.enable_steady_tick(output::TICK);
     let converted = resample_watched(source, to, size, to_source, settings, &mut |share| {
         bar.set_position((share * STEPS as f64) as u64);
-        !stop.wished()
+        !stop.requested()
     });
     bar.finish_and_clear();
     Ok(converted?)

@@ -13,7 +13,7 @@ use crate::stop::Stop;
 /// Steps of the bar for each picture.
 const STEPS: u64 = 1000;
 
-/// The bar and the wish to stop.
+/// The bar and the stop request.
 pub struct Bar {
     bar: ProgressBar,
     stop: Stop,
@@ -61,6 +61,6 @@ impl Watch for Bar {
     }
 
     fn stopped(&self) -> bool {
-        self.stop.wished()
+        self.stop.requested()
     }
 }

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
 use clerestory::{Error, Result};

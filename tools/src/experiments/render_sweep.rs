@@ -202,7 +202,11 @@ impl Running<'_> {
         Ok(Some(SceneResults {
             address: address.into(),
             triangles,
-            reference: reference_path.display().to_string(),
+            reference: reference_path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
             tone,
             reference_error_of_mean: unbiased::error_of_mean(&reference)?,
             reference_picture: Some(reference),

@@ -51,7 +51,7 @@ pub struct SceneResults {
     pub address: String,
     /// Triangles of all its instances.
     pub triangles: u64,
-    /// The reference's file.
+    /// Name of the reference's file, in the folder of references.
     pub reference: String,
     /// Pixels for the reader: exposure and curve of shown pictures and of FLIP.
     pub tone: ToneMap,

@@ -63,8 +63,8 @@ pub struct SeriesPoint {
     pub budget: Budget,
     /// Median samples per pixel.
     pub samples: f64,
-    /// Median rays.
-    pub rays: f64,
+    /// Median rays; `None` where the technique counts none.
+    pub rays: Option<f64>,
     /// Median seconds.
     pub seconds: f64,
     /// Least and greatest seconds.
@@ -88,11 +88,11 @@ pub struct SeriesPoint {
 }
 
 impl SeriesPoint {
-    /// Median work.
+    /// Median work, 0 where it is not counted.
     pub fn work(&self, work: Work) -> f64 {
         match work {
             Work::Seconds => self.seconds,
-            Work::Rays => self.rays,
+            Work::Rays => self.rays.unwrap_or(0.0),
             Work::Samples => self.samples,
         }
     }
@@ -126,7 +126,7 @@ pub struct SceneSeries {
     pub address: String,
     /// Triangles.
     pub triangles: u64,
-    /// The reference's file.
+    /// Name of the reference's file, in the folder of references.
     pub reference: String,
     /// Relative RMSE that every variant reaches, at which costs are compared.
     pub common_error: Option<f64>,
@@ -239,10 +239,11 @@ fn point(results: &Point) -> SeriesPoint {
         .iter()
         .filter_map(|one| one.relative_bias)
         .collect();
+    let counts_rays = results.measurements.iter().all(|one| one.counters.contains_key("rays"));
     SeriesPoint {
         budget: results.budget,
         samples: median_work(results, Work::Samples),
-        rays: median_work(results, Work::Rays),
+        rays: counts_rays.then(|| median_work(results, Work::Rays)),
         seconds: median_work(results, Work::Seconds),
         seconds_range: range(&all(&|one| Work::Seconds.of(one))),
         rmse: root(mean(&all(&|one| one.error.mse))),
@@ -321,6 +322,28 @@ pub(super) mod tests {
         let point = scene.series[0].points[1];
         assert!((point.relative_mse - 2.0 / 16.0).abs() < 1e-15 && (point.rmse - 0.25).abs() < 1e-15);
         assert_eq!(point.seconds_range, [1.6, 1.6]);
+    }
+
+    #[test]
+    fn rays_that_are_not_counted_are_none() {
+        let mut results = made_up_scene();
+        for point in &mut results.variants[0].points {
+            for one in &mut point.measurements {
+                one.counters.clear();
+            }
+        }
+        let scene = scene(&results);
+        let rays = |series: &Series| {
+            series
+                .points
+                .iter()
+                .map(|point| point.rays.is_some())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(rays(&scene.series[0]), [false; 3]);
+        assert_eq!(rays(&scene.series[1]), [true; 3]);
+        let to_error = [0, 1].map(|i: usize| scene.series[i].rays_to_error.is_some());
+        assert_eq!(to_error, [false, true]);
     }
 
     #[test]

@@ -192,7 +192,7 @@ pub fn budgets(scene: &SceneSeries) -> Table {
                 point.budget.to_string().into(),
                 point.samples.into(),
                 point.seconds.into(),
-                (point.rays * 1e-6).into(),
+                point.rays.map_or(NONE.into(), |rays| Cell::Number(rays * 1e-6)),
                 point.relative_mse.into(),
                 point.relative_rmse.into(),
                 format!("{} … {}", Cell::Number(least), Cell::Number(greatest)).into(),

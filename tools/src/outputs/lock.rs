@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::fingerprint::Fingerprint;
 
 /// The right to write the files of one name, until it is dropped: a file that only one process can make.

@@ -1,7 +1,7 @@
 //! Slabs at every face, edge and corner of boxes, against f64.
 
 use super::*;
-use crate::accel::test_support::{Random, U, ray};
+use crate::accel::test_support::{Random, U};
 
 /// A cube, boxes without extent along one, two and three axes, one of odd numbers, one away from the origin.
 fn boxes() -> [Aabb; 6] {
@@ -30,7 +30,7 @@ fn places(bounds: &Aabb) -> Vec<(Vec3, [usize; 3])> {
 
 /// The test of a ray for a box alone, and the box's span behind the ray's begin.
 fn span(bounds: &Aabb, origin: Vec3, direction: Vec3) -> (BoxTest, [f32; 2]) {
-    let test = BoxTest::new(bounds, &ray(origin, direction));
+    let test = BoxTest::new(bounds, &Ray::new(origin, direction));
     let (enter, leave) = test.span(bounds.lower, bounds.upper);
     (test, [enter.max(0.0), leave])
 }
@@ -165,7 +165,7 @@ fn boxes_are_met_up_to_their_slack_and_no_further() {
                 if i % 5 == 0 {
                     direction[random.below(3)] = 0.0;
                 }
-                let ray = ray(target - 3.0 * direction, direction);
+                let ray = Ray::new(target - 3.0 * direction, direction);
                 let test = BoxTest::new(&root, &ray);
                 let (enter, leave) = test.span(-upper, upper);
                 // The same planes in f64, and how far apart the ends are at most by which boxes are grown.

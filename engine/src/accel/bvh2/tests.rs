@@ -1,5 +1,5 @@
 use super::*;
-use crate::accel::test_support::{Random, Sheared, U, brute_force, ray};
+use crate::accel::test_support::{Random, Sheared, U, brute_force};
 use crate::accel::{FINISHED, NO_HIT, triangle};
 
 fn build(triangles: &[[Vec3; 3]]) -> Bvh2 {
@@ -119,17 +119,17 @@ pub(in crate::accel) fn hard_rays(random: &mut Random, triangles: &[[Vec3; 3]], 
         let axis = Vec3::AXES[random.below(3)] * if random.below(2) == 0 { 1.0 } else { -1.0 };
         let negative_zero = Vec3::new(-0.0, -0.0, -0.0);
         let r = match i % 10 {
-            0 => ray(outside, random.vector()),
-            1 => ray(outside, a[0] - outside),
-            2 => ray(outside, (a[0] + a[1]) * 0.5 - outside),
-            3 => ray(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
+            0 => Ray::new(outside, random.vector()),
+            1 => Ray::new(outside, a[0] - outside),
+            2 => Ray::new(outside, (a[0] + a[1]) * 0.5 - outside),
+            3 => Ray::new(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
             // Parallel to an axis, through a vertex, an edge, a box face.
-            4 => ray(a[0] - axis * size, axis),
-            5 => ray((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
-            6 => ray(a[0].with_x(b[0].x), axis),
+            4 => Ray::new(a[0] - axis * size, axis),
+            5 => Ray::new((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
+            6 => Ray::new(a[0].with_x(b[0].x), axis),
             // Starting on a vertex; along an edge.
-            7 => ray(a[0], random.vector()),
-            8 => ray(a[0], a[1] - a[0]),
+            7 => Ray::new(a[0], random.vector()),
+            8 => Ray::new(a[0], a[1] - a[0]),
             _ => Ray {
                 t_min: 0.25,
                 t_max: 1.0,
@@ -238,7 +238,7 @@ fn no_ray_passes_between_the_triangles_of_a_sphere() {
             };
             // Origins stay inside the tessellation.
             let origin = centre + random.vector() * radius * if i % 5 == 0 { 0.0 } else { 0.5 };
-            let r = ray(origin, target - origin);
+            let r = Ray::new(origin, target - origin);
             assert!(bvh.any_hit(&r), "radius {radius} at {centre}: {r:?}");
         }
     }
@@ -363,7 +363,7 @@ fn filter_decides_which_candidates_count() {
 fn invalid_rays_and_settings_are_refused() {
     let triangles = grid(4);
     let bvh = build(&triangles);
-    let good = ray(Vec3::new(1.3, 1.4, 5.0), -Vec3::Z);
+    let good = Ray::new(Vec3::new(1.3, 1.4, 5.0), -Vec3::Z);
     assert!(bvh.any_hit(&good));
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
         for i in 0..3 {

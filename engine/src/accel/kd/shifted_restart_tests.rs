@@ -2,7 +2,7 @@ use super::shifted_restart::{LeafSequence, ShiftedRestart, leaves_by_stack};
 use super::tree::KdKind;
 use super::{KdNode, KdTree, Scheme};
 use crate::accel::Ray;
-use crate::accel::test_support::{Random, ray};
+use crate::accel::test_support::Random;
 use glam::Vec3;
 
 const DEPTH: u32 = 12;
@@ -44,7 +44,7 @@ fn random_tree(random: &mut Random) -> KdTree {
 fn through_the_cube(random: &mut Random) -> Ray {
     let to = Vec3::new(random.unit(), random.unit(), random.unit());
     let origin = Vec3::splat(0.5) + 2.0 * random.direction();
-    ray(origin, (to - origin).normalize())
+    Ray::new(origin, (to - origin).normalize())
 }
 
 /// The leaves that a scheme visits, by the triangles that it tests: whatever a filter refuses is gone beyond.

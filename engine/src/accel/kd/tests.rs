@@ -3,7 +3,7 @@ use super::*;
 use crate::accel::FINISHED;
 use crate::accel::box_test::BoxTest;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
-use crate::accel::test_support::{Random, brute_force, ray};
+use crate::accel::test_support::{Random, brute_force};
 
 const SCHEMES: [Scheme; 7] = [
     Scheme::Stack,
@@ -269,11 +269,11 @@ fn a_wall_ends_in_a_leaf_without_volume() {
 #[test]
 fn small_and_empty_scenes_have_trees() {
     let none = build(&[], &KdSettings::default());
-    assert!(!none.closest_hit(&ray(Vec3::ZERO, Vec3::X)).is_hit());
+    assert!(!none.closest_hit(&Ray::new(Vec3::ZERO, Vec3::X)).is_hit());
     assert_eq!(none.statistics().sah_cost, 0.0);
     let triangles = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
     let one = build(&triangles, &KdSettings::default());
-    let hit = one.closest_hit(&ray(Vec3::new(0.2, 0.2, 1.0), -Vec3::Z));
+    let hit = one.closest_hit(&Ray::new(Vec3::new(0.2, 0.2, 1.0), -Vec3::Z));
     assert_eq!((hit.t, hit.triangle), (1.0, 0));
     assert_eq!((one.statistics().leaves, one.statistics().nodes), (1, 0));
 }
@@ -309,7 +309,7 @@ fn ways_as_long_as_the_word_of_flags_are_gone_to_their_end() {
         assert_eq!(tree.statistics().max_depth, levels);
         for direction in [Vec3::X, -Vec3::X] {
             let start = if direction.x > 0.0 { -1.0 } else { levels as f32 + 2.0 };
-            let ray = ray(Vec3::new(start, 0.1, 0.1), direction);
+            let ray = Ray::new(Vec3::new(start, 0.1, 0.1), direction);
             for scheme in SCHEMES {
                 let mut seen = Vec::new();
                 let mut counters = KdCounters::default();
@@ -357,7 +357,7 @@ fn bytes_are_eight_for_each_node_and_entry_that_memory_serves() {
     }
     // A way of 32 nodes that leaves a far child at each: 32 entries pushed and popped.
     let (tree, _) = chain(32);
-    let ray = ray(Vec3::new(34.0, 0.1, 0.1), -Vec3::X);
+    let ray = Ray::new(Vec3::new(34.0, 0.1, 0.1), -Vec3::X);
     let with = |node_levels, stack| KdCaches {
         node_levels,
         stack,
@@ -436,7 +436,7 @@ fn work_is_in_the_order_of_the_schemes() {
     let mut random = Random(66);
     let mut nodes = [0; 7];
     for _ in 0..2000 {
-        let ray = ray(random.vector(), random.direction());
+        let ray = Ray::new(random.vector(), random.direction());
         for (i, scheme) in SCHEMES.into_iter().enumerate() {
             nodes[i] += tested(&tree, scheme, &ray).1.nodes;
         }
@@ -454,7 +454,7 @@ fn a_hit_ends_a_ray_without_a_restart_for_each_far_child_that_is_left() {
         let mut random = Random(77);
         let (mut restarts, mut needed, mut hits) = (0, 0, 0);
         for _ in 0..4000 {
-            let (hit, work) = tested(&tree, scheme, &ray(random.vector(), random.direction()));
+            let (hit, work) = tested(&tree, scheme, &Ray::new(random.vector(), random.direction()));
             restarts += work.restarts;
             // The way to the first leaf is none.
             needed += work.leaves.saturating_sub(1);

@@ -3,7 +3,7 @@ use super::*;
 use crate::accel::box_tree::{BoxTree, Child, TreeShape};
 use crate::accel::bvh2::{Bvh2, Bvh2Settings, MAX_DEPTH};
 use crate::accel::leaf_rule::half_area;
-use crate::accel::test_support::{Random, ray};
+use crate::accel::test_support::Random;
 use crate::accel::{Aabb, LeafRule, Ray, RayIndex};
 use glam::Vec3;
 
@@ -225,7 +225,7 @@ fn hits_are_those_of_the_binned_tree() {
         triangles[i * 7 + 2] = triangles[i * 7 + 3];
     }
     let rays: Vec<Ray> = (0..3000)
-        .map(|_| ray(random.vector() * 1.5, random.direction()))
+        .map(|_| Ray::new(random.vector() * 1.5, random.direction()))
         .collect();
     let binned = Bvh2::build(&triangles, &Bvh2Settings::default()).expect("valid");
     for quality in [BuildQuality::Fast, BuildQuality::High] {
@@ -271,7 +271,7 @@ fn refitted_trees_have_the_hits_of_new_ones() {
     let anew = build(&triangles, &LbvhSettings::default()).expect("valid");
     let mut hits = 0;
     for _ in 0..3000 {
-        let ray = ray(random.vector() * 1.5, random.direction());
+        let ray = Ray::new(random.vector() * 1.5, random.direction());
         let (a, b) = (moved.closest_hit(&ray), anew.closest_hit(&ray));
         assert_eq!(bytemuck::bytes_of(&a), bytemuck::bytes_of(&b));
         hits += u32::from(a.is_hit());

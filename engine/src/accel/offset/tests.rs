@@ -1,6 +1,6 @@
 use super::*;
 use crate::accel::bvh2::{Bvh2, Bvh2Settings};
-use crate::accel::test_support::{Random, ray};
+use crate::accel::test_support::Random;
 use crate::accel::triangle::{intersect_triangle, ray_shear};
 use crate::accel::{Ray, RayIndex};
 
@@ -84,7 +84,7 @@ fn leaving_rays_meet_neither_their_triangle_nor_coplanar_ones() {
         let start = offset_ray_origin(point.position, point.error, n, w);
         let side = if n.dot(w) < 0.0 { -n } else { n };
         assert!((start - point.position).dot(side) >= 0.0);
-        assert!(!meets(&t, &ray(start, w)), "{t:?} {u} {v} {w}");
+        assert!(!meets(&t, &Ray::new(start, w)), "{t:?} {u} {v} {w}");
     }
     // A small triangle beside a coplanar one ten thousand times its size.
     for _ in 0..20_000 {
@@ -100,7 +100,7 @@ fn leaving_rays_meet_neither_their_triangle_nor_coplanar_ones() {
         let point = surface_point(&small, bary, reach(surface_point(&small, bary, 0.0).position, &all));
         let w = leaving(&mut random, n);
         let start = offset_ray_origin(point.position, point.error, n, w);
-        assert!(!meets(&big, &ray(start, w)), "{big:?} {bary:?} {w}");
+        assert!(!meets(&big, &Ray::new(start, w)), "{big:?} {bary:?} {w}");
     }
 }
 
@@ -121,7 +121,7 @@ fn walls_beyond_twice_the_offset_are_not_skipped() {
         let v = random.vector();
         let w = n + (v - n * v.dot(n)) * 0.9;
         let start = offset_ray_origin(point.position, point.error, n, w);
-        assert!(meets(&wall, &ray(start, w)), "{t:?} {bary:?} {w} gap {gap}");
+        assert!(meets(&wall, &Ray::new(start, w)), "{t:?} {bary:?} {w} gap {gap}");
     }
 }
 

@@ -1,7 +1,7 @@
 use super::oracles::{intersect_triangle_f64, moller_trumbore};
 use super::*;
 use crate::accel::Ray;
-use crate::accel::test_support::{Random, Sheared, U, ray};
+use crate::accel::test_support::{Random, Sheared, U};
 
 fn test(ray: &Ray, triangle: &[Vec3; 3]) -> Option<TriangleHit> {
     let shear = ray_shear(ray.origin.into(), ray.direction.into());
@@ -37,7 +37,7 @@ fn random_case(random: &mut Random) -> (Ray, [Vec3; 3]) {
     if random.below(3) > 0 {
         direction = direction.normalize_or_zero();
     }
-    (ray(origin, direction), triangle)
+    (Ray::new(origin, direction), triangle)
 }
 
 #[test]
@@ -129,11 +129,11 @@ fn oracles_agree_with_each_other() {
 
 #[test]
 fn degenerate_and_invalid_triangles_are_missed() {
-    let r = ray(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z);
+    let r = Ray::new(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z);
     let good = [Vec3::ZERO, Vec3::X, Vec3::Y];
     let hit = test(&r, &good).map(|h| (h.t, h.u, h.v));
     assert_eq!(hit, Some((1.0, 0.25, 0.25)));
-    let back = test(&ray(Vec3::new(0.25, 0.25, -1.0), Vec3::Z), &good);
+    let back = test(&Ray::new(Vec3::new(0.25, 0.25, -1.0), Vec3::Z), &good);
     assert_eq!(back.map(|h| (h.t, h.u, h.v)), Some((1.0, 0.25, 0.25)));
 
     let target = Vec3::new(0.25, 0.25, 0.0);
@@ -171,7 +171,7 @@ fn degenerate_and_invalid_triangles_are_missed() {
 fn edges_and_vertices_belong_to_both_sides() {
     let quad = [[Vec3::ZERO, Vec3::X, Vec3::ONE], [Vec3::ZERO, Vec3::ONE, Vec3::Y]].map(|t| t.map(|v| v.with_z(0.0)));
     let hits = |target: Vec3, direction: Vec3| {
-        let r = ray(target - direction, direction);
+        let r = Ray::new(target - direction, direction);
         quad.iter().filter(|t| test(&r, t).is_some()).count()
     };
     for x in [0.0, 0.125, 0.5, 1.0] {
@@ -195,5 +195,5 @@ fn a_needle_is_not_met_far_before_its_tip() {
     // Its long edges point at the ray; in plain f32 both edge values round to zero there.
     let tip = Vec3::new(100.0, 100.0, 0.0);
     let needle = [tip, Vec3::new(101.0, 101.0, 0.0), Vec3::new(101.0, 101.00001, 0.0)];
-    assert_eq!(test(&ray(Vec3::Z, -Vec3::Z), &needle), None);
+    assert_eq!(test(&Ray::new(Vec3::Z, -Vec3::Z), &needle), None);
 }

@@ -91,7 +91,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::test_support::{Random, ray};
+    use crate::accel::test_support::Random;
     use crate::accel::triangle::oracles::moller_trumbore;
 
     /// Where a ray's line meets a triangle's plane, inside or not, in f64.
@@ -127,7 +127,7 @@ mod tests {
                 from + (to - from) * random.unit() + random.vector() * random.magnitude(-30, -18)
             };
             let origin = random.vector() * 3.0;
-            let ray = ray(origin, (target - origin).normalize_or(Vec3::X));
+            let ray = Ray::new(origin, (target - origin).normalize_or(Vec3::X));
             let (found, expected) = (triangle.intersect(&ray), moller_trumbore(&ray, &vertices));
             met += u32::from(expected.is_some());
             let [a, b, c] = vertices.map(|v| v.as_dvec3());
@@ -169,9 +169,9 @@ mod tests {
         assert_eq!(WaldTriangle::new(&[Vec3::NAN, Vec3::X, Vec3::Y]), None);
         let triangle = WaldTriangle::new(&[Vec3::ZERO, Vec3::X, Vec3::Y]).expect("a triangle");
         for origin in [Vec3::new(-1.0, 0.2, 0.0), Vec3::new(-1.0, 0.2, 0.5)] {
-            assert_eq!(triangle.intersect(&ray(origin, Vec3::X)), None);
+            assert_eq!(triangle.intersect(&Ray::new(origin, Vec3::X)), None);
         }
-        let hit = triangle.intersect(&ray(Vec3::new(0.25, 0.5, 2.0), Vec3::NEG_Z));
+        let hit = triangle.intersect(&Ray::new(Vec3::new(0.25, 0.5, 2.0), Vec3::NEG_Z));
         assert_eq!(
             hit,
             Some(TriangleHit {

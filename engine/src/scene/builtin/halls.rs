@@ -38,7 +38,7 @@ pub const CATHEDRAL: Entry = Entry {
             "source",
             "area",
             &["area", "point"],
-            "windows that shine, or a lamp in the nave",
+            "windows that emit light, or a lamp in the nave",
         ),
         Parameter::color(
             "light",

@@ -1,5 +1,5 @@
 //! Ambient occlusion, the smallest frame method: light of a uniform sky, scattered once and diffusely.
-//! One ray per pixel and frame, distributed by the cosine. Unbiased on `LE|LDE`. A ray that its quota stops makes its sample NaN, which the film counts and leaves out.
+//! Two rays per pixel and frame: from the eye, and one distributed by the cosine. Unbiased on `LE|LDE`. A ray that its quota stops makes its sample NaN, which the film counts and leaves out.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ const ROW: Row = Row {
     id: "CL-AMBIENT",
     name: "technique `ambient`: ambient occlusion under a uniform sky",
     role: Role::Technique,
-    limits: "Light of a uniform sky, scattered once and diffusely: nothing else may shine, and nothing be seen through.",
+    limits: "Light of a uniform sky, scattered once and diffusely: nothing else may emit light, and nothing be seen through.",
     sources: &[sources::ZHUKOV_1998.whole()],
     shaders: &["shaders/techniques/ambient/"],
     path_set: Some("bounces=0..1,lobes=diffuse+reflection+transmission"),
@@ -28,7 +28,7 @@ const ROW: Row = Row {
 
 pub(super) const CARD: Card = Card {
     id: "ambient",
-    summary: "ambient occlusion: what a uniform sky sends to surfaces directly, by a ray for each pixel and frame",
+    summary: "ambient occlusion: what a uniform sky sends to surfaces directly, by a ray over the hemisphere for each pixel and frame",
     rows: &[&[ROW]],
     bias: Bias::Unbiased,
     needs: &[],
@@ -37,7 +37,7 @@ pub(super) const CARD: Card = Card {
     refusals: |scene| {
         reasons(&[
             (scene.environment != EnvironmentUse::Constant, "the sky is not uniform"),
-            (scene.shines() || scene.has_unlit, "more shines than the sky"),
+            (scene.shines() || scene.has_unlit, "there are emitters besides the sky"),
             (!scene.is_opaque(), "surfaces let light through"),
             (scene.media.any(), "it has participating media"),
         ])
@@ -48,9 +48,14 @@ pub(super) const CARD: Card = Card {
     create: |gpu, scene, view, _| Accumulated::boxed(gpu, view, Ambient::new(gpu, scene)?),
 };
 
-/// The kernel, for a scene, and the steps that a ray takes at most.
+/// The kernel, for a scene.
 #[derive(Debug)]
-pub struct Ambient(Arc<GpuScene>, ComputePipeline<kernel::Kernel>, u64);
+pub struct Ambient {
+    scene: Arc<GpuScene>,
+    pipeline: ComputePipeline<kernel::Kernel>,
+    /// Steps that a ray takes at most.
+    steps: u64,
+}
 
 impl Ambient {
     /// Specializes the kernel.
@@ -62,25 +67,33 @@ impl Ambient {
         let pipeline = gpu.compute_pipeline(&surface_spec!(kernel, scene, {
             index_quota: index.quota, index_kind: index.kind, ..Default::default()
         }))?;
-        Ok(Self(scene, pipeline, index.steps))
+        let steps = index.steps;
+        Ok(Self { scene, pipeline, steps })
     }
 }
 
 impl FrameMethod for Ambient {
     fn parts(&mut self, gpu: &Gpu, _: &Camera, [width, height]: [u32; 2]) -> Result<u32> {
-        Ok(Part::count(gpu, 2 * self.2 * u64::from(width) * u64::from(height)))
+        Ok(Part::count(gpu, 2 * self.steps * u64::from(width) * u64::from(height)))
     }
 
     fn record(&mut self, recorder: &mut Recorder, frame: &Frame<'_>, target: &FrameTarget<'_>) -> Result<()> {
-        let [lower, upper] = self.0.bounds().map(|corner| corner.to_array());
+        let [lower, upper] = self.scene.bounds().map(|corner| corner.to_array());
         let camera = CameraFrame::new(frame.camera, target.size)?.rays(target.size);
-        let (part, seed, radiance) = (frame.part.range(target.pixels()?), frame.seed, target.radiance.view());
-        #[rustfmt::skip]
-        let push = kernel::Push { camera, frame: frame.number, seed, first: part.start, lower, upper };
-        let groups = self.1.groups_over(part.len() as u32);
+        let (part, radiance) = (frame.part.range(target.pixels()?), target.radiance.view());
+        let push = kernel::Push {
+            camera,
+            frame: frame.number,
+            seed: frame.seed,
+            first: part.start,
+            lower,
+            upper,
+        };
+        let groups = self.pipeline.groups_over(part.len() as u32);
         recorder.pass("ambient: shade", |pass| {
-            let (set, index, scene) = (kernel::Set0 { radiance }, self.0.index_set(), self.0.scene_set());
-            pass.dispatch(&self.1, &[&set, &index, &scene], &push, groups)
+            let set = kernel::Set0 { radiance };
+            let (index, scene) = (self.scene.index_set(), self.scene.scene_set());
+            pass.dispatch(&self.pipeline, &[&set, &index, &scene], &push, groups)
         })
     }
 
@@ -89,6 +102,6 @@ impl FrameMethod for Ambient {
     }
 
     fn pipelines(&self) -> Vec<PipelineInfo> {
-        vec![self.1.info()]
+        vec![self.pipeline.info()]
     }
 }

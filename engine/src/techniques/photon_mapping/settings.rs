@@ -72,8 +72,7 @@ crate::settings! {
         pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons per pass";
         /// Kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials.
         ///
-        /// Footprints are worth their time only where no one radius suits the whole picture: elsewhere fixed kernels reach the same error 1.5 to 6 times
-        /// sooner with the defaults below, and the experiment photon-defaults measures both.
+        /// Footprints are worth their time only where no one radius suits the whole picture; the experiment `photon-defaults` measures both.
         pub shape: KernelShape = KernelShape::Fixed;
         /// Gathers so many of the photons nearest to each point under one kernel that reaches to the last of them, fewer as passes go on, down
         /// to 2; with 0 photons have kernels of their own.
@@ -113,9 +112,8 @@ crate::settings! {
         /// Points query the map one by one, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, the last
         /// bits may differ.
         ///
-        /// With neighbours, where a quota is an error, points that ask together meet it sooner. Packets are no default since they often lose: on
-        /// the software driver they save 8 to 16 % of the time of queries in closed rooms, where points of a subgroup lie in the same kernels, and
-        /// cost up to 26 % elsewhere (experiment `photon-queues`).
+        /// With neighbours, where a quota is an error, points that ask together meet it sooner. Packets are no default since they often lose
+        /// (experiment `photon-queues`).
         pub query: MapQuery = MapQuery::Single;
         /// Invocations of queries serve every path under way, or only those that query the map, found by stream compaction or in blocks that
         /// subgroups collect; changes pictures only as query does.

@@ -60,11 +60,11 @@ pub(in crate::techniques) const CARD: Card = Card {
 fn refusals(profile: &SceneProfile) -> Vec<String> {
     let placed = profile.lights.point + profile.lights.spot;
     let lights = placed + profile.lights.directional;
-    let shines = profile.has_area_lights() || profile.has_unlit;
+    let emits = profile.has_area_lights() || profile.has_unlit;
     let all = [
         (
-            shines,
-            "surfaces shine, and what they send to others is not shown".to_owned(),
+            emits,
+            "surfaces emit light, and what they send to others is not shown".to_owned(),
         ),
         (
             profile.has_transmission(),

@@ -23,7 +23,7 @@
 //! There are two ways to use it: [`Preview`], for hosts that move lights and surfaces, light parts by probes of their own and show one frame each time; and [`PreviewMethod`],
 //! a [`FrameMethod`](super::FrameMethod), which is the technique `preview`. That one sees each frame through another place of its pixels, and of the lens,
 //! so that edges and what is out of focus converge as frames add up; the environment is its probe. It refuses scenes whose light it would leave out:
-//! those where surfaces shine, those with media, and those where light passes through surfaces; and those with modified Phong surfaces, which both
+//! those where surfaces emit light, those with media, and those where light passes through surfaces; and those with modified Phong surfaces, which both
 //! ways refuse where there are probes, since these are filtered by GGX lobes.
 
 mod card;

@@ -1,11 +1,12 @@
 //! Rays along axes, whose directions have zeros of either sign.
 
 use clerestory::Result;
+use clerestory::accel::Ray;
 use clerestory::scene::load;
 use glam::{DVec3, Vec3};
 
 use crate::random::Random;
-use crate::rays::{RaySet, ray};
+use crate::rays::RaySet;
 use crate::scenes::{SMALL, lattice, orthographic};
 use crate::{Easel, HardCase, Judgement};
 
@@ -27,11 +28,11 @@ pub(super) const CASE: HardCase = HardCase {
         for i in 0..600 {
             let (from, to) = (point(), point());
             let axis = axes[i % 6];
-            rays.push(ray(from, axis));
-            rays.push(ray(from, to - from));
-            rays.push(ray(from + axis * 7.0, -axis * 1e-20));
+            rays.push(Ray::new(from, axis));
+            rays.push(Ray::new(from, to - from));
+            rays.push(Ray::new(from + axis * 7.0, -axis * 1e-20));
             let signed = |sign: u32, v: f32| if v == 0.0 && i as u32 & sign != 0 { -0.0 } else { v };
-            rays.push(ray(
+            rays.push(Ray::new(
                 from,
                 Vec3::new(signed(1, axis.x), signed(2, axis.y), signed(4, axis.z)),
             ));

@@ -1,10 +1,11 @@
 //! NaN and infinity in what a scene holds.
 
+use clerestory::accel::Ray;
 use clerestory::scene::{Environment, LightKind, Medium, Phase, Scene, load};
 use clerestory::{Error, Result};
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::rays::{RaySet, awkward_rays, ray};
+use crate::rays::{RaySet, awkward_rays};
 use crate::scenes::{furnace, lattice};
 use crate::{Easel, HardCase, Judgement};
 
@@ -29,9 +30,9 @@ pub(super) const CASE: HardCase = HardCase {
             Vec3::splat(1e30),
             Vec3::new(0.0, 1e-38, 0.0),
         ];
-        rays.extend(directions.map(|direction| ray(Vec3::ZERO, direction)));
-        rays.push(ray(Vec3::splat(f32::NAN), Vec3::X));
-        rays.push(ray(Vec3::splat(1e20), Vec3::NEG_ONE));
+        rays.extend(directions.map(|direction| Ray::new(Vec3::ZERO, direction)));
+        rays.push(Ray::new(Vec3::splat(f32::NAN), Vec3::X));
+        rays.push(Ray::new(Vec3::splat(1e20), Vec3::NEG_ONE));
         vec![RaySet {
             what: "what is not a ray".into(),
             triangles,

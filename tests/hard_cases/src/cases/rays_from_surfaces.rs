@@ -1,12 +1,13 @@
 //! Rays that start on surfaces, edges and corners.
 
 use clerestory::Result;
+use clerestory::accel::Ray;
 use clerestory::scene::Camera;
 use glam::DVec3;
 
 use crate::easel::finish;
 use crate::random::Random;
-use crate::rays::{RaySet, ray};
+use crate::rays::RaySet;
 use crate::scenes::{furnace, soup};
 use crate::{Easel, HardCase, Judgement};
 
@@ -34,9 +35,9 @@ pub(super) const CASE: HardCase = HardCase {
             let [a, b, c] = random.choose(&triangles);
             let other = random.choose(&triangles)[0];
             for from in [a, (a + b) * 0.5, (a + b + c) / 3.0] {
-                rays.push(ray(from, random.direction()));
-                rays.push(ray(from, other - from));
-                rays.push(ray(from, b - a));
+                rays.push(Ray::new(from, random.direction()));
+                rays.push(Ray::new(from, other - from));
+                rays.push(Ray::new(from, b - a));
             }
         }
         vec![RaySet {

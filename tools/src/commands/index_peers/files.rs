@@ -1,7 +1,7 @@
 //! What `clerestory index --peers` writes: tables as Markdown, JSON and CSV, charts of rates and of where the time goes, and its part of the page of results.
 
 use clerestory::Error;
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory_tools::experiments::bars::{self, Bar, Group, Row};
 use clerestory_tools::experiments::table::Table;
 use clerestory_tools::page::Block;

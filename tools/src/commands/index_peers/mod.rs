@@ -322,15 +322,9 @@ fn take_turns(contenders: &mut [Contender<'_>], rays: &[Vec<Ray>; 2], repeat: u3
 
 /// Primary rays, and one that leaves what each of them meets.
 fn rays_of(index: &Bvh2, triangles: &[[Vec3; 3]], primary: &[(Vec3, Vec3)]) -> [Vec<Ray>; 2] {
-    let ray = |origin: Vec3, direction: Vec3| Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
-    };
     let (low, high) = bounds_of(triangles);
     let offset = RELATIVE_OFFSET * (high - low).max_element();
-    let primary: Vec<Ray> = primary.iter().map(|(o, d)| ray(*o, *d)).collect();
+    let primary: Vec<Ray> = primary.iter().map(|(o, d)| Ray::new(*o, *d)).collect();
     let leave = |(i, from): (usize, &Ray)| {
         let hit = index.closest_hit(from);
         let [a, b, c] = *triangles.get(hit.triangle as usize)?;
@@ -340,7 +334,7 @@ fn rays_of(index: &Bvh2, triangles: &[[Vec3; 3]], primary: &[(Vec3, Vec3)]) -> [
         let hash = pcg3d(UVec3::new(i as u32, 0, 1));
         let around = square_to_sphere(DVec2::new(unit_float(hash.x), unit_float(hash.y))).as_vec3();
         let origin = Vec3::from(from.origin) + hit.t * direction + offset * normal;
-        Some(ray(origin, (normal + around).normalize_or(normal)))
+        Some(Ray::new(origin, (normal + around).normalize_or(normal)))
     };
     let diffuse = primary.par_iter().enumerate().filter_map(leave).collect();
     [primary, diffuse]

@@ -27,11 +27,11 @@ impl Interruptible {
         Ok(Self { bar, stop })
     }
 
-    /// Renders pilots and chooses. A wish to stop ends the pilots half a second later at most, and the picture after its first step.
+    /// Renders pilots and chooses. A stop request ends the pilots half a second later at most, and the picture after its first step.
     pub fn plan(&self, renderer: &Renderer, options: &RenderOptions, goal: Goal) -> Outcome<Plan> {
         self.bar.set_message("pilot pictures…");
         self.bar.enable_steady_tick(output::TICK);
-        Ok(plan::plan(renderer, options, goal, &mut || !self.stop.wished())?)
+        Ok(plan::plan(renderer, options, goal, &mut || !self.stop.requested())?)
     }
 
     /// Renders until done, out of time or told to stop; says whether it was told. The first step is always done.
@@ -51,13 +51,13 @@ impl Interruptible {
             let first = *first.get_or_insert(progress);
             self.bar.set_position((progress.fraction * LENGTH as f64) as u64);
             self.bar.set_message(message(first, progress));
-            if self.stop.wished() {
+            if self.stop.requested() {
                 break;
             }
         }
         let rendered = rendering.finish()?;
-        // A wish that came when all samples were there has stopped nothing.
-        let interrupted = self.stop.wished() && rendered.report.stopped_early;
+        // A request that came when all samples were there has stopped nothing.
+        let interrupted = self.stop.requested() && rendered.report.stopped_early;
         Ok((rendered, interrupted))
     }
 }

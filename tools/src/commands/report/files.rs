@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use clerestory::Error;
-use clerestory::film::{atomic, png};
+use clerestory::atomic;
+use clerestory::film::png;
 use clerestory_tools::experiments::findings::Findings;
 use clerestory_tools::experiments::reference::slug;
 use clerestory_tools::experiments::results::Results;

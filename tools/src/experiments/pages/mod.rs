@@ -11,7 +11,7 @@ mod stored;
 
 use std::path::Path;
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::{Error, Result};
 
 pub use page::{FILE as PAGE, File, files};

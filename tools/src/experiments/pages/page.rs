@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clerestory::Result;
-use clerestory::film::atomic;
+use clerestory::atomic;
 
 use super::stored::{Stored, findings};
 use crate::experiments::Experiment;

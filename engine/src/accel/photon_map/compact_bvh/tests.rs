@@ -4,7 +4,7 @@ use crate::accel::lbvh::SortedCodes;
 use crate::accel::lbvh::hard_boxes;
 use crate::accel::lbvh::radix_tree::hierarchy;
 use crate::accel::sweep::{area_sweep_tree, volume_sweep_tree};
-use crate::accel::test_support::{Random, U, brute_force, ray};
+use crate::accel::test_support::{Random, U, brute_force};
 use crate::accel::triangle::{intersect_triangle, ray_shear};
 use crate::accel::{Hit, LeafRule};
 
@@ -239,7 +239,7 @@ fn no_layout_culls_what_the_triangle_test_reports() {
         // Rather along the plane than across it: there reported distances err most.
         let mut direction = random.direction();
         direction[i % 3] *= 0.3;
-        let endless = ray(place - random.magnitude(-6, 2) * direction, direction);
+        let endless = Ray::new(place - random.magnitude(-6, 2) * direction, direction);
         let expected = brute_force(&triangles, |_| true, &endless);
         if !expected.is_hit() {
             continue;
@@ -289,7 +289,7 @@ fn a_million_queries_visit_the_same_leaves() {
     let mix = |hash: u64, leaf: u32| (hash ^ u64::from(leaf)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     for _ in 0..1_000_000 {
         let (point, direction) = (random.vector(), random.direction());
-        let ray = ray(point, direction);
+        let ray = Ray::new(point, direction);
         let mut hashes = [0u64; 4];
         complete.point_query(point, &mut totals[0], |leaf| hashes[0] = mix(hashes[0], leaf));
         compact.point_query(point, &mut totals[1], |leaf| hashes[1] = mix(hashes[1], leaf));

@@ -256,12 +256,7 @@ fn copied(context: &Context<'_>, model: &DeviceModel, size: u32) -> Result<Copie
 fn cheapest_rays(gpu: &Gpu, side: u32) -> Result<(RayTracer, Vec<Ray>)> {
     let scene = scene::load(CHEAPEST)?;
     let index = Bvh2::build(&geometry::triangles(&scene), &Bvh2Settings::default())?;
-    let ray = |(origin, direction): (glam::Vec3, glam::Vec3)| Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
-    };
+    let ray = |(origin, direction): (glam::Vec3, glam::Vec3)| Ray::new(origin, direction);
     let rays = geometry::camera_rays(scene.require_camera(None)?, side)?;
     let tracer = RayTracer::new(gpu, &index, &TraceSettings::ray_per_thread())?;
     Ok((tracer, rays.into_iter().map(ray).collect()))

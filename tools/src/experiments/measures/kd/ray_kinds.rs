@@ -72,7 +72,7 @@ impl Place<'_> {
         let axis = self.below(3);
         let mut direction = Vec3::new(self.sign(), self.sign(), self.sign()) * 0.0;
         direction[axis] = self.sign();
-        ray(origin, direction)
+        Ray::new(origin, direction)
     }
 
     /// Within a plane across an axis that holds a corner, as the planes of kd-trees do.
@@ -81,7 +81,7 @@ impl Place<'_> {
         let axis = self.below(3);
         origin[axis] = self.corner()[axis];
         direction[axis] = 0.0 * self.sign();
-        ray(origin, direction)
+        Ray::new(origin, direction)
     }
 
     /// To a corner or a point of an edge from anywhere, or from it in any direction; of unit length, or as long as the way.
@@ -90,11 +90,11 @@ impl Place<'_> {
         let along = [0.0, 0.5, self.unit()][self.below(3)];
         let target = a + along * (b - a);
         if i.is_multiple_of(5) {
-            return ray(target, self.direction());
+            return Ray::new(target, self.direction());
         }
         let origin = self.within();
         let way = target - origin;
-        ray(
+        Ray::new(
             origin,
             if i.is_multiple_of(2) {
                 way.normalize_or(Vec3::X)
@@ -102,15 +102,6 @@ impl Place<'_> {
                 way
             },
         )
-    }
-}
-
-fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.into(),
-        t_min: 0.0,
-        direction: direction.into(),
-        t_max: f32::INFINITY,
     }
 }
 
@@ -135,7 +126,7 @@ pub fn rays(
     };
     let side = (of_each as f64).sqrt().ceil() as u32;
     let seen = geometry::camera_rays(camera, side)?.into_iter().take(of_each);
-    let camera: Vec<Ray> = seen.map(|(origin, direction)| ray(origin, direction)).collect();
+    let camera: Vec<Ray> = seen.map(|(origin, direction)| Ray::new(origin, direction)).collect();
     let ends = camera.iter().filter_map(|ray| {
         let hit = index.closest_hit(ray);
         hit.is_hit()
@@ -159,7 +150,7 @@ pub fn rays(
         };
         (0..of_each).map(one).collect()
     };
-    let interior = of(|place, _| ray(place.within(), place.direction()));
+    let interior = of(|place, _| Ray::new(place.within(), place.direction()));
     let axis_parallel = of(|place, _| place.axis_parallel());
     let in_plane = of(|place, _| place.in_plane());
     let seam = of(|place, i| place.seam(i));

@@ -60,12 +60,7 @@ fn live() -> Result<Box<dyn Fn(DVec3) -> f64 + Sync>> {
     let origin = lower + Vec3::new(0.55, 0.6, 0.52) * (upper - lower);
     let index = Bvh2::build(&triangles, &Default::default())?;
     Ok(Box::new(move |d| {
-        let hit = index.closest_hit(&Ray {
-            origin: origin.to_array(),
-            t_min: 0.0,
-            direction: d.as_vec3().to_array(),
-            t_max: f32::INFINITY,
-        });
+        let hit = index.closest_hit(&Ray::new(origin, d.as_vec3()));
         if hit.triangle == NO_HIT {
             return sky(d);
         }

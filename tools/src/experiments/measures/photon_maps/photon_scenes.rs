@@ -138,12 +138,7 @@ impl Surfaces {
 
     /// What a ray of unit direction meets first.
     pub fn meet(&self, origin: Vec3, direction: Vec3) -> Option<Intersection> {
-        let ray = Ray {
-            origin: origin.into(),
-            t_min: 0.0,
-            direction: direction.into(),
-            t_max: f32::INFINITY,
-        };
+        let ray = Ray::new(origin, direction);
         let hit: Hit = self.index.closest_hit(&ray);
         let [a, b, c] = *self.triangles.get(hit.triangle as usize)?;
         let normal = (b - a).cross(c - a).normalize_or_zero();

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use clerestory::film::atomic;
+use clerestory::atomic;
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
 use clerestory::techniques::photon_mapping::{MapperCounts, PhotonSettings};

@@ -176,12 +176,7 @@ impl Case {
     fn towards(&self, random: &mut Random, target: DVec3) -> Ray {
         let origin = (target + random.direction() * self.distance).as_vec3();
         let direction = (target - origin.as_dvec3()).normalize().as_vec3();
-        Ray {
-            origin: origin.into(),
-            t_min: 0.0,
-            direction: direction.into(),
-            t_max: f32::INFINITY,
-        }
+        Ray::new(origin, direction)
     }
 }
 

@@ -342,7 +342,7 @@ fn spheres(context: &Context<'_>, gpu: &Gpu, python: &Path) -> Result<(Vec<Row>,
     Ok((rows, is_shown))
 }
 
-/// All forms of a sphere; those that are there when somebody wishes to stop.
+/// All forms of a sphere; those that are there when somebody asks to stop.
 fn compare(
     context: &Context<'_>,
     gpu: &Gpu,

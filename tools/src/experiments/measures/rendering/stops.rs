@@ -1,4 +1,4 @@
-//! How long renderings take to stop: by a budget of time, and by a wish between two steps, on scenes made to go on for ever and on the hard cases.
+//! How long renderings take to stop: by a budget of time, and by a request between two steps, on scenes that would never end and on the hard cases.
 //!
 //! Oracle: the clock of who waits. A rendering before each one that is measured has compiled the kernels.
 
@@ -41,7 +41,7 @@ fn sparse_grid(density: f32) -> Scene {
     scene
 }
 
-/// Scenes made to go on for ever.
+/// Scenes that would never end.
 const HOSTILE: [(&str, MakeScene); 4] = [
     ("a thousand equal triangles", || Ok(equal_triangles(1000))),
     ("a million equal triangles", || Ok(equal_triangles(1_000_000))),
@@ -71,7 +71,7 @@ rows! {
         prepared: f64 = "until the first step (s)",
         longest: f64 = "longest step (s)",
         read: f64 = "picture and report (s)",
-        cancelled: f64 = "from a wish to stop to the picture, at most (s)",
+        cancelled: f64 = "from a stop request to the picture, at most (s)",
         steps: u64 = "steps",
         least: u64 = "samples of a pixel, at least",
     }
@@ -86,7 +86,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.ended.into(),
     ),
     Criterion::each(
-        "a wish to stop ends within: seconds",
+        "a stop request ends within: seconds",
         Bound::AtMost(1.0),
         |row: &Row| row.cancelled.into(),
     ),
@@ -167,7 +167,7 @@ impl Study for Found {
         Findings::of(self, CRITERIA)
             .headline("end of the rendering that took longest of those with a budget of 2 s (s)", longest.map(Measured::from))
             .note(
-                "Techniques that refuse a scene have no row. A wish to stop comes at the worst time: when the technique begins to be prepared, or with the longest \
+                "Techniques that refuse a scene have no row. A stop request comes at the worst time: when the technique begins to be prepared, or with the longest \
                  step, and the picture is read behind it. Grids of more than 2²⁴ tentative collisions a way are refused before anything is rendered.",
             )
     }
