@@ -76,7 +76,7 @@ fn chain(levels: u32) -> Case {
             for t_min in [0.0, 3.0, levels as f32 - 2.0] {
                 rays.push(Ray {
                     t_min,
-                    ..ray(Vec3::new(start, side, side), direction)
+                    ..Ray::new(Vec3::new(start, side, side), direction)
                 });
             }
         }

@@ -197,7 +197,7 @@ pub fn awkward_rays(seed: u64, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray
                 _ => Ray {
                     t_min: 0.25,
                     t_max: 1.0,
-                    ..ray(outside, a[0] - outside)
+                    ..Ray::new(outside, a[0] - outside)
                 },
             }
         })

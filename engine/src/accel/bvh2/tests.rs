@@ -133,7 +133,7 @@ pub(in crate::accel) fn hard_rays(random: &mut Random, triangles: &[[Vec3; 3]], 
             _ => Ray {
                 t_min: 0.25,
                 t_max: 1.0,
-                ..ray(outside, a[0] - outside)
+                ..Ray::new(outside, a[0] - outside)
             },
         };
         rays.push(r);

@@ -170,8 +170,8 @@ fn caches_change_where_work_is_done_and_no_hit() {
 fn a_leaf_that_waits_lets_its_ray_go_on_to_the_next() {
     // Along the axis each leaf lies behind one plane more; against it the last leaf lies behind all of them, and the others beside the way.
     let (tree, _) = chain(32);
-    let along = ray(Vec3::new(-1.0, 0.1, 0.1), Vec3::X);
-    let against = ray(Vec3::new(34.0, 0.1, 0.1), -Vec3::X);
+    let along = Ray::new(Vec3::new(-1.0, 0.1, 0.1), Vec3::X);
+    let against = Ray::new(Vec3::new(34.0, 0.1, 0.1), -Vec3::X);
     let waits = KdCaches {
         postpone: true,
         ..KdCaches::default()

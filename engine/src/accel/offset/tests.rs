@@ -144,7 +144,7 @@ fn shadow_segments_meet_neither_end_but_what_is_between() {
         let (start, direction) = shadow_segment(&from, n, &to, normal(&b));
         let segment = Ray {
             t_max: 1.0,
-            ..ray(start, direction)
+            ..Ray::new(start, direction)
         };
         assert!(
             !meets(&a, &segment) && !meets(&b, &segment),
@@ -196,7 +196,7 @@ fn chords_of_a_convex_tessellation_are_free() {
             let (start, direction) = shadow_segment(&from, from_normal, &to, to_normal);
             let segment = Ray {
                 t_max: 1.0,
-                ..ray(start, direction)
+                ..Ray::new(start, direction)
             };
             assert!(!bvh.any_hit(&segment), "radius {radius} at {centre}: {segment:?}");
         }

@@ -150,7 +150,7 @@ fn rays_visit_the_same_leaves_in_the_same_order() {
             let (origin, direction, end) = hard_ray(&mut random, &boxes, i);
             let ray = Ray {
                 t_max: end,
-                ..ray(origin, direction)
+                ..Ray::new(origin, direction)
             };
             for shrinks in [false, true] {
                 let mut ends = [end; 2];

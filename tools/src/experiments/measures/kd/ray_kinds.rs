@@ -161,7 +161,7 @@ pub fn rays(
         };
         Ray {
             t_min: DIFFUSE_BEGIN * size,
-            ..ray(origin, place.direction())
+            ..Ray::new(origin, place.direction())
         }
     });
     Ok([camera, interior, diffuse.collect(), axis_parallel, in_plane, seam])
