@@ -114,6 +114,8 @@ pub struct FrameReport {
     pub spp: u32,
     /// Fewest and most samples that a pixel has received.
     pub samples: [u32; 2],
+    /// Samples that a pixel has received on average.
+    pub mean_samples: f64,
     /// Seed.
     pub seed: u32,
     /// True when it was stopped before all samples were there.
@@ -452,7 +454,11 @@ impl Rendering {
             path_set: Some(report.path_set.clone()),
             settings: Some(report.settings.to_string()),
             seed: Some(u64::from(report.seed)),
-            spp: Some(u64::from(report.samples[1])),
+            // Where some pixels have more than were asked for, others have fewer.
+            spp: Some(match report.samples {
+                [_, most] if most > report.spp => report.mean_samples.round() as u64,
+                [_, most] => most.into(),
+            }),
             device: Some(report.device.clone()),
             driver: Some(report.driver.clone()),
             engine_version: Some(report.engine_version.clone()),
@@ -484,6 +490,7 @@ impl Rendering {
             size: self.options.size,
             spp: self.options.spp,
             samples: [least.min(greatest) as u32, greatest as u32],
+            mean_samples: samples.iter().map(|count| f64::from(*count)).sum::<f64>() / samples.len().max(1) as f64,
             seed: self.options.seed,
             stopped_early: !self.finished,
             non_finite_samples,

@@ -16,6 +16,9 @@ layout(constant_id = 19) const bool HAS_MEDIA = true;
 layout(constant_id = 18) const bool RESUMES = false;
 // Loop iterations of a ray from which on they count as work of the submission.
 layout(constant_id = 27) const uint WORK_LEAST = WORK_UNIT;
+// Walks have numbers of their own.
+layout(constant_id = 28) const bool NUMBERED = false;
+#define CLERESTORY_NUMBERED NUMBERED
 
 layout(push_constant, scalar) uniform Push {
     WalkKey key;

@@ -159,6 +159,9 @@ layout(set = 0, binding = 21, scalar) restrict buffer WalkMediumCounters {
     uint second_rays[2];  // of places that have one already
 } medium_counters;
 
+// Sequence and place in it of the walk in each slot, where walks have numbers of their own instead of those of a WalkKey; elsewhere some other buffer is bound.
+layout(set = 0, binding = 22) uniform utextureBuffer walk_numbers_in;
+
 #define COUNT_MEDIUM(COUNTER, AMOUNT) { \
     uint counted_amount = AMOUNT; \
     if (counted_amount > 0u && atomicAdd(medium_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \

@@ -2,10 +2,10 @@
 
 use clerestory::film::{GpuFilm, NonFiniteSamples};
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::sets::{PathAovSet, WaveSet};
-use clerestory::gpu::shaders::techniques::path::path_resolve;
-use clerestory::gpu::shaders::types::GatheredLight;
-use clerestory::gpu::{Access, Category};
+use clerestory::gpu::shaders::sets::{PathAovSet, PathShareSet, WaveSet};
+use clerestory::gpu::shaders::techniques::path::{path_resolve, path_resolve_shares};
+use clerestory::gpu::shaders::types::{GatheredLight, PathShare};
+use clerestory::gpu::{Access, Category, Pass};
 use clerestory_tests::with_gpu;
 
 #[test]
@@ -55,6 +55,7 @@ fn they_are_counted_by_kind_and_left_out() {
             walk_airlight_rays: none,
             walk_shadow_states: none,
             medium_counters: none,
+            walk_numbers_in: &texels,
         };
         let aovs = PathAovSet { path_aovs: none };
         let spec = path_resolve::Spec { write_aovs: false };
@@ -64,19 +65,61 @@ fn they_are_counted_by_kind_and_left_out() {
             pixel_count: 2,
             sample_count: SAMPLES,
         };
-        let mut recorder = gpu.recorder("resolve").unwrap();
-        recorder
-            .pass("resolve", |pass| {
-                pass.dispatch(&kernel, &[&wave, &aovs, &film.bands()[0].set()], &push, [1, 1, 1])?;
-                pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
-                Ok(())
-            })
-            .unwrap();
-        recorder.submit().unwrap().wait().unwrap();
-        let (picture, left_out) = film.picture().unwrap();
-        assert_eq!(left_out, NonFiniteSamples { nan: 2, infinite: 2 });
-        let values = |name: &str| picture.layer(name).unwrap().values();
-        assert_eq!(values("samples"), [1.0, 3.0]);
-        assert_eq!(values("radiance"), [1.0, 2.0, 3.0, 2.0, 2.0, 2.0]);
+        let groups = [1, 1, 1];
+        let expect = |film: &GpuFilm, record: &dyn Fn(&mut Pass<'_>) -> clerestory::Result<()>| {
+            let mut recorder = gpu.recorder("resolve").unwrap();
+            recorder
+                .pass("resolve", |pass| {
+                    record(pass)?;
+                    pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
+                    Ok(())
+                })
+                .unwrap();
+            recorder.submit().unwrap().wait().unwrap();
+            let (picture, left_out) = film.picture().unwrap();
+            assert_eq!(left_out, NonFiniteSamples { nan: 2, infinite: 2 });
+            let values = |name: &str| picture.layer(name).unwrap().values();
+            assert_eq!(values("samples"), [1.0, 3.0]);
+            assert_eq!(values("radiance"), [1.0, 2.0, 3.0, 2.0, 2.0, 2.0]);
+        };
+        expect(&film, &|pass| {
+            pass.dispatch(&kernel, &[&wave, &aovs, &film.bands()[0].set()], &push, groups)
+        });
+
+        // Adaptive samples: three of the first pixel, five of the second.
+        let places = [0, 3, 8].map(|first_place| PathShare {
+            first_place,
+            first_sample: 0,
+        });
+        let buffer = gpu.buffer_with("shares", Category::Work, &places).unwrap();
+        let shares = PathShareSet {
+            path_shares: buffer.view(),
+        };
+        let spec = path_resolve_shares::Spec { write_aovs: false };
+        let kernel = gpu.compute_pipeline::<path_resolve_shares::Kernel>(&spec).unwrap();
+        let film = GpuFilm::new(gpu, [2, 1], false).unwrap();
+        let push = path_resolve_shares::Push {
+            first_pixel: 0,
+            pixel_count: 2,
+            first_place: 0,
+            slot_count: 8,
+        };
+        expect(&film, &|pass| {
+            pass.dispatch(&kernel, &[&wave, &aovs, &shares, &film.bands()[0].set()], &push, groups)
+        });
+        // Behind place 100 of a round, of which the wave has the last eight.
+        let places = [100, 103, 108].map(|first_place| PathShare {
+            first_place,
+            first_sample: 0,
+        });
+        gpu.upload(&buffer, 0, &places).unwrap();
+        let film = GpuFilm::new(gpu, [2, 1], false).unwrap();
+        let push = path_resolve_shares::Push {
+            first_place: 100,
+            ..push
+        };
+        expect(&film, &|pass| {
+            pass.dispatch(&kernel, &[&wave, &aovs, &shares, &film.bands()[0].set()], &push, groups)
+        });
     });
 }

@@ -388,6 +388,7 @@ mod tests {
         slope: 2.0 / 3.0,
         bias_exponent: 2.0 / 3.0,
         samples_a_pass: 1,
+        samples_least: 1,
         shares_noise: true,
     };
 

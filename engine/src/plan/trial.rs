@@ -329,8 +329,14 @@ impl<'a> Trial<'a> {
         } else {
             Truth::Neighbourhood
         };
-        // First samples are there for the bias alone.
-        let stages: Vec<&Stage> = self.stages.iter().filter(|stage| stage.spp > 1).chain(last).collect();
+        // First samples are there for the bias alone. What is known to fall otherwise tells the error only where nothing else does.
+        let telling = |stage: &&Stage| stage.spp >= self.law.samples_least;
+        let least = match self.stages.iter().chain(last).any(|stage| telling(&stage)) {
+            true => self.law.samples_least.max(2),
+            false => 2,
+        };
+        let stages = self.stages.iter().filter(|stage| stage.spp >= least);
+        let stages: Vec<&Stage> = stages.chain(last).collect();
         let pairs: Vec<Pair<'_>> = stages
             .iter()
             .map(|stage| {

@@ -29,6 +29,8 @@ pub struct Law {
     pub bias_exponent: f64,
     /// Samples per pixel, 1 or more, that are taken before anything shrinks: pictures with no more than these have the same bias.
     pub samples_a_pass: u32,
+    /// Samples per pixel from which on its error falls so: pictures of fewer do not show how.
+    pub samples_least: u32,
     /// Neighbouring pixels share their noise, as under a kernel, so that what is bright in one picture alone is not rare light that pixels around may
     /// get, too.
     pub shares_noise: bool,
@@ -40,6 +42,7 @@ impl Law {
         slope: 1.0,
         bias_exponent: 0.0,
         samples_a_pass: 1,
+        samples_least: 1,
         shares_noise: false,
     };
 }

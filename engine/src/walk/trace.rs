@@ -2,7 +2,7 @@
 //!
 //! One kernel a stage, specialized to the scene: what it lacks is not compiled in, and the bindings of what it lacks hold other buffers.
 
-use super::wave::stage_barrier;
+use super::wave::{WaveBuffers, stage_barrier};
 use crate::Result;
 use crate::gpu::shaders::constants::{NO_MEDIUM, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
@@ -49,7 +49,15 @@ pub(super) struct TracePipelines {
 
 impl TracePipelines {
     /// For rays that begin, or for those that a quota stopped.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, index_quota: u32, shadows: bool, resumes: bool) -> Result<Self> {
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        buffers: &WaveBuffers,
+        index_quota: u32,
+        shadows: bool,
+        resumes: bool,
+    ) -> Result<Self> {
+        let numbered = buffers.is_numbered();
         let work_least = work_least(gpu.caps().kind);
         let (profile, index_kind) = (scene.profile(), scene.index_traversal().kind());
         let (has_alpha, has_media) = (profile.has_alpha(), profile.media.any());
@@ -65,6 +73,7 @@ impl TracePipelines {
             index_kind,
             resumes,
             work_least,
+            numbered,
             ..Default::default()
         };
         let shadow = shadow::Spec {
@@ -79,6 +88,7 @@ impl TracePipelines {
             index_kind,
             resumes,
             work_least,
+            numbered,
             ..Default::default()
         };
         Ok(Self {

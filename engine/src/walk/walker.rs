@@ -185,7 +185,7 @@ impl Walker {
             (wanted, _) => wanted,
         };
         Ok(Self {
-            trace: TracePipelines::new(gpu, &scene, quota, options.shadows, false)?,
+            trace: TracePipelines::new(gpu, &scene, &buffers, quota, options.shadows, false)?,
             resume: None,
             compaction: Compaction::new(gpu)?,
             pace: Pace::new(gpu.caps().kind, bounces),
@@ -335,7 +335,14 @@ impl Walker {
         let resumes = wave.resumes && matches!(wave.next, Next::Hits | Next::Shadows);
         if resumes && self.resume.is_none() {
             let shadows = self.options.shadows;
-            self.resume = Some(TracePipelines::new(&self.gpu, &self.scene, self.quota, shadows, true)?);
+            self.resume = Some(TracePipelines::new(
+                &self.gpu,
+                &self.scene,
+                &self.buffers,
+                self.quota,
+                shadows,
+                true,
+            )?);
         }
         let trace = self.resume.as_ref().filter(|_| resumes).unwrap_or(&self.trace);
         let mut recorder = self.gpu.recorder(&format!("{} wave", self.options.name))?;

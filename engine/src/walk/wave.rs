@@ -83,6 +83,8 @@ pub struct WaveBuffers {
     chunks: Buffer,
     pub(super) readback: Buffer,
     pub(super) media: Option<MediaBuffers>,
+    /// Of walks that have some.
+    numbers: Option<TexelView>,
     needs: WaveNeeds,
     slots: u32,
 }
@@ -193,6 +195,7 @@ impl WaveBuffers {
                 size_of::<Status>() as u64,
             ))?,
             media: needs.media.then(|| MediaBuffers::new(gpu, slots, needs)).transpose()?,
+            numbers: None,
             needs,
             slots,
         })
@@ -208,13 +211,25 @@ impl WaveBuffers {
         self.needs
     }
 
+    /// Gives walks numbers of their own in place of those of a [`WalkKey`](super::WalkKey): by slot the sequence and the place in it that its random numbers are
+    /// keyed by, two words (`R32G32_UINT`), which the owner writes before anything is drawn. Sequences may then have differing numbers of walks. To be called before
+    /// a walker is made of the memory.
+    pub fn number_by(&mut self, numbers: TexelView) {
+        self.numbers = Some(numbers);
+    }
+
+    /// Whether walks have numbers of their own.
+    pub fn is_numbered(&self) -> bool {
+        self.numbers.is_some()
+    }
+
     /// What walks have gathered: a [`GatheredLight`] a slot.
     pub fn gathered(&self) -> BufferView<'_> {
         self.gathered.view()
     }
 
     /// Set 0 with the queues in the roles of a bounce of this parity. Without media nothing is read or written through the bindings for them, and some
-    /// other buffer stands there.
+    /// other buffer stands there; so it does without numbers.
     pub fn set(&self, parity: usize) -> WaveSet<'_> {
         let none = self.chunks.view();
         let media = |of: fn(&MediaBuffers) -> &Buffer| self.media.as_ref().map_or(none, |media| of(media).view());
@@ -241,6 +256,7 @@ impl WaveBuffers {
             walk_airlight_rays: media(|m| &m.airlight_rays),
             walk_shadow_states: media(|m| &m.shadow_states),
             medium_counters: media(|m| &m.counters),
+            walk_numbers_in: self.numbers.as_ref().unwrap_or(&self.flags),
         }
     }
 }

@@ -4,6 +4,9 @@
 
 #include "walk/wave.glsl"
 
+layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel and sample of its own: pixels have differing numbers of samples
+#define CLERESTORY_NUMBERED NUMBERED
+
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
     uint path_set;          // PathSet, packed

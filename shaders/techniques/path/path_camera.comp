@@ -11,6 +11,8 @@ layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL or SAMPLE
 layout(constant_id = 1) const bool HAS_LENS = true;
 layout(constant_id = 2) const bool ORTHOGRAPHIC = false;
 layout(constant_id = 3) const bool WRITE_AOVS = true;
+layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel and sample of its own: pixels have differing numbers of samples
+#define CLERESTORY_NUMBERED NUMBERED
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 
 #include "techniques/path/path_aovs.glsl"
@@ -32,7 +34,7 @@ layout(push_constant, scalar) uniform Push {
     float focus_distance;
     uint width;
     uint height;
-    uint pixel_count;
+    uint slot_count;
     uint interior;      // material of the body that the camera is inside of, or OUTSIDE
     WalkKey key;        // sequences are pixels, places in them samples
 } push;
@@ -41,7 +43,7 @@ layout(push_constant, scalar) uniform Push {
 
 void main() {
     uint slot = gl_GlobalInvocationID.x;
-    if (slot >= push.pixel_count * push.key.indices) {
+    if (slot >= push.slot_count) {
         return;
     }
     uint pixel = walk_sequence(slot);

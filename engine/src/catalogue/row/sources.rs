@@ -76,6 +76,7 @@ sources! {
     KHRONOS_MATERIALS_VOLUME = "khronos-materials-volume": "Khronos", "KHR_materials_volume", "glTF extension", 0;
     KHRONOS_SPIRV = "khronos-spirv": "Khronos", "SPIR-V Specification", "", 0;
     KHRONOS_VULKAN = "khronos-vulkan": "Khronos", "Vulkan 1.3 Specification", "", 0;
+    KIRK_ARVO_1991 = "kirk-arvo-1991": "D. Kirk, J. Arvo", "Unbiased Sampling Techniques for Image Synthesis", "SIGGRAPH", 1991;
     KNAUS_ZWICKER_2011 = "knaus-zwicker-2011": "C. Knaus, M. Zwicker", "Progressive Photon Mapping: A Probabilistic Approach", "ACM TOG 30(3)", 2011;
     KULLA_CONTY_2017 = "kulla-conty-2017": "C. Kulla, A. Conty", "Revisiting Physically Based Shading at Imageworks", "SIGGRAPH course notes", 2017;
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;
@@ -91,6 +92,7 @@ sources! {
     MILLER_2019 = "miller-2019": "B. Miller, I. Georgiev, W. Jarosz", "A Null-scattering Path Integral Formulation of Light Transport", "SIGGRAPH", 2019;
     MILLER_HOFFMAN_1984 = "miller-hoffman-1984": "G. Miller, C. R. Hoffman", "Illumination and Reflection Maps", "SIGGRAPH course notes", 1984;
     MOLLER_TRUMBORE_1997 = "moller-trumbore-1997": "T. Möller, B. Trumbore", "Fast, Minimum Storage Ray/Triangle Intersection", "JGT 2(1)", 1997;
+    NEYMAN_1934 = "neyman-1934": "J. Neyman", "On the Two Different Aspects of the Representative Method", "Journal of the Royal Statistical Society 97(4)", 1934;
     NOVAK_2014 = "novak-2014": "J. Novák, A. Selle, W. Jarosz", "Residual Ratio Tracking for Estimating Attenuation in Participating Media", "SIGGRAPH Asia", 2014;
     NUSSELT_1928 = "nusselt-1928": "W. Nusselt", "Graphische Bestimmung des Winkelverhältnisses bei der Wärmestrahlung", "Zeitschrift des VDI 72", 1928;
     OPENEXR = "openexr": "Academy Software Foundation", "Technical Introduction to OpenEXR", "", 0;

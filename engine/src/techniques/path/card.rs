@@ -11,18 +11,19 @@ use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resol
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
-use crate::settings::{SettingsDecl, TypedSettings};
+use crate::settings::{Settings, SettingsDecl, TypedSettings};
+use crate::techniques::path::adaptive::LIKE_PILOTS;
 use crate::techniques::path::unseen::unseen_by_eye_paths;
-use crate::techniques::path::{PathTracer, PathTracerSettings};
+use crate::techniques::path::{Adaptive, PathTracer, PathTracerSettings};
 use crate::techniques::skipped::skipped;
-use crate::techniques::{Bias, Card, Foresight, Skipped, Technique, Variant};
+use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant};
 use crate::transport::{COMPENSATION, METAL_LOBES, PathSet, SURFACE_FEATURES};
 
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "path",
     summary: "unidirectional path tracing with next-event estimation and multiple importance sampling",
-    rows: &[ROWS, super::ROWS],
+    rows: &[ROWS, super::ROWS, super::adaptive::ROWS],
     bias: Bias::Unbiased,
     needs: &[],
     kernels: &[&KERNELS],
@@ -49,6 +50,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     ],
     foresight: Foresight {
         misses: unseen_by_eye_paths,
+        law,
         ..Foresight::PLAIN
     },
     create: |gpu, scene, view, settings| {
@@ -58,6 +60,18 @@ pub(in crate::techniques) const CARD: Card = Card {
         Ok(Box::new(PathTracer::new(gpu, scene, view.camera, view.size, settings)?))
     },
 };
+
+/// With adaptive samples the error falls as that of independent ones does once pictures have a pilot that is a like part of their samples.
+fn law(settings: &Settings) -> Result<Law> {
+    let settings: PathTracerSettings = settings.read()?;
+    Ok(Law {
+        samples_least: match settings.adaptive {
+            Adaptive::Off => 1,
+            Adaptive::Relative | Adaptive::Absolute => LIKE_PILOTS,
+        },
+        ..Law::INDEPENDENT
+    })
+}
 
 /// What a picture may take, of whatever scene.
 pub(in crate::techniques) const KERNELS: [&ShaderInfo; 9] = [

@@ -12,6 +12,7 @@
 //! numbers) only, never on wave size, queue order or threads. Nothing is lost silently: rays that an iteration quota stops go on in a
 //! later dispatch, and samples that are not finite are counted and left out.
 
+mod adaptive;
 pub(super) mod card;
 mod pipelines;
 mod record;
@@ -21,16 +22,18 @@ mod wave;
 
 use std::sync::Arc;
 
+use self::adaptive::AdaptiveSamples;
 pub(super) use self::card::CARD;
 use self::pipelines::{Pipelines, camera_pipeline};
-use self::record::{EyeStages, record_resolve};
-pub use self::settings::PathTracerSettings;
+use self::record::{EyeStages, ResolveTarget, record_resolve};
+pub use self::settings::{Adaptive, PathTracerSettings};
 pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::Result;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
+use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::WALK_GROUP;
 use crate::gpu::shaders::types::{FilmAov, FilmPixel, PathAov};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Timings};
@@ -84,6 +87,8 @@ pub struct PathTracer {
     walker: Walker,
     aovs: Buffer,
     film: GpuFilm,
+    /// Where pixels get differing numbers of samples.
+    adaptive: Option<AdaptiveSamples>,
     /// The last whole wave, until it has reached the film.
     pending: Option<Wave>,
     /// The wave under way.
@@ -131,11 +136,22 @@ impl PathTracer {
         let band = film.bands().iter().map(|band| u64::from(band.pixels())).max();
         let pixel_bytes = size_of::<FilmPixel>().max(size_of::<FilmAov>()) as u64;
         let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
-        let (buffers, aovs) = WaveBuffers::within_memory(gpu, slots, needs, |slots| {
+        let numbered = settings.adaptive != Adaptive::Off;
+        let (mut buffers, (aovs, numbers)) = WaveBuffers::within_memory(gpu, slots, needs, |slots| {
             let bytes = size_of::<PathAov>() as u64 * if film.has_aovs() { u64::from(slots) } else { 0 };
             let aovs = gpu.buffer(&BufferDesc::storage("path aovs", bytes, Category::Work))?;
-            gpu.buffer(&reading).map(|_| aovs)
+            let numbers = numbered
+                .then(|| gpu.storage_texels("path numbers", Category::Work, vk::Format::R32G32_UINT, slots.into()));
+            let numbers = numbers.transpose()?;
+            gpu.buffer(&reading).map(|_| (aovs, numbers))
         })?;
+        let adaptive = match numbers {
+            Some(numbers) => {
+                buffers.number_by(numbers.clone());
+                Some(AdaptiveSamples::new(gpu, &settings, &film, numbers)?)
+            }
+            None => None,
+        };
         let options = WalkOptions {
             name: "path",
             shadows: needs.waiting,
@@ -154,6 +170,7 @@ impl PathTracer {
             walker,
             aovs,
             film,
+            adaptive,
             pending: None,
             in_flight: None,
             cursor: Cursor::default(),
@@ -173,8 +190,7 @@ impl PathTracer {
         self.pipelines.camera = pipeline;
         self.frame = frame;
         self.eye = camera.transform.translation;
-        (self.pending, self.in_flight) = (None, None);
-        self.cursor = Cursor::default();
+        self.begin_anew();
         Ok(())
     }
 
@@ -185,9 +201,17 @@ impl PathTracer {
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear()?;
         self.settings.seed = seed;
+        self.begin_anew();
+        Ok(())
+    }
+
+    /// Forgets which samples are there, the film being clear.
+    fn begin_anew(&mut self) {
         (self.pending, self.in_flight) = (None, None);
         self.cursor = Cursor::default();
-        Ok(())
+        if let Some(adaptive) = &mut self.adaptive {
+            adaptive.restart(&self.film);
+        }
     }
 
     /// Makes one submission towards `samples` samples per pixel, a bounded piece of work whatever the scene; `None` when all samples are there. A wave that takes
@@ -205,7 +229,7 @@ impl PathTracer {
         let mut in_flight = match self.in_flight.take() {
             Some(in_flight) => in_flight,
             None => {
-                let Some((wave, next)) = self.cursor.next_wave(&self.film, self.slots(), samples) else {
+                let Some((wave, next)) = self.next_wave(samples)? else {
                     return Ok(None);
                 };
                 let walks = self.walker.begin(wave.key(self.settings.seed), wave.paths())?;
@@ -220,6 +244,28 @@ impl PathTracer {
             self.in_flight = Some(in_flight);
         }
         Ok(Some(self.step_so_far(timings, samples)))
+    }
+
+    /// The next wave towards `samples` samples per pixel, and where the one after it begins.
+    fn next_wave(&mut self, samples: u32) -> Result<Option<(Wave, Cursor)>> {
+        let slots = self.slots();
+        let Some(adaptive) = &self.adaptive else {
+            return Ok(self.cursor.next_wave(&self.film, slots, samples));
+        };
+        let next = adaptive.next_wave(&self.cursor, &self.film, slots);
+        if next.is_some() {
+            return Ok(next);
+        }
+        // A round follows from what the film has of those before.
+        self.flush()?;
+        let Some(adaptive) = &mut self.adaptive else {
+            return Ok(None);
+        };
+        if !adaptive.begin_round(&self.film, slots, samples)? {
+            return Ok(None);
+        }
+        (self.cursor.band, self.cursor.in_band) = (0, 0);
+        Ok(adaptive.next_wave(&self.cursor, &self.film, slots))
     }
 
     /// What is there towards `samples` samples per pixel, after submissions that took `timings`.
@@ -257,7 +303,7 @@ impl PathTracer {
         self.in_flight.is_some()
     }
 
-    /// Samples that every pixel has received.
+    /// Samples that every pixel has received, where all get as many.
     pub(crate) fn samples_done(&self) -> u32 {
         self.cursor.sample
     }
@@ -281,6 +327,7 @@ impl PathTracer {
         all.extend(self.walker.compaction_pipelines());
         all.push(p.resolve.info());
         all.extend(p.medium.as_ref().map(ComputePipeline::info));
+        all.extend(self.adaptive.iter().flat_map(AdaptiveSamples::pipelines));
         all
     }
 
@@ -314,6 +361,7 @@ impl PathTracer {
             eye: self.eye,
             pipelines: &self.pipelines,
             film: &self.film,
+            adaptive: self.adaptive.as_ref(),
             aovs: &self.aovs,
             wave: *wave,
             arrival,
@@ -344,8 +392,12 @@ impl PathTracer {
     fn flush(&mut self) -> Result<()> {
         let Some(wave) = &self.pending else { return Ok(()) };
         let mut recorder = self.gpu.recorder("path film")?;
-        let (film, buffers) = (&self.film, self.walker.buffers());
-        record_resolve(&mut recorder, &self.pipelines, film, buffers, &self.aovs, wave)?;
+        let buffers = self.walker.buffers();
+        let target = ResolveTarget {
+            film: &self.film,
+            adaptive: self.adaptive.as_ref(),
+        };
+        record_resolve(&mut recorder, &self.pipelines, target, buffers, &self.aovs, wave)?;
         let submission = recorder.submit()?;
         self.pending = None;
         submission.wait()?;

@@ -1,6 +1,6 @@
 //! The path tracer's own kernels, specialized to what a scene needs.
 
-use super::settings::PathTracerSettings;
+use super::settings::{Adaptive, PathTracerSettings};
 use crate::Result;
 use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resolve, path_shade};
 use crate::gpu::{ComputePipeline, Gpu};
@@ -29,6 +29,7 @@ pub(super) fn camera_pipeline(
         has_lens: camera.lens_radius > 0.0 && !frame.orthographic,
         orthographic: frame.orthographic,
         write_aovs: settings.aovs,
+        numbered: settings.adaptive != Adaptive::Off,
     })
 }
 
@@ -50,6 +51,7 @@ impl Pipelines {
             has_punctual_lights: scene.has_punctual_lights(),
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
+            numbered: settings.adaptive != Adaptive::Off,
             has_alpha: profile.has_alpha(),
             has_media: profile.media.any(),
             has_path_automaton: settings.path_set.has_automaton(),
@@ -69,6 +71,7 @@ impl Pipelines {
             has_alpha: shade.has_alpha,
             sampler_kind: shade.sampler_kind,
             has_path_automaton: shade.has_path_automaton,
+            numbered: shade.numbered,
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             has_airlight: settings.equiangular

@@ -1,5 +1,6 @@
 //! The passes of a wave of eye paths beside those of all walks: what each stage reads, and the barriers between them.
 
+use super::adaptive::AdaptiveSamples;
 use super::pipelines::Pipelines;
 use super::settings::PathTracerSettings;
 use super::wave::Wave;
@@ -22,6 +23,7 @@ pub(super) struct EyeStages<'a> {
     pub eye: DVec3,
     pub pipelines: &'a Pipelines,
     pub film: &'a GpuFilm,
+    pub adaptive: Option<&'a AdaptiveSamples>,
     pub aovs: &'a Buffer,
     pub wave: Wave,
     pub arrival: Option<&'a dyn ArrivalStage>,
@@ -58,7 +60,13 @@ impl WalkStages for EyeStages<'_> {
     /// The last wave's way to the film.
     fn record_before(&mut self, recorder: &mut Recorder, buffers: &WaveBuffers) -> Result<()> {
         match &*self.pending {
-            Some(pending) => record_resolve(recorder, self.pipelines, self.film, buffers, self.aovs, pending),
+            Some(pending) => {
+                let target = ResolveTarget {
+                    film: self.film,
+                    adaptive: self.adaptive,
+                };
+                record_resolve(recorder, self.pipelines, target, buffers, self.aovs, pending)
+            }
             None => Ok(()),
         }
     }
@@ -68,6 +76,9 @@ impl WalkStages for EyeStages<'_> {
     }
 
     fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+        if let Some(adaptive) = self.adaptive {
+            adaptive.record_numbers(recorder, &self.film.bands()[self.wave.band], &self.wave)?;
+        }
         let v = self.frame;
         let push = path_camera::Push {
             origin: v.origin,
@@ -80,7 +91,7 @@ impl WalkStages for EyeStages<'_> {
             focus_distance: v.focus_distance,
             width: self.film.size()[0],
             height: self.film.size()[1],
-            pixel_count: self.wave.pixels,
+            slot_count: self.wave.paths(),
             interior: self.scene.body_around(self.eye).unwrap_or(OUTSIDE),
             key: self.wave.key(self.settings.seed),
         };
@@ -126,30 +137,36 @@ impl WalkStages for EyeStages<'_> {
     }
 }
 
+/// Where a wave's samples go.
+#[derive(Clone, Copy)]
+pub(super) struct ResolveTarget<'a> {
+    pub film: &'a GpuFilm,
+    pub adaptive: Option<&'a AdaptiveSamples>,
+}
+
 /// A wave's way to the film.
 pub(super) fn record_resolve(
     recorder: &mut Recorder,
     pipelines: &Pipelines,
-    film: &GpuFilm,
+    target: ResolveTarget<'_>,
     buffers: &WaveBuffers,
     aovs: &Buffer,
     wave: &Wave,
 ) -> Result<()> {
-    let band = &film.bands()[wave.band];
-    let push = path_resolve::Push {
-        first_film_pixel: wave.first_pixel - band.first_pixel(),
-        pixel_count: wave.pixels,
-        sample_count: wave.samples,
-    };
-    let aovs = PathAovSet { path_aovs: aovs.view() };
+    let band = &target.film.bands()[wave.band];
+    let (walks, aovs) = (buffers.set(0), PathAovSet { path_aovs: aovs.view() });
     recorder.pass("path: resolve", |pass| {
-        let groups = [pipelines.resolve.groups_for(wave.pixels), 1, 1];
-        pass.dispatch(
-            &pipelines.resolve,
-            &[&buffers.set(0), &aovs, &band.set()],
-            &push,
-            groups,
-        )?;
+        if let Some(adaptive) = target.adaptive {
+            adaptive.resolve(pass, &walks, &aovs, band, wave)?;
+        } else {
+            let push = path_resolve::Push {
+                first_film_pixel: wave.first_pixel - band.first_pixel(),
+                pixel_count: wave.pixels,
+                sample_count: wave.samples,
+            };
+            let groups = [pipelines.resolve.groups_for(wave.pixels), 1, 1];
+            pass.dispatch(&pipelines.resolve, &[&walks, &aovs, &band.set()], &push, groups)?;
+        }
         pass.memory_barrier(
             Access::COMPUTE,
             Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,

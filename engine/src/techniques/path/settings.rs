@@ -5,6 +5,19 @@ use crate::transport::path_set::PathSet;
 use crate::transport::random::SamplerKind;
 use crate::walk::{RAY_QUOTA, SLOTS_MAX};
 
+/// By which error samples are shared out among pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Adaptive {
+    /// By none: every pixel has as many.
+    #[default]
+    Off,
+    /// The relative error: that of the relative MSE, with its usual offset.
+    Relative,
+    /// The absolute error.
+    Absolute,
+}
+
 crate::settings! {
     /// Settings of the path tracer.
     pub struct PathTracerSettings {
@@ -29,6 +42,12 @@ crate::settings! {
         ///
         /// Grids of densities have no such samples: light close to a lamp in them is as noisy with it as without.
         pub equiangular: bool = true;
+        /// After a pilot, more samples for pixels with more noise, relative or absolute, as many in all; changes the noise only.
+        ///
+        /// The pilot is a quarter of the samples, a power of two of 256 at most; pictures of fewer than 8 samples per pixel have none, and are those without. Every
+        /// pixel keeps a quarter of the mean at least. Unbiased: the noise of a pixel is taken from the pilot's samples of other pixels alone. How
+        /// many samples were asked for at first decides the pilot.
+        pub adaptive: Adaptive = Adaptive::Off;
         /// 0 chooses by the kind of device; never changes the picture.
         pub paths_in_flight: u32 = 0, in 0..=SLOTS_MAX, unit "paths";
         /// Iterations after which a ray is continued in a later dispatch; never changes the picture.

@@ -13,9 +13,9 @@ pub(crate) const SAMPLES_PER_WAVE: u32 = 4096;
 /// Slots for each pixel of a picture, of which [`SAMPLES_PER_WAVE`] fill a wave where pixels are few.
 const SLOTS_PER_PIXEL: u32 = 1024;
 /// Samples of a pixel that are best under way together, in neighbouring lanes.
-const SAMPLES_TOGETHER: u32 = 8;
+pub(super) const SAMPLES_TOGETHER: u32 = 8;
 
-/// One wave: consecutive pixels of a band × consecutive samples.
+/// One wave: consecutive pixels of a band × consecutive samples, or consecutive places of a round of adaptive samples.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wave {
     pub band: usize,
@@ -23,13 +23,23 @@ pub(super) struct Wave {
     pub pixels: u32,
     pub first_sample: u32,
     pub samples: u32,
+    /// Of adaptive samples: its places in the round of the band, which pixels share.
+    pub places: Option<Places>,
+}
+
+/// Consecutive places of a band's round.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Places {
+    pub first: u32,
+    pub count: u32,
 }
 
 /// Where the next wave begins.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Cursor {
     pub band: usize,
-    pub pixel_in_band: u32,
+    /// Pixels of the band that are done, or places of its round.
+    pub in_band: u32,
     pub sample: u32,
     /// Samples of each pixel in the waves of this pass over the picture.
     pub samples: u32,
@@ -39,7 +49,7 @@ pub(super) struct Cursor {
 impl Wave {
     /// Its paths.
     pub fn paths(&self) -> u32 {
-        self.pixels * self.samples
+        self.places.map_or(self.pixels * self.samples, |places| places.count)
     }
 
     /// What their random numbers are keyed by.
@@ -62,25 +72,22 @@ impl Cursor {
         }
         let bands = film.bands();
         let band = &bands[c.band];
-        if c.band == 0 && c.pixel_in_band == 0 {
+        if c.band == 0 && c.in_band == 0 {
             // As many as fit with the whole picture, else as many as there are already, so that a picture is complete early.
-            let whole = if bands.len() == 1 { slots / band.pixels() } else { 0 };
-            c.samples = whole
-                .max(c.sample.clamp(1, SAMPLES_TOGETHER))
-                .min(SAMPLES_PER_WAVE)
-                .min(samples - c.sample);
+            c.samples = samples_of_pass(film, slots, c.sample).min(samples - c.sample);
         }
-        let pixels = (band.pixels() - c.pixel_in_band).min(slots / c.samples);
+        let pixels = (band.pixels() - c.in_band).min(slots / c.samples);
         let wave = Wave {
             band: c.band,
-            first_pixel: band.first_pixel() + c.pixel_in_band,
+            first_pixel: band.first_pixel() + c.in_band,
             pixels,
             first_sample: c.sample,
             samples: c.samples,
+            places: None,
         };
-        c.pixel_in_band += pixels;
-        if c.pixel_in_band == band.pixels() {
-            c.pixel_in_band = 0;
+        c.in_band += pixels;
+        if c.in_band == band.pixels() {
+            c.in_band = 0;
             c.band += 1;
         }
         if c.band == bands.len() {
@@ -90,6 +97,15 @@ impl Cursor {
         c.done += u64::from(pixels) * u64::from(wave.samples);
         Some((wave, c))
     }
+}
+
+/// Samples of each pixel in a pass over the picture that is begun where pixels have `taken`.
+pub(super) fn samples_of_pass(film: &GpuFilm, slots: u32, taken: u32) -> u32 {
+    let whole = match film.bands() {
+        [band] => slots / band.pixels(),
+        _ => 0,
+    };
+    whole.max(taken.clamp(1, SAMPLES_TOGETHER)).min(SAMPLES_PER_WAVE)
 }
 
 /// Slots that waves of a picture can fill, in whole workgroups.

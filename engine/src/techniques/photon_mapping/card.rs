@@ -77,6 +77,7 @@ fn law(settings: &Settings) -> Result<Law> {
             0.0
         },
         samples_a_pass: settings.samples_per_pass,
+        samples_least: 1,
         shares_noise: true,
     })
 }
