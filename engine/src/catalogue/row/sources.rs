@@ -97,6 +97,7 @@ sources! {
     OWEN_1995 = "owen-1995": "A. Owen", "Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences", "Monte Carlo and Quasi-Monte Carlo Methods in Scientific Computing", 1995;
     PANTALEONI_LUEBKE_2010 = "pantaleoni-luebke-2010": "J. Pantaleoni, D. Luebke", "HLBVH: Hierarchical LBVH Construction for Real-Time Ray Tracing of Dynamic Geometry", "HPG", 2010;
     PHARR_2016 = "pharr-2016": "M. Pharr, W. Jakob, G. Humphreys", "Physically Based Rendering, 3rd edition", "Morgan Kaufmann", 2016;
+    PHARR_2023 = "pharr-2023": "M. Pharr, W. Jakob, G. Humphreys", "Physically Based Rendering, 4th edition", "MIT Press", 2023;
     PRAUN_HOPPE_2003 = "praun-hoppe-2003": "E. Praun, H. Hoppe", "Spherical Parametrization and Remeshing", "SIGGRAPH", 2003;
     RAKIC_1995 = "rakic-1995": "A. D. Rakić", "Algorithm for the Determination of Intrinsic Optical Constants of Metal Films: Application to Aluminum", "Appl. Opt. 34", 1995;
     RAMAMOORTHI_HANRAHAN_2001 = "ramamoorthi-hanrahan-2001": "R. Ramamoorthi, P. Hanrahan", "An Efficient Representation for Irradiance Environment Maps", "SIGGRAPH", 2001;
