@@ -54,11 +54,12 @@ uint distribution_sample(uint base, uint count, inout uint word, uint fresh, out
 uint distribution_row_base(uint base, uvec2 size, uint row) { return base + size.y + 1u + row * (size.x + 1u); }
 
 // The cell that two words choose, which become the place within its share.
-uvec2 distribution_sample_2d(uint base, uvec2 size, inout uvec2 word, uvec2 fresh) {
+uvec2 distribution_sample_2d(uint base, uvec2 size, inout uvec2 word, uvec2 fresh, out float probability) {
     float p_row;
     float p_column;
     uint row = distribution_sample(base, size.y, word.y, fresh.y, p_row);
     uint column = distribution_sample(distribution_row_base(base, size, row), size.x, word.x, fresh.x, p_column);
+    probability = p_row * p_column;
     return uvec2(column, row);
 }
 

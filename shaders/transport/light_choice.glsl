@@ -1,7 +1,8 @@
 // Direct light: choosing a light by its power, a point or direction on it, and the densities that multiple importance sampling needs.
 //
 // One point of the unit square chooses the light and the place on it, so that the points of a sequence keep their strata on each light;
-// triangles are sampled uniformly by area, the environment by its luminance. BG-2, BG-3. Expects the constants of transport/features.glsl.
+// triangles are sampled uniformly by area, the environment by its luminance above what is left to scattered rays. BG-2, BG-3.
+// Expects the constants of transport/features.glsl.
 #ifndef CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
 #define CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
 
@@ -27,7 +28,7 @@ uvec2 environment_size(SceneEnvironment e) { return uvec2(e.width, e.height); }
 
 // Radiance from a direction in the environment's frame, and the density per solid angle with which light sampling that has chosen the
 // environment finds it.
-vec4 environment_look_up(SceneEnvironment e, vec3 local) { return environment_look_up(environment_size(e), local); }
+vec4 environment_look_up(SceneEnvironment e, vec3 local) { return environment_look_up(environment_size(e), e.ambient, local); }
 
 vec3 environment_radiance(SceneEnvironment e, vec3 local) { return environment_look_up(e, local).rgb; }
 
@@ -49,10 +50,10 @@ LightSample sample_light(vec3 from, uvec2 word, vec3 scene_lower, vec3 scene_upp
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         vec4 found;
         SceneEnvironment e = load_environment();
-        vec3 local = environment_sample(e.cdf_base, environment_size(e), word, fresh.yz, found);
+        vec3 local = environment_sample(environment_cdf_base(), environment_size(e), e.ambient, false, word, fresh.yz, found);
         result.direction = environment_to_world(e, local);
         result.pdf = found.a * probability;
-        result.radiance = found.rgb / result.pdf;
+        result.radiance = result.pdf > 0.0 ? found.rgb / result.pdf : vec3(0.0);
         result.infinite = true;
         return result;
     }

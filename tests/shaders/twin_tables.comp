@@ -46,10 +46,11 @@ void main() {
         uvec2 size = uvec2(in_bits(0u), in_bits(1u));
         uint base = 4u * size.x * (size.y + 1u);
         vec4 found;
-        out3(0u, environment_sample(base, size, uvec2(in_word(2u), in_word(4u)), uvec2(in_word(6u), in_word(8u)), found));
+        bool emission = in_bits(16u) != 0u;
+        out3(0u, environment_sample(base, size, in1(15u), emission, uvec2(in_word(2u), in_word(4u)), uvec2(in_word(6u), in_word(8u)), found));
         out3(3u, found.rgb);
         out1(6u, found.a);
-        vec4 seen = environment_look_up(size, in3(10u));
+        vec4 seen = environment_look_up(size, in1(15u), in3(10u));
         out3(7u, seen.rgb);
         out1(10u, seen.a);
         out2(11u, environment_uv(in3(10u)));

@@ -234,32 +234,33 @@ fn environments_are_sampled_by_what_is_looked_up() {
         let mut map = Environment::uniform(Vec3::ONE);
         (map.width, map.height) = (8, 4);
         map.radiance = (0..32).map(|i| Vec3::splat(((i * 5) % 11) as f32)).collect();
-        let tables = EnvironmentTables::build(&map).unwrap();
-        let floats = [bytemuck::cast_slice(&tables.texels), &tables.cdf[..]].concat();
+        let tables = EnvironmentTables::build(&map, true).unwrap();
+        let all = EnvironmentTables::build(&map, false).unwrap();
         let words = pairs(gpu, SamplerKind::Pcg, 15, false);
-        let cases: Vec<Case> = (words.iter().zip(words.iter().rev()))
-            .map(|(w, fresh)| {
-                let [a, b, c, d] = [w[0], w[1], fresh[0], fresh[1]].map(halves);
-                let size = [8, 4].map(f32::from_bits);
-                Case::new(&[size, a, b, c, d].concat())
-            })
-            .collect();
         // Four cells of the test along each side of a texel, even in azimuth and in polar angle.
         const COLUMNS: usize = 32;
         const ROWS: usize = 16;
         const STEPS: usize = 8;
-        let directions = twin_tables(gpu, 2, &cases, &floats);
-        let counts = grid(
-            directions.iter().map(|r| {
+        let draw = |emission: bool, cdf: &[f32]| {
+            let floats = [bytemuck::cast_slice(&tables.texels), cdf].concat();
+            let cases: Vec<Case> = (words.iter().zip(words.iter().rev()))
+                .map(|(w, fresh)| {
+                    let [a, b, c, d] = [w[0], w[1], fresh[0], fresh[1]].map(halves);
+                    let size = [8, 4].map(f32::from_bits);
+                    let rest = [0.0, 0.0, 0.0, 0.0, 0.0, tables.ambient, f32::from_bits(emission.into())];
+                    Case::new(&[&size[..], &a, &b, &c, &d, &rest].concat())
+                })
+                .collect();
+            let directions = twin_tables(gpu, 2, &cases, &floats);
+            let points = directions.iter().map(|r| {
                 let w = r.vector(0);
                 [
                     w.y.clamp(-1.0, 1.0).acos() / PI,
                     (turn(-w.z, w.x) + 0.5).rem_euclid(1.0),
                 ]
-            }),
-            ROWS,
-            COLUMNS,
-        );
+            });
+            grid(points, ROWS, COLUMNS)
+        };
         let expected = |density: &dyn Fn(DVec3) -> f64| -> Vec<f64> {
             let cell = |i: usize| {
                 let at = |k: usize, first: usize, cells: usize| {
@@ -276,11 +277,18 @@ fn environments_are_sampled_by_what_is_looked_up() {
             };
             (0..ROWS * COLUMNS).map(cell).collect()
         };
-        let bilinear = expected(&|w| tables.environment_look_up(w).w);
-        let total = bilinear.iter().sum::<f64>() / DRAWS as f64;
-        assert!((total - 1.0).abs() < 1e-3, "the density integrates to one: {total}");
-        expect_counts("environment", &counts, &bilinear);
-        // The test would see a density that is constant where it should not be.
-        assert!(chi_square_test(&counts, &expected(&|_| 0.25 / PI)) < FALSE_ALARM);
+        let emission_cdf = tables.emission_cdf.as_ref().unwrap();
+        for (what, emission, of, cdf) in [
+            ("light above the mean", false, &tables, &tables.cdf),
+            ("all light", true, &all, emission_cdf),
+        ] {
+            let counts = draw(emission, cdf);
+            let bilinear = expected(&|w| of.environment_look_up(w).w);
+            let total = bilinear.iter().sum::<f64>() / DRAWS as f64;
+            assert!((total - 1.0).abs() < 1e-3, "the density integrates to one: {total}");
+            expect_counts(what, &counts, &bilinear);
+            // The test would see a density that is constant where it should not be.
+            assert!(chi_square_test(&counts, &expected(&|_| 0.25 / PI)) < FALSE_ALARM);
+        }
     });
 }

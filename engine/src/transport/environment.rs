@@ -7,7 +7,11 @@
 //! where radiance is over azimuth and polar angle: so it needs no factor for the map's distortion, stays finite at the poles, samples a
 //! uniform environment uniformly, and is in proportion to luminance but for that bend of the rows, of a factor from ½ to 2 in the row next to a
 //! pole and of 1 ± O(1/row) beyond.
-//! Guarantee: wherever the map has luminance, the density is positive. Twin of `transport/environment.glsl`.
+//!
+//! Scattered rays find light of all directions alike, so that light sampling that is combined with them has the lesser variance where it leaves
+//! the mean luminance to them and follows what stands out (Karlík et al. 2019). What alone has to find all light, the emission of photons,
+//! has tables of its own. Guarantee: wherever the map has luminance, the density of emission is positive. Twin of
+//! `transport/environment.glsl`.
 
 use super::distribution::{build_distribution_2d, distribution_probability_2d, distribution_sample_2d};
 use super::random::unit_float;
@@ -89,9 +93,18 @@ pub fn environment_interpolated(corners: &[DVec4; 4], within: DVec2) -> DVec3 {
     a.lerp(b, within.x).lerp(c.lerp(d, within.x), within.y)
 }
 
-/// Luminances at the corners of a cell, which are taken to be [`ENVIRONMENT_LUMINANCE_MIN`] at least.
-pub fn environment_luminances(corners: &[DVec4; 4]) -> DVec4 {
-    DVec4::from_array(corners.map(|corner| luminance(corner.truncate()).max(ENVIRONMENT_LUMINANCE_MIN)))
+/// Luminances at the corners of a cell above `ambient`, what is left to scattered rays; [`ENVIRONMENT_LUMINANCE_MIN`] at least.
+pub fn environment_luminances(corners: &[DVec4; 4], ambient: f64) -> DVec4 {
+    DVec4::from_array(corners.map(|corner| (luminance(corner.truncate()) - ambient).max(ENVIRONMENT_LUMINANCE_MIN)))
+}
+
+/// Least share of the light of a map that is worth sampling; what is above the mean in less is a difference of f32 numbers, whose rounding
+/// would show.
+const LEAST_SHARE: f64 = 1.0 / 64.0;
+
+/// The cells of a map, row by row.
+fn cells(size: UVec2) -> impl Iterator<Item = UVec2> {
+    (0..=size.y).flat_map(move |y| (0..size.x).map(move |x| UVec2::new(x, y)))
 }
 
 /// A map as light sampling reads it.
@@ -99,18 +112,24 @@ pub fn environment_luminances(corners: &[DVec4; 4]) -> DVec4 {
 pub struct EnvironmentTables {
     /// Of the map, in texels.
     pub size: UVec2,
-    /// Cumulative probabilities of the cells: [`build_distribution_2d`] of one row more than the map has.
+    /// Luminance that light sampling leaves to scattered rays; that of photons leaves none.
+    pub ambient: f32,
+    /// How much light sampling has of the map's light, from 0 to 1; where it is 0, no density is positive.
+    pub share: f64,
+    /// Cumulative probabilities of the cells for light sampling: [`build_distribution_2d`] of one row more than the map has.
     pub cdf: Vec<f32>,
+    /// The same for emission, where it differs.
+    pub emission_cdf: Option<Vec<f32>>,
     /// By row: radiance with the map's strength, and what the luminances at the corners of cell (x, y) are multiplied by for the density,
     /// sr⁻¹. The last row is there twice, the second time for the cells at the south pole.
     pub texels: Vec<Vec4>,
 }
 
 impl EnvironmentTables {
-    /// The tables of a map.
+    /// The tables of a map; `compensated` where light sampling leaves the mean luminance to scattered rays.
     ///
     /// Errors: a size that does not fit the texels, a radiance that is negative or not finite.
-    pub fn build(environment: &Environment) -> Result<Self> {
+    pub fn build(environment: &Environment, compensated: bool) -> Result<Self> {
         let size = UVec2::new(environment.width, environment.height);
         let (width, height) = (size.x as usize, size.y as usize);
         let name = format!("environment {}", environment.name);
@@ -122,29 +141,52 @@ impl EnvironmentTables {
         let texels = (environment.radiance.iter().chain(last)).map(|c| (*c * environment.strength).extend(0.0));
         let mut tables = Self {
             size,
+            ambient: 0.0,
+            share: 1.0,
             cdf: Vec::new(),
+            emission_cdf: None,
             texels: texels.collect(),
         };
-        let cells: Vec<(u32, u32)> = (0..=size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))).collect();
-        let weights: Vec<f64> = cells
-            .iter()
-            .map(|&(x, y)| {
-                let corners = tables.environment_corners(UVec2::new(x, y));
-                let sum: f64 = corners.iter().map(|corner| luminance(corner.truncate())).sum();
-                sum * environment_cell_solid_angle(size, y)
-            })
-            .collect();
         let grid = size + UVec2::Y;
-        tables.cdf = build_distribution_2d(&name, grid, &weights)?;
-        for (i, &(x, y)) in cells.iter().enumerate() {
-            let cell = UVec2::new(x, y);
-            let mean = 0.25 * environment_luminances(&tables.environment_corners(cell)).element_sum();
-            let probability = distribution_probability_2d(&tables.cdf, 0, grid, cell);
+        let all = tables.cell_weights();
+        tables.cdf = build_distribution_2d(&name, grid, &all)?;
+        let total: f64 = all.iter().sum();
+        if compensated && total > 0.0 {
             #[expect(clippy::cast_possible_truncation, reason = "the device computes in f32")]
-            let factor = (probability / (mean * environment_cell_solid_angle(size, y))) as f32;
-            tables.texels[i].w = factor;
+            let ambient = (total / (4.0 * PI)) as f32;
+            tables.ambient = ambient;
+            let rest = tables.cell_weights();
+            let share = rest.iter().sum::<f64>() / total;
+            tables.share = if share < LEAST_SHARE { 0.0 } else { share };
+            let cdf = build_distribution_2d(&name, grid, &rest)?;
+            tables.emission_cdf = Some(std::mem::replace(&mut tables.cdf, cdf));
+        }
+        if tables.share > 0.0 {
+            for (i, cell) in cells(size).enumerate() {
+                let luminances = environment_luminances(&tables.environment_corners(cell), tables.ambient.into());
+                let solid_angle = environment_cell_solid_angle(size, cell.y);
+                let probability = distribution_probability_2d(&tables.cdf, 0, grid, cell);
+                #[expect(clippy::cast_possible_truncation, reason = "the device computes in f32")]
+                let factor = (probability / (0.25 * luminances.element_sum() * solid_angle)) as f32;
+                tables.texels[i].w = factor;
+            }
         }
         Ok(tables)
+    }
+
+    /// Luminance above what is left to scattered rays, times solid angle.
+    fn cell_weights(&self) -> Vec<f64> {
+        let above = |corner: DVec4| {
+            let above = luminance(corner.truncate()) - f64::from(self.ambient);
+            // What is not a number stays so.
+            if self.ambient > 0.0 && above < 0.0 { 0.0 } else { above }
+        };
+        cells(self.size)
+            .map(|cell| {
+                let sum: f64 = self.environment_corners(cell).into_iter().map(above).sum();
+                0.25 * sum * environment_cell_solid_angle(self.size, cell.y)
+            })
+            .collect()
     }
 
     /// The texels at the upper corners of a cell, then those at the lower ones, of which the first has the factor of the cell's density.
@@ -155,7 +197,7 @@ impl EnvironmentTables {
         [at(cell.x, upper), at(next, upper), at(cell.x, cell.y), at(next, cell.y)]
     }
 
-    /// Radiance from a direction, and in the last component the density of [`environment_sample`](Self::environment_sample) there, sr⁻¹.
+    /// Radiance from a direction, and in the last component the density of light sampling there, sr⁻¹.
     pub fn environment_look_up(&self, w: DVec3) -> DVec4 {
         let (cell, within) = environment_cell(environment_uv(w), self.size);
         let corners = self.environment_corners(cell);
@@ -163,18 +205,19 @@ impl EnvironmentTables {
         let rim = 0.5 * (w.x * w.x + w.z * w.z) / (1.0 + if south { -w.y } else { w.y });
         let from_rim = ((rim - first) / (last - first)).clamp(0.0, 1.0);
         let down = if south { 1.0 - from_rim } else { from_rim };
-        let sides = environment_sides(environment_luminances(&corners), down);
+        let sides = environment_sides(environment_luminances(&corners, self.ambient.into()), down);
         let pdf = corners[2].w * (sides.x + (sides.y - sides.x) * within.x);
         environment_interpolated(&corners, within).extend(pdf)
     }
 
-    /// A direction that two words choose, and [`environment_look_up`](Self::environment_look_up) there. `fresh` are two more words, for the bits
-    /// that the choice of a cell takes.
-    pub fn environment_sample(&self, mut word: [u32; 2], fresh: [u32; 2]) -> (DVec3, DVec4) {
+    /// A direction that two words choose, its radiance and density: for light sampling those of [`environment_look_up`](Self::environment_look_up).
+    /// `fresh` are two more words, for the bits that the choice of a cell takes.
+    pub fn environment_sample(&self, emission: bool, mut word: [u32; 2], fresh: [u32; 2]) -> (DVec3, DVec4) {
         let size = self.size;
-        let (cell, _) = distribution_sample_2d(&self.cdf, 0, size + UVec2::Y, &mut word, fresh);
+        let cdf = self.emission_cdf.as_ref().filter(|_| emission).unwrap_or(&self.cdf);
+        let (cell, probability) = distribution_sample_2d(cdf, 0, size + UVec2::Y, &mut word, fresh);
         let corners = self.environment_corners(cell);
-        let luminances = environment_luminances(&corners);
+        let luminances = environment_luminances(&corners, if emission { 0.0 } else { self.ambient.into() });
         let (upper, lower) = (luminances.x + luminances.y, luminances.z + luminances.w);
         let down = linear_sample(unit_float(word[1]), 0.5 * upper, 0.5 * lower);
         let sides = environment_sides(luminances, down);
@@ -186,7 +229,13 @@ impl EnvironmentTables {
         let (sin, cos) = (TAU * ((f64::from(cell.x) + 0.5 + around) / f64::from(size.x) - 0.5)).sin_cos();
         let row = r.atan2(y) * FRAC_1_PI * f64::from(size.y) + 0.5;
         let within = DVec2::new(around, (row - f64::from(cell.y)).clamp(0.0, 1.0));
-        let pdf = corners[2].w * (sides.x + (sides.y - sides.x) * around);
+        let solid_angle = environment_cell_solid_angle(size, cell.y);
+        let factor = if emission {
+            probability / (0.25 * luminances.element_sum() * solid_angle)
+        } else {
+            corners[2].w
+        };
+        let pdf = factor * (sides.x + (sides.y - sides.x) * around);
         let found = environment_interpolated(&corners, within).extend(pdf);
         (DVec3::new(r * sin, y, -r * cos), found)
     }
@@ -201,6 +250,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     sources: &[
         sources::PHARR_2016.at("14.2.4"),
         sources::PHARR_2023.at("2.4.2 of bilinear densities"),
+        sources::KARLIK_2019.whole(),
     ],
     shaders: &["shaders/transport/environment.glsl"],
     bias: Some(Bias::Unbiased),
@@ -262,12 +312,16 @@ mod tests {
     #[test]
     fn samples_have_the_density_that_is_looked_up() {
         for (width, height) in [(1, 1), (2, 1), (5, 3), (16, 8), (7, 64)] {
-            let tables = EnvironmentTables::build(&map(width, height)).unwrap();
+            let tables = EnvironmentTables::build(&map(width, height), height == 8).unwrap();
             let mut equal = 0;
             for i in 0..2000 {
                 let [word, fresh] = words(i);
-                let (w, found) = tables.environment_sample(word, fresh);
+                let (w, found) = tables.environment_sample(false, word, fresh);
                 assert!((w.length() - 1.0).abs() < 1e-12);
+                if tables.emission_cdf.is_none() {
+                    let (same, emitted) = tables.environment_sample(true, word, fresh);
+                    assert!(same == w && (emitted.w / found.w - 1.0).abs() < 1e-6);
+                }
                 let seen = tables.environment_look_up(w);
                 let largest = found.truncate().max_element();
                 assert!((found - seen).truncate().abs().max_element() <= 1e-9 * largest + 1e-12);
@@ -292,12 +346,12 @@ mod tests {
         let turn = |w: DVec3| DVec3::new(-w.z, w.x, w.y);
         let back = |w: DVec3| DVec3::new(w.y, w.z, -w.x);
         // As many draws as cells resolve to a few per cent: a density constant in each cell would be seen.
-        for (width, height) in [(1, 3), (12, 6), (8, 1)] {
-            let tables = EnvironmentTables::build(&map(width, height)).unwrap();
+        for (width, height, compensated) in [(1, 3, false), (12, 6, false), (8, 1, false), (12, 6, true)] {
+            let tables = EnvironmentTables::build(&map(width, height), compensated).unwrap();
             let next = std::cell::Cell::new(0);
             let sample = |_: DVec3| {
                 let [word, fresh] = words(next.replace(next.get() + 1));
-                Some(turn(tables.environment_sample(word, fresh).0))
+                Some(turn(tables.environment_sample(false, word, fresh).0))
             };
             let density = |w: DVec3| tables.environment_look_up(back(w)).w;
             let p = sphere_test(120_000, 5, 16, sample, density);
@@ -315,8 +369,7 @@ mod tests {
     /// The density is luminance over its integral, but for the bend of rows between polar angle and height.
     #[test]
     fn density_is_in_proportion_to_luminance() {
-        let (width, height) = (64, 32);
-        let tables = EnvironmentTables::build(&map(width, height)).unwrap();
+        let tables = EnvironmentTables::build(&map(64, 32), true).unwrap();
         let n = 40_000;
         let mean = (0..n)
             .map(|i| {
@@ -331,13 +384,13 @@ mod tests {
         let (mut sum, mut squares, mut flat) = (0.0, 0.0, 0.0);
         for i in 0..n {
             let [word, fresh] = words(i);
-            let (w, found) = tables.environment_sample(word, fresh);
+            let (w, found) = tables.environment_sample(true, word, fresh);
             let ratio = luminance(found.truncate()) / (found.w * 4.0 * PI * mean);
             assert!((0.4..2.5).contains(&ratio), "{ratio}");
             sum += ratio;
             squares += (ratio - 1.0).powi(2);
             let (cell, _) = environment_cell(environment_uv(w), tables.size);
-            let mean = 0.25 * environment_luminances(&tables.environment_corners(cell)).element_sum();
+            let mean = 0.25 * environment_luminances(&tables.environment_corners(cell), 0.0).element_sum();
             flat += (luminance(found.truncate()) / mean - 1.0).powi(2);
         }
         assert!((sum / f64::from(n) - 1.0).abs() < 0.02);
@@ -349,9 +402,12 @@ mod tests {
     fn uniform_maps_are_sampled_uniformly() {
         let mut e = map(64, 32);
         e.radiance.fill(Vec3::splat(0.5));
-        let tables = EnvironmentTables::build(&e).unwrap();
+        let tables = EnvironmentTables::build(&e, false).unwrap();
+        let compensated = EnvironmentTables::build(&e, true).unwrap();
+        assert_eq!(compensated.share, 0.0);
         for i in 0..1000 {
             let w = square_to_sphere(random3(i, 1).truncate());
+            assert_eq!(compensated.environment_look_up(w).w, 0.0);
             let pdf = tables.environment_look_up(w).w;
             // Rounding moves a quantum or two of the 10,000 of a cap's row.
             assert!((pdf / UNIFORM_SPHERE_PDF - 1.0).abs() < 3e-4, "{w}: {pdf}");
@@ -365,8 +421,9 @@ mod tests {
         e.radiance[8] = Vec3::splat(1e-20);
         for faint in [1e-20, 1e-38] {
             e.radiance[8] = Vec3::splat(faint);
-            let tables = EnvironmentTables::build(&e).unwrap();
-            let probability = |x, y| distribution_probability_2d(&tables.cdf, 0, UVec2::new(8, 5), UVec2::new(x, y));
+            let tables = EnvironmentTables::build(&e, true).unwrap();
+            let cdf = tables.emission_cdf.as_ref().unwrap();
+            let probability = |x, y| distribution_probability_2d(cdf, 0, UVec2::new(8, 5), UVec2::new(x, y));
             for (x, y) in [(0, 1), (7, 1), (0, 2), (7, 2)] {
                 assert!(probability(x, y) > 0.0);
             }
@@ -376,13 +433,15 @@ mod tests {
             );
             for i in 0..100 {
                 let [word, fresh] = words(i);
-                let (w, found) = tables.environment_sample(word, fresh);
-                assert!(found.is_finite() && found.w > 0.0, "{w}: {found}");
+                for emission in [false, true] {
+                    let (w, found) = tables.environment_sample(emission, word, fresh);
+                    assert!(found.is_finite() && found.w > 0.0, "{w}: {found}");
+                }
             }
         }
         e.radiance[3] = Vec3::splat(f32::NAN);
-        assert!(EnvironmentTables::build(&e).is_err());
+        assert!(EnvironmentTables::build(&e, false).is_err());
         e.radiance.pop();
-        assert!(EnvironmentTables::build(&e).is_err());
+        assert!(EnvironmentTables::build(&e, false).is_err());
     }
 }

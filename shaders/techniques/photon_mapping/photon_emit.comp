@@ -67,7 +67,7 @@ Emission emit(uint slot, out float probability) {
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         vec4 found;
         SceneEnvironment environment = load_environment();
-        vec3 local = environment_sample(environment.cdf_base, environment_size(environment), direction, fresh.yz, found);
+        vec3 local = environment_sample(environment_cdf_base(), environment_size(environment), 0.0, true, direction, fresh.yz, found);
         return parallel_emission(-environment_to_world(environment, local), found.rgb / (found.a * probability), u);
     }
     if (HAS_PUNCTUAL_LIGHTS && light.kind == LIGHT_DIRECTIONAL) {

@@ -97,20 +97,21 @@ fn environments_agree_with_their_twins() {
         (map.width, map.height) = (16, 8);
         let radiance = |i: u32| Vec3::new(((i * 7) % 13) as f32, ((i * 5) % 11) as f32, (i % 3) as f32);
         map.radiance = (0..128).map(radiance).collect();
-        let tables = EnvironmentTables::build(&map).unwrap();
-        let floats = [bytemuck::cast_slice(&tables.texels), &tables.cdf[..]].concat();
-        let table = cases(16, |r| {
-            join(&[
-                &[f32::from_bits(16), f32::from_bits(8)],
-                &random_word(r),
-                &random_word(r),
-                &random_word(r),
-                &random_word(r),
-                &direction(r).to_array(),
-                &[unit(r), unit(r)],
-            ])
-        });
-        let results = twin_tables(gpu, 2, &table, &floats);
+        let tables = EnvironmentTables::build(&map, true).unwrap();
+        let emission_cdf = tables.emission_cdf.as_ref().unwrap();
+        let make = |emission: u32| {
+            cases(16, |r| {
+                join(&[
+                    &[f32::from_bits(16), f32::from_bits(8)],
+                    &random_word(r),
+                    &random_word(r),
+                    &random_word(r),
+                    &random_word(r),
+                    &direction(r).to_array(),
+                    &[unit(r), unit(r), tables.ambient, f32::from_bits(emission)],
+                ])
+            })
+        };
         let trig = 4.0 * trigonometric_error(gpu);
         // Places in a cell are its size smaller than directions; radiance changes by 13 and density by less than one from side to side.
         let expect = |what: &str, got: [f32; 4], twin: DVec4, case: &[f32]| {
@@ -119,27 +120,32 @@ fn environments_agree_with_their_twins() {
                 assert!(difference < 16.0 * 13.0 * trig, "{what}: {got} {twin}, {case:?}");
             }
         };
-        for (case, result) in table.iter().zip(&results) {
-            let x = case.0.map(f64::from);
-            let (w, found) = tables.environment_sample([word(&x, 2), word(&x, 4)], [word(&x, 6), word(&x, 8)]);
-            assert!(
-                (result.vector(0) - w).length() < trig,
-                "{} {w}: {:?}",
-                result.vector(0),
-                case.0
-            );
-            let r = result.0;
-            expect("sample", [r[3], r[4], r[5], r[6]], found, &case.0);
-            let seen = tables.environment_look_up(v3(&x, 10));
-            let pole = x[10].hypot(x[12]) < 1e-2;
-            if !pole {
-                expect("look-up", [r[7], r[8], r[9], r[10]], seen, &case.0);
+        for (emission, cdf) in [(false, &tables.cdf), (true, emission_cdf)] {
+            let table = make(emission.into());
+            let floats = [bytemuck::cast_slice(&tables.texels), &cdf[..]].concat();
+            for (case, result) in table.iter().zip(twin_tables(gpu, 2, &table, &floats)) {
+                let x = case.0.map(f64::from);
+                let (words, fresh) = ([word(&x, 2), word(&x, 4)], [word(&x, 6), word(&x, 8)]);
+                let (w, found) = tables.environment_sample(emission, words, fresh);
+                assert!(
+                    (result.vector(0) - w).length() < trig,
+                    "{} {w}: {:?}",
+                    result.vector(0),
+                    case.0
+                );
+                let r = result.0;
+                expect("sample", [r[3], r[4], r[5], r[6]], found, &case.0);
+                let seen = tables.environment_look_up(v3(&x, 10));
+                let pole = x[10].hypot(x[12]) < 1e-2;
+                if !pole {
+                    expect("look-up", [r[7], r[8], r[9], r[10]], seen, &case.0);
+                }
+                let uv = environment_uv(v3(&x, 10));
+                let (du, dv) = ((f64::from(r[11]) - uv.x).abs(), (f64::from(r[12]) - uv.y).abs());
+                // At the poles the azimuth is not defined, and u is the same at 0 and 1.
+                assert!((pole || du.min(1.0 - du) < trig) && dv < trig, "{:?}: {uv}", case.0);
+                assert!((result.vector(13) - environment_direction(v2(&x, 13))).length() < trig);
             }
-            let uv = environment_uv(v3(&x, 10));
-            let (du, dv) = ((f64::from(r[11]) - uv.x).abs(), (f64::from(r[12]) - uv.y).abs());
-            // At the poles the azimuth is not defined, and u is the same at 0 and 1.
-            assert!((pole || du.min(1.0 - du) < trig) && dv < trig, "{:?}: {uv}", case.0);
-            assert!((result.vector(13) - environment_direction(v2(&x, 13))).length() < trig);
         }
     });
 }

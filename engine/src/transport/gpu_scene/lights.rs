@@ -23,8 +23,10 @@ pub(super) struct Lights {
     pub(super) records: Vec<SceneLight>,
     /// The scene's lights without area among them.
     pub(super) punctual: PunctualLights,
-    /// Cumulative probabilities of the lights, then of the environment's cells.
+    /// Cumulative probabilities of the lights, then of the environment's cells, for light sampling.
     pub(super) cdf: Vec<f32>,
+    /// The same for the emission of photons, where it differs.
+    pub(super) emission_cdf: Option<Vec<f32>>,
     /// The environment's block: header and texels.
     pub(super) environment: Vec<u8>,
     /// Sum of their powers, W of luminance.
@@ -101,23 +103,28 @@ impl Lights {
             }
         }
         let mut environment = Vec::new();
-        let mut environment_cdf = Vec::new();
+        let mut tables = None;
         if let Some(map) = scene.environment.as_ref().filter(|_| profile.has_environment()) {
-            let tables = EnvironmentTables::build(map)?;
+            let found = sampled_environment(map, !records.is_empty())?;
             powers.push(environment_power(map, radius));
             records.push(SceneLight {
                 kind: LIGHT_ENVIRONMENT,
                 ..SceneLight::default()
             });
-            // The lights' table has one more entry than there are lights; the cells' begins behind it.
-            environment = environment_block(map, &tables, records.len() as u32 + 1);
-            environment_cdf = tables.cdf;
+            environment = environment_block(map, &found);
+            tables = Some(found);
         }
         let power = powers.iter().sum();
+        // Photons leave by all of a light's power.
+        let mut sampled = powers.clone();
+        if let (Some(tables), Some(of_environment)) = (&tables, sampled.last_mut()) {
+            *of_environment *= tables.share;
+        }
         share_choices(&records, &mut powers);
+        share_choices(&records, &mut sampled);
         if has_unsampled && records.is_empty() {
             // Kernels that know of emission also sample lights: a dark one to choose.
-            powers.push(0.0);
+            sampled.push(0.0);
             records.push(SceneLight {
                 kind: LIGHT_DARK,
                 ..SceneLight::default()
@@ -126,13 +133,22 @@ impl Lights {
         let mut cdf = if records.is_empty() {
             Vec::new()
         } else {
-            build_distribution("lights", &powers)?
+            build_distribution("lights", &sampled)?
         };
-        cdf.extend(environment_cdf);
+        let mut emission_cdf = None;
+        if let Some(tables) = tables {
+            cdf.extend(tables.cdf);
+            if let Some(cells) = tables.emission_cdf {
+                let mut all = build_distribution("lights", &powers)?;
+                all.extend(cells);
+                emission_cdf = Some(all);
+            }
+        }
         Ok(Self {
             records,
             punctual,
             cdf,
+            emission_cdf,
             environment,
             power,
             has_unsampled,
@@ -240,8 +256,21 @@ fn environment_power(map: &Environment, radius: f64) -> f64 {
     integral * f64::from(map.strength) * std::f64::consts::PI * radius * radius
 }
 
-/// The header `SceneEnvironment` (axes, size, where its table begins), then the texels of the tables.
-fn environment_block(map: &Environment, tables: &EnvironmentTables, cdf_base: u32) -> Vec<u8> {
+/// The tables of a map: its mean luminance is left to scattered rays, unless there would be nothing to sample at all.
+fn sampled_environment(map: &Environment, has_others: bool) -> Result<EnvironmentTables> {
+    let knob = std::env::var("CLERESTORY_KNOB").unwrap_or_default();
+    if knob == "none" {
+        return EnvironmentTables::build(map, false);
+    }
+    let tables = EnvironmentTables::build(map, true)?;
+    if tables.share > 0.0 || has_others || knob == "all" {
+        return Ok(tables);
+    }
+    EnvironmentTables::build(map, false)
+}
+
+/// The header `SceneEnvironment` (axes, size, what is left to scattered rays), then the texels of the tables.
+fn environment_block(map: &Environment, tables: &EnvironmentTables) -> Vec<u8> {
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (map.rotation * axis).to_array());
     let header = SceneEnvironment {
         right: axes[0],
@@ -249,7 +278,7 @@ fn environment_block(map: &Environment, tables: &EnvironmentTables, cdf_base: u3
         up: axes[1],
         height: map.height,
         back: axes[2],
-        cdf_base,
+        ambient: tables.ambient,
     };
     let mut block = bytemuck::bytes_of(&header).to_vec();
     block.extend_from_slice(bytemuck::cast_slice(&tables.texels));
