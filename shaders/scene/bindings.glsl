@@ -22,18 +22,25 @@ layout(set = 2, binding = 6) uniform utextureBuffer scene_materials;
 layout(set = 2, binding = 7) uniform utextureBuffer scene_textures;
 layout(set = 2, binding = 8) uniform utextureBuffer scene_texels;    // RGBA8
 layout(set = 2, binding = 9) uniform utextureBuffer scene_lights;
-// Cumulative probabilities: of the lights, then (from the environment's cdf_base on) of the environment's texels.
+// Cumulative probabilities: of the lights, then (from environment_cdf_base on) of the environment's cells.
 layout(set = 2, binding = 10) uniform textureBuffer scene_cdf;
-// ENVIRONMENT_HEADER_QUARTERS, then by texel RGB radiance and the density of its choice per solid angle.
+// ENVIRONMENT_HEADER_QUARTERS, then by texel RGB radiance and what the luminances at the corners of a cell are multiplied by for the density
+// of light sampling per solid angle; the last row is there twice (transport/environment.glsl).
 layout(set = 2, binding = 11) uniform utextureBuffer scene_environment;
 layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
 
 float distribution_cdf(uint index) { return texelFetch(scene_cdf, int(index)).x; }
+vec4 environment_texel(uint index) {
+    return uintBitsToFloat(texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + index)));
+}
 float albedo_table(uint index) { return texelFetch(scene_albedo_table, int(index)).x; }
 
 uvec4 material_quarter(uint material, uint quarter) { return texelFetch(scene_materials, int(MATERIAL_QUARTERS * material + quarter)); }
 
 uint light_count() { return uint(textureSize(scene_lights)) / LIGHT_QUARTERS; }
+
+// Where the table of the environment's cells begins, behind that of the lights.
+uint environment_cdf_base() { return light_count() + 1u; }
 
 SceneTriangle load_triangle(uint index) {
     int first = int(TRIANGLE_QUARTERS * index);
@@ -82,7 +89,7 @@ SceneEnvironment load_environment() {
     uvec4 q0 = texelFetch(scene_environment, 0);
     uvec4 q1 = texelFetch(scene_environment, 1);
     uvec4 q2 = texelFetch(scene_environment, 2);
-    return SceneEnvironment(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), q2.w);
+    return SceneEnvironment(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), uintBitsToFloat(q2.w));
 }
 
 #endif

@@ -18,6 +18,7 @@
 #define CLERESTORY_TRANSPORT_BSDF_GLSL
 
 #include "transport/albedo.glsl"
+#include "transport/choice.glsl"
 #include "transport/fresnel.glsl"
 #include "transport/ggx.glsl"
 #include "transport/phong.glsl"
@@ -297,6 +298,7 @@ vec4 bsdf_eval_pdf(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_part(
 
 vec3 bsdf_eval(Bsdf b, vec3 wo, vec3 wi, uint mask) { return bsdf_eval_pdf(b, wo, wi, mask).rgb; }
 
+// `u.xy` choose the lobe and the direction, `u.z` between the two sides of a rough microfacet.
 BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
     BsdfSample s = BsdfSample(vec3(0.0), 0.0, 1.0, vec3(0.0), 0u);
     bool below = wo.z < 0.0;
@@ -308,7 +310,7 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
     float p_cosine = cosine_probability(b, lobes, wo.z, eta, mask);
     vec3 wi;
     uint flags;
-    if (u.z < p_cosine) {
+    if (choose_first(u.x, p_cosine)) {
         wi = square_to_cosine_hemisphere(u.xy);
         flags = LOBE_DIFFUSE & LOBE_REFLECTION;
     } else if (bsdf_is_phong(b) && !bsdf_is_delta(b)) {
@@ -322,7 +324,8 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
         vec3 t;
         microfacet_split(b, cos_h, eta, mask, r, t);
         float p_reflection = reflection_probability(r, t);
-        bool reflected = u.z - p_cosine < p_reflection * (1.0 - p_cosine);
+        // A delta leaves the number over that chose it.
+        bool reflected = (delta ? u.x : u.z) < p_reflection;
         wi = 2.0 * cos_h * h - wo;
         uint shape = delta ? LOBE_SPECULAR : LOBE_GLOSSY;
         flags = shape & LOBE_REFLECTION;

@@ -10,8 +10,6 @@
 
 // Keeps a quotient of zeros zero.
 const float LABEL_LEAST = 1e-37;
-// The largest number below one.
-const float LABEL_DRAW_MAX = 0.99999994;
 
 // A sample with its label, one of the lobes of the mask that it was drawn with. `alike`: the base and the microfacets' reflection need not
 // be told apart. `u` is used and, for further use, made uniform again.
@@ -34,9 +32,8 @@ BsdfSample bsdf_label(Bsdf b, vec3 wo, BsdfSample s, uint mask, bool alike, inou
     float d = max(diffuse.x, max(diffuse.y, diffuse.z));
     float g = max(glossy.x, max(glossy.y, glossy.z));
     float p = d / max(d + g, LABEL_LEAST);
-    bool chosen = u < p;
+    bool chosen = choose_first(u, p);
     float share = chosen ? p : 1.0 - p;
-    u = clamp((chosen ? u : u - p) / share, 0.0, LABEL_DRAW_MAX);
     s.flags = chosen ? base : microfacets;
     s.weight = (chosen ? diffuse : glossy) / (s.pdf * share);
     return s;

@@ -1,7 +1,8 @@
 // Direct light: choosing a light by its power, a point or direction on it, and the densities that multiple importance sampling needs.
 //
-// One draw chooses the light, stratified through the cumulative table; triangles are sampled uniformly by area, the environment by its
-// luminance. BG-2, BG-3. Expects the constants of transport/features.glsl.
+// One point of the unit square chooses the light and the place on it, so that the points of a sequence keep their strata on each light;
+// triangles are sampled uniformly by area, the environment by its luminance above what is left to scattered rays. BG-2, BG-3.
+// Expects the constants of transport/features.glsl.
 #ifndef CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
 #define CLERESTORY_TRANSPORT_LIGHT_CHOICE_GLSL
 
@@ -25,31 +26,14 @@ vec3 environment_to_world(SceneEnvironment e, vec3 local) { return e.right * loc
 
 uvec2 environment_size(SceneEnvironment e) { return uvec2(e.width, e.height); }
 
-// Radiance of a texel, and the density per solid angle of environment_sample in it.
-vec4 load_environment_texel(SceneEnvironment e, uvec2 texel) {
-    return uintBitsToFloat(texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + texel.y * e.width + texel.x)));
-}
+// Radiance from a direction in the environment's frame, and the density per solid angle with which light sampling that has chosen the
+// environment finds it.
+vec4 environment_look_up(SceneEnvironment e, vec3 local) { return environment_look_up(environment_size(e), e.ambient, local); }
 
-// Bilinear, around in u and clamped at the poles; `local` is in the environment's frame.
-vec3 environment_radiance(SceneEnvironment e, vec3 local) {
-    vec2 p = environment_uv(local) * vec2(environment_size(e)) - 0.5;
-    vec2 base = floor(p);
-    vec2 w = p - base;
-    int width = int(e.width);
-    uvec2 x = uvec2((ivec2(int(base.x)) + ivec2(width, width + 1)) % width);
-    uvec2 y = uvec2(clamp(ivec2(int(base.y)) + ivec2(0, 1), ivec2(0), ivec2(int(e.height) - 1)));
-    return mix(mix(load_environment_texel(e, uvec2(x.x, y.x)).rgb, load_environment_texel(e, uvec2(x.y, y.x)).rgb, w.x),
-               mix(load_environment_texel(e, uvec2(x.x, y.y)).rgb, load_environment_texel(e, uvec2(x.y, y.y)).rgb, w.x), w.y);
-}
+vec3 environment_radiance(SceneEnvironment e, vec3 local) { return environment_look_up(e, local).rgb; }
 
 // The environment is the last light.
 float environment_choice_probability() { return distribution_probability(0u, light_count() - 1u); }
-
-// Density with which light sampling finds a direction in which the environment is seen.
-float environment_light_pdf(SceneEnvironment e, vec3 local) {
-    return environment_choice_probability()
-        * load_environment_texel(e, environment_texel(environment_uv(local), environment_size(e))).a;
-}
 
 // Density with which light sampling finds the point of a triangle light that a ray has hit at distance t.
 float triangle_light_pdf(Surface s, vec3 direction, float t) {
@@ -57,18 +41,19 @@ float triangle_light_pdf(Surface s, vec3 direction, float t) {
     return area_to_solid_angle(2.0 * choice / s.double_area, t * t, abs(dot(s.geometric_normal, direction)));
 }
 
-// `choice` picks the light, `u` the point or texel, `within` the direction in a texel. Zero radiance when there is nothing to see.
-LightSample sample_light(vec3 from, float choice, vec2 u, vec2 within, vec3 scene_lower, vec3 scene_upper) {
+// A light, and a point or a direction of it, by one point of the unit square in two words. Zero radiance when there is nothing to see.
+LightSample sample_light(vec3 from, uvec2 word, vec3 scene_lower, vec3 scene_upper) {
     LightSample result = LightSample(vec3(0.0), vec3(0.0), 0.0, SurfacePoint(vec3(0.0), vec3(0.0)), vec3(0.0), false);
+    uvec3 fresh = pcg3d(uvec3(word, 0u));
     float probability;
-    SceneLight light = load_light(distribution_sample(0u, light_count(), choice, probability));
+    SceneLight light = load_light(distribution_sample(0u, light_count(), word.x, fresh.x, probability));
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
-        uvec2 texel;
+        vec4 found;
         SceneEnvironment e = load_environment();
-        vec3 local = environment_sample(e.cdf_base, environment_size(e), u, within, texel);
+        vec3 local = environment_sample(environment_cdf_base(), environment_size(e), e.ambient, false, word, fresh.yz, found);
         result.direction = environment_to_world(e, local);
-        result.pdf = load_environment_texel(e, texel).a * probability;
-        result.radiance = environment_radiance(e, local) / result.pdf;
+        result.pdf = found.a * probability;
+        result.radiance = result.pdf > 0.0 ? found.rgb / result.pdf : vec3(0.0);
         result.infinite = true;
         return result;
     }
@@ -81,6 +66,7 @@ LightSample sample_light(vec3 from, float choice, vec2 u, vec2 within, vec3 scen
     Surface s;
     result.point.position = light.position;
     if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
+        vec2 u = vec2(unit_float(word.x), unit_float(word.y));
         s = surface_at(Hit(0.0, square_to_triangle(u).yz, light.triangle), scene_lower, scene_upper);
         result.point = s.point;
         result.normal = s.geometric_normal;

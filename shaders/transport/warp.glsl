@@ -1,15 +1,19 @@
 // Warps from the unit square to the domains that a renderer samples, with their densities.
 //
-// Sources: concentric disk of Shirley and Chiu (1997); triangle of Heitz, "A Low-Distortion Map Between Triangle and Square" (2019).
+// Sources: concentric disk of Shirley and Chiu (1997); triangle of Heitz, "A Low-Distortion Map Between Triangle and Square" (2019);
+// linear densities in the stable form of Pharr et al. (2023, 2.3.2).
 // Guarantees: densities integrate to one over their domain (solid angle for directions); directions have unit length.
 #ifndef CLERESTORY_TRANSPORT_WARP_GLSL
 #define CLERESTORY_TRANSPORT_WARP_GLSL
 
 #include "pi.glsl"
 #include "scene/normal_map.glsl"
+#include "transport/choice.glsl"
 
 const float UNIFORM_SPHERE_PDF = 0.07957747154594766788;
 const float UNIFORM_HEMISPHERE_PDF = 0.15915494309189533577;
+// Keeps a quotient of zeros zero.
+const float LINEAR_LEAST = 1e-30;
 
 // Point of the unit disk; density 1/pi.
 vec2 square_to_disk(vec2 u) {
@@ -52,6 +56,15 @@ vec3 square_to_triangle(vec2 u) {
     float low = 0.5 * min(u.x, u.y);
     vec2 b = u.x < u.y ? vec2(low, u.y - low) : vec2(u.x - low, low);
     return vec3(1.0 - b.x - b.y, b);
+}
+
+// Number in [0, 1) whose density changes linearly from one end to the other, where it is in proportion to a and b; not both are zero.
+float linear_sample(float u, float a, float b) {
+    // Scaled, so that no square overflows.
+    float most = max(a, b);
+    a /= most;
+    b /= most;
+    return min(u * (a + b) / max(a + sqrt(mix(a * a, b * b, u)), LINEAR_LEAST), BELOW_ONE);
 }
 
 #endif

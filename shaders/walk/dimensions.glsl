@@ -4,12 +4,10 @@
 
 // Those before are for a walk's start. From here on each bounce has DIMENSIONS_PER_BOUNCE slots.
 const uint DIMENSION_FIRST_BOUNCE = 2u;
-const uint DIMENSIONS_PER_BOUNCE = 5u;
-const uint DIMENSION_DIRECTION = 0u;    // direction within a lobe
-const uint DIMENSION_LOBE = 1u;         // lobe; Russian roulette
-const uint DIMENSION_LIGHT = 2u;        // which light
-const uint DIMENSION_LIGHT_POINT = 3u;  // point of a triangle, or texel of the environment
-const uint DIMENSION_LIGHT_WITHIN = 4u; // direction within the texel
+const uint DIMENSIONS_PER_BOUNCE = 3u;
+const uint DIMENSION_DIRECTION = 0u;  // lobe, and direction within it
+const uint DIMENSION_SIDE = 1u;       // side of a rough microfacet; label of the lobe, and Russian roulette
+const uint DIMENSION_LIGHT = 2u;      // light, and point or direction of it
 
 // Ways through media have slots of their own, far behind those of all bounces.
 const uint DIMENSION_FIRST_MEDIUM = 1u << 24;

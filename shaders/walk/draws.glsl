@@ -27,10 +27,15 @@ uint walk_index(uint slot) {
 
 Sampler walk_sampler(uint slot, uint dimension) { return Sampler(walk_sequence(slot), walk_index(slot), dimension, push.key.seed); }
 
+// Two words of a bounce.
+uvec2 bounce_words(uint slot, uint bounce, uint dimension) {
+    return sampler_bits(walk_sampler(slot, DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_PER_BOUNCE + dimension));
+}
+
 // Two numbers of a bounce.
 vec2 bounce_sample(uint slot, uint bounce, uint dimension) {
-    Sampler s = walk_sampler(slot, DIMENSION_FIRST_BOUNCE + bounce * DIMENSIONS_PER_BOUNCE + dimension);
-    return sample_2d(s);
+    uvec2 words = bounce_words(slot, bounce, dimension);
+    return vec2(unit_float(words.x), unit_float(words.y));
 }
 
 #endif

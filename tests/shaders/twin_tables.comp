@@ -7,8 +7,16 @@
 
 const bool SEPARABLE_MASKING = false;
 
+#define CLERESTORY_SAMPLER 1u
+
 float distribution_cdf(uint index) { return twin_table[index]; }
+vec4 environment_texel(uint index) {
+    return vec4(twin_table[4u * index], twin_table[4u * index + 1u], twin_table[4u * index + 2u], twin_table[4u * index + 3u]);
+}
 float albedo_table(uint index) { return twin_table[index]; }
+
+// A word travels as two halves: its bits must not pass through floating-point registers that could quieten a NaN.
+uint in_word(uint i) { return uint(in1(i)) << 16u | uint(in1(i + 1u)); }
 
 #include "transport/albedo.glsl"
 #include "transport/environment.glsl"
@@ -28,18 +36,32 @@ void main() {
     }
     case 1u: {  // choice among entries
         float probability;
-        out_bits(0u, distribution_sample(0u, in_bits(0u), in1(1u), probability));
+        uint word = in_word(1u);
+        out_bits(0u, distribution_sample(0u, in_bits(0u), word, in_word(3u), probability));
         out1(1u, probability);
+        out1(2u, unit_float(word));
         break;
     }
-    case 2u: {  // environment maps
+    case 2u: {  // environment maps, whose texels stand first
         uvec2 size = uvec2(in_bits(0u), in_bits(1u));
-        uvec2 texel;
-        out3(0u, environment_sample(0u, size, in2(2u), in2(4u), texel));
-        out_bits(4u, texel.x);
-        out_bits(5u, texel.y);
-        out2(6u, environment_uv(in3(6u)));
-        out3(9u, environment_direction(in2(4u)));
+        uint base = 4u * size.x * (size.y + 1u);
+        vec4 found;
+        bool emission = in_bits(16u) != 0u;
+        out3(0u, environment_sample(base, size, in1(15u), emission, uvec2(in_word(2u), in_word(4u)), uvec2(in_word(6u), in_word(8u)), found));
+        out3(3u, found.rgb);
+        out1(6u, found.a);
+        vec4 seen = environment_look_up(size, in1(15u), in3(10u));
+        out3(7u, seen.rgb);
+        out1(10u, seen.a);
+        out2(11u, environment_uv(in3(10u)));
+        out3(13u, environment_direction(in2(13u)));
+        break;
+    }
+    case 3u: {  // numbers that are used again, linear densities
+        float u = in1(0u);
+        out1(0u, choose_first(u, in1(1u)) ? 1.0 : 0.0);
+        out1(1u, u);
+        out1(2u, linear_sample(in1(0u), in1(2u), in1(3u)));
         break;
     }
     }

@@ -10,14 +10,16 @@ mod scattering;
 use std::f64::consts::{PI, TAU};
 
 use clerestory::gpu::Gpu;
-use clerestory::transport::distribution::{build_distribution, build_distribution_2d, distribution_probability};
+use clerestory::scene::Environment;
+use clerestory::transport::distribution::build_distribution;
+use clerestory::transport::environment::{EnvironmentTables, environment_direction};
 use clerestory::transport::ggx::ggx_visible_pdf;
 use clerestory::transport::random::SamplerKind;
 use clerestory_tests::shaders::types::RandomCase;
 use clerestory_tests::statistics::{FALSE_ALARM, chi_square_test, expect_counts};
 use clerestory_tests::twin::{Case, random_words};
 use clerestory_tests::{twin_kernel, with_gpu};
-use glam::{DVec3, UVec2};
+use glam::{DVec2, DVec3, Vec3};
 
 twin_kernel!(twin_math);
 twin_kernel!(twin_tables);
@@ -57,6 +59,12 @@ fn expect_even(what: &str, counts: &[f64]) {
 
 fn wide(points: &[[f32; 2]]) -> impl Iterator<Item = [f64; 2]> + '_ {
     points.iter().map(|p| p.map(f64::from))
+}
+
+/// The word of a number from the device, whose upper 24 bits it has, in two halves as it travels.
+fn halves(u: f32) -> [f32; 2] {
+    let bits = (u * 16_777_216.0) as u32;
+    [(bits >> 8) as f32, ((bits & 255) << 8) as f32]
 }
 
 /// Azimuth of a vector as a share of the circle.
@@ -197,46 +205,90 @@ fn lights_are_chosen_by_their_power() {
             .collect();
         let cdf = build_distribution("lights", &powers).unwrap();
         let points = pairs(gpu, SamplerKind::Pcg, 13, false);
-        let cases: Vec<Case> = points.iter().map(|p| Case::new(&[f32::from_bits(50), p[0]])).collect();
+        let cases: Vec<Case> = (points.iter())
+            .map(|p| {
+                let ([a, b], [c, d]) = (halves(p[0]), halves(p[1]));
+                Case::new(&[f32::from_bits(50), a, b, c, d])
+            })
+            .collect();
         let mut counts = vec![0.0; 50];
+        // By quarters of what the choice leaves.
+        let mut quarters = vec![0.0; 200];
         for result in twin_tables(gpu, 1, &cases, &cdf) {
             counts[result.bits(0) as usize] += 1.0;
+            quarters[result.bits(0) as usize * 4 + (result.0[2] * 4.0) as usize] += 1.0;
         }
         let total: f64 = powers.iter().sum();
         let expected: Vec<f64> = powers.iter().map(|p| p / total * DRAWS as f64).collect();
         expect_counts("lights", &counts, &expected);
+        let expected_quarters: Vec<f64> = (0..200).map(|i| expected[i / 4] / 4.0).collect();
+        expect_counts("places on lights", &quarters, &expected_quarters);
         // The test would see a choice that is even where it should not be.
         assert!(chi_square_test(&counts, &vec![DRAWS as f64 / 50.0; 50]) < FALSE_ALARM);
     });
 }
 
 #[test]
-fn environments_are_sampled_by_their_texels_and_evenly_within() {
+fn environments_are_sampled_by_what_is_looked_up() {
     with_gpu(|gpu| {
-        let size = UVec2::new(16, 8);
-        let weights: Vec<f64> = (0..128).map(|i| f64::from((i * 5) % 11)).collect();
-        let cdf = build_distribution_2d("environment", size, &weights).unwrap();
-        let (texel, within) = (
-            pairs(gpu, SamplerKind::Pcg, 15, false),
-            pairs(gpu, SamplerKind::Pcg, 16, false),
-        );
-        let cases: Vec<Case> = (texel.iter().zip(&within))
-            .map(|(t, w)| Case::new(&[f32::from_bits(16), f32::from_bits(8), t[0], t[1], w[0], w[1]]))
-            .collect();
-        // Four cells per texel: halves in azimuth, and in height, which is even over a texel's solid angle.
-        let mut counts = vec![0.0; 512];
-        for result in twin_tables(gpu, 2, &cases, &cdf) {
-            let w = result.vector(0);
-            let (column, row) = (result.bits(4) as usize, result.bits(5) as usize);
-            let u = turn(-w.z, w.x) + 0.5;
-            let right = ((u - column as f64 / 16.0) * 16.0).rem_euclid(16.0) >= 0.5;
-            let height = |r: usize| (PI * r as f64 / 8.0).cos();
-            let lower = w.y < 0.5 * (height(row) + height(row + 1));
-            counts[(row * 16 + column) * 4 + usize::from(right) * 2 + usize::from(lower)] += 1.0;
+        let mut map = Environment::uniform(Vec3::ONE);
+        (map.width, map.height) = (8, 4);
+        map.radiance = (0..32).map(|i| Vec3::splat(((i * 5) % 11) as f32)).collect();
+        let tables = EnvironmentTables::build(&map, true).unwrap();
+        let all = EnvironmentTables::build(&map, false).unwrap();
+        let words = pairs(gpu, SamplerKind::Pcg, 15, false);
+        // Four cells of the test along each side of a texel, even in azimuth and in polar angle.
+        const COLUMNS: usize = 32;
+        const ROWS: usize = 16;
+        const STEPS: usize = 8;
+        let draw = |emission: bool, cdf: &[f32]| {
+            let floats = [bytemuck::cast_slice(&tables.texels), cdf].concat();
+            let cases: Vec<Case> = (words.iter().zip(words.iter().rev()))
+                .map(|(w, fresh)| {
+                    let [a, b, c, d] = [w[0], w[1], fresh[0], fresh[1]].map(halves);
+                    let size = [8, 4].map(f32::from_bits);
+                    let rest = [0.0, 0.0, 0.0, 0.0, 0.0, tables.ambient, f32::from_bits(emission.into())];
+                    Case::new(&[&size[..], &a, &b, &c, &d, &rest].concat())
+                })
+                .collect();
+            let directions = twin_tables(gpu, 2, &cases, &floats);
+            let points = directions.iter().map(|r| {
+                let w = r.vector(0);
+                [
+                    w.y.clamp(-1.0, 1.0).acos() / PI,
+                    (turn(-w.z, w.x) + 0.5).rem_euclid(1.0),
+                ]
+            });
+            grid(points, ROWS, COLUMNS)
+        };
+        let expected = |density: &dyn Fn(DVec3) -> f64| -> Vec<f64> {
+            let cell = |i: usize| {
+                let at = |k: usize, first: usize, cells: usize| {
+                    (first as f64 + (k as f64 + 0.5) / STEPS as f64) / cells as f64
+                };
+                let sum: f64 = (0..STEPS * STEPS)
+                    .map(|k| {
+                        let v = at(k / STEPS, i / COLUMNS, ROWS);
+                        let w = environment_direction(DVec2::new(at(k % STEPS, i % COLUMNS, COLUMNS), v));
+                        density(w) * (PI * v).sin()
+                    })
+                    .sum();
+                sum * 2.0 * PI * PI / (ROWS * COLUMNS * STEPS * STEPS) as f64 * DRAWS as f64
+            };
+            (0..ROWS * COLUMNS).map(cell).collect()
+        };
+        let emission_cdf = tables.emission_cdf.as_ref().unwrap();
+        for (what, emission, of, cdf) in [
+            ("light above the mean", false, &tables, &tables.cdf),
+            ("all light", true, &all, emission_cdf),
+        ] {
+            let counts = draw(emission, cdf);
+            let bilinear = expected(&|w| of.environment_look_up(w).w);
+            let total = bilinear.iter().sum::<f64>() / DRAWS as f64;
+            assert!((total - 1.0).abs() < 1e-3, "the density integrates to one: {total}");
+            expect_counts(what, &counts, &bilinear);
+            // The test would see a density that is constant where it should not be.
+            assert!(chi_square_test(&counts, &expected(&|_| 0.25 / PI)) < FALSE_ALARM);
         }
-        let rows: f64 = weights.iter().sum();
-        let expected: Vec<f64> = (0..512).map(|i| weights[i / 4] / rows / 4.0 * DRAWS as f64).collect();
-        assert!((distribution_probability(&cdf, 0, 0) - weights[..16].iter().sum::<f64>() / rows).abs() < 1e-6);
-        expect_counts("environment", &counts, &expected);
     });
 }

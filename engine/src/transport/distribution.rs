@@ -1,13 +1,17 @@
 //! Choice among entries in proportion to their weights: cumulative tables in one and two dimensions.
 //!
-//! Method: inversion of the cumulative distribution by bisection. Probabilities are multiples of 2⁻²⁴, the grid of the engine's random
+//! Method: inversion of the cumulative distribution by bisection, by random words of 32 bits, which become their places within the entry's
+//! share, so that one point chooses an entry and a place in it (Shirley et al. 1996). Probabilities are multiples of 2⁻²⁴, the grid of the engine's random
 //! numbers, shared out by largest remainder, and each positive weight has at least one: so f32 holds the table exactly, an entry's
 //! probability is exactly the share of random numbers that choose it, and no entry with a positive weight is lost however small it
 //! is. Guarantee: at most 24 steps. Twin of `transport/distribution.glsl`.
 
 use crate::catalogue::{Bias, Role, Row, sources};
+use crate::gpu::shaders::constants::{DISTRIBUTION_QUANTA, WORD_RANGE};
+use crate::transport::choice::BELOW_ONE;
+use crate::transport::random::unit_float;
 use crate::{Error, Result};
-use glam::{DVec2, UVec2};
+use glam::UVec2;
 
 /// Number of steps between 0 and 1.
 const QUANTA: u64 = 1 << 24;
@@ -97,8 +101,27 @@ pub fn distribution_probability(cdf: &[f32], base: usize, entry: usize) -> f64 {
     f64::from(cdf[base + entry + 1]) - f64::from(cdf[base + entry])
 }
 
-/// The entry that `u` in [0, 1) chooses, the last one whose cumulative probability is at most `u`, and its probability.
-pub fn distribution_sample(cdf: &[f32], base: usize, count: usize, u: f64) -> (usize, f64) {
+/// The place of a word within the share of all words that begins at `first`, as a word again.
+///
+/// The bits that choosing took are made up for by those of `fresh`, another random word, so that the result has 24 good bits however
+/// small the share. The device's rounding moves it by half of the last of them at most.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "parts of 32-bit words"
+)]
+pub fn rescaled_word(word: u32, first: f64, share: f64, fresh: u32) -> u32 {
+    let quanta = f64::from(DISTRIBUTION_QUANTA);
+    let rest = word.wrapping_sub(((first * quanta) as u32) << 8);
+    let place = (f64::from(rest) + unit_float(fresh)) / (share * f64::from(WORD_RANGE));
+    (((place.min(BELOW_ONE) * quanta) as u32) << 8) | (fresh & 255)
+}
+
+/// The entry that a word chooses, the last one whose cumulative probability is at most the word's upper 24 bits, and its probability.
+///
+/// The word becomes its place within that entry's share: [`rescaled_word`].
+pub fn distribution_sample(cdf: &[f32], base: usize, count: usize, word: &mut u32, fresh: u32) -> (usize, f64) {
+    let u = unit_float(*word);
     let (mut lower, mut upper) = (0, count);
     while upper - lower > 1 {
         let middle = usize::midpoint(lower, upper);
@@ -108,7 +131,9 @@ pub fn distribution_sample(cdf: &[f32], base: usize, count: usize, u: f64) -> (u
             upper = middle;
         }
     }
-    (lower, distribution_probability(cdf, base, lower))
+    let probability = distribution_probability(cdf, base, lower);
+    *word = rescaled_word(*word, f64::from(cdf[base + lower]), probability, fresh);
+    (lower, probability)
 }
 
 /// Where the table of a row begins.
@@ -123,10 +148,18 @@ pub fn distribution_probability_2d(cdf: &[f32], base: usize, size: UVec2, cell: 
         * distribution_probability(cdf, distribution_row_base(base, size, row), cell.x as usize)
 }
 
-/// The cell that `u` in [0, 1)² chooses and its probability.
-pub fn distribution_sample_2d(cdf: &[f32], base: usize, size: UVec2, u: DVec2) -> (UVec2, f64) {
-    let (row, p_row) = distribution_sample(cdf, base, size.y as usize, u.y);
-    let (column, p_column) = distribution_sample(cdf, distribution_row_base(base, size, row), size.x as usize, u.x);
+/// The cell that two words choose, which become the place within its share, and its probability.
+pub fn distribution_sample_2d(
+    cdf: &[f32],
+    base: usize,
+    size: UVec2,
+    word: &mut [u32; 2],
+    fresh: [u32; 2],
+) -> (UVec2, f64) {
+    let [x, y] = word;
+    let (row, p_row) = distribution_sample(cdf, base, size.y as usize, y, fresh[1]);
+    let row_base = distribution_row_base(base, size, row);
+    let (column, p_column) = distribution_sample(cdf, row_base, size.x as usize, x, fresh[0]);
     #[expect(clippy::cast_possible_truncation, reason = "below the grid's size")]
     (UVec2::new(column as u32, row as u32), p_row * p_column)
 }
@@ -138,23 +171,32 @@ pub(crate) const ROWS: &[Row] = &[Row {
     role: Role::PartOf("BG-3"),
     limits: "Blind to shadows and to where a light is from the point that it lights; distant lights keep half of the choices at most where there are others, so that what each light adds has at most twice the second moment that it has by power alone.",
     sources: &[sources::SHIRLEY_1996.at("inversion of the cumulative distribution")],
-    shaders: &["shaders/transport/distribution.glsl"],
+    shaders: &["shaders/transport/distribution.glsl", "shaders/transport/choice.glsl"],
     bias: Some(Bias::Unbiased),
     tests: &[
         "engine/src/transport/distribution.rs::probabilities_follow_weights_and_none_is_lost",
         "engine/src/transport/distribution.rs::cells_follow_their_probability",
+        "engine/src/transport/distribution.rs::what_is_left_of_a_word_is_even_in_each_entry",
+        "engine/src/transport/choice.rs::what_is_left_is_even_in_each_alternative",
         "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
         "engine/src/transport/gpu_scene/lights.rs::no_light_loses_more_than_half_of_its_choices",
         "tests/tests/twins/tables.rs::distributions_agree_with_their_twins",
     ],
-    api: &["clerestory::transport::distribution"],
+    api: &["clerestory::transport::distribution", "clerestory::transport::choice"],
     ..Row::of(file!())
 }];
 
 #[cfg(test)]
 mod tests {
+    use super::super::random::pcg4d;
     use super::super::testing::{chi_square_test, random3};
     use super::*;
+    use glam::UVec4;
+
+    /// Independent words.
+    fn words(i: u32, seed: u32) -> [u32; 4] {
+        pcg4d(UVec4::new(i, seed, 0xd157, 0)).to_array()
+    }
 
     #[test]
     fn probabilities_follow_weights_and_none_is_lost() {
@@ -182,7 +224,10 @@ mod tests {
         let cdf = build_distribution("test", &[0.0, 3.0, 0.0, 1.0, 0.0]).unwrap();
         for k in (0..QUANTA).step_by(4099).chain([QUANTA - 1]) {
             let u = k as f64 / QUANTA as f64;
-            let (i, p) = distribution_sample(&cdf, 0, 5, u);
+            let mut word = (k as u32) << 8 | 255;
+            let (i, p) = distribution_sample(&cdf, 0, 5, &mut word, 0);
+            let place = (u - f64::from(cdf[i])) / p;
+            assert!((unit_float(word) - place).abs() <= 1.0 / QUANTA as f64 / p, "{place}");
             assert!(f64::from(cdf[i]) <= u && u < f64::from(cdf[i + 1]));
             assert!(p > 0.0 && p == distribution_probability(&cdf, 0, i));
         }
@@ -199,7 +244,8 @@ mod tests {
         let n = 40_000;
         let mut observed = vec![0.0; 117];
         for i in 0..n {
-            let (cell, p) = distribution_sample_2d(&cdf, 0, size, random3(i, 2).truncate());
+            let [x, y, a, b] = words(i, 2);
+            let (cell, p) = distribution_sample_2d(&cdf, 0, size, &mut [x, y], [a, b]);
             assert_eq!(p, distribution_probability_2d(&cdf, 0, size, cell));
             observed[(cell.y * size.x + cell.x) as usize] += 1.0;
         }
@@ -212,6 +258,32 @@ mod tests {
             chi_square_test(&observed, &wrong) < 1e-5,
             "the test must be able to fail"
         );
+    }
+
+    /// Chi-square of 60,000 words over four entries and 16 cells of what is left; false alarm 1e-5. The least entry has four quanta: what is
+    /// left there comes from the fresh word.
+    #[test]
+    fn what_is_left_of_a_word_is_even_in_each_entry() {
+        let least = 4.0 / QUANTA as f64;
+        let cdf = [0.0, 0.25, 0.3, 0.3 + least, 1.0].map(|c: f64| (c * QUANTA as f64).round() as f32 / QUANTA as f32);
+        let n = 60_000;
+        let mut observed = vec![0.0; 64];
+        let mut small = vec![0.0; 16];
+        for i in 0..n {
+            let [mut word, fresh, inside, _] = words(i, 3);
+            let (entry, _) = distribution_sample(&cdf, 0, 4, &mut word, fresh);
+            observed[entry * 16 + (word >> 28) as usize] += 1.0;
+            // Words of the least entry alone, and the third to sixth bit below its own ten.
+            let mut word = ((f64::from(cdf[2]) * QUANTA as f64) as u32) * 256 + (inside >> 22);
+            let (entry, p) = distribution_sample(&cdf, 0, 4, &mut word, fresh);
+            assert_eq!((entry, p), (2, least));
+            small[(word >> 16 & 15) as usize] += 1.0;
+        }
+        let expected: Vec<f64> = (0..64)
+            .map(|cell| distribution_probability(&cdf, 0, cell / 16) * f64::from(n) / 16.0)
+            .collect();
+        assert!(chi_square_test(&observed, &expected) > 1e-5);
+        assert!(chi_square_test(&small, &[f64::from(n) / 16.0; 16]) > 1e-5);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod albedo;
 pub mod bsdf;
+pub mod choice;
 pub mod differentials;
 pub mod distribution;
 pub mod environment;

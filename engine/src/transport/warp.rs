@@ -1,15 +1,19 @@
 //! Warps from the unit square to the domains that a renderer samples, with their densities.
 //!
 //! Sources: concentric disk of Shirley and Chiu (1997); triangle of Heitz, "A Low-Distortion Map Between Triangle and Square"
-//! (2019). Guarantees: densities integrate to one over their domain (solid angle for directions); directions have unit length. Twin of
-//! `transport/warp.glsl`.
+//! (2019); linear densities in the stable form of Pharr et al. (2023, 2.3.2). Guarantees: densities integrate to one over their domain
+//! (solid angle for directions); directions have unit length. Twin of `transport/warp.glsl`.
 
 pub use crate::scene::normal_map::orthonormal_basis;
 
+use super::choice::BELOW_ONE;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
 use crate::catalogue::{Bias, Role, Row, sources};
+
+/// Keeps a quotient of zeros zero.
+const LINEAR_LEAST: f64 = crate::gpu::shaders::constants::LINEAR_LEAST as f64;
 
 /// Density of [`square_to_sphere`], sr⁻¹.
 pub const UNIFORM_SPHERE_PDF: f64 = 0.25 * FRAC_1_PI;
@@ -75,6 +79,19 @@ pub fn square_to_triangle(u: DVec2) -> DVec3 {
     DVec3::new(1.0 - b1 - b2, b1, b2)
 }
 
+/// Number in [0, 1) whose density changes linearly from one end to the other, where it is in proportion to `a` and `b`, not both zero.
+pub fn linear_sample(u: f64, a: f64, b: f64) -> f64 {
+    let most = a.max(b);
+    let (a, b) = (a / most, b / most);
+    let root = (a * a + (b * b - a * a) * u).sqrt();
+    (u * (a + b) / (a + root).max(LINEAR_LEAST)).min(BELOW_ONE)
+}
+
+/// Density of [`linear_sample`] at `x`.
+pub fn linear_pdf(x: f64, a: f64, b: f64) -> f64 {
+    (a + (b - a) * x) / (0.5 * a + 0.5 * b)
+}
+
 /// Rows of the catalogue.
 pub(crate) const ROWS: &[Row] = &[Row {
     id: "BG-2",
@@ -91,6 +108,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/samplers.rs::warps_keep_areas",
         "tests/tests/samplers.rs::pairs_fill_the_square_evenly",
         "engine/src/transport/warp.rs::disk_and_triangle_are_uniform",
+        "engine/src/transport/warp.rs::linear_densities_are_followed",
         "tests/tests/twins/directions.rs::warps_cones_and_bases_agree_with_their_twins",
     ],
     api: &["clerestory::transport::warp"],
@@ -213,6 +231,27 @@ mod tests {
         assert!(chi_square_test(&disk, &expected) > SIGNIFICANCE);
         assert!(chi_square_test(&triangle, &expected) > SIGNIFICANCE);
         assert_eq!(square_to_disk(DVec2::splat(0.5)), DVec2::ZERO);
+    }
+
+    #[test]
+    fn linear_densities_are_followed() {
+        let n = 20_000;
+        for (k, (a, b)) in [(1.0, 1.0), (0.0, 3.0), (2e200, 1e200), (1e-30, 4e-24)]
+            .into_iter()
+            .enumerate()
+        {
+            let mut cells = vec![0.0; 32];
+            for i in 0..n {
+                let x = linear_sample(random3(i, 8 + k as u32).x, a, b);
+                assert!((0.0..1.0).contains(&x));
+                cells[(x * 32.0) as usize] += 1.0;
+            }
+            let expected: Vec<f64> = (0..32)
+                .map(|cell| linear_pdf((f64::from(cell) + 0.5) / 32.0, a, b) * f64::from(n) / 32.0)
+                .collect();
+            assert!(chi_square_test(&cells, &expected) > SIGNIFICANCE, "{a} {b}");
+        }
+        assert_eq!((linear_sample(0.0, 0.0, 1.0), linear_sample(0.0, 1.0, 0.0)), (0.0, 0.0));
     }
 
     #[test]

@@ -41,7 +41,7 @@ void main() {
     vec2 place = vec2(pixel % push.camera.width, pixel / push.camera.width) + sample_2d(s);
     Ray ray = Ray(vec3(0.0), 0.0, vec3(0.0), FAR_AWAY);
     camera_ray(push.camera, place, square_to_disk(sample_2d(s)), ray.origin, ray.direction);
-    vec3 light = load_environment_texel(load_environment(), uvec2(0u)).rgb;
+    vec3 light = environment_texel(0u).rgb;
     for (uint way = 0u; way < 2u && light != vec3(0.0); ++way) {
         Hit hit = no_hit(FAR_AWAY);
         bool stopped = closest_hit(ray, INDEX_START, hit) != INDEX_FINISHED;

@@ -48,16 +48,16 @@ ShadowRay shadow_ray(uint slot, WalkState path, vec3 from, vec3 to, vec3 contrib
 }
 
 // Light of a point or spot scattered once on the way, at a place chosen by the angle under which the light sees it. True where there is some.
-bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec2 u) {
+bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, uvec2 word) {
     float probability;
-    SceneLight light = load_light(distribution_sample(0u, light_count(), u.x, probability));
+    SceneLight light = load_light(distribution_sample(0u, light_count(), word.x, 0u, probability));
     if (light.kind != LIGHT_POINT && light.kind != LIGHT_SPOT) {
         return false;
     }
     float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
     vec3 start = path.origin + way.start * path.direction;
     EquiAngular e = equi_angular(start, path.direction, t_max, light.position);
-    float t = equi_angular_sample(e, t_max, u.y);
+    float t = equi_angular_sample(e, t_max, unit_float(word.y));
     float pdf = equi_angular_pdf(e, t);
     vec3 from = place_on_way(path, way, t);
     vec3 to = light.position - from;
@@ -81,10 +81,8 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
 
 // Light that a collision at `from`, t from the start of the way, scatters into the path. The flags of the place where there is some, or 0.
 uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
-    vec2 choice = bounce_sample(slot, path.bounce, DIMENSION_LIGHT);
-    vec2 u = bounce_sample(slot, path.bounce, DIMENSION_LIGHT_POINT);
-    vec2 within = HAS_ENVIRONMENT ? bounce_sample(slot, path.bounce, DIMENSION_LIGHT_WITHIN) : vec2(0.0);
-    LightSample light = sample_light(from, choice.x, u, within, push.scene_lower, push.scene_upper);
+    uvec2 word = bounce_words(slot, path.bounce, DIMENSION_LIGHT);
+    LightSample light = sample_light(from, word, push.scene_lower, push.scene_upper);
     if (light.radiance == vec3(0.0)) {
         return 0u;
     }
@@ -107,7 +105,7 @@ uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, S
 
 // The path's new direction at a collision; false when it ends.
 bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
-    vec2 lobe = bounce_sample(slot, path.bounce, DIMENSION_LOBE);
+    float roulette = bounce_sample(slot, path.bounce, DIMENSION_SIDE).y;
     vec2 u = bounce_sample(slot, path.bounce, DIMENSION_DIRECTION);
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
     vec3 wi = normalize(phase_direction(path.direction, c, u.y));
@@ -115,7 +113,7 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     path.origin = at;
     path.direction = wi;
     path.bounce += 1u;
-    return path_roulette(path, lobe.y) && path.throughput != vec3(0.0);
+    return path_roulette(path, roulette) && path.throughput != vec3(0.0);
 }
 
 void main() {
@@ -184,7 +182,7 @@ void main() {
             }
             if (HAS_AIRLIGHT && lighting && m.sigma_s != vec3(0.0)) {
                 Sampler s = walk_sampler(slot, dimension + DIMENSION_AIRLIGHT);
-                if (sample_airlight(slot, place, path, bands, m, way, sample_2d(s))) {
+                if (sample_airlight(slot, place, path, bands, m, way, sampler_bits(s))) {
                     flags |= FLAG_AIRLIGHT | FLAG_WAITING;
                 }
             }

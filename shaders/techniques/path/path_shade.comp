@@ -45,8 +45,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         if (HAS_ENVIRONMENT && counted) {
             SceneEnvironment e = load_environment();
             vec3 local = world_to_environment(e, path.direction);
-            float weight = emission_weight(path.pdf, environment_light_pdf(e, local));
-            radiance += path.throughput * environment_radiance(e, local) * weight;
+            vec4 seen = environment_look_up(e, local);
+            float weight = emission_weight(path.pdf, environment_choice_probability() * seen.a);
+            radiance += path.throughput * seen.rgb * weight;
         }
         return;
     }
@@ -94,10 +95,8 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
     lit = lit && (!HAS_PATH_AUTOMATON || lit_mask != 0u);
     if (lit && path_set_contains(push.path_set, bounce + 1u)) {
-        vec2 choice = bounce_sample(slot, bounce, DIMENSION_LIGHT);
-        vec2 u = bounce_sample(slot, bounce, DIMENSION_LIGHT_POINT);
-        vec2 within = HAS_ENVIRONMENT ? bounce_sample(slot, bounce, DIMENSION_LIGHT_WITHIN) : vec2(0.0);
-        LightSample light = sample_light(s.point.position, choice.x, u, within, push.scene_lower, push.scene_upper);
+        uvec2 word = bounce_words(slot, bounce, DIMENSION_LIGHT);
+        LightSample light = sample_light(s.point.position, word, push.scene_lower, push.scene_upper);
         vec3 wi = light.direction;
         if (light.radiance != vec3(0.0) && sides_agree(frame.z, frame.outward, wi)) {
             // The density is that of the directions sampled below, whatever part of them finds light that counts.
@@ -127,13 +126,13 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         }
     }
 
-    vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
-    BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), mask);
+    vec2 side = bounce_sample(slot, bounce, DIMENSION_SIDE);
+    BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), side.x), mask);
     if (HAS_PATH_AUTOMATON) {
         uint after_base = path_set_successor(successors, LOBE_DIFFUSE & LOBE_REFLECTION);
         uint after_microfacets = path_set_successor(successors, LOBE_GLOSSY & LOBE_REFLECTION);
         bool alike = !HAS_LOBE_LABELS || after_base == after_microfacets;
-        scattered = bsdf_label(bsdf, frame.wo, scattered, mask, alike, lobe.y);
+        scattered = bsdf_label(bsdf, frame.wo, scattered, mask, alike, side.y);
         state = scattered.flags != 0u ? path_set_successor(successors, scattered.flags) : 0u;
     }
     vec3 wi = frame_to_world(frame, scattered.wi);
@@ -147,7 +146,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : around;
     }
     path.bounce = bounce + 1u;
-    if (!path_roulette(path, lobe.y)) {
+    if (!path_roulette(path, side.y)) {
         return;
     }
     path.origin = departure(a, wi, path.throughput);

@@ -33,10 +33,7 @@ struct Emission {
     Differentials differentials;
 };
 
-vec2 emission_sample(uint slot, uint dimension) {
-    Sampler s = walk_sampler(slot, dimension);
-    return sample_2d(s);
-}
+uvec2 emission_words(uint slot, uint dimension) { return sampler_bits(walk_sampler(slot, dimension)); }
 
 vec3 in_frame(vec3 local, vec3 z) {
     vec3 x;
@@ -61,17 +58,17 @@ Emission parallel_emission(vec3 direction, vec3 irradiance, vec2 u) {
 
 // `probability` is that of the light.
 Emission emit(uint slot, out float probability) {
-    vec2 choice = emission_sample(slot, PHOTON_DIMENSION_LIGHT);
-    vec2 u = emission_sample(slot, PHOTON_DIMENSION_POINT);
-    vec2 v = emission_sample(slot, PHOTON_DIMENSION_DIRECTION);
-    SceneLight light = load_light(distribution_sample(0u, light_count(), choice.x, probability));
+    uvec2 point = emission_words(slot, PHOTON_DIMENSION_POINT);
+    uvec2 direction = emission_words(slot, PHOTON_DIMENSION_DIRECTION);
+    uvec3 fresh = pcg3d(uvec3(point.x, direction));
+    SceneLight light = load_light(distribution_sample(0u, light_count(), point.x, fresh.x, probability));
+    vec2 u = vec2(unit_float(point.x), unit_float(point.y));
+    vec2 v = vec2(unit_float(direction.x), unit_float(direction.y));
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
-        uvec2 texel;
+        vec4 found;
         SceneEnvironment environment = load_environment();
-        vec2 within = emission_sample(slot, PHOTON_DIMENSION_WITHIN);
-        vec3 local = environment_sample(environment.cdf_base, environment_size(environment), v, within, texel);
-        float pdf = load_environment_texel(environment, texel).a * probability;
-        return parallel_emission(-environment_to_world(environment, local), environment_radiance(environment, local) / pdf, u);
+        vec3 local = environment_sample(environment_cdf_base(), environment_size(environment), 0.0, true, direction, fresh.yz, found);
+        return parallel_emission(-environment_to_world(environment, local), found.rgb / (found.a * probability), u);
     }
     if (HAS_PUNCTUAL_LIGHTS && light.kind == LIGHT_DIRECTIONAL) {
         return parallel_emission(light.direction, light.strength / probability, u);
@@ -84,7 +81,8 @@ Emission emit(uint slot, out float probability) {
         Surface s = surface_at(Hit(0.0, square_to_triangle(u).yz, light.triangle), push.scene_lower, push.scene_upper);
         SceneMaterial m = load_material(s.material);
         bool both_sides = (m.flags & MATERIAL_DOUBLE_SIDED) != 0u;
-        vec3 normal = both_sides && choice.y < 0.5 ? -s.geometric_normal : s.geometric_normal;
+        bool turned = both_sides && choose_first(v.x, 0.5);
+        vec3 normal = turned ? -s.geometric_normal : s.geometric_normal;
         vec3 local = square_to_cosine_hemisphere(v);
         e.direction = in_frame(local, normal);
         e.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, e.direction);

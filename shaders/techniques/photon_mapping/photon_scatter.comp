@@ -160,10 +160,10 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
         return false;
     }
     ScatteringFrame frame = scattering_frame(a, normal);
-    vec2 lobe = bounce_sample(slot, bounce, DIMENSION_LOBE);
-    BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), lobe.x), LOBE_ALL);
+    vec2 side = bounce_sample(slot, bounce, DIMENSION_SIDE);
+    BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), side.x), LOBE_ALL);
     if (TELLS_CAUSTICS && (HAS_METAL || HAS_SPECULAR_LAYER)) {
-        scattered = bsdf_label(bsdf, frame.wo, scattered, LOBE_ALL, false, lobe.y);
+        scattered = bsdf_label(bsdf, frame.wo, scattered, LOBE_ALL, false, side.y);
     }
     vec3 wi = frame_to_world(frame, scattered.wi);
     if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi)) {
@@ -176,7 +176,7 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     // Between lossless surfaces photons end by SURVIVAL_MAX alone. Also ends a photon whose flux is not a number.
     float most = bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
     float survival = min(largest_component(flux) / largest_component(photon.throughput), most);
-    if (!(lobe.y < survival)) {
+    if (!(side.y < survival)) {
         return false;
     }
     if (HAS_DIFFERENTIALS) {

@@ -11,11 +11,9 @@
 
 // descriptor set 3: PhotonWave
 
-// Slots of random numbers at emission, the last two among those that walks use for light sampling at their first bounce.
-const uint PHOTON_DIMENSION_LIGHT = 0u;
-const uint PHOTON_DIMENSION_POINT = 1u;
-const uint PHOTON_DIMENSION_DIRECTION = 4u;
-const uint PHOTON_DIMENSION_WITHIN = 5u;
+// Slots of random numbers at emission: those for a walk's start.
+const uint PHOTON_DIMENSION_POINT = 0u;      // light, and point of it
+const uint PHOTON_DIMENSION_DIRECTION = 1u;  // side of the light, and direction
 
 // State of a photon's path, beside its number of bounces: whether it has been scattered diffusely.
 const uint PHOTON_UNDIFFUSED = 0u;

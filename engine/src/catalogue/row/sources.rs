@@ -68,6 +68,7 @@ sources! {
     KAJIYA_1986 = "kajiya-1986": "J. Kajiya", "The Rendering Equation", "SIGGRAPH", 1986;
     KARIS_2013 = "karis-2013": "B. Karis", "Real Shading in Unreal Engine 4", "SIGGRAPH course notes", 2013;
     KARRAS_2012 = "karras-2012": "T. Karras", "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees", "HPG", 2012;
+    KARLIK_2019 = "karlik-2019": "O. Karlík, M. Šik, P. Vévoda, T. Skřivan, J. Křivánek", "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling", "ACM TOG 38(6)", 2019;
     KAUTZ_2000 = "kautz-2000": "J. Kautz, P.-P. Vázquez, W. Heidrich, H.-P. Seidel", "A Unified Approach to Prefiltered Environment Maps", "EGWR", 2000;
     KAY_KAJIYA_1986 = "kay-kajiya-1986": "T. Kay, J. Kajiya", "Ray Tracing Complex Scenes", "SIGGRAPH", 1986;
     KELEMEN_SZIRMAY_KALOS_2001 = "kelemen-szirmay-kalos-2001": "C. Kelemen, L. Szirmay-Kalos", "A Microfacet Based Coupled Specular-Matte BRDF Model", "Eurographics short papers", 2001;
@@ -99,6 +100,7 @@ sources! {
     OWEN_1995 = "owen-1995": "A. Owen", "Randomly Permuted (t,m,s)-Nets and (t,s)-Sequences", "Monte Carlo and Quasi-Monte Carlo Methods in Scientific Computing", 1995;
     PANTALEONI_LUEBKE_2010 = "pantaleoni-luebke-2010": "J. Pantaleoni, D. Luebke", "HLBVH: Hierarchical LBVH Construction for Real-Time Ray Tracing of Dynamic Geometry", "HPG", 2010;
     PHARR_2016 = "pharr-2016": "M. Pharr, W. Jakob, G. Humphreys", "Physically Based Rendering, 3rd edition", "Morgan Kaufmann", 2016;
+    PHARR_2023 = "pharr-2023": "M. Pharr, W. Jakob, G. Humphreys", "Physically Based Rendering, 4th edition", "MIT Press", 2023;
     PRAUN_HOPPE_2003 = "praun-hoppe-2003": "E. Praun, H. Hoppe", "Spherical Parametrization and Remeshing", "SIGGRAPH", 2003;
     RAKIC_1995 = "rakic-1995": "A. D. Rakić", "Algorithm for the Determination of Intrinsic Optical Constants of Metal Films: Application to Aluminum", "Appl. Opt. 34", 1995;
     RAMAMOORTHI_HANRAHAN_2001 = "ramamoorthi-hanrahan-2001": "R. Ramamoorthi, P. Hanrahan", "An Efficient Representation for Irradiance Environment Maps", "SIGGRAPH", 2001;

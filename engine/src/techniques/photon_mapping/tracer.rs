@@ -124,6 +124,8 @@ struct Kit {
     counters_readback: Buffer,
     records: TexelView,
     capacity: u32,
+    /// [`GpuScene::emission_choice`].
+    emission: Option<TexelView>,
 }
 
 /// The stages of a wave of photons.
@@ -195,6 +197,7 @@ impl PhotonTracer {
                     .buffer(&BufferDesc::readback("photon counters", size_of::<Counters>() as u64))?,
                 records: record_texels(gpu, capacity)?,
                 capacity,
+                emission: scene.emission_choice(gpu)?,
                 scene,
                 stored,
             },
@@ -345,7 +348,7 @@ impl WalkStages for PhotonStages<'_> {
         };
         recorder.pass("photon: emit", |pass| {
             let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
-            let (scene, own) = (kit.scene.scene_set(), kit.wave_set());
+            let (scene, own) = (kit.scene.emission_set(kit.emission.as_ref()), kit.wave_set());
             pass.dispatch(&kit.emit, &[wave, &scene, &own], &push, groups)?;
             stage_barrier(pass);
             Ok(())

@@ -8,11 +8,10 @@ use glam::DVec3;
 
 use super::{Bsdf, BsdfContext, BsdfSample, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, bsdf_eval, lobe_allowed};
 use crate::gpu::shaders::constants;
+use crate::transport::choice::choose_first;
 
 /// Keeps a quotient of zeros zero.
 const LABEL_LEAST: f64 = constants::LABEL_LEAST as f64;
-/// The largest draw, the last number below one of single precision.
-const LABEL_DRAW_MAX: f64 = constants::LABEL_DRAW_MAX as f64;
 
 /// A sample with its label, one of the lobes of the mask that it was drawn with.
 ///
@@ -43,9 +42,8 @@ pub fn bsdf_label(
     let glossy = whole - diffuse;
     let (d, g) = (diffuse.max_element(), glossy.max_element());
     let p = d / (d + g).max(LABEL_LEAST);
-    let chosen = *u < p;
+    let chosen = choose_first(u, p);
     let share = if chosen { p } else { 1.0 - p };
-    *u = (if chosen { *u } else { *u - p } / share).clamp(0.0, LABEL_DRAW_MAX);
     s.flags = if chosen { base } else { microfacets };
     s.weight = if chosen { diffuse } else { glossy } / (s.pdf * share);
     s

@@ -27,6 +27,7 @@ pub use self::features::{BsdfContext, BsdfFeatures};
 pub use self::label::bsdf_label;
 use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
+use super::choice::choose_first;
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
 use super::phong::{phong_eval, phong_exponent, phong_pdf, phong_sample};
 use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
@@ -213,7 +214,8 @@ pub fn bsdf_pdf(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32
     bsdf_eval_pdf(context, b, wo, wi, mask).1
 }
 
-/// A direction in proportion to the allowed lobes: `u.xy` choose the direction, `u.z` the lobe.
+/// A direction in proportion to the allowed lobes: `u.xy` choose the lobe and the direction, `u.z` between the two sides of a rough
+/// microfacet.
 ///
 /// Strategies: the cosine for the diffuse base and the metal's multiple scattering, visible normals for all microfacet lobes, with
 /// reflection and transmission told apart by the Fresnel factor of the sampled facet, or the power of the cosine for a Phong lobe; all
@@ -227,9 +229,9 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
         side,
         ..
     } = &upper;
-    let uv = DVec2::new(u.x, u.y);
+    let mut uv = DVec2::new(u.x, u.y);
     let (mut wi, mut flags);
-    if u.z < p_cosine {
+    if choose_first(&mut uv.x, p_cosine) {
         wi = square_to_cosine_hemisphere(uv);
         flags = LOBE_DIFFUSE & LOBE_REFLECTION;
     } else if context.is_phong(b) && !b.is_delta() {
@@ -245,7 +247,8 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
         let cos_h = wo.dot(h);
         let (r, t) = context.microfacet_split(b, cos_h, eta, mask);
         let p_reflection = reflection_probability(r, t);
-        let reflected = u.z - p_cosine < p_reflection * (1.0 - p_cosine);
+        // A delta leaves the number over that chose it.
+        let reflected = if delta { uv.x } else { u.z } < p_reflection;
         wi = 2.0 * cos_h * h - wo;
         let shape = if delta { LOBE_SPECULAR } else { LOBE_GLOSSY };
         flags = shape & LOBE_REFLECTION;

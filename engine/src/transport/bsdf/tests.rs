@@ -271,7 +271,7 @@ fn delta_lobes_are_chosen_as_often_as_they_say() {
         for cos_o in [0.9, 0.2, -0.5, -0.9] {
             let samples: Vec<BsdfSample> = (0..draws)
                 .map(|i| {
-                    let u = DVec3::new(0.3, 0.6, (f64::from(i) + 0.5) / f64::from(draws));
+                    let u = DVec3::new((f64::from(i) + 0.5) / f64::from(draws), 0.6, 0.3);
                     bsdf_sample(&c, &b, direction(cos_o, 0.4), u, LOBE_ALL)
                 })
                 .collect();
@@ -516,7 +516,7 @@ fn clear_solid_is_the_smooth_dielectric() {
                 &c,
                 &b,
                 wo,
-                DVec3::new(0.5, 0.5, (f64::from(i) + 0.5) / 2000.0),
+                DVec3::new((f64::from(i) + 0.5) / 2000.0, 0.5, 0.5),
                 LOBE_ALL,
             );
             if s.flags == LOBE_SPECULAR & LOBE_REFLECTION {

@@ -1,5 +1,5 @@
 //! Everything that light sampling chooses among, and the probabilities of the choice: by power, as [`lights`](crate::transport::lights)
-//! has it, with limits for distant ones; then by texel of the environment.
+//! has it, with limits for distant ones; then by cell of the environment.
 
 use glam::{DVec3, Mat3, Quat, UVec2, Vec3};
 
@@ -14,8 +14,8 @@ use crate::gpu::shaders::constants::{
 use crate::gpu::shaders::types::{SceneEnvironment, SceneLight, SceneMaterial, SceneTriangle};
 use crate::gpu::{Buffer, Gpu};
 use crate::scene::{Environment, LightKind, Scene, SceneProfile};
-use crate::transport::distribution::{build_distribution, distribution_probability_2d};
-use crate::transport::environment::{environment_distribution, environment_texel_solid_angle, luminance};
+use crate::transport::distribution::build_distribution;
+use crate::transport::environment::{EnvironmentTables, environment_texel_solid_angle, luminance};
 use crate::transport::lights::triangle_power;
 
 /// Everything that light sampling chooses among: emissive triangles, lights without area, the environment last.
@@ -23,8 +23,10 @@ pub(super) struct Lights {
     pub(super) records: Vec<SceneLight>,
     /// The scene's lights without area among them.
     pub(super) punctual: PunctualLights,
-    /// Cumulative probabilities of the lights, then of the environment's texels.
+    /// Cumulative probabilities of the lights, then of the environment's cells, for light sampling.
     pub(super) cdf: Vec<f32>,
+    /// The same for the emission of photons, where it differs.
+    pub(super) emission_cdf: Option<Vec<f32>>,
     /// The environment's block: header and texels.
     pub(super) environment: Vec<u8>,
     /// Sum of their powers, W of luminance.
@@ -101,22 +103,28 @@ impl Lights {
             }
         }
         let mut environment = Vec::new();
-        let mut environment_cdf = Vec::new();
+        let mut tables = None;
         if let Some(map) = scene.environment.as_ref().filter(|_| profile.has_environment()) {
-            environment_cdf = environment_distribution(map)?;
+            let found = sampled_environment(map, !records.is_empty())?;
             powers.push(environment_power(map, radius));
             records.push(SceneLight {
                 kind: LIGHT_ENVIRONMENT,
                 ..SceneLight::default()
             });
-            // The lights' table has one more entry than there are lights; the texels' begins behind it.
-            environment = environment_block(map, &environment_cdf, records.len() as u32 + 1);
+            environment = environment_block(map, &found);
+            tables = Some(found);
         }
         let power = powers.iter().sum();
+        // Photons leave by all of a light's power.
+        let mut sampled = powers.clone();
+        if let (Some(tables), Some(of_environment)) = (&tables, sampled.last_mut()) {
+            *of_environment *= tables.share;
+        }
         share_choices(&records, &mut powers);
+        share_choices(&records, &mut sampled);
         if has_unsampled && records.is_empty() {
             // Kernels that know of emission also sample lights: a dark one to choose.
-            powers.push(0.0);
+            sampled.push(0.0);
             records.push(SceneLight {
                 kind: LIGHT_DARK,
                 ..SceneLight::default()
@@ -125,13 +133,22 @@ impl Lights {
         let mut cdf = if records.is_empty() {
             Vec::new()
         } else {
-            build_distribution("lights", &powers)?
+            build_distribution("lights", &sampled)?
         };
-        cdf.extend(environment_cdf);
+        let mut emission_cdf = None;
+        if let Some(tables) = tables {
+            cdf.extend(tables.cdf);
+            if let Some(cells) = tables.emission_cdf {
+                let mut all = build_distribution("lights", &powers)?;
+                all.extend(cells);
+                emission_cdf = Some(all);
+            }
+        }
         Ok(Self {
             records,
             punctual,
             cdf,
+            emission_cdf,
             environment,
             power,
             has_unsampled,
@@ -239,9 +256,21 @@ fn environment_power(map: &Environment, radius: f64) -> f64 {
     integral * f64::from(map.strength) * std::f64::consts::PI * radius * radius
 }
 
-/// The header `SceneEnvironment` (axes, size, where its table begins), then the texels: radiance scaled by the strength, and the density
-/// with which `environment_sample` finds a direction in them, sr⁻¹.
-fn environment_block(map: &Environment, cdf: &[f32], cdf_base: u32) -> Vec<u8> {
+/// The tables of a map: its mean luminance is left to scattered rays, unless there would be nothing to sample at all.
+fn sampled_environment(map: &Environment, has_others: bool) -> Result<EnvironmentTables> {
+    let knob = std::env::var("CLERESTORY_KNOB").unwrap_or_default();
+    if knob == "none" {
+        return EnvironmentTables::build(map, false);
+    }
+    let tables = EnvironmentTables::build(map, true)?;
+    if tables.share > 0.0 || has_others || knob == "all" {
+        return Ok(tables);
+    }
+    EnvironmentTables::build(map, false)
+}
+
+/// The header `SceneEnvironment` (axes, size, what is left to scattered rays), then the texels of the tables.
+fn environment_block(map: &Environment, tables: &EnvironmentTables) -> Vec<u8> {
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (map.rotation * axis).to_array());
     let header = SceneEnvironment {
         right: axes[0],
@@ -249,17 +278,10 @@ fn environment_block(map: &Environment, cdf: &[f32], cdf_base: u32) -> Vec<u8> {
         up: axes[1],
         height: map.height,
         back: axes[2],
-        cdf_base,
+        ambient: tables.ambient,
     };
-    let size = UVec2::new(map.width, map.height);
     let mut block = bytemuck::bytes_of(&header).to_vec();
-    for (row, texels) in (0..map.height).zip(map.radiance.chunks(map.width as usize)) {
-        let solid_angle = environment_texel_solid_angle(size, row);
-        for (column, texel) in (0..map.width).zip(texels) {
-            let density = distribution_probability_2d(cdf, 0, size, UVec2::new(column, row)) / solid_angle;
-            block.extend_from_slice(bytemuck::bytes_of(&(*texel * map.strength).extend(density as f32)));
-        }
-    }
+    block.extend_from_slice(bytemuck::cast_slice(&tables.texels));
     block
 }
 

@@ -46,6 +46,8 @@ pub struct GpuScene {
     surface_area: f64,
     light_power: f64,
     light_kinds: LightKinds,
+    /// What photons choose by, where light sampling leaves some to scattered rays.
+    emission_cdf: Option<Vec<f32>>,
     punctual_lights: PunctualLights,
     index: IndexOnDevice,
     buffers: SceneBuffers,
@@ -182,6 +184,7 @@ impl GpuScene {
             surface_area: geometry.surface_area(),
             light_power: lights.power,
             light_kinds: lights.kinds(),
+            emission_cdf: lights.emission_cdf,
             punctual_lights: lights.punctual,
             index,
             buffers,
@@ -358,6 +361,26 @@ impl GpuScene {
             scene_cdf: &b.cdf,
             scene_environment: &b.environment,
             scene_albedo_table: &b.albedo_table,
+        }
+    }
+}
+
+impl GpuScene {
+    /// The probabilities by which photons leave lights, where they are others than those of light sampling, for [`Self::emission_set`].
+    pub(crate) fn emission_choice(&self, gpu: &Gpu) -> Result<Option<TexelView>> {
+        let upload = |cdf: &Vec<f32>| {
+            let data = bytemuck::cast_slice(cdf);
+            gpu.texels_with::<u8>("photon probabilities", Category::Light, vk::Format::R32_SFLOAT, data)
+        };
+        self.emission_cdf.as_ref().map(upload).transpose()
+    }
+
+    /// Set 2 for the emission of photons.
+    pub(crate) fn emission_set<'a>(&'a self, choice: Option<&'a TexelView>) -> SceneSet<'a> {
+        let set = self.scene_set();
+        SceneSet {
+            scene_cdf: choice.unwrap_or(&self.buffers.cdf),
+            ..set
         }
     }
 }
