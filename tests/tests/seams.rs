@@ -184,7 +184,7 @@ fn meshes() -> Vec<Mesh> {
     ]
 }
 
-fn kinds() -> [IndexKind; 5] {
+fn kinds() -> [IndexKind; 6] {
     IndexKind::NAMES.map(|name| name.parse().unwrap())
 }
 

@@ -104,8 +104,8 @@ pub struct Arguments {
     /// Sequence of random numbers; by default that of the settings, else sobol
     #[arg(long, value_enum)]
     sampler: Option<Sampler>,
-    /// Ray index: bvh2 by binned SAH, lbvh along the Morton curve (shortest build, slower rays), lbvh-high optimised, lbvh-device like lbvh but built by the device, kd a kd-tree (longest build). The picture is the same with each
-    #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd", default_value_t, value_parser = parse_index)]
+    /// Ray index: bvh2 by binned SAH, lbvh along the Morton curve (shortest build, slower rays), lbvh-high optimised, lbvh-device like lbvh but built by the device, kd a kd-tree (longest build), wide eight children a node, made of bvh2. The picture is the same with each
+    #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd|wide", default_value_t, value_parser = parse_index)]
     index: IndexKind,
     /// With --index kd: folder that keeps kd-trees; a tree over the same triangles is read from there instead of being built again. A file there is trusted with how long rays take, not with the picture: what is damaged, or no such tree, is built anew
     #[arg(long, value_name = "FOLDER")]
