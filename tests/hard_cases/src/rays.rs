@@ -48,7 +48,7 @@ pub const INDEXES: &[IndexCase] = &[
         name: "kd",
         build: |triangles| Ok(Box::new(KdTree::build(triangles, &KdSettings::default())?)),
     },
-    IndexKind {
+    IndexCase {
         name: "wide",
         build: |triangles| Ok(Box::new(WideBvh::build(triangles, &WideSettings::default())?)),
     },
