@@ -5,7 +5,7 @@ use super::*;
 use crate::accel::box_test::{BOX_SLACK, BoxTest};
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
 use crate::accel::lbvh::{self, LbvhSettings};
-use crate::accel::test_support::{Random, U, brute_force, ray};
+use crate::accel::test_support::{Random, U, brute_force};
 use crate::accel::{FINISHED, NO_HIT};
 use crate::gpu::shaders::constants;
 
@@ -399,14 +399,14 @@ fn a_million_equal_triangles_are_one_flat_tree() {
     let bvh = build(&vec![triangle; 1_000_000]);
     let statistics = bvh.statistics();
     assert!(statistics.max_depth <= 20, "{statistics:?}");
-    let r = ray(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z);
+    let r = Ray::new(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z);
     let mut counters = TraversalCounters::default();
     let mut traversal = WideTraversal::closest(&r);
     while traversal.resume != FINISHED {
         traversal.run(&bvh, &r, 30_000, &mut |_, _| true, &mut counters);
     }
     assert_eq!((traversal.hit.triangle, counters.triangles), (0, 1_000_000));
-    assert!(!bvh.closest_hit(&ray(Vec3::new(0.75, 0.75, 1.0), -Vec3::Z)).is_hit());
+    assert!(!bvh.closest_hit(&Ray::new(Vec3::new(0.75, 0.75, 1.0), -Vec3::Z)).is_hit());
 }
 
 /// A chain of the binary tree: each next triangle many times as far and as large, so that every split cuts off one.
@@ -451,7 +451,7 @@ fn nothing_and_one_triangle_are_trees_too() {
         (none.nodes().len(), none.triangles().len(), none.nodes()[0].slots),
         (1, 0, 0)
     );
-    assert!(!none.closest_hit(&ray(Vec3::ONE, -Vec3::ONE)).is_hit());
+    assert!(!none.closest_hit(&Ray::new(Vec3::ONE, -Vec3::ONE)).is_hit());
     let one = build(&[[Vec3::ZERO, Vec3::X, Vec3::Y]]);
     assert_eq!(
         (
@@ -461,7 +461,7 @@ fn nothing_and_one_triangle_are_trees_too() {
             .0,
         1
     );
-    assert_eq!(one.closest_hit(&ray(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z)).triangle, 0);
+    assert_eq!(one.closest_hit(&Ray::new(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z)).triangle, 0);
     assert!(one.triangles().iter().all(|t| t.index != NO_HIT));
 }
 
@@ -469,7 +469,7 @@ fn nothing_and_one_triangle_are_trees_too() {
 fn invalid_rays_and_settings_are_refused() {
     let triangles = grid(4);
     let bvh = build(&triangles);
-    let good = ray(Vec3::new(1.3, 1.4, 5.0), -Vec3::Z);
+    let good = Ray::new(Vec3::new(1.3, 1.4, 5.0), -Vec3::Z);
     assert!(bvh.any_hit(&good));
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
         for i in 0..3 {
