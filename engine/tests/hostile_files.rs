@@ -188,6 +188,25 @@ fn totals_are_bounded_before_anything_is_read_or_made() {
 }
 
 #[test]
+fn triangles_are_counted_for_each_instance() {
+    let mut model = gltf(&["a.bin".into()], &[]);
+    let zeros = |count| json!({"componentType": 5126, "type": "VEC3", "count": count});
+    model["accessors"] = json!([zeros(3000), zeros(500)]);
+    model["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 1}}});
+    let mut files = Memory::default();
+    files.add("m.gltf", model.to_string()).add("a.bin", positions());
+    let limits = InputLimits {
+        decoded_base: 1 << 20,
+        ..InputLimits::default()
+    };
+    // Half a million triangles of 48 bytes.
+    let error = load(files.clone(), "m.gltf", limits).0.expect_err("24 MB").to_string();
+    assert!(error.contains("triangles of all instances"), "{error}");
+    let loaded = load(files, "m.gltf", InputLimits::default()).0.expect("scene");
+    assert_eq!(loaded.scene.instances.len(), 500);
+}
+
+#[test]
 fn pictures_that_promise_more_than_their_bytes_can_hold_are_refused() {
     let mut jpeg = Vec::new();
     let picture = image::RgbImage::from_pixel(8, 8, image::Rgb([1, 2, 3]));

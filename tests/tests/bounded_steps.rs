@@ -1,5 +1,6 @@
 //! A step is a bounded piece of work, whatever the scene: a host looks at its time and at stop requests between two of them. Work is counted, never timed.
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -222,8 +223,8 @@ impl Parted {
 }
 
 impl FrameMethod for Parted {
-    fn begin_parts(&mut self, _: &Gpu) -> Result<u32> {
-        Ok(self.parts[0])
+    fn begin_parts(&mut self, _: &Gpu) -> Result<Option<u32>> {
+        Ok(Some(self.parts[0]))
     }
 
     fn begin(&mut self, recorder: &mut Recorder) -> Result<()> {
@@ -304,6 +305,103 @@ fn parts_of_frames_are_asked_for_in_order_each_in_a_submission_of_its_own() {
     });
 }
 
+/// How often a method is asked until it knows its parts, and how many they are.
+fn counted_parts(gpu: &Gpu, method: &mut impl FrameMethod) -> (u32, u32) {
+    let mut asked = (1..).map(|times| (times, method.begin_parts(gpu).unwrap()));
+    asked.find_map(|(times, of)| Some((times, of?))).unwrap()
+}
+
+/// A method that takes longer than a step has to count a part.
+struct Slow {
+    counted: Arc<AtomicU32>,
+    drawn: Arc<AtomicU32>,
+}
+
+impl FrameMethod for Slow {
+    fn begin_parts(&mut self, _: &Gpu) -> Result<Option<u32>> {
+        std::thread::sleep(Duration::from_millis(300));
+        let counted = self.counted.fetch_add(1, Ordering::Relaxed) + 1;
+        Ok((counted == 3).then_some(2))
+    }
+
+    fn begin_part(&mut self, _: &mut Recorder, _: Part) -> Result<()> {
+        self.drawn.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn record(&mut self, _: &mut Recorder, _: &Frame<'_>, _: &FrameTarget<'_>) -> Result<()> {
+        Ok(())
+    }
+
+    fn path_set(&self) -> PathSet {
+        PathSet::EMITTED
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        Vec::new()
+    }
+}
+
+#[test]
+fn steps_end_between_two_counts_of_parts() {
+    with_gpu(|gpu| {
+        let scene = equal_triangles(2);
+        let view = View {
+            camera: &scene.cameras[0],
+            size: [4, 4],
+            seed: 1,
+            aovs: false,
+        };
+        let (counted, drawn) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicU32::new(0)));
+        let method = Slow {
+            counted: Arc::clone(&counted),
+            drawn: Arc::clone(&drawn),
+        };
+        let mut technique = Accumulated::new(gpu, &view, method).unwrap();
+        let now = || [&counted, &drawn].map(|count| count.load(Ordering::Relaxed));
+        // The third count is the last, and a part is drawn behind it.
+        for expected in [[1, 0], [2, 0], [3, 1]] {
+            assert!(technique.step(1).unwrap().is_some());
+            assert_eq!(now(), expected);
+        }
+        while technique.step(1).unwrap().is_some() {}
+        assert_eq!(now(), [3, 2]);
+    });
+}
+
+#[test]
+fn shadow_maps_are_measured_one_at_a_time() {
+    with_gpu(|gpu| {
+        let mut scene = equal_triangles(6000);
+        for x in [0.3, 0.5, 0.7] {
+            let position = Vec3::new(x, 0.5, 1.5);
+            scene.add_light(
+                "lamp",
+                LightKind::Point {
+                    position,
+                    intensity: Vec3::ONE,
+                },
+            );
+        }
+        let settings = PreviewSettings {
+            shadow_side: 256,
+            ..PreviewSettings::default()
+        };
+        let on_device = upload(gpu, &scene);
+        let mut preview = PreviewMethod::new(gpu, Arc::clone(&on_device), [16, 16], settings).unwrap();
+        let (asked, parts) = counted_parts(gpu, &mut preview);
+        assert!(asked == 3 && parts >= 6, "{asked}, {parts}");
+        assert_eq!(counted_parts(gpu, &mut preview), (1, parts), "known by now");
+        // Maps are of places: one that has moved is measured again, and the others with it.
+        let moved = LightKind::Point {
+            position: Vec3::new(0.5, 0.6, 1.5),
+            intensity: Vec3::ONE,
+        };
+        on_device.move_light(gpu, 1, &moved).unwrap();
+        assert_eq!(counted_parts(gpu, &mut preview).0, 3);
+    });
+}
+
 /// A frame by `method`, recorded as a whole and part by part: the same bits, and how many parts there are.
 fn frame_parts(gpu: &Gpu, scene: &Scene, size: [u32; 2], mut method: impl FrameMethod, least: [u32; 2]) {
     let camera = &scene.cameras[0];
@@ -339,7 +437,7 @@ fn frame_parts(gpu: &Gpu, scene: &Scene, size: [u32; 2], mut method: impl FrameM
             recorder.submit().unwrap().wait().unwrap();
         }
         let parts = [
-            method.begin_parts(gpu).unwrap(),
+            counted_parts(gpu, &mut method).1,
             method.parts(gpu, camera, size).unwrap(),
         ];
         let values = gpu.read::<u32>(radiance.view(), 3 * (size[0] * size[1]) as usize);

@@ -14,7 +14,7 @@ use clerestory::gpu::{
     Access, Buffer, BufferDesc, BufferView, Category, ColorTarget, Gpu, GpuOptions, GraphicsDesc, Image, ImageBarrier,
     ImageDesc, Lesser, OptionalFeatures, Pass, Residency, Sampler, SamplerDesc, Targets, rw_compute_to_compute,
 };
-use clerestory_tests::shaders::{cube_probe, out_of_bounds, quad_frag, quad_vert};
+use clerestory_tests::shaders::{cube_probe, layer_geom, out_of_bounds, quad_frag, quad_vert, value_frag, value_vert};
 use clerestory_tests::{gpu, gpu_with, with_gpu};
 
 fn storage(gpu: &Gpu, name: &str, bytes: u64) -> Buffer {
@@ -550,6 +550,63 @@ fn what_a_panic_left_in_the_middle_of_a_pass_is_not_submitted() {
         let next = recorder.pass("next", |pass| pass.fill(words.view(), 1));
         assert!(matches!(&next, Err(Error::Setting { .. })), "{next:?}");
         assert!(matches!(recorder.submit(), Err(Error::Setting { .. })));
+    });
+}
+
+#[test]
+fn a_rendering_whose_closure_panics_ends() {
+    with_gpu(|gpu| {
+        let picture = image(gpu, vk::ImageUsageFlags::COLOR_ATTACHMENT);
+        let colors = [Some(ColorTarget {
+            image: &picture,
+            clear: None,
+        })];
+        let targets = Targets {
+            colors: &colors,
+            ..Targets::default()
+        };
+        let words = storage(gpu, "words", 64);
+        let mut recorder = gpu.recorder("panics").unwrap();
+        recorder
+            .pass("caught inside", |pass| {
+                pass.image_barrier(&[ImageBarrier {
+                    to: Access::COLOR_WRITE,
+                    ..to_layout(&picture, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                }]);
+                let panicked = catch_unwind(AssertUnwindSafe(|| {
+                    pass.render(&targets, |_| -> clerestory::Result<()> { panic!("a planned panic") })
+                }));
+                assert!(panicked.is_err());
+                // Not allowed inside of a rendering.
+                pass.fill(words.view(), 7)
+            })
+            .unwrap();
+        recorder.submit().unwrap().wait().unwrap();
+        assert_eq!(gpu.read::<u32>(words.view(), 16).unwrap(), [7; 16]);
+    });
+}
+
+#[test]
+fn geometry_shaders_get_the_primitives_that_they_take() {
+    type Desc = GraphicsDesc<'static, value_vert::Shader, value_frag::Shader, layer_geom::Shader>;
+    with_gpu(|gpu| {
+        let of = |topology| {
+            gpu.graphics_pipeline(&Desc {
+                colors: &[vk::Format::R32_UINT],
+                topology,
+                ..Desc::default()
+            })
+        };
+        for topology in [
+            vk::PrimitiveTopology::POINT_LIST,
+            vk::PrimitiveTopology::LINE_LIST,
+            vk::PrimitiveTopology::LINE_STRIP,
+        ] {
+            let made = of(topology);
+            let refused = matches!(&made, Err(Error::Setting { cause, .. }) if cause.contains("layer.geom"));
+            assert!(refused, "{topology:?}: {made:?}");
+        }
+        of(vk::PrimitiveTopology::TRIANGLE_STRIP).unwrap();
     });
 }
 

@@ -15,7 +15,7 @@
 //! // SAFETY: it is recorded by this thread alone, and `recorded` is kept until its fence has been waited for.
 //! let mut recorder = unsafe { Recorder::borrow(gpu, &BorrowDesc::new("host's frame", commands))? };
 //! recorder.pass("sort", |pass| sort.record(pass, sides, Count::Host(1000), scratch))?;
-//! let recorded = recorder.finish();
+//! let recorded = recorder.finish()?;
 //! // The host's own passes follow; it ends the command buffer, submits it, waits for its fence, and then:
 //! println!("{:.3} ms", 1e3 * recorded.timings().seconds());
 //! drop(recorded);
@@ -66,27 +66,41 @@ impl<'a> BorrowDesc<'a> {
 /// A recorder on a host's command buffer: a [`Recorder`] that is not submitted.
 ///
 /// Dropped without [`BorrowedRecorder::finish`], as after an error, it leaves a command buffer that must be reset.
-pub struct BorrowedRecorder(Recorder);
+pub struct BorrowedRecorder {
+    recorder: Recorder,
+    /// The host's command buffer: what holds a `&mut Recorder` may put another recorder in this one's place.
+    lent: vk::CommandBuffer,
+}
 
 impl Deref for BorrowedRecorder {
     type Target = Recorder;
 
     fn deref(&self) -> &Recorder {
-        &self.0
+        &self.recorder
     }
 }
 
 impl DerefMut for BorrowedRecorder {
     fn deref_mut(&mut self) -> &mut Recorder {
-        &mut self.0
+        &mut self.recorder
     }
 }
 
 impl BorrowedRecorder {
     /// Ends the borrowing; records nothing. Of what was recorded, the last barriers are those that each kernel and pass documents: mostly
     /// writes are visible to compute shaders, and the host writes the barrier to its own uses.
-    pub fn finish(self) -> Recorded {
-        self.0.recorded
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when a pass has no end, since a panic ended it, or when what recorded has put another recorder in this one's place:
+    /// the command buffer must not be executed then.
+    pub fn finish(self) -> Result<Recorded> {
+        let Self { recorder, lent } = self;
+        recorder.check_whole()?;
+        if !recorder.is_borrowed || recorder.command_buffer != lent {
+            let cause = "is not the one that was lent: what was recorded is kept by another, and must not be executed";
+            return Err(Error::setting("recorder", recorder.name, cause));
+        }
+        Ok(recorder.recorded)
     }
 }
 
@@ -108,7 +122,7 @@ impl Recorder {
     /// - It is executed by a queue of that family, in an order with the engine's own submissions that the host sees to: the engine's queue,
     ///   held by [`Gpu::lock_queue`], gives the order of submissions.
     /// - The [`Recorded`] lives until the device is done with it for the last time, and the host's own objects that were lent by
-    ///   [`Gpu::borrow_buffer`] do, too. Without a `Recorded` (the recorder was dropped), and after a panic inside a pass, it is not executed.
+    ///   [`Gpu::borrow_buffer`] do, too. Without a `Recorded` (the recorder was dropped, or [`BorrowedRecorder::finish`] failed) it is not executed.
     /// - With timestamps or counts it is executed once at most.
     /// - What the engine's objects hold is not used by other work at the same time: recording a frame twice over one picture wants the
     ///   barriers that two passes in one command buffer want. While the device works on it, mapped buffers that it uses are neither written
@@ -130,7 +144,10 @@ impl Recorder {
             // SAFETY: the caller's command buffer is recording, outside a rendering.
             unsafe { recorder.barrier_over_everything() };
         }
-        Ok(BorrowedRecorder(recorder))
+        Ok(BorrowedRecorder {
+            lent: recorder.command_buffer,
+            recorder,
+        })
     }
 
     /// Notes for the barrier checks of debug builds that commands which are not this recorder's use a buffer here: the host's, or those

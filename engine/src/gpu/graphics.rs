@@ -187,7 +187,8 @@ impl Gpu {
     /// [`Error::Shader`] when the shaders do not agree on a binding or on the push constants, [`Error::MissingFeature`] on a queue without
     /// graphics, when a shader needs what the device lacks (geometry shaders, clip distances, views, layers from vertex shaders), writes
     /// buffers or images from a stage that cannot, when the descriptors, attachments or views are more than the device allows, or for a format that
-    /// the device cannot render into, [`Error::Setting`] for a topology or comparison beyond those of pipelines without tessellation,
+    /// the device cannot render into, [`Error::Setting`] for a topology or comparison beyond those of pipelines without tessellation
+    /// or a topology that the geometry shader does not take,
     /// [`Error::OutOfMemory`], [`Error::Vulkan`].
     pub fn graphics_pipeline<V: VertexShader, F: FragmentShader, G: GeometryStage>(
         &self,
@@ -201,6 +202,7 @@ impl Gpu {
         check_shaders(&self.inner, &shaders)?;
         check_attachments(&self.inner, shaders[0].name, desc.colors, desc.view_mask)?;
         check_state(&self.inner, shaders[0].name, desc)?;
+        check_topology(desc.topology, G::info())?;
         let attachments = desc.colors.len() as u32;
         let mut objects = PipelineObjects::new(&self.inner, &shaders, attachments)?;
         let name = shaders[0].name;
@@ -395,6 +397,48 @@ fn check_state<V: VertexShader, F: FragmentShader, G: GeometryStage>(
         }
     }
     Ok(())
+}
+
+/// Fails for primitives that are not those that the geometry shader takes, by its module's own word.
+fn check_topology(topology: vk::PrimitiveTopology, geometry: Option<&'static ShaderInfo>) -> Result<()> {
+    let Some(shader) = geometry else {
+        return Ok(());
+    };
+    let input = match topology {
+        vk::PrimitiveTopology::POINT_LIST => INPUT_POINTS,
+        vk::PrimitiveTopology::LINE_LIST | vk::PrimitiveTopology::LINE_STRIP => INPUT_LINES,
+        _ => INPUT_TRIANGLES,
+    };
+    if execution_modes(shader.spirv).any(|mode| mode == input) {
+        return Ok(());
+    }
+    let cause = format!("is not what the geometry shader {} takes", shader.name);
+    Err(Error::setting("topology", format!("{topology:?}"), cause))
+}
+
+/// Execution modes of SPIR-V that say what a geometry shader takes ("SPIR-V Specification", "Execution Mode").
+const INPUT_POINTS: u32 = 19;
+const INPUT_LINES: u32 = 20;
+const INPUT_TRIANGLES: u32 = 22;
+
+/// The execution modes of a module ("SPIR-V Specification", §2.3, and OpExecutionMode).
+fn execution_modes(spirv: &[u8]) -> impl Iterator<Item = u32> {
+    const HEADER_WORDS: usize = 5;
+    const OP_EXECUTION_MODE: u32 = 16;
+    let word = move |index: usize| {
+        let bytes = spirv.get(4 * index..4 * index + 4)?;
+        Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    };
+    let mut at = HEADER_WORDS;
+    let instructions = std::iter::from_fn(move || {
+        let first = word(at)?;
+        let mode = word(at + 2);
+        // No instruction has no words; a module that says so ends here.
+        let length = (first >> 16) as usize;
+        at = if length == 0 { usize::MAX / 8 } else { at + length };
+        Some((first & 0xFFFF, mode))
+    });
+    instructions.filter_map(|(operation, mode)| mode.filter(|_| operation == OP_EXECUTION_MODE))
 }
 
 fn make<V: VertexShader, F: FragmentShader, G: GeometryStage>(

@@ -26,7 +26,8 @@
 //! | [`Pass::fill`], [`Pass::update`], [`Pass::copy`] and those with images | ranges past the end, parts over each other | ranges, whole words, overlap, device and use |
 //! | [`Pass::barrier`], [`Pass::image_barrier`], [`Pass::memory_barrier`] | handles of another device, layouts that an image cannot be in | device and use; a refused one is left out, and the pass fails |
 //! | [`Pass::render`] | targets that differ, are no targets, or are too many | size, area, layers, views, device and use; attachments are those that the pipeline was made for |
-//! | [`Recorder::pass`], [`Recorder::submit`] | passes without an end after a panic | a recorder with one is not submitted |
+//! | [`Recorder::pass`], [`Recorder::submit`] | passes without an end after a panic | a recorder with one is not submitted; a rendering ends when its closure panics |
+//! | [`BorrowedRecorder`] as `&mut` [`Recorder`] | another recorder in its place, whose `Recorded` keeps nothing of the host's command buffer | [`BorrowedRecorder::finish`] compares the command buffers |
 //! | [`Submission`], [`Recorded`] | memory that goes while the device uses it | both keep all that was recorded; a submission waits when it is dropped. One that is leaked leaks what it keeps |
 //! | [`Surface::present`] | an image that is kept beyond its swapchain | images keep their swapchain, and that its surface and window |
 //! | `raw` of anything, [`Gpu::raw_device`], [`Gpu::lock_queue`] | nothing: what is done with handles is `unsafe` in `ash` | |
@@ -46,6 +47,8 @@
 //!   least as long as what a shader reaches there by no index; that indices stay in it [`Gpu::from_host`] makes the host promise.
 //! - *The texel format* of an image is not compared with the type that a shader reads or writes it by: what is read is undefined then.
 //! - *Counts of indirect dispatches and draws* are the device's to read: more than it can do may hang it.
+//! - *What one graphics shader writes and the next one reads* is not compared: a pipeline of shaders that were not written for each other may read what
+//!   is undefined, and so may a vertex shader that sets no size for points. That a geometry shader takes the pipeline's primitives is checked.
 //! - *The driver's own faults.*
 //!
 //! Miri has not been run: it knows no calls to a driver, and of what needs no device nothing here is `unsafe`. The address sanitizer has not been run

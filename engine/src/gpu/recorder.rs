@@ -166,7 +166,7 @@ impl Recorder {
     }
 
     /// Fails after a pass that a panic ended: queries or a rendering that it began have no end.
-    fn check_whole(&self) -> Result<()> {
+    pub(super) fn check_whole(&self) -> Result<()> {
         if !self.in_pass {
             return Ok(());
         }

@@ -10,6 +10,7 @@ use ash::vk;
 
 use super::barrier::Access;
 use super::buffer::BufferView;
+use super::device::Inner;
 use super::graphics::{Attachments, GeometryStage, GraphicsPipeline};
 use super::image::Image;
 use super::interface::{BindingSet, FragmentShader, PushConstants, VertexShader};
@@ -104,6 +105,19 @@ pub struct Targets<'a> {
     pub view_mask: u32,
 }
 
+/// A rendering that was begun; it ends when this is dropped, by a panic of whoever draws, too.
+struct Rendering {
+    gpu: Arc<Inner>,
+    command_buffer: vk::CommandBuffer,
+}
+
+impl Drop for Rendering {
+    fn drop(&mut self) {
+        // SAFETY: the command buffer is recording, and the rendering was begun where this was made.
+        unsafe { self.gpu.device.cmd_end_rendering(self.command_buffer) };
+    }
+}
+
 /// Draws between the begin and the end of rendering.
 pub struct Render<'p, 'a> {
     pass: &'p mut Pass<'a>,
@@ -158,6 +172,10 @@ impl<'a> Pass<'a> {
         let command_buffer = self.command_buffer;
         // SAFETY: the command buffer is recording, outside rendering; the images are kept alive.
         unsafe { inner.device.cmd_begin_rendering(command_buffer, &info) };
+        let rendering = Rendering {
+            gpu: inner,
+            command_buffer,
+        };
         let format = |target: &Option<ColorTarget<'_>>| target.map_or(vk::Format::UNDEFINED, |t| t.image.format());
         let mut render = Render {
             pass: self,
@@ -169,8 +187,7 @@ impl<'a> Pass<'a> {
             area,
         };
         let result = render.set_area(area).and_then(|()| record(&mut render));
-        // SAFETY: rendering was begun above.
-        unsafe { inner.device.cmd_end_rendering(command_buffer) };
+        drop(rendering);
         result
     }
 

@@ -49,7 +49,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// All files, in the order of their first use; none for a `builtin:` address.
     pub files: Vec<InputFile>,
-    /// Bytes of decoded texels, densities, radiance and materials that were counted against the limits.
+    /// Bytes of decoded texels, densities, radiance and materials, and of what one place of a file makes many of (placements, names), that were counted
+    /// against the limits.
     pub bytes_decoded: u64,
 }
 
@@ -156,7 +157,25 @@ pub(super) fn stem(path: &Path) -> String {
     stem.strip_suffix(".scene").map(str::to_string).unwrap_or(stem)
 }
 
+/// Bytes that a triangle takes on the device, an index left out.
+const PLACED_TRIANGLE: u64 = 48;
+
 fn model(path: &Path, files: &InputFiles<'_>) -> Result<Scene> {
+    let scene = read_model(path, files)?;
+    // Those of a mesh's first instance are in the file; the others cost it nothing.
+    let mut placed = vec![false; scene.meshes.len()];
+    let again = scene.instances.iter().filter_map(|instance| {
+        let mesh = instance.mesh as usize;
+        let is_again = std::mem::replace(placed.get_mut(mesh)?, true);
+        is_again.then(|| scene.meshes[mesh].triangles.len() as u64)
+    });
+    let bytes = PLACED_TRIANGLE.saturating_mul(again.sum());
+    let counted = files.reserve(bytes, bytes);
+    counted.map_err(|cause| Error::scene(&scene.source, "triangles of all instances", cause))?;
+    Ok(scene)
+}
+
+fn read_model(path: &Path, files: &InputFiles<'_>) -> Result<Scene> {
     match extension(path).as_str() {
         "gltf" | "glb" => gltf::load_from(path, files),
         "ply" => ply::load(path, files),

@@ -253,6 +253,17 @@ pub struct Material {
     pub unlit: bool,
 }
 
+/// Bytes of a name in a note, about.
+const NOTED_NAME: usize = 200;
+
+/// A name as notes show it: without the end of one that is too long to be read, since there may be many notes.
+pub(crate) fn shortened(name: &str) -> String {
+    match name.char_indices().find(|(start, _)| *start >= NOTED_NAME) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => name.into(),
+    }
+}
+
 impl Default for Material {
     fn default() -> Self {
         Self {

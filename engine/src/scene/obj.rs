@@ -14,7 +14,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::mtl::{self, LibraryMaterial};
-use super::{Material, Mesh, Note, Scene, files};
+use super::{Material, Mesh, Note, Scene, files, shortened};
 use crate::input::InputFiles;
 use crate::{Error, Result};
 
@@ -76,6 +76,9 @@ fn parse(bytes: &[u8], source: &str, folder: &Path, read: &InputFiles<'_>) -> Re
     let at_line = |(line, cause): (usize, String)| Error::scene(source, format!("line {line}"), cause);
     let text = plain(bytes).map_err(at_line)?;
     check_indices(&text).map_err(at_line)?;
+    let names = copied_names(&text);
+    let counted = read.reserve(names, names);
+    counted.map_err(|cause| Error::scene(source, "names of objects", cause))?;
     let options = tobj::LoadOptions {
         single_index: true,
         triangulate: true,
@@ -126,6 +129,7 @@ fn parse(bytes: &[u8], source: &str, folder: &Path, read: &InputFiles<'_>) -> Re
     let grey = scene.add_material(Material::lambert("default", GREY));
     for model in models {
         let name = model.name;
+        let noted = format!("object {:?}", shortened(&name));
         let mesh = model.mesh;
         if mesh.indices.is_empty() {
             continue;
@@ -149,7 +153,7 @@ fn parse(bytes: &[u8], source: &str, folder: &Path, read: &InputFiles<'_>) -> Re
             if count != 0 && count != positions.len() {
                 scene.notes.push(Note {
                     feature: format!("{what} at some corners only"),
-                    at: format!("object {name:?}"),
+                    at: noted.clone(),
                     instead: "left out".into(),
                 });
             }
@@ -157,7 +161,7 @@ fn parse(bytes: &[u8], source: &str, folder: &Path, read: &InputFiles<'_>) -> Re
         if !mesh.vertex_color.is_empty() {
             scene.notes.push(Note {
                 feature: "vertex colours".into(),
-                at: format!("object {name:?}"),
+                at: noted,
                 instead: "left out".into(),
             });
         }
@@ -186,6 +190,28 @@ fn parse(bytes: &[u8], source: &str, folder: &Path, read: &InputFiles<'_>) -> Re
     }
     scene.check()?;
     Ok(scene)
+}
+
+/// Bytes of the copies of objects' names: the crate ends a mesh at each change of material, and both it and its placement have the name.
+fn copied_names(text: &str) -> u64 {
+    let (mut name, mut has_faces, mut bytes) = (0, false, 0);
+    // Behind the last line a mesh ends, too.
+    for line in text.lines().chain(["o"]) {
+        let line = line.trim();
+        match key_of(line) {
+            "f" => has_faces = true,
+            key @ ("o" | "g" | "usemtl") => {
+                if std::mem::take(&mut has_faces) {
+                    bytes += 2 * name;
+                }
+                if key != "usemtl" {
+                    name = line[key.len()..].trim().len() as u64;
+                }
+            }
+            _ => {}
+        }
+    }
+    bytes
 }
 
 /// Keys of shapes that are no faces.
@@ -483,6 +509,29 @@ mod tests {
         assert_eq!((scene.materials.len(), read.bytes_decoded()), (1, 0));
         let note = scene.notes.iter().find(|note| note.at == "mtllib a.mtl").expect("note");
         assert!(note.feature.contains("bytes of memory"), "{}", note.feature);
+    }
+
+    #[test]
+    fn names_of_objects_are_counted_for_each_change_of_material() {
+        let changes = "usemtl red\nf 1 2 3\nusemtl lamp\nf 1 2 3\n".repeat(100);
+        let model = |name: &str| format!("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\no {name}\n{changes}");
+        let mut memory = Memory::default();
+        memory.add("a.mtl", MTL);
+        let limits = InputLimits {
+            decoded_base: 100_000,
+            decoded_per_byte: 0,
+            ..InputLimits::default()
+        };
+        let parse = |name: &str| {
+            let read = InputFiles::new(&memory, limits);
+            super::parse(model(name).as_bytes(), "a.obj", Path::new(""), &read)
+        };
+        assert_eq!(parse("b").expect("scene").meshes.len(), 200);
+        let error = parse(&"a".repeat(1000)).expect_err("400 kB of names").to_string();
+        assert!(
+            error.contains("names of objects") && error.contains("bytes of memory"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -328,7 +328,13 @@ fn check_count(body: &Body<'_>, element: &Element) -> Result<(), Fault> {
 
 fn skip(body: &mut Body<'_>, element: &Element) -> Result<(), Fault> {
     check_count(body, element)?;
-    for i in 0..element.count {
+    // Rows without values take nothing of the body, however many there are.
+    let count = if element.properties.is_empty() {
+        0
+    } else {
+        element.count
+    };
+    for i in 0..count {
         for property in &element.properties {
             skip_property(body, element, property, i)?;
         }
@@ -651,6 +657,15 @@ mod tests {
         );
         let at: Vec<String> = notes(ASCII.as_bytes()).into_iter().map(|note| note.at).collect();
         assert_eq!(at, ["element edge"]);
+    }
+
+    #[test]
+    fn elements_without_properties_cost_nothing() {
+        // Row by row they are 10¹¹ steps.
+        let rows = "element nothing 1000000\n".repeat(100_000);
+        let text = ASCII.replace("element face", &format!("{rows}element face"));
+        let mesh = parse(&[text.as_bytes(), &[b' '; 1 << 20]].concat()).expect("mesh");
+        assert_eq!(mesh.triangles.len(), 2);
     }
 
     #[test]

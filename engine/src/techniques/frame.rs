@@ -156,13 +156,14 @@ pub trait FrameMethod: Send {
         Ok(())
     }
 
-    /// In how many parts what frames share falls, now: those of [`FrameMethod::begin_part`]. May wait for the device.
+    /// In how many parts what frames share falls, now: those of [`FrameMethod::begin_part`]. May wait for the device, a bounded time: `None` when it has
+    /// not counted all of them yet, and is to be asked again.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
-    fn begin_parts(&mut self, gpu: &Gpu) -> Result<u32> {
+    fn begin_parts(&mut self, gpu: &Gpu) -> Result<Option<u32>> {
         let _ = gpu;
-        Ok(1)
+        Ok(Some(1))
     }
 
     /// As [`FrameMethod::begin`], one of the parts that [`FrameMethod::begin_parts`] has told last. One that failed is recorded again.
@@ -325,20 +326,21 @@ impl<M: FrameMethod> Accumulated<M> {
         Ok((drawn, recorder.submit()?.wait()?))
     }
 
-    /// What comes next of what frames share; `None` when it is there, or goes with the first frame.
-    fn next_begin_part(&mut self) -> Result<Option<Part>> {
-        if self.begun {
-            return Ok(None);
+    /// Counts the parts of what frames share, if that has not been done, until `goes_on` says no; whether they are counted.
+    fn count_begin_parts(&mut self, goes_on: impl Fn() -> bool) -> Result<bool> {
+        while !self.begun && self.begin_part.is_none() {
+            match self.method.begin_parts(&self.gpu)? {
+                Some(of) => self.begin_part = Some(Part { number: 0, of }),
+                None if goes_on() => {}
+                None => return Ok(false),
+            }
         }
-        let part = match self.begin_part {
-            Some(part) => part,
-            None => Part {
-                number: 0,
-                of: self.method.begin_parts(&self.gpu)?,
-            },
-        };
-        self.begin_part = Some(part);
-        Ok((part.of > 1).then_some(part))
+        Ok(true)
+    }
+
+    /// What comes next of what frames share; `None` when it is there, or goes with the first frame.
+    fn next_begin_part(&self) -> Option<Part> {
+        self.begin_part.filter(|part| !self.begun && part.of > 1)
     }
 
     /// What comes next of a frame that falls in parts; `None` for frames that do not.
@@ -354,15 +356,20 @@ impl<M: FrameMethod> Accumulated<M> {
         Ok((part.of > 1).then_some(part))
     }
 
-    /// Draws parts, each a submission, until the time of a step is over, or what frames share is there, or a frame is; whether there was any.
+    /// Counts parts and draws them, each a submission, until the time of a step is over, or what frames share is there, or a frame is; whether that was
+    /// the step.
     fn submit_parts(&mut self, timings: &mut Vec<Timings>) -> Result<bool> {
         let clock = Instant::now();
-        while let Some(part) = self.next_begin_part()? {
+        let goes_on = || clock.elapsed().as_secs_f64() < STEP_SECONDS;
+        if !self.count_begin_parts(goes_on)? {
+            return Ok(true);
+        }
+        while let Some(part) = self.next_begin_part() {
             let mut recorder = self.gpu.recorder("what frames share")?;
             self.method.begin_part(&mut recorder, part)?;
             timings.push(recorder.submit()?.wait()?);
             (self.begin_part, self.begun) = (Some(part.next()), part.is_last());
-            if self.begun || clock.elapsed().as_secs_f64() >= STEP_SECONDS {
+            if self.begun || !goes_on() {
                 return Ok(true);
             }
         }
@@ -393,7 +400,7 @@ impl<M: FrameMethod> Accumulated<M> {
                 return Ok(true);
             }
             self.frame_part = Some(part.next());
-            if clock.elapsed().as_secs_f64() >= STEP_SECONDS {
+            if !goes_on() {
                 return Ok(true);
             }
         }

@@ -242,7 +242,7 @@ impl Host {
         preview.record_lights(&mut recorder, &surfaces, &lights)?;
         preview.record(&mut recorder, &on_device, &surfaces, camera, &[everything])?;
         preview.record_display(&mut recorder, &picture, scene.defaults.exposure, PixelFormat::Rgba8)?;
-        let recorded = recorder.finish();
+        let recorded = recorder.finish()?;
         self.barrier(
             commands,
             vk::AccessFlags2::TRANSFER_READ | vk::AccessFlags2::TRANSFER_WRITE,

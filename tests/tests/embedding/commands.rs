@@ -1,5 +1,7 @@
 //! Recording into a host's command buffer, over its buffers: one submission with passes of the host's own in between.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use clerestory::accel::lbvh::{BuildQuality, LbvhBuilder, LbvhSettings, build};
 use clerestory::accel::trace::{RayTracer, TraceSettings};
 use clerestory::accel::{DeviceTraversal, Hit, Ray, RayIndex};
@@ -325,7 +327,7 @@ fn a_frame_of_a_host(gpu: &Gpu, opening_barrier: bool) {
     builder.record_traversable(&mut recorder, &hierarchy).unwrap();
     tracer.record(&mut recorder, &traced, 2).unwrap();
     record_preview(&mut recorder, &mut preview, &scene, &on_device, &picture);
-    let recorded = recorder.finish();
+    let recorded = recorder.finish().unwrap();
     own.barrier(written, used);
     for (from, to, bytes) in &copies {
         own.copy(from, to, *bytes);
@@ -390,6 +392,40 @@ fn a_hosts_one_submission_on_its_own_device() {
     host.work();
 }
 
+#[test]
+fn a_recorder_in_the_place_of_the_lent_one_is_found() {
+    with_gpu(|gpu| {
+        let own = Own::new(gpu);
+        let once = vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT;
+        // What a frame method may do with the recorder that it is given.
+        own.begin(once);
+        let mut recorder = own.borrow(false, true).unwrap();
+        let mut other = gpu.recorder("another").unwrap();
+        std::mem::swap(&mut *recorder, &mut other);
+        assert!(matches!(other.submit(), Err(Error::Setting { .. })), "the host submits");
+        assert!(matches!(recorder.finish(), Err(Error::Setting { .. })));
+        own.end();
+        // Back again, nothing is wrong.
+        own.begin(once);
+        let mut recorder = own.borrow(false, true).unwrap();
+        let mut other = gpu.recorder("another").unwrap();
+        for _ in 0..2 {
+            std::mem::swap(&mut *recorder, &mut other);
+        }
+        recorder.finish().unwrap();
+        own.end();
+        // A panic that ended a pass.
+        own.begin(once);
+        let mut recorder = own.borrow(false, true).unwrap();
+        let panicked = catch_unwind(AssertUnwindSafe(|| {
+            recorder.pass("panics", |_| -> Result<()> { panic!("a planned panic") })
+        }));
+        assert!(panicked.is_err());
+        assert!(matches!(recorder.finish(), Err(Error::Setting { .. })));
+        own.end();
+    });
+}
+
 /// Adds a pass that writes a word.
 fn write(recorder: &mut Recorder, gpu: &Gpu, words: &Buffer, index: u32, value: u32) -> Result<()> {
     let pipeline = gpu.compute_pipeline::<out_of_bounds::Kernel>(&())?;
@@ -414,7 +450,7 @@ fn a_command_buffer_without_timestamps_runs_as_often_as_it_is_submitted() {
                 pass.copy(words.view(), other.view())
             })
             .unwrap();
-        let recorded = recorder.finish();
+        let recorded = recorder.finish().unwrap();
         own.end();
         for _ in 0..2 {
             gpu.upload(&words, 0, &[1u32; 16]).unwrap();

@@ -35,6 +35,7 @@ pub mod web_page;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use clerestory::input::read_text;
 use clerestory::{Error, Result};
 
 use self::sweep::Sweep;
@@ -42,6 +43,9 @@ use self::sweep_criteria::{SweepCriterion, SweepHeadline};
 
 /// The files of `tools/experiments/`: name and text.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/experiments.rs"));
+
+/// Most bytes of a file that describes one.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// An experiment as its file describes it.
 #[derive(Debug, Clone, serde::Deserialize)]
@@ -122,7 +126,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 pub fn find(name: &str) -> Result<Experiment> {
     let path = Path::new(name);
     if path.extension().is_some_and(|ending| ending == "toml") {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+        let text = read_text(path, MOST_BYTES)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         return parse(&stem, &text);
     }

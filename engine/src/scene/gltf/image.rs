@@ -15,6 +15,9 @@ use crate::{Error, Result};
 /// Bytes that the decoder may allocate for one image.
 const MAX_DECODER_BYTES: u64 = 1 << 30;
 
+/// How often every byte of the files may be decoded: views of one picture that differ in length are pictures of their own.
+const ENCODED_PER_BYTE: u64 = 4;
+
 /// Where a texture is used and how.
 pub struct TextureUse<'u> {
     pub index: Index<json::Texture>,
@@ -148,6 +151,11 @@ impl Reader<'_> {
             self.images.insert(i, None);
             return Ok(None);
         }
+        let (encoded, read) = (self.encoded.saturating_add(bytes.len() as u64), self.files.bytes_read());
+        if encoded > read.saturating_mul(ENCODED_PER_BYTE) {
+            let cause = format!("images of {encoded} bytes are to be decoded from files of {read} bytes");
+            return self.fail(place, cause);
+        }
         let mut reader = ::image::ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
             .map_err(|error| fail(error.to_string()))?;
@@ -167,7 +175,7 @@ impl Reader<'_> {
         let (peak, kept) = memory_of([width, height], decoder.total_bytes(), is_jpeg);
         self.files.reserve(peak, kept).map_err(fail)?;
         let decoded = ::image::DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))?;
-        self.texels = texels;
+        (self.texels, self.encoded) = (texels, encoded);
         let rgba = decoded.into_rgba8();
         let index = self.scene.add_image(Image {
             name: name.unwrap_or(place),

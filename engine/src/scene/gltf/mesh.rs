@@ -20,6 +20,9 @@ impl Reader<'_> {
         for (k, primitive) in source.primitives.iter().enumerate() {
             let place = format!("meshes[{i}].primitives[{k}]");
             if let Some(mut mesh) = self.primitive(primitive, &place)? {
+                if let Some(name) = source.name.as_ref().filter(|_| k > 0) {
+                    self.reserve(name.len() as u64, &place)?;
+                }
                 mesh.name = match &source.name {
                     Some(name) if source.primitives.len() == 1 => name.clone(),
                     Some(name) => format!("{name} {k}"),

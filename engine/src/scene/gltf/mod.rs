@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 use ::gltf::json::{self, Index, Root};
 
-use super::{Note, Scene, files};
+use super::{Note, Scene, files, shortened};
 use crate::catalogue::{Role, Row, sources};
 use crate::input::InputFiles;
 use crate::{Error, Result};
@@ -93,6 +93,7 @@ fn load_bytes(bytes: &[u8], folder: &Path, files: &InputFiles<'_>, source: &str)
         elements: 0,
         element_budget: 0,
         texels: 0,
+        encoded: 0,
         images: BTreeMap::new(),
         decoded: BTreeMap::new(),
         meshes: BTreeMap::new(),
@@ -124,6 +125,8 @@ struct Reader<'a> {
     element_budget: u64,
     /// Texels decoded so far.
     texels: u64,
+    /// Bytes of encoded images decoded so far.
+    encoded: u64,
     /// glTF image index to scene image index; `None` for one that cannot be used.
     images: BTreeMap<usize, Option<u32>>,
     /// Where an image's bytes begin in memory and how many there are, to the scene's image: what is there once is decoded once.
@@ -140,9 +143,16 @@ impl<'a> Reader<'a> {
         Err(Error::scene(self.source, at, cause))
     }
 
+    /// Counts memory that the scene is about to take for good: one name in a file may be that of a million things.
+    fn reserve(&self, bytes: u64, at: &str) -> Result<()> {
+        let counted = self.files.reserve(bytes, bytes);
+        counted.map_err(|cause| Error::scene(self.source, at, cause))
+    }
+
     fn note(&mut self, feature: impl Into<String>, at: impl Into<String>, instead: impl Into<String>) {
         let note = Note {
-            feature: feature.into(),
+            // Each use of one long name may be a note.
+            feature: shortened(&feature.into()),
             at: at.into(),
             instead: instead.into(),
         };

@@ -8,9 +8,9 @@ use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde_json::Value;
 
 use super::Reader;
-use crate::Result;
 use crate::scene::check::MAX_INSTANCES;
 use crate::scene::{Camera, Instance, Light, LightKind, Projection};
+use crate::{Error, Result};
 
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
@@ -113,6 +113,9 @@ impl Reader<'_> {
                     format!("brings the instances to {total}; at most {MAX_INSTANCES} are allowed"),
                 );
             }
+            // One is the node's own; the others cost the file nothing.
+            let more = (meshes.len() * placements.len()).saturating_sub(1);
+            self.reserve((more * (size_of::<Instance>() + name.len())) as u64, at)?;
             for placement in placements {
                 for &mesh in &meshes {
                     self.scene.instances.push(Instance {
@@ -170,6 +173,10 @@ impl Reader<'_> {
                 .as_ref()
                 .map_or(default, |v| Vec3::from_slice(&v[3 * i..3 * i + 3]).as_dvec3())
         };
+        let memory = (count * size_of::<DAffine3>()) as u64;
+        self.files
+            .reserve(memory, 0)
+            .map_err(|cause| Error::scene(self.source, &at, cause))?;
         let mut placements = Vec::with_capacity(count);
         for i in 0..count {
             let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |v| {
@@ -214,9 +221,10 @@ impl Reader<'_> {
         if self.scene.cameras.is_empty() {
             self.scene.defaults.aspect = aspect.filter(usable);
         }
-        let name = node.or(camera.name.as_deref()).unwrap_or(&place).to_string();
+        let name = node.or(camera.name.as_deref()).unwrap_or(&place);
+        self.reserve(name.len() as u64, at)?;
         self.scene.cameras.push(Camera {
-            name,
+            name: name.into(),
             transform: DAffine3::from_mat3_translation(rotation, world.translation),
             projection,
             lens_radius: 0.0,
@@ -272,8 +280,10 @@ impl Reader<'_> {
                 return self.fail(format!("{place}.type"), "is not one of directional, point, spot");
             }
         };
+        let name = light.name.as_deref().unwrap_or(node);
+        self.reserve(name.len() as u64, at)?;
         self.scene.lights.push(Light {
-            name: light.name.clone().unwrap_or_else(|| node.into()),
+            name: name.into(),
             kind,
         });
         Ok(())

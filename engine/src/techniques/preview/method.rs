@@ -70,6 +70,8 @@ pub struct PreviewMethod {
     probe: Option<LightProbe>,
     lights_drawn: u64,
     coverage: Coverage,
+    /// Places of the shadow maps whose parts have been counted, as bits.
+    measured: Vec<[u32; 3]>,
     /// Parts of what frames share: maps by number and where they are seen from.
     shadow_parts: Vec<(u32, Vec3, DrawPart)>,
     /// Parts of a frame that draw; further ones shade.
@@ -96,6 +98,7 @@ impl PreviewMethod {
             probe,
             lights_drawn: 0,
             coverage: Coverage::new(gpu)?,
+            measured: Vec::new(),
             shadow_parts: Vec::new(),
             draw_parts: Vec::new(),
         })
@@ -119,20 +122,26 @@ impl FrameMethod for PreviewMethod {
         self.drawing.lights.record(recorder, &self.scene.surfaces(), &lights)
     }
 
-    fn begin_parts(&mut self, _: &Gpu) -> Result<u32> {
+    fn begin_parts(&mut self, _: &Gpu) -> Result<Option<u32>> {
         let (surfaces, lights) = (self.scene.surfaces(), self.scene.lights_without_area());
-        self.shadow_parts.clear();
-        if let Some(shadows) = self.drawing.lights.shadows() {
-            let size = [shadows.desc().side; 2];
-            for (map, place) in (0..).zip(self.drawing.lights.places(&lights)) {
-                let parts = self
-                    .coverage
-                    .parts(&surfaces, &shadows.views(&surfaces, place)?, size)?;
-                self.shadow_parts
-                    .extend(parts.into_iter().map(|part| (map, place, part)));
-            }
+        let places = self.drawing.lights.places(&lights);
+        let bits = |place: &Vec3| place.to_array().map(f32::to_bits);
+        let is_measured = |(place, known): (&Vec3, &[u32; 3])| bits(place) == *known;
+        if self.measured.len() > places.len() || !places.iter().zip(&self.measured).all(is_measured) {
+            self.measured.clear();
+            self.shadow_parts.clear();
         }
-        Ok(self.shadow_parts.len().max(1) as u32)
+        // A map each time: hosts look at the time between two.
+        let map = self.measured.len();
+        if let (Some(shadows), Some(&place)) = (self.drawing.lights.shadows(), places.get(map)) {
+            let views = shadows.views(&surfaces, place)?;
+            let parts = self.coverage.parts(&surfaces, &views, [shadows.desc().side; 2])?;
+            let parts = parts.into_iter().map(|part| (map as u32, place, part));
+            self.shadow_parts.extend(parts);
+            self.measured.push(bits(&place));
+        }
+        let is_whole = self.measured.len() == places.len();
+        Ok(is_whole.then(|| self.shadow_parts.len().max(1) as u32))
     }
 
     fn begin_part(&mut self, recorder: &mut Recorder, part: Part) -> Result<()> {

@@ -12,7 +12,7 @@ use crate::accel::MAX_COORDINATE;
 use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::raster::ObjectTriangles;
-use crate::scene::{Instance, Scene, SceneProfile};
+use crate::scene::{Instance, Mesh, Scene, SceneProfile};
 use crate::{Error, Result};
 
 /// All instances flattened to world space.
@@ -61,12 +61,48 @@ pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
         .collect()
 }
 
+/// Fails for more triangles or vertices than fit in texel buffers of `limit` texels, before any is placed: a small file may place one mesh a million
+/// times.
+pub(super) fn check_placed(scene: &Scene, profile: &SceneProfile, limit: u64) -> Result<()> {
+    const TRIANGLE_TEXELS: u64 = (size_of::<SceneTriangle>() / size_of::<[u32; 4]>()) as u64;
+    let placed = |of: fn(&Mesh) -> usize| {
+        let counts = scene
+            .instances
+            .iter()
+            .map(|at| of(&scene.meshes[at.mesh as usize]) as u64);
+        counts.sum::<u64>()
+    };
+    let vertices = if has_attributes(profile) {
+        placed(|mesh| mesh.positions.len())
+    } else {
+        0
+    };
+    for (name, value) in [
+        ("triangles", TRIANGLE_TEXELS * placed(|mesh| mesh.triangles.len())),
+        ("vertices", vertices),
+    ] {
+        if value > limit {
+            return Err(Error::LimitExceeded {
+                name: format!("{name} of all instances"),
+                value,
+                limit_name: "maxTexelBufferElements",
+                limit,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Whether shading reads more of vertices than where they are.
+fn has_attributes(profile: &SceneProfile) -> bool {
+    profile.has_shading_normals || profile.has_textures || profile.has_normal_maps || profile.has_vertex_colors
+}
+
 impl Geometry {
     pub(super) fn flatten(scene: &Scene, profile: &SceneProfile) -> Result<Self> {
         let mut all = Self::default();
         let default_material = scene.materials.len() as u32;
-        let has_attributes =
-            profile.has_shading_normals || profile.has_textures || profile.has_normal_maps || profile.has_vertex_colors;
+        let has_attributes = has_attributes(profile);
         let mut placed = 0u32;
         for instance in instances_in_order(scene) {
             let mesh = &scene.meshes[instance.mesh as usize];
@@ -193,4 +229,40 @@ pub(super) fn is_traceable(p: &Vec3) -> bool {
 /// The corners of a triangle, metres.
 pub(super) fn corners_of(triangle: &SceneTriangle) -> [Vec3; 3] {
     [triangle.a, triangle.b, triangle.c].map(Vec3::from_array)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DAffine3;
+
+    use super::*;
+
+    #[test]
+    fn what_instances_place_is_held_against_the_limit() {
+        let mut scene = Scene::default();
+        let mut mesh = Mesh {
+            positions: vec![Vec3::ZERO; 7],
+            triangles: vec![[0, 1, 2]; 2],
+            ..Mesh::default()
+        };
+        let mut refused = |mesh: &Mesh, limit| {
+            scene.meshes = vec![mesh.clone()];
+            let at = Instance {
+                mesh: 0,
+                transform: DAffine3::IDENTITY,
+                name: String::new(),
+            };
+            scene.instances = vec![at; 5];
+            match check_placed(&scene, &SceneProfile::of(&scene), limit) {
+                Err(Error::LimitExceeded { name, value, .. }) => Some((name, value)),
+                _ => None,
+            }
+        };
+        // Three texels for each of ten triangles; 35 vertices, of which nothing is kept.
+        assert_eq!(refused(&mesh, 30), None);
+        assert_eq!(refused(&mesh, 29), Some(("triangles of all instances".into(), 30)));
+        mesh.normals = vec![Vec3::Z; 7];
+        assert_eq!(refused(&mesh, 34), Some(("vertices of all instances".into(), 35)));
+        assert_eq!(refused(&mesh, 35), None);
+    }
 }

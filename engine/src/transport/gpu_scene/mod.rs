@@ -17,7 +17,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
-use self::geometry::{Geometry, visible_objects};
+use self::geometry::{Geometry, check_placed, visible_objects};
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
 use self::materials::{material_record, materials_by_use};
@@ -157,6 +157,7 @@ impl GpuScene {
     pub fn with_kept_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind, folder: Option<&Path>) -> Result<Self> {
         scene.check()?;
         let profile = SceneProfile::of(scene);
+        check_placed(scene, &profile, gpu.caps().max_texel_buffer_elements)?;
         let mut geometry = Geometry::flatten(scene, &profile)?;
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::super::load_slice;
+use super::super::{load_bytes, load_slice};
 use super::Document;
 use crate::Result;
+use crate::input::{AnyFile, InputFiles, InputLimits};
 use crate::scene::Scene;
 
 #[test]
@@ -90,6 +91,115 @@ fn repeated_use_cannot_multiply_work_without_bound() {
         .push(json!({"componentType": 5121, "type": "VEC3", "count": 3_000_000}));
     document.json["meshes"][0]["primitives"] = (0..1000).map(|_| json!({"attributes": {"POSITION": 0}})).collect();
     assert!(document.refusal().contains("too many for its size"));
+}
+
+/// Reads a document with room for 200 kB of what its file makes many of.
+fn read_within(document: &Document) -> Result<Scene> {
+    let limits = InputLimits {
+        decoded_base: 200_000,
+        decoded_per_byte: 0,
+        ..InputLimits::default()
+    };
+    let files = InputFiles::new(&AnyFile, limits);
+    load_bytes(&document.glb(), Path::new(""), &files, "test.glb")
+}
+
+fn place_many(document: &mut Document, count: u32) {
+    let zeros = json!({"componentType": 5126, "type": "VEC3", "count": count});
+    document.list("accessors").push(zeros);
+    document.json["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 1}}});
+}
+
+fn nodes_of(document: &mut Document, node: Value) {
+    document.json["nodes"] = json!(vec![node; 500]);
+    document.json["scenes"][0]["nodes"] = (0..500).collect();
+}
+
+#[test]
+fn one_name_cannot_multiply_memory() {
+    type Change = fn(&mut Document, &str);
+    let cases: [(&str, Change); 4] = [
+        ("placements", |document, name| {
+            place_many(document, 500);
+            document.json["nodes"][0]["name"] = name.into();
+        }),
+        ("primitives", |document, name| {
+            let primitive = document.primitive().clone();
+            document.json["meshes"][0] = json!({"name": name, "primitives": vec![primitive; 500]});
+        }),
+        ("lights", |document, name| {
+            let light = json!({"type": "point", "name": name});
+            document.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [light]}});
+            nodes_of(document, json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+        }),
+        ("cameras", |document, name| {
+            let perspective = json!({"yfov": 0.7, "znear": 0.1});
+            document.json["cameras"] = json!([{"type": "perspective", "name": name, "perspective": perspective}]);
+            nodes_of(document, json!({"camera": 0}));
+        }),
+    ];
+    for (what, change) in cases {
+        let with = |name: &str| {
+            let mut document = Document::triangle();
+            change(&mut document, name);
+            read_within(&document)
+        };
+        let scene = with("a").unwrap_or_else(|error| panic!("{what}: {error}"));
+        let counts = [scene.instances.len(), scene.lights.len(), scene.cameras.len()];
+        assert!(counts.contains(&500), "{what}: {counts:?}");
+        let error = with(&"a".repeat(1000)).expect_err(what).to_string();
+        assert!(error.contains("bytes of memory"), "{what}: {error}");
+    }
+}
+
+#[test]
+fn placements_are_counted_before_they_are_made() {
+    let mut document = Document::triangle();
+    place_many(&mut document, 100_000);
+    let error = read_within(&document).expect_err("10 MB of them").to_string();
+    assert!(
+        error.contains("EXT_mesh_gpu_instancing") && error.contains("bytes of memory"),
+        "{error}"
+    );
+    assert_eq!(document.load().instances.len(), 100_000);
+}
+
+#[test]
+fn views_of_one_picture_are_decoded_a_few_times_only() {
+    let with = |views: usize| {
+        let mut document = Document::triangle();
+        document.png(&[[1, 2, 3, 4]; 3]);
+        // What follows a picture is no part of it, and a view may hold it.
+        document.bytes.resize(document.bytes.len() + 100_000, 0);
+        let view = document.list("bufferViews")[1].clone();
+        for i in 0..views {
+            let mut view = view.clone();
+            view["byteLength"] = (100_000 - i).into();
+            document.list("bufferViews").push(view);
+            document.list("images").push(json!({"bufferView": 2 + i}));
+            document.list("textures").push(json!({"source": 1 + i}));
+            let texture = json!({"index": 1 + i});
+            let material = json!({"pbrMetallicRoughness": {"baseColorTexture": texture}});
+            document.list("materials").push(material);
+        }
+        document
+    };
+    assert_eq!(with(3).load().images.len(), 3);
+    let error = with(6).refusal();
+    assert!(error.contains("images[") && error.contains("to be decoded"), "{error}");
+}
+
+#[test]
+fn notes_do_not_repeat_long_names() {
+    let mut document = Document::triangle();
+    let name = "ä".repeat(5000);
+    document.json["textures"] = json!([{"extensions": {name: {}}}]);
+    let material = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+    document.json["materials"] = json!(vec![material; 100]);
+    let scene = document.load();
+    let notes = scene.notes.iter().filter(|note| note.feature.starts_with('ä'));
+    assert_eq!(notes.count(), 100);
+    assert!(scene.notes.iter().all(|note| note.feature.len() < 300));
 }
 
 #[test]
