@@ -35,6 +35,7 @@ pub mod web_page;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use clerestory::input::read_text;
 use clerestory::{Error, Result};
 
 use self::sweep::Sweep;
@@ -42,6 +43,9 @@ use self::sweep_criteria::{SweepCriterion, SweepHeadline};
 
 /// The files of `tools/experiments/`: name and text.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/experiments.rs"));
+
+/// Most bytes of a file that describes one.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// An experiment as its file describes it.
 #[derive(Debug, Clone, serde::Deserialize)]
@@ -122,7 +126,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 pub fn find(name: &str) -> Result<Experiment> {
     let path = Path::new(name);
     if path.extension().is_some_and(|ending| ending == "toml") {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+        let text = read_text(path, MOST_BYTES)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         return parse(&stem, &text);
     }
@@ -287,5 +291,25 @@ mod tests {
         assert_eq!(experiment.name, "mine");
         assert!(matches!(experiment.kind(), Ok(Kind::Sweep(_))));
         assert!(find(folder.path().join("none.toml").to_str().unwrap()).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn experiments_are_read_from_regular_files_of_bounded_length_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name).display().to_string();
+        std::os::unix::fs::symlink("/dev/zero", at("endless.toml")).unwrap();
+        let pipe = std::process::Command::new("mkfifo")
+            .arg(at("pipe.toml"))
+            .status()
+            .unwrap();
+        assert!(pipe.success());
+        for name in ["endless.toml", "pipe.toml"] {
+            let refusal = find(&at(name)).unwrap_err().to_string();
+            assert!(refusal.contains("not a regular file"), "{refusal}");
+        }
+        let long = std::fs::File::create(at("long.toml")).unwrap();
+        long.set_len(MOST_BYTES + 1).unwrap();
+        assert!(find(&at("long.toml")).unwrap_err().to_string().contains("at most"));
     }
 }
