@@ -64,7 +64,7 @@ pub struct AgreementOptions {
     /// Folder for scenes and pictures, made if need be.
     #[serde(skip)]
     pub output: PathBuf,
-    /// The report's files without their suffix (`.md`, `.json`); none when `None`.
+    /// The files of an earlier report without their suffix (`.md`, `.json`), for `keep`.
     #[serde(skip)]
     pub results: Option<PathBuf>,
     /// What the report at `results` holds of this machine and these options stays in it. Without a selection of scenes only those are
@@ -134,14 +134,19 @@ impl Fault {
     }
 }
 
-/// Compares all wanted scenes on a device, until `watch` says to stop, and writes the report after each. A scene of which Mitsuba makes a
+/// Compares all wanted scenes on a device, until `watch` says to stop, and gives `keep` the report after each. A scene of which Mitsuba makes a
 /// picture that is not finite is noted and left out.
 ///
 /// # Errors
 /// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the
 /// exporter and the files. A picture that disagrees and one that is not finite are not errors: see [`AgreementReport::passes`]; nor is what
 /// fails after a stop request.
-pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Result<AgreementReport> {
+pub fn run_with(
+    gpu: &Gpu,
+    options: &AgreementOptions,
+    watch: &dyn Watch,
+    keep: &mut dyn FnMut(&AgreementReport) -> Result<()>,
+) -> Result<AgreementReport> {
     let wanted = selected(options)?;
     let machine = Machine::read(gpu.caps(), &format!("mitsuba {}", mitsuba_version(&options.python)?));
     let mut report = AgreementReport {
@@ -185,10 +190,8 @@ pub fn run_with(gpu: &Gpu, options: &AgreementOptions, watch: &dyn Watch) -> Res
                 report.uncompared.push(Uncompared { name, cause });
             }
         }
-        // Written after every scene, so that a run that is cut short leaves what it has found.
-        if let Some(prefix) = &options.results {
-            report.write(prefix)?;
-        }
+        // After every scene, so that a run that is cut short leaves what it has found.
+        keep(&report)?;
     }
     Ok(report)
 }

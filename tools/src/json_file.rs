@@ -4,18 +4,22 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use clerestory::atomic;
+use clerestory::input::read_text;
 use clerestory::{Error, Result};
 use serde::de::DeserializeOwned;
+
+/// Most bytes of such a file.
+const MOST_BYTES: u64 = 1 << 28;
 
 /// The value of a file; `None` where there is none. `what` names its kind in errors.
 ///
 /// # Errors
 /// [`Error::Io`], and [`Error::Setting`] where the file is of another form.
 pub fn read<T: DeserializeOwned>(path: &Path, what: &'static str) -> Result<Option<T>> {
-    let text = match std::fs::read_to_string(path) {
+    let text = match read_text(path, MOST_BYTES) {
         Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(Error::io(path, error)),
+        Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error),
     };
     let value = serde_json::from_str(&text);
     value.map(Some).map_err(|cause| malformed(path, what, &cause))

@@ -4,11 +4,18 @@
 //! `--overwrite` alone. The same holds for what came to the place while the command worked, and for better pictures: the new files are written
 //! beside them then. What cannot be written at its place in the end goes to the system's temporary folder, which is an error that says where.
 
+mod folder;
 mod lock;
+mod page;
+mod repeated;
+
+pub use folder::{NamedFile, OutputFolder};
+pub use page::OutputPage;
+pub use repeated::Repeated;
 
 use std::fs::DirBuilder;
 use std::io::{self, ErrorKind, Read};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
@@ -66,8 +73,13 @@ impl Inputs {
         }
     }
 
+    /// A file that is read and written, whether it is there or not: no other output may take its place.
+    fn add_place(&mut self, path: &Path) {
+        self.0.push(place(path));
+    }
+
     fn hold(&self, path: &Path) -> bool {
-        path.canonicalize().is_ok_and(|path| self.0.contains(&path))
+        self.0.contains(&place(path))
     }
 }
 
@@ -87,6 +99,13 @@ struct Planned {
 
 /// By what a file is known to be the one that was there before: its size, and the time of its last change.
 type Seen = (u64, Option<SystemTime>);
+
+/// A file to write.
+#[derive(Debug, Clone, Copy)]
+struct New<'a> {
+    path: &'a Path,
+    bytes: &'a [u8],
+}
 
 /// What became of files.
 #[derive(Debug, Default)]
@@ -112,27 +131,46 @@ impl Written {
     pub fn check(self) -> Outcome {
         self.failure.map_or(Ok(()), Err)
     }
+
+    /// As [`Written::check`], of several; the first failure counts, the others are said.
+    pub fn check_all(all: impl IntoIterator<Item = Self>) -> Outcome {
+        let mut failures = all.into_iter().filter_map(|written| written.failure);
+        let first = failures.next();
+        failures.for_each(|failure| failure.report());
+        first.map_or(Ok(()), Err)
+    }
 }
 
 impl Outputs {
     /// Checks that all the files can be written, and may be. Nothing on the disk changes; missing folders are made, and said, when files are written.
     ///
-    /// A text without a mark of its own (`.md`, `.csv`, `.svg`) is this program's where a JSON file among the same files is.
+    /// What has no mark of its own (`.md`, `.csv`, `.svg`, further `.json`) is this program's where the first JSON file among the same files is.
     pub fn plan<P: AsRef<Path>>(paths: &[P], inputs: &Inputs, overwrite: bool) -> Outcome<Self> {
         let paths: Vec<&Path> = paths.iter().map(AsRef::as_ref).collect();
-        for path in &paths {
+        Self::plan_known(&paths, inputs, overwrite, |path| is_ours(path, &paths))
+    }
+
+    /// As [`Outputs::plan`], of files all of which are known to be this program's.
+    pub fn of_ours(paths: &[PathBuf], inputs: &Inputs, overwrite: bool) -> Outcome<Self> {
+        let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+        Self::plan_known(&paths, inputs, overwrite, |_| Ok(true))
+    }
+
+    fn plan_known(
+        paths: &[&Path],
+        inputs: &Inputs,
+        overwrite: bool,
+        is_ours: impl Fn(&Path) -> Result<bool>,
+    ) -> Outcome<Self> {
+        for path in paths {
             refuse_input(path, inputs)?;
         }
-        refuse_one_twice(&paths)?;
-        let mut files = Vec::new();
-        for path in &paths {
-            check_old(path, &paths, overwrite)?;
-            files.push(Planned {
-                path: path.to_path_buf(),
-                seen: seen(path),
-            });
+        refuse_one_twice(paths)?;
+        let files = paths.iter().map(|path| Planned::now(path)).collect();
+        for path in paths {
+            check_old(path, overwrite, || is_ours(path))?;
         }
-        for path in &paths {
+        for path in paths {
             probe(path)?;
         }
         Ok(Self { files, overwrite })
@@ -145,115 +183,121 @@ impl Outputs {
 
     /// Writes the files, each as a whole or not at all, in the order of the plan. `better` says why what is there is worth more than what comes.
     pub fn write(&self, contents: &[Vec<u8>], better: impl FnOnce() -> Option<String>) -> Written {
-        self.write_in_place(contents, better)
-            .unwrap_or_else(|cause| self.write_aside(contents, &cause))
+        let files = self.files.iter().zip(contents);
+        let files: Vec<New> = files
+            .map(|(file, bytes)| New {
+                path: &file.path,
+                bytes,
+            })
+            .collect();
+        self.write_files(&files, better)
     }
 
-    fn write_in_place(&self, contents: &[Vec<u8>], better: impl FnOnce() -> Option<String>) -> Result<Written> {
-        let Some(first) = self.files.first() else {
+    /// As [`Outputs::write`], of some of the files and of others beside them.
+    fn write_files(&self, files: &[New], better: impl FnOnce() -> Option<String>) -> Written {
+        self.write_in_place(files, better)
+            .unwrap_or_else(|cause| write_aside(files, &cause))
+    }
+
+    fn write_in_place(&self, files: &[New], better: impl FnOnce() -> Option<String>) -> Result<Written> {
+        let Some(first) = files.first() else {
             return Ok(Written::default());
         };
-        for file in &self.files {
-            make_folder_of(&file.path)?;
+        for file in files {
+            make_folder_of(file.path)?;
         }
         // Of several processes with the same output each sees what those before it wrote.
-        let _lock = Lock::of(&first.path).map_err(|cause| Error::io(&first.path, cause))?;
+        let _lock = Lock::of(first.path).map_err(|cause| Error::io(first.path, cause))?;
         if !self.overwrite
-            && let Some(reason) = self.changed().or_else(better)
+            && let Some(reason) = self.changed(files).or_else(better)
         {
-            let paths = self.write_beside(contents)?;
+            let paths = write_beside(files)?;
             output::warn(&format!("{reason}; written beside it instead, --overwrite replaces it"));
             return Ok(Written { paths, failure: None });
         }
-        for (file, bytes) in self.files.iter().zip(contents) {
-            atomic::write(&file.path, bytes)?;
+        for file in files {
+            atomic::write(file.path, file.bytes)?;
         }
-        let paths = self.files.iter().map(|file| file.path.clone()).collect();
+        let paths = files.iter().map(|file| file.path.to_owned()).collect();
         Ok(Written { paths, failure: None })
     }
 
-    /// A file that was written by somebody else since the plan was made.
-    fn changed(&self) -> Option<String> {
-        let changed = |file: &&Planned| {
-            let now = seen(&file.path);
-            now.is_some() && now != file.seen
+    /// A file that was written by somebody else since the plan was made; what the plan does not name was not there.
+    fn changed(&self, files: &[New]) -> Option<String> {
+        let before = |path: &Path| self.files.iter().find(|file| file.path == path)?.seen;
+        let changed = |file: &&New| {
+            let now = seen(file.path);
+            now.is_some() && now != before(file.path)
         };
-        let file = self.files.iter().find(changed)?;
+        let file = files.iter().find(changed)?;
         Some(format!("{} has changed since this command began", file.path.display()))
     }
+}
 
-    /// Writes all files by names that are free: `NAME-2.exr` and so on, the same number for all.
-    fn write_beside(&self, contents: &[Vec<u8>]) -> Result<Vec<PathBuf>> {
-        const NUMBERS: std::ops::Range<u32> = 2..10_000;
-        for number in NUMBERS {
-            let paths: Vec<PathBuf> = self.files.iter().map(|file| numbered(&file.path, number)).collect();
-            if paths.iter().any(|path| path.symlink_metadata().is_ok()) {
-                continue;
-            }
-            for (path, bytes) in paths.iter().zip(contents) {
-                atomic::write_new(path, bytes)?;
-            }
-            return Ok(paths);
-        }
-        let path = &self.files[0].path;
-        Err(Error::io(
-            path,
-            io::Error::new(ErrorKind::AlreadyExists, "has no free name beside it"),
-        ))
-    }
-
-    /// Writes all files to a new folder of the system's folder for temporary files; the failure says why, and where.
-    fn write_aside(&self, contents: &[Vec<u8>], cause: &Error) -> Written {
-        let folder = std::env::temp_dir().join(format!("clerestory-{:016x}", atomic::random()));
-        let mut paths = Vec::new();
-        let mut write = || -> Result<()> {
-            private_folder(&folder).map_err(|cause| Error::io(&folder, cause))?;
-            for (file, bytes) in self.files.iter().zip(contents) {
-                let path = folder.join(file.path.file_name().unwrap_or_default());
-                atomic::write_new(&path, bytes)?;
-                paths.push(path);
-            }
-            Ok(())
-        };
-        let written = write();
-        let hint = match written {
-            Ok(()) => format!("what was to be written is kept in {}", folder.display()),
-            Err(second) if paths.is_empty() => {
-                // It is empty, or was not made.
-                let _ = std::fs::remove_dir(&folder);
-                format!("nor could it be kept elsewhere: {second}")
-            }
-            // The first of them is the picture with all that is known, which is worth more than what goes with it.
-            Err(second) => format!(
-                "{} of {} files are kept in {}; the others could not be: {second}",
-                paths.len(),
-                self.files.len(),
-                folder.display()
-            ),
-        };
-        let failure = Failure {
-            code: Code::Run,
-            message: cause.to_string(),
-            hint: Some(hint),
-        };
-        Written {
-            paths,
-            failure: Some(failure),
+impl Planned {
+    fn now(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            seen: seen(path),
         }
     }
 }
 
-/// Checks a page whose measured part will be replaced while all else stays: a Markdown file that the command does not read.
-pub fn check_page(page: &Path, inputs: &Inputs) -> Outcome {
-    refuse_input(page, inputs)?;
-    if pictures::extension(page) != "md" {
-        return Err(Failure::usage(format!(
-            "--page {}: pages are .md files",
-            page.display()
-        )));
+/// Writes all files by names that are free: `NAME-2.exr` and so on, the same number for all.
+fn write_beside(files: &[New]) -> Result<Vec<PathBuf>> {
+    const NUMBERS: std::ops::Range<u32> = 2..10_000;
+    for number in NUMBERS {
+        let paths: Vec<PathBuf> = files.iter().map(|file| numbered(file.path, number)).collect();
+        if paths.iter().any(|path| path.symlink_metadata().is_ok()) {
+            continue;
+        }
+        for (path, file) in paths.iter().zip(files) {
+            atomic::write_new(path, file.bytes)?;
+        }
+        return Ok(paths);
     }
-    check_old(page, &[], true)?;
-    Ok(atomic::probe(page)?)
+    let cause = io::Error::new(ErrorKind::AlreadyExists, "has no free name beside it");
+    Err(Error::io(files[0].path, cause))
+}
+
+/// Writes all files to a new folder of the system's folder for temporary files; the failure says why, and where.
+fn write_aside(files: &[New], cause: &Error) -> Written {
+    let folder = std::env::temp_dir().join(format!("clerestory-{:016x}", atomic::random()));
+    let mut paths = Vec::new();
+    let mut write = || -> Result<()> {
+        private_folder(&folder).map_err(|cause| Error::io(&folder, cause))?;
+        for file in files {
+            let path = folder.join(file.path.file_name().unwrap_or_default());
+            atomic::write_new(&path, file.bytes)?;
+            paths.push(path);
+        }
+        Ok(())
+    };
+    let written = write();
+    let hint = match written {
+        Ok(()) => format!("what was to be written is kept in {}", folder.display()),
+        Err(second) if paths.is_empty() => {
+            // It is empty, or was not made.
+            let _ = std::fs::remove_dir(&folder);
+            format!("nor could it be kept elsewhere: {second}")
+        }
+        // The first of them is the picture with all that is known, which is worth more than what goes with it.
+        Err(second) => format!(
+            "{} of {} files are kept in {}; the others could not be: {second}",
+            paths.len(),
+            files.len(),
+            folder.display()
+        ),
+    };
+    let failure = Failure {
+        code: Code::Run,
+        message: cause.to_string(),
+        hint: Some(hint),
+    };
+    Written {
+        paths,
+        failure: Some(failure),
+    }
 }
 
 /// Checks a folder of a command's own, which gets files of many names: it can be written to, and no file that the command reads lies in it.
@@ -292,15 +336,26 @@ fn refuse_one_twice(paths: &[&Path]) -> Outcome {
     Ok(())
 }
 
-/// Where a file would be written: behind its links, and in its folder without any, as far as these are there.
+/// Where a file would be written: behind its links, and in its folder without any. Folders that are not there yet have none.
 fn place(path: &Path) -> PathBuf {
     let end = atomic::end_of_links(path).unwrap_or_else(|_| path.to_owned());
-    if let Ok(there) = end.canonicalize() {
-        return there;
+    for there in end.ancestors() {
+        let (Ok(mut place), Ok(rest)) = (named(there).canonicalize(), end.strip_prefix(there)) else {
+            continue;
+        };
+        let mut went_up = false;
+        for part in rest.components() {
+            if part == Component::ParentDir {
+                went_up = true;
+                place.pop();
+            } else {
+                place.push(part);
+            }
+        }
+        // Above what is not there yet may be links again.
+        return if went_up { self::place(&place) } else { place };
     }
-    let folder = end.parent().and_then(|folder| named(folder).canonicalize().ok());
-    let beside = folder.zip(end.file_name()).map(|(folder, name)| folder.join(name));
-    beside.unwrap_or(end)
+    end
 }
 
 /// A folder by a name that is not empty.
@@ -313,7 +368,7 @@ fn named(folder: &Path) -> &Path {
 }
 
 /// Refuses to replace what is no file, or should not be replaced unasked.
-fn check_old(path: &Path, all: &[&Path], overwrite: bool) -> Outcome {
+fn check_old(path: &Path, overwrite: bool, is_ours: impl FnOnce() -> Result<bool>) -> Outcome {
     // What cannot be looked at is found out by writing beside it.
     let Ok(found) = std::fs::metadata(path) else {
         return Ok(());
@@ -333,7 +388,7 @@ fn check_old(path: &Path, all: &[&Path], overwrite: bool) -> Outcome {
         return Ok(());
     } else if found.permissions().readonly() {
         "is write-protected"
-    } else if !is_ours(path, all)? {
+    } else if !is_ours()? {
         "is there, and this program did not write it"
     } else {
         return Ok(());
@@ -345,16 +400,10 @@ fn check_old(path: &Path, all: &[&Path], overwrite: bool) -> Outcome {
 fn is_ours(path: &Path, all: &[&Path]) -> Result<bool> {
     match pictures::extension(path).as_str() {
         "exr" | "hdr" | "png" => mark::is_marked(path),
-        "json" => json_is_ours(path),
-        _ => {
-            let reports = all.iter().filter(|other| pictures::extension(other) == "json");
-            for report in reports.filter(|report| report.is_file()) {
-                if json_is_ours(report)? {
-                    return Ok(true);
-                }
-            }
-            Ok(false)
-        }
+        _ => match all.iter().find(|other| pictures::extension(other) == "json") {
+            Some(report) if report.is_file() => json_is_ours(report),
+            _ => Ok(false),
+        },
     }
 }
 
@@ -558,6 +607,75 @@ mod tests {
             // A table without its report could be anybody's.
             assert!(Outputs::one(&paths[1], &Inputs::default(), false).is_err());
         }
+        Ok(())
+    }
+
+    #[test]
+    fn what_has_no_mark_is_ours_where_the_report_is() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let names = ["report.json", "rows.json", "1.csv"];
+        let plan = || {
+            OutputFolder::plan(
+                folder.path(),
+                &names,
+                &Inputs::default(),
+                Overwriting { overwrite: false },
+            )
+        };
+        for name in &names[1..] {
+            std::fs::write(folder.path().join(name), "[1, 2]")?;
+            assert_eq!(said(plan()).0, Some(Code::Usage), "{name}");
+            std::fs::remove_file(folder.path().join(name))?;
+        }
+        std::fs::write(folder.path().join(names[0]), "{\"verdicts\": [], \"tables\": []}")?;
+        for name in &names[1..] {
+            std::fs::write(folder.path().join(name), "[1, 2]")?;
+        }
+        let planned = plan().map_err(|failure| failure.message)?;
+        // One that is not in the plan came meanwhile.
+        std::fs::write(folder.path().join("2.csv"), "somebody's")?;
+        let files = ["report.json", "2.csv"].map(|name| NamedFile::new(name, "{}"));
+        let written = planned.write(&files);
+        assert_eq!(
+            written.paths,
+            ["report-2.json", "2-2.csv"].map(|name| folder.path().join(name))
+        );
+        assert_eq!(std::fs::read(folder.path().join("2.csv"))?, b"somebody's");
+        Ok(())
+    }
+
+    #[test]
+    fn pages_are_inputs_that_no_other_file_may_replace() -> Tested {
+        let folder = tempfile::tempdir()?;
+        let page = folder.path().join("index.md");
+        for there in [false, true] {
+            let mut inputs = Inputs::default();
+            let plan = OutputPage::plan(Some(&page), &mut inputs, Overwriting { overwrite: there });
+            let plan = plan.map_err(|failure| failure.message)?.ok_or("no page")?;
+            let (code, message) = said(Outputs::one(&folder.path().join("./index.md"), &inputs, true));
+            assert!(code == Some(Code::Usage) && message.contains("reads it"), "{message}");
+            let block = clerestory_tools::page::Block {
+                name: "one",
+                command: "test",
+            };
+            assert!(plan.write(block, "measured").check().is_ok());
+            std::fs::write(&page, std::fs::read_to_string(&page)? + "words\n")?;
+        }
+        let text = std::fs::read_to_string(&page)?;
+        assert_eq!(
+            (text.matches("measured").count(), text.matches("words\n").count()),
+            (1, 2)
+        );
+        let mut permissions = page.metadata()?.permissions();
+        permissions.set_readonly(true);
+        std::fs::set_permissions(&page, permissions)?;
+        let plan = |overwrite| OutputPage::plan(Some(&page), &mut Inputs::default(), Overwriting { overwrite });
+        let (code, message) = said(plan(false));
+        assert!(
+            code == Some(Code::Usage) && message.contains("write-protected"),
+            "{message}"
+        );
+        assert!(plan(true).is_ok());
         Ok(())
     }
 

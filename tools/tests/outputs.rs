@@ -86,6 +86,21 @@ fn fill(folder: &Path) -> Tested {
     std::fs::write(at("tables/notes.md"), "# Notes\n")?;
     std::fs::write(at("tables/empty-scene.png"), "no picture")?;
     std::fs::write(at("tables/tiny/tiny.toml"), EXPERIMENT)?;
+    for (name, file) in [("alpha", "rows.json"), ("ambient", "1.csv"), ("absorption", "map.svg")] {
+        std::fs::create_dir_all(at("pages").join(name))?;
+        std::fs::write(at("pages").join(name).join(file), "[1, 2]\n")?;
+    }
+    std::fs::create_dir(at("results"))?;
+    std::fs::write(at("results/README.md"), "# Results\n\nOf somebody's project.\n")?;
+    // A report of the program's with somebody's words beside it.
+    let report = "{\"device\": \"d\", \"driver\": \"e\", \"engine_version\": \"0.1.0\"}";
+    std::fs::create_dir(at("own"))?;
+    std::fs::write(at("own/index.json"), report)?;
+    std::fs::write(at("own/index.md"), "# Words\n")?;
+    std::fs::write(at("protected.md"), "# Words\n")?;
+    let mut permissions = at("protected.md").metadata()?.permissions();
+    permissions.set_readonly(true);
+    std::fs::set_permissions(at("protected.md"), permissions)?;
     Ok(())
 }
 
@@ -126,7 +141,7 @@ fn duck() -> String {
 }
 
 /// Each command that writes, with each of its own inputs as output, or with a file there that is not the program's.
-const REFUSED: [(&str, &str); 24] = [
+const REFUSED: [(&str, &str); 44] = [
     ("render --spp 1 --reference a.exr -o a.exr", "reads it"),
     ("render --spp 1 --reference a.exr -o a.exr --overwrite", "reads it"),
     ("render --size 4 --spp 1 --reference c.png -o c.exr", "reads it"),
@@ -153,8 +168,89 @@ const REFUSED: [(&str, &str); 24] = [
     ("bench --sort --page package.json", "pages are .md files"),
     ("report tables/tiny/tiny.toml --folder tables", "lies in the folder"),
     ("report samplers --folder pages", "did not write it"),
+    ("report alpha --folder pages", "did not write it"),
+    ("report ambient --folder pages", "did not write it"),
+    ("report absorption --folder pages", "did not write it"),
+    (
+        "report kd-or-bvh --scene tables/sort.json --folder new --references tables",
+        "lies in the folder",
+    ),
+    (
+        "report tables/tiny/tiny.toml --references tables --folder new",
+        "lies in the folder",
+    ),
+    (
+        "report tables/tiny/tiny.toml --references tables/tiny/tiny.toml --folder new",
+        "lies in the folder",
+    ),
+    ("report --pages", "did not write it"),
+    ("report samplers --results --folder new", "did not write it"),
     ("stability empty-scene --pictures tables", "did not write it"),
+    (
+        "agreement --python tables/notes.md --output tables",
+        "lies in the folder",
+    ),
+    ("agreement --python own/index.md --results own/index", "reads it"),
+    ("agreement --python own/index.md --page own/index.md", "reads it"),
+    ("agreement --python true --results package", "did not write it"),
+    // A page is read, too: what stands around the part that is replaced.
+    (
+        "agreement --python true --results own/index --page own/index.md",
+        "reads it",
+    ),
+    (
+        "agreement --python true --results new/a --page new/a.md --output out",
+        "reads it",
+    ),
+    (
+        "agreement --python true --output own --page own/index.md",
+        "lies in the folder",
+    ),
+    ("agreement --python true --page protected.md", "write-protected"),
+    (
+        "index --peers --scene soup.obj --folder own --page own/index.md",
+        "reads it",
+    ),
+    (
+        "index --peers --scene soup.obj --folder own --page new/../own/index.md --overwrite",
+        "reads it",
+    ),
+    (
+        "index --peers --scene soup.obj --folder new --page ./new/index.md",
+        "reads it",
+    ),
+    ("index --peers --scene soup.obj --page protected.md", "write-protected"),
+    ("index --peers --scene own/index.md --folder own", "reads it"),
+    ("bench --sort --scene tables/sort.json --folder tables", "reads it"),
+    ("bench --sort --scene own/index.md --page own/index.md", "reads it"),
+    ("bench --sort --page protected.md", "write-protected"),
 ];
+
+/// Commands that go on where the place for what they would keep is one of their inputs.
+const GOES_ON: [&str; 2] = [
+    "render --spp 1 --reference a.exr --index kd --index-cache a.exr --stats none -o new.exr",
+    "index --scene soup.obj --index-cache soup.obj --repeat 1 --rays 2",
+];
+
+/// Options whose names are no files.
+const NO_FILES: [[&str; 2]; 2] = [["render", "--camera"], ["agreement", "--scene"]];
+/// Options without a value that write.
+const WRITING: [[&str; 2]; 2] = [["report", "--results"], ["report", "--pages"]];
+
+/// The options of a command's help that take a file or a folder, by all of their names.
+fn options_of_files(help: &str) -> Vec<Vec<&str>> {
+    let mut found = Vec::new();
+    for line in help.lines().map(str::trim).filter(|line| line.starts_with('-')) {
+        let Some((names, value)) = line.split_once('<') else {
+            continue;
+        };
+        let value = value.split('>').next().unwrap_or_default();
+        if value.contains("FILE") || value.contains("FOLDER") || value == "NAME" {
+            found.push(names.split([' ', ',']).filter(|name| !name.is_empty()).collect());
+        }
+    }
+    found
+}
 
 #[test]
 fn no_command_writes_over_what_it_reads_or_what_is_not_its_own() -> Tested {
@@ -165,12 +261,7 @@ fn no_command_writes_over_what_it_reads_or_what_is_not_its_own() -> Tested {
         wants(folder.path(), line, 2, &["error:", word])?;
         assert!(contents(folder.path())? == before, "{line} changed a file");
     }
-    let python = "agreement --python tables/notes.md --output tables";
-    wants(folder.path(), python, 2, &["lies in the folder"])?;
-    let results = "agreement --python true --results package";
-    wants(folder.path(), results, 2, &["did not write it"])?;
-    assert!(contents(folder.path())? == before);
-    // Each command of the help that can write stands above: all that take --overwrite.
+    // Each command of the help that can write stands above: all that take --overwrite. So does each of their options that takes a file.
     let help = program(folder.path()).arg("--help").output()?;
     let help = String::from_utf8(help.stdout)?;
     // Continued lines are indented further.
@@ -180,15 +271,76 @@ fn no_command_writes_over_what_it_reads_or_what_is_not_its_own() -> Tested {
         .take_while(|line| !line.is_empty())
         .filter(named)
         .filter_map(|line| line.split_whitespace().next());
+    let lines = || REFUSED.iter().map(|(line, _)| *line).chain(GOES_ON);
+    let tried = |command: &str, names: &[&str]| {
+        let of_command = |line: &&str| line.split(' ').next() == Some(command);
+        let mut lines = lines().filter(of_command);
+        lines.any(|line| line.split(' ').any(|word| names.contains(&word)))
+    };
     let mut seen = 0;
     for command in commands.filter(|command| *command != "help") {
         let options = program(folder.path()).args([command, "--help"]).output()?;
-        let writes = String::from_utf8(options.stdout)?.contains("--overwrite");
-        let tried = command == "agreement" || REFUSED.iter().any(|(line, _)| line.split(' ').next() == Some(command));
-        assert_eq!(writes, tried, "{command}");
+        let options = String::from_utf8(options.stdout)?;
+        let writes = options.contains("--overwrite");
+        assert_eq!(writes, tried(command, &[command]), "{command}");
+        for names in options_of_files(&options) {
+            let is_exempt = NO_FILES.iter().any(|[of, name]| *of == command && names.contains(name));
+            assert!(tried(command, &names) != is_exempt, "{command} {names:?}");
+        }
         seen += 1;
     }
+    for [command, name] in WRITING {
+        assert!(tried(command, &[name]), "{command} {name}");
+    }
     assert!(seen >= 11, "{seen} commands: {help}");
+    Ok(())
+}
+
+/// What cannot be kept is only said.
+#[test]
+fn caches_in_place_of_an_input_change_nothing() -> Tested {
+    let folder = tempfile::tempdir()?;
+    fill(folder.path())?;
+    let before = contents(folder.path())?;
+    for line in GOES_ON {
+        wants(folder.path(), line, 0, &[])?;
+        let after = contents(folder.path())?;
+        assert!(
+            before.iter().all(|(path, bytes)| after.get(path) == Some(bytes)),
+            "{line}"
+        );
+    }
+    Ok(())
+}
+
+#[test]
+fn pages_of_results_are_made_where_they_are_the_programs() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let list = folder.path().join("results/README.md");
+    std::fs::create_dir(folder.path().join("results"))?;
+    std::fs::write(&list, "# Results\n\nOf somebody's project.\n")?;
+    wants(
+        folder.path(),
+        "report --pages",
+        2,
+        &["results/README.md", "did not write it"],
+    )?;
+    assert_eq!(count(&folder.path().join("results"))?, 1);
+    wants(folder.path(), "report --pages --overwrite", 0, &["wrote results"])?;
+    // Its own are replaced unasked, unless they are write-protected.
+    let own = std::fs::read_to_string(&list)?;
+    std::fs::write(&list, own.clone() + "more\n")?;
+    wants(folder.path(), "report --pages", 0, &[])?;
+    assert!(own.contains("(samplers/README.md)") && std::fs::read_to_string(&list)? == own);
+    let mut permissions = list.metadata()?.permissions();
+    permissions.set_readonly(true);
+    std::fs::set_permissions(&list, permissions)?;
+    wants(
+        folder.path(),
+        "report --pages",
+        2,
+        &["results/README.md", "write-protected"],
+    )?;
     Ok(())
 }
 
@@ -286,6 +438,34 @@ fn a_limit_on_the_size_of_files_loses_nothing() -> Tested {
     Ok(())
 }
 
+/// Of what took long to measure at least the words are left.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_an_experiment_found_is_printed_where_it_cannot_be_written() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let program = env!("CARGO_BIN_EXE_clerestory");
+    let mut shell = Command::new("sh");
+    let line = format!("ulimit -f 1; exec {program} report phase-functions --smoke --folder new");
+    let output = shell
+        .args(["-c", &line])
+        .current_dir(folder.path())
+        .env("TMPDIR", folder.path())
+        .stdin(Stdio::null())
+        .output()?;
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(
+        said(&output).contains("ulimit -f") && said(&output).contains("nor could it"),
+        "{}",
+        said(&output)
+    );
+    let printed = String::from_utf8(output.stdout)?;
+    assert!(
+        printed.starts_with("# phase-functions") && printed.contains("| "),
+        "{printed}"
+    );
+    Ok(())
+}
+
 #[cfg(unix)]
 #[test]
 fn modes_and_links_of_outputs_stay() -> Tested {
@@ -364,20 +544,20 @@ fn of_processes_with_one_output_none_loses_its_picture() -> Tested {
 /// Starts a rendering without end and waits until it renders.
 #[cfg(unix)]
 fn begin(folder: &Path, more: &[&str]) -> Result<std::process::Child, Box<dyn std::error::Error>> {
+    let line = "-v render --size 8 --spp 100000000 --stats none -o out/a.exr";
+    let arguments: Vec<&str> = line.split(' ').chain(more.iter().copied()).collect();
+    begin_until(folder, &arguments, "rendering;")
+}
+
+/// Starts the program and waits until it says a word.
+#[cfg(unix)]
+fn begin_until(
+    folder: &Path,
+    arguments: &[&str],
+    word: &str,
+) -> Result<std::process::Child, Box<dyn std::error::Error>> {
     let mut child = program(folder)
-        .args([
-            "-v",
-            "render",
-            "--size",
-            "8",
-            "--spp",
-            "100000000",
-            "--stats",
-            "none",
-            "-o",
-            "out/a.exr",
-        ])
-        .args(more)
+        .args(arguments)
         .env("TMPDIR", folder)
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
@@ -386,7 +566,7 @@ fn begin(folder: &Path, more: &[&str]) -> Result<std::process::Child, Box<dyn st
     let mut heard = Vec::new();
     let mut byte = [0];
     // Byte by byte, so that nothing of the rest is taken.
-    while !String::from_utf8_lossy(&heard).contains("rendering;") {
+    while !String::from_utf8_lossy(&heard).contains(word) {
         if std::io::Read::read(&mut stderr, &mut byte)? == 0 {
             return Err(format!("ended too early: {}", String::from_utf8_lossy(&heard)).into());
         }
@@ -437,6 +617,21 @@ fn an_interrupted_picture_does_not_replace_a_better_one() -> Tested {
     let spp = exr::read(at("out/a.exr"))?.metadata.spp;
     assert!(spp.is_some_and(|spp| spp < 1 << 40), "{spp:?}");
     assert_eq!(count(&at("out"))?, 6);
+    Ok(())
+}
+
+/// The tree takes far longer than the signal.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_while_the_index_is_built_ends_the_program() -> Tested {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = tempfile::tempdir()?;
+    let line = "-v render builtin:triangle-soup?n=200000 --index kd --size 8 --spp 1 --stats none -o out/a.exr";
+    let arguments: Vec<&str> = line.split(' ').collect();
+    let output = interrupt(begin_until(folder.path(), &arguments, "device=")?)?;
+    assert_eq!(output.status.signal(), Some(2), "{}", said(&output));
+    assert!(!said(&output).contains("rendering;"), "{}", said(&output));
+    assert_eq!(count(folder.path())?, 0);
     Ok(())
 }
 

@@ -3,15 +3,18 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use clerestory::atomic;
 use clerestory::film::ZTest;
 use clerestory::film::z_test::{ACCEPTED_FRACTION, Verdict};
 use clerestory::gpu::Caps;
+use clerestory::input::read_text;
 use clerestory::{Error, Result};
 
 use super::AgreementOptions;
 use super::race::{Contender, EqualError, Race};
 use crate::machine;
+
+/// Most bytes of an earlier report.
+const MOST_BYTES: u64 = 1 << 28;
 
 /// What everything ran on.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -155,7 +158,7 @@ impl AgreementReport {
     /// The scenes of the report at `prefix` that were compared on this machine with these options, whatever their selection; none where
     /// there is no such report.
     pub(super) fn kept(prefix: &Path, machine: &Machine, options: &AgreementOptions) -> Vec<SceneAgreement> {
-        let text = std::fs::read_to_string(prefix.with_extension("json")).unwrap_or_default();
+        let text = read_text(&prefix.with_extension("json"), MOST_BYTES).unwrap_or_default();
         let same = |report: &Self| {
             let of_all = |options: &AgreementOptions| {
                 let scenes = Vec::new();
@@ -197,20 +200,14 @@ impl AgreementReport {
         self.uncompared.iter().map(line).collect()
     }
 
-    /// Writes `prefix.json` and `prefix.md`.
+    /// The report as JSON and as a page of Markdown.
     ///
     /// # Errors
-    /// [`Error::Io`].
-    pub fn write(&self, prefix: &Path) -> Result<()> {
-        let json = serde_json::to_string_pretty(self).map_err(|cause| Error::Picture {
-            path: prefix.display().to_string(),
-            cause: cause.to_string(),
-        })?;
-        for (suffix, text) in [("json", json + "\n"), ("md", self.to_markdown())] {
-            let path = prefix.with_extension(suffix);
-            atomic::write(&path, text.as_bytes())?;
-        }
-        Ok(())
+    /// [`Error::Setting`] for what JSON cannot hold.
+    pub fn texts(&self) -> Result<[String; 2]> {
+        let json = serde_json::to_string_pretty(self)
+            .map_err(|cause| Error::setting("report", "agreement", cause.to_string()))?;
+        Ok([json + "\n", self.to_markdown()])
     }
 
     /// Agreement and time to equal error, one row per scene, as a part of a page of results.
@@ -565,7 +562,8 @@ pub(crate) mod tests {
         let (report, prefix) = (made_up(), folder.path().join("report"));
         let kept = |options: &AgreementOptions| AgreementReport::kept(&prefix, &report.machine, options).len();
         assert_eq!(kept(&report.options), 0);
-        report.write(&prefix).unwrap();
+        let [json, _] = report.texts().unwrap();
+        std::fs::write(prefix.with_extension("json"), json).unwrap();
         assert_eq!(kept(&report.options), report.scenes.len());
         let mut others = report.options.clone();
         others.scenes = vec!["one".into()];

@@ -14,7 +14,7 @@ use super::progress::Bar;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output;
-use crate::outputs::{self, Inputs, Outputs, Overwriting};
+use crate::outputs::{self, Inputs, OutputPage, Outputs, Overwriting, Repeated, Written};
 
 /// Compares converged pictures with those of Mitsuba 3, within their noise, and measures both renderers' time to equal error
 #[derive(Debug, Args)]
@@ -114,37 +114,54 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         keep: arguments.keep,
     };
     options.check()?;
-    let inputs = Inputs::of(&arguments.python);
-    let overwrite = arguments.overwriting.overwrite;
+    let mut inputs = Inputs::of(&arguments.python);
+    let page = OutputPage::plan(arguments.page.as_deref(), &mut inputs, arguments.overwriting)?;
     outputs::check_folder(&arguments.output, &inputs)?;
-    if let Some(prefix) = &arguments.results {
-        let files = ["json", "md"].map(|ending| prefix.with_extension(ending));
-        Outputs::plan(&files, &inputs, overwrite)?;
-    }
-    if let Some(page) = &arguments.page {
-        outputs::check_page(page, &inputs)?;
-    }
+    let mut results = match &arguments.results {
+        Some(prefix) => {
+            let files = ["json", "md"].map(|ending| prefix.with_extension(ending));
+            let plan = Outputs::plan(&files, &inputs, arguments.overwriting.overwrite)?;
+            Some(Repeated::new(plan))
+        }
+        None => None,
+    };
     let gpu = arguments.device.open()?;
     let bar = Bar::start()?;
-    let report = run_with(&gpu, &options, &bar);
+    let report = run_with(&gpu, &options, &bar, &mut |report| {
+        if let Some(results) = &mut results {
+            results.write(&report.texts()?.map(String::into_bytes));
+        }
+        Ok(())
+    });
     bar.clear();
-    let report = report?;
+    let kept = results.map_or(Ok(()), Repeated::check);
+    let report = match report {
+        Ok(report) => report,
+        Err(error) => {
+            if let Err(unkept) = kept {
+                unkept.report();
+            }
+            return Err(error.into());
+        }
+    };
     let log = gpu.validation_log();
     drop(gpu);
     check_validation(&log)?;
     if bar.stopped() {
         output::note("interrupted; the reports hold what was compared before");
+        kept?;
         return Ok(Code::Interrupted.into());
     }
-    if let Some(page) = &arguments.page {
-        BLOCK.write(page, &report.to_results_block())?;
-        output::note(&format!("wrote {}", page.display()));
-    }
-    if arguments.json {
-        output::print_json(&report)?;
+    // What was measured is printed whatever becomes of the files, and written whatever becomes of the printing.
+    let printed = if arguments.json {
+        output::print_json(&report)
     } else {
-        output::print(&report.to_markdown())?;
-    }
+        output::print(&report.to_markdown())
+    };
+    let written = page.map(|page| page.write(BLOCK, &report.to_results_block()));
+    kept?;
+    written.map_or(Ok(()), Written::check)?;
+    printed?;
     if report.passes() {
         return Ok(ExitCode::SUCCESS);
     }

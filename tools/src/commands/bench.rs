@@ -15,7 +15,7 @@ use super::{check_validation, index, index_peers, sort_rates};
 use crate::failure::{Failure, Outcome};
 use crate::options::{DeviceOptions, Size, parse_size};
 use crate::output::{self, Table};
-use crate::outputs::{self, Inputs, Outputs, Overwriting};
+use crate::outputs::{Inputs, OutputFolder, OutputPage, Overwriting, Written};
 
 /// Measures paths and rays per second of the path tracer: medians of repeated runs
 #[derive(Debug, Args)]
@@ -90,10 +90,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         [] => defaults.iter().map(|scene| (*scene).to_owned()).collect(),
         given => given.to_vec(),
     };
-    check_outputs(arguments)?;
+    let places = Places::plan(arguments)?;
     let gpu = arguments.device.open()?;
     if of_kernels {
-        return run_kernels(gpu, arguments, &scenes(&index::SCENES));
+        return run_kernels(gpu, arguments, &scenes(&index::SCENES), &places);
     }
     let mut all = Vec::new();
     for address in &scenes(&SCENES) {
@@ -142,22 +142,33 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks all that will be written, before anything is measured.
-fn check_outputs(arguments: &Arguments) -> Outcome {
-    let mut inputs = Inputs::default();
-    for address in &arguments.scenes {
-        inputs.add_address(address);
-    }
-    if let Some(folder) = &arguments.folder {
-        let of_indexes = index_peers::FILES.iter().filter(|_| !arguments.sort);
-        for names in [sort_rates::FILES.iter().collect(), of_indexes.collect::<Vec<_>>()] {
-            let files: Vec<PathBuf> = names.into_iter().map(|name| folder.join(name)).collect();
-            Outputs::plan(&files, &inputs, arguments.overwriting.overwrite)?;
+/// Where the rates go.
+struct Places {
+    sorts: Option<OutputFolder>,
+    indexes: Option<OutputFolder>,
+    page: Option<OutputPage>,
+}
+
+impl Places {
+    /// Checks all that will be written, before anything is measured.
+    fn plan(arguments: &Arguments) -> Outcome<Self> {
+        let mut inputs = Inputs::default();
+        for address in &arguments.scenes {
+            inputs.add_address(address);
         }
-    }
-    match &arguments.page {
-        Some(page) => outputs::check_page(page, &inputs),
-        None => Ok(()),
+        let page = OutputPage::plan(arguments.page.as_deref(), &mut inputs, arguments.overwriting)?;
+        let folder = arguments.folder.as_deref();
+        let plan = |names: &[&str], wanted: bool| {
+            let folder = folder.filter(|_| wanted);
+            folder
+                .map(|folder| OutputFolder::plan(folder, names, &inputs, arguments.overwriting))
+                .transpose()
+        };
+        Ok(Self {
+            sorts: plan(&sort_rates::FILES, true)?,
+            indexes: plan(&index_peers::FILES, !arguments.sort)?,
+            page,
+        })
     }
 }
 
@@ -168,7 +179,7 @@ const SORT_BLOCK: Block<'static> = Block {
 };
 
 /// The sort beside its peers and, where not it alone is asked for, the indexes beside theirs.
-fn run_kernels(gpu: Gpu, arguments: &Arguments, scenes: &[String]) -> Outcome<ExitCode> {
+fn run_kernels(gpu: Gpu, arguments: &Arguments, scenes: &[String], places: &Places) -> Outcome<ExitCode> {
     let load = || machine::load().unwrap_or_else(|| "unknown".into());
     let load_before = load();
     let rates = sort_rates::measure(&gpu, arguments.repeat, arguments.peers)?;
@@ -177,9 +188,6 @@ fn run_kernels(gpu: Gpu, arguments: &Arguments, scenes: &[String]) -> Outcome<Ex
         scenes,
         rays: PEER_RAYS,
         repeat: arguments.repeat,
-        json: arguments.json,
-        folder: arguments.folder.as_deref(),
-        page: None,
     };
     let indexes = if arguments.sort {
         None
@@ -194,9 +202,6 @@ fn run_kernels(gpu: Gpu, arguments: &Arguments, scenes: &[String]) -> Outcome<Ex
         "threads": machine::threads(), "load_before": load_before, "load_after": load_after, "repeat": arguments.repeat, "sorts": rates,
         "indexes": indexes,
     });
-    if let Some(folder) = &arguments.folder {
-        sort_rates::write(folder, &rates, &document)?;
-    }
     let head = output::one_line(&format!(
         "{}, driver {}; {}, {} threads; random 32-bit keys per second, medians of {} runs in turns (least … greatest), load average \
          {load_before} before and {load_after} after",
@@ -206,21 +211,25 @@ fn run_kernels(gpu: Gpu, arguments: &Arguments, scenes: &[String]) -> Outcome<Ex
         machine::threads(),
         arguments.repeat,
     ));
-    if let Some(page) = &arguments.page {
-        SORT_BLOCK.write(page, &format!("{head}.\n\n{}", sort_rates::markdown(&rates)))?;
-        output::note(&format!("wrote {}", page.display()));
+    // What was measured is printed whatever becomes of the files, and written whatever becomes of the printing.
+    let printed = if arguments.json {
+        output::print_json(&document)
+    } else {
+        let of_indexes = indexes.as_ref().map_or_else(String::new, index_peers::markdown);
+        output::print(&format!("{head}\n{}{of_indexes}", sort_rates::tables(&rates)))
+    };
+    let mut written = Vec::new();
+    if let Some(page) = &places.page {
+        written.push(page.write(SORT_BLOCK, &format!("{head}.\n\n{}", sort_rates::markdown(&rates))));
     }
-    if let Some(indexes) = &indexes {
-        index_peers::write(indexes, &settings)?;
+    if let Some(folder) = &places.sorts {
+        written.push(folder.write(&sort_rates::files(&rates, &document)?));
     }
-    if arguments.json {
-        output::print_json(&document)?;
-        return Ok(ExitCode::SUCCESS);
+    if let (Some(folder), Some(indexes)) = (&places.indexes, &indexes) {
+        written.push(folder.write(&index_peers::files(indexes)?));
     }
-    output::print(&format!("{head}\n{}", sort_rates::tables(&rates)))?;
-    if let Some(indexes) = &indexes {
-        output::print(&index_peers::markdown(indexes))?;
-    }
+    Written::check_all(written)?;
+    printed?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -20,7 +20,7 @@ use super::{check_validation, index_peers};
 use crate::failure::{Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output::{self, Table};
-use crate::outputs::{self, Inputs, Outputs, Overwriting};
+use crate::outputs::{Inputs, OutputFolder, OutputPage, Overwriting};
 
 /// Compares ray indexes: build time, surface area cost, depth, and what rays visit
 #[derive(Debug, Args)]
@@ -161,24 +161,18 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     for address in &arguments.scenes {
         inputs.add_address(address);
     }
-    if let Some(folder) = &arguments.folder {
-        let files = index_peers::FILES.map(|name| folder.join(name));
-        Outputs::plan(&files, &inputs, arguments.overwriting.overwrite)?;
-    }
-    if let Some(page) = &arguments.page {
-        outputs::check_page(page, &inputs)?;
-    }
+    let page = OutputPage::plan(arguments.page.as_deref(), &mut inputs, arguments.overwriting)?;
+    let folder = arguments.folder.as_deref();
+    let folder = folder.map(|folder| OutputFolder::plan(folder, &index_peers::FILES, &inputs, arguments.overwriting));
+    let folder = folder.transpose()?;
     let gpu = arguments.device.open()?;
     if arguments.peers {
         let settings = index_peers::Settings {
             scenes: &arguments.scenes,
             rays: arguments.rays,
             repeat: arguments.repeat,
-            json: arguments.json,
-            folder: arguments.folder.as_deref(),
-            page: arguments.page.as_deref(),
         };
-        return index_peers::run(gpu, &settings);
+        return index_peers::run(gpu, &settings, folder.as_ref(), page.as_ref(), arguments.json);
     }
     let builder = LbvhBuilder::new(&gpu, &fast(30))?;
     let mut all: Vec<Measured> = Vec::new();

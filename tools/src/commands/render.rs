@@ -53,7 +53,7 @@ Examples:
 
 Beside a model NAME.gltf, NAME.scene.toml may say what glTF cannot: environment map, measured metals, aperture, exposure, technique.
 
-Ctrl-C stops after the current step and writes the picture so far, with exit code 130; a second one stops at once and writes nothing. \
+Ctrl-C stops after the current step and writes the picture so far, with exit code 130; a second one, or one while the index is built, stops at once and writes nothing. \
 Files that are read, or that this program did not write, are refused as output before the rendering begins. An interrupted picture does not replace one with more \
 samples, nor any picture one that came to its place in the meantime: it is written beside it, as NAME-2.exr. What cannot be written in the end is kept in the \
 system's folder for temporary files, which the error names. \
@@ -274,12 +274,13 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     )?;
     let gpu = arguments.device.open()?;
     tracing::info!(device = gpu.caps().device, driver = gpu.caps().driver, "device");
-    let interruptible = Interruptible::start()?;
     let desc = RendererDesc {
         index: arguments.index,
         index_folder: arguments.index_cache.clone(),
     };
     let renderer = Renderer::with(&gpu, &scene, &desc)?;
+    // Not before: until the index is built there is nothing that an interrupt could keep, and nothing that looks at it.
+    let interruptible = Interruptible::start()?;
     let goal = Goal {
         error: arguments.error,
         time: arguments.time,

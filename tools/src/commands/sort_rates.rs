@@ -3,9 +3,6 @@
 //! Peers: the standard library's sorts, and with `--peers` those of the crates rdst (all threads, or one) and radsort. Every sorter sorts
 //! the same random keys; sorters take turns, and medians count.
 
-use std::path::Path;
-
-use clerestory::atomic;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
 use clerestory::{Error, Result};
@@ -17,6 +14,7 @@ use rdst::{RadixKey, RadixSort as _};
 
 use crate::failure::Outcome;
 use crate::output::{self, Table};
+use crate::outputs::NamedFile;
 
 /// Sizes as powers of two.
 const SIZES: [u32; 8] = [10, 12, 14, 16, 18, 20, 22, 24];
@@ -338,11 +336,9 @@ pub fn markdown(rates: &[Rate]) -> String {
 /// The files in a folder; a plot may be left out.
 pub const FILES: [&str; 4] = ["sort.json", "sort.csv", "sort-keys.svg", "sort-pairs.svg"];
 
-/// Writes `sort.json`, `sort.csv` and for each load a plot into a folder.
-pub fn write(folder: &Path, rates: &[Rate], head: &serde_json::Value) -> Outcome {
-    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-    let save = |name: &str, text: String| atomic::write(&folder.join(name), text.as_bytes());
-    save("sort.json", output::json_text("sort.json", head)?)?;
+/// `sort.json`, `sort.csv` and for each load a plot.
+pub fn files(rates: &[Rate], head: &serde_json::Value) -> Outcome<Vec<NamedFile>> {
+    let mut files = vec![NamedFile::new("sort.json", output::json_text("sort.json", head)?)];
     let mut sheet = Sheet::new(
         "rates",
         &[
@@ -364,7 +360,7 @@ pub fn write(folder: &Path, rates: &[Rate], head: &serde_json::Value) -> Outcome
             rate.range[1].into(),
         ]);
     }
-    save("sort.csv", sheet.csv())?;
+    files.push(NamedFile::new("sort.csv", sheet.csv()));
     for load in Load::ALL {
         let curve = |name: &&'static str| Curve {
             name: (*name).into(),
@@ -386,10 +382,10 @@ pub fn write(folder: &Path, rates: &[Rate], head: &serde_json::Value) -> Outcome
             y: &format!("{}/s, median, least to greatest", load.word()),
         };
         if let Some(svg) = plot::log_log_of_rates(words, &curves)? {
-            save(&format!("sort-{}.svg", load.word()), svg)?;
+            files.push(NamedFile::new(format!("sort-{}.svg", load.word()), svg));
         }
     }
-    Ok(())
+    Ok(files)
 }
 
 #[cfg(test)]
@@ -422,11 +418,8 @@ mod tests {
             page.contains("| keys | std unstable |") && page.contains("| 1024 | "),
             "{page}"
         );
-        let folder = tempfile::tempdir().unwrap();
-        assert!(write(folder.path(), &rates, &serde_json::json!({})).is_ok());
-        for name in FILES {
-            assert!(folder.path().join(name).is_file(), "{name}");
-        }
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), FILES.len());
+        let made = files(&rates, &serde_json::json!({})).unwrap_or_default();
+        let names: Vec<&str> = made.iter().map(|file| file.name.as_str()).collect();
+        assert_eq!(names, FILES);
     }
 }

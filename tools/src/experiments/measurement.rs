@@ -9,12 +9,16 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use clerestory::input::read_file;
 use clerestory::{Error, Result};
 use serde_json::Value;
 
 use super::fingerprint;
 use super::sweep::Budget;
 use super::unbiased::UnbiasedError;
+
+/// Most bytes of a file of measurements.
+const MOST_BYTES: u64 = 1 << 30;
 
 /// One picture's cost and error.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -90,10 +94,10 @@ impl Store {
     /// # Errors
     /// [`Error::Io`] when a file is there and cannot be read.
     pub fn open(path: &Path) -> Result<Self> {
-        let text = match std::fs::read(path) {
+        let text = match read_file(path, MOST_BYTES) {
             Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(Error::io(path, error)),
+            Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(error),
         };
         let lines = text.lines().filter_map(|line| serde_json::from_str(line).ok());
         Ok(Self {

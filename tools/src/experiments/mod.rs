@@ -292,4 +292,24 @@ mod tests {
         assert!(matches!(experiment.kind(), Ok(Kind::Sweep(_))));
         assert!(find(folder.path().join("none.toml").to_str().unwrap()).is_err());
     }
+
+    #[cfg(unix)]
+    #[test]
+    fn experiments_are_read_from_regular_files_of_bounded_length_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name).display().to_string();
+        std::os::unix::fs::symlink("/dev/zero", at("endless.toml")).unwrap();
+        let pipe = std::process::Command::new("mkfifo")
+            .arg(at("pipe.toml"))
+            .status()
+            .unwrap();
+        assert!(pipe.success());
+        for name in ["endless.toml", "pipe.toml"] {
+            let refusal = find(&at(name)).unwrap_err().to_string();
+            assert!(refusal.contains("not a regular file"), "{refusal}");
+        }
+        let long = std::fs::File::create(at("long.toml")).unwrap();
+        long.set_len(MOST_BYTES + 1).unwrap();
+        assert!(find(&at("long.toml")).unwrap_err().to_string().contains("at most"));
+    }
 }

@@ -1,18 +1,18 @@
 //! What `clerestory index --peers` writes: tables as Markdown, JSON and CSV, charts of rates and of where the time goes, and its part of the page of results.
 
-use clerestory::Error;
-use clerestory::atomic;
 use clerestory_tools::experiments::bars::{self, Bar, Group, Row};
 use clerestory_tools::experiments::table::Table;
 use clerestory_tools::page::Block;
 
 use super::verdicts::verdicts;
 use super::work::Work;
-use super::{BASE, Found, KINDS, Measured, Settings};
+use super::{BASE, Found, KINDS, Measured};
 use crate::failure::Outcome;
 use crate::output;
+use crate::outputs::NamedFile;
 
-const BLOCK: Block<'static> = Block {
+/// The part of a page.
+pub(super) const BLOCK: Block<'static> = Block {
     name: "indexes and rays beside other libraries",
     command: "clerestory index --peers",
 };
@@ -30,30 +30,19 @@ pub const FILES: [&str; 6] = [
 /// Words of the parts of time, in the order of [`Work::shares`].
 const PARTS: [&str; 4] = ["inner nodes", "triangles", "lanes that wait", "begin and end of rays"];
 
-/// Writes what the settings ask for.
-pub fn write(found: &Found, settings: &Settings<'_>) -> Outcome {
-    if let Some(folder) = settings.folder {
-        std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
-        let save = |name: &str, text: &str| atomic::write(&folder.join(name), text.as_bytes());
-        save("index.json", &output::json_text("index.json", found)?)?;
-        save("index.md", &markdown(found))?;
-        save("index.csv", &rates(found).csv())?;
-        save("index-work.csv", &work(found).csv())?;
-        for (name, svg) in [
-            ("index-rates.svg", chart_of_rates(found)?),
-            ("index-work.svg", chart_of_work(found)?),
-        ] {
-            if let Some(svg) = svg {
-                save(name, &svg)?;
-            }
-        }
-        output::note(&format!("wrote {}", folder.display()));
+/// The files of what was found.
+pub fn files(found: &Found) -> Outcome<Vec<NamedFile>> {
+    let [json, page, csv, work_csv, rates_svg, work_svg] = FILES;
+    let mut files = vec![
+        NamedFile::new(json, output::json_text(json, found)?),
+        NamedFile::new(page, markdown(found)),
+        NamedFile::new(csv, rates(found).csv()),
+        NamedFile::new(work_csv, work(found).csv()),
+    ];
+    for (name, svg) in [(rates_svg, chart_of_rates(found)?), (work_svg, chart_of_work(found)?)] {
+        files.extend(svg.map(|svg| NamedFile::new(name, svg)));
     }
-    if let Some(page) = settings.page {
-        BLOCK.write(page, &markdown(found))?;
-        output::note(&format!("wrote {}", page.display()));
-    }
-    Ok(())
+    Ok(files)
 }
 
 /// Facts, verdicts and tables.

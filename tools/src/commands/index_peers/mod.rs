@@ -13,9 +13,8 @@ mod ours;
 mod verdicts;
 mod work;
 
-pub use files::{FILES, markdown, write};
+pub use files::{FILES, files, markdown};
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use clerestory::accel::box_test::BOX_SLACK;
@@ -35,6 +34,7 @@ use self::work::Work;
 use super::check_validation;
 use crate::failure::{Failure, Outcome};
 use crate::output;
+use crate::outputs::{OutputFolder, OutputPage, Written};
 
 /// Rays of a task of a thread.
 const CHUNK: usize = 1024;
@@ -48,7 +48,7 @@ pub const BASE: &str = "obvhs CWBVH, medium";
 /// our test may err by, for both tests.
 const SAME_PLACE: f32 = 2.0 * BOX_SLACK;
 
-/// What to compare, and where to.
+/// What to compare.
 pub struct Settings<'a> {
     /// Addresses.
     pub scenes: &'a [String],
@@ -56,12 +56,6 @@ pub struct Settings<'a> {
     pub rays: u32,
     /// Measured runs.
     pub repeat: u32,
-    /// Prints JSON.
-    pub json: bool,
-    /// Writes files into it.
-    pub folder: Option<&'a Path>,
-    /// Writes a part of it.
-    pub page: Option<&'a Path>,
 }
 
 /// What a ray met.
@@ -212,18 +206,32 @@ pub fn measure(gpu: &Gpu, settings: &Settings<'_>) -> Outcome<Found> {
     Ok(found)
 }
 
-/// Runs the comparison, prints it and writes it where that is asked for.
-pub fn run(gpu: Gpu, settings: &Settings<'_>) -> Outcome<ExitCode> {
+/// Runs the comparison, writes it where that is asked for and prints it, as JSON or as Markdown.
+pub fn run(
+    gpu: Gpu,
+    settings: &Settings<'_>,
+    folder: Option<&OutputFolder>,
+    page: Option<&OutputPage>,
+    json: bool,
+) -> Outcome<ExitCode> {
     let found = measure(&gpu, settings)?;
     let log = gpu.validation_log();
     drop(gpu);
     check_validation(&log)?;
-    write(&found, settings)?;
-    if settings.json {
-        output::print_json(&found)?;
+    let text = markdown(&found);
+    // What was measured is printed whatever becomes of the files, and written whatever becomes of the printing.
+    let printed = if json {
+        output::print_json(&found)
     } else {
-        output::print(&markdown(&found))?;
+        output::print(&text)
+    };
+    let mut written = Vec::new();
+    written.extend(page.map(|page| page.write(files::BLOCK, &text)));
+    if let Some(folder) = folder {
+        written.push(folder.write(&files(&found)?));
     }
+    Written::check_all(written)?;
+    printed?;
     Ok(ExitCode::SUCCESS)
 }
 

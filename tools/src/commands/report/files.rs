@@ -1,9 +1,7 @@
-//! The files of an experiment's results, each written as a whole or not at all.
+//! The files of an experiment's results.
 
 use std::path::Path;
 
-use clerestory::Error;
-use clerestory::atomic;
 use clerestory::film::png;
 use clerestory_tools::experiments::findings::Findings;
 use clerestory_tools::experiments::reference::slug;
@@ -13,27 +11,58 @@ use clerestory_tools::experiments::strip::{self, Strip};
 use clerestory_tools::experiments::{Experiment, summary, sweep_criteria, web_page};
 
 use crate::failure::Outcome;
-use crate::output;
+use crate::outputs::NamedFile;
+use crate::{output, pictures};
 
-/// The files at the top of every experiment's folder that others could have, too. The first one says that the folder is an experiment's, and is written before
-/// the others.
-pub const NAMES: [&str; 4] = ["report.json", "report.md", "measurements.csv", "index.html"];
+/// The files of every experiment's folder that others could have, too. The first one says that the folder is an experiment's, and is written before the
+/// others.
+const NAMES: [&str; 5] = [
+    "report.json",
+    "report.md",
+    "measurements.csv",
+    "index.html",
+    "rows.json",
+];
+/// Folders in an experiment's folder.
+const PLOTS: &str = "plots";
+const STRIPS: &str = "strips";
 
-fn write(path: &Path, text: &str) -> Outcome {
-    Ok(atomic::write(path, text.as_bytes())?)
+/// What a run may write into an experiment's folder: the files with fixed names, and of the tables, plots and pictures that it numbers or names those that are there.
+pub fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = NAMES.map(str::to_owned).to_vec();
+    names.extend(numbered_and_drawn(folder));
+    for inner in [PLOTS, STRIPS] {
+        let drawn = numbered_and_drawn(&folder.join(inner));
+        names.extend(drawn.into_iter().map(|name| format!("{inner}/{name}")));
+    }
+    names
 }
 
-fn make(folder: &Path) -> Outcome {
-    std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error).into())
+/// Tables by number, plots and pictures in a folder.
+pub fn numbered_and_drawn(folder: &Path) -> Vec<String> {
+    let is_one = |name: &str| {
+        let path = Path::new(name);
+        match pictures::extension(path).as_str() {
+            "svg" | "png" => true,
+            "csv" => path
+                .file_stem()
+                .is_some_and(|stem| stem.to_string_lossy().parse::<u32>().is_ok()),
+            _ => false,
+        }
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| is_one(name)).collect();
+    names.sort();
+    names
 }
 
-/// Writes what a measure found: a page with the verdicts first, JSON, a CSV for each table, plots and rows. Returns the page.
-pub fn measure(folder: &Path, experiment: &Experiment, findings: &Findings, rows: &str) -> Outcome<String> {
-    make(folder)?;
-    write(
-        &folder.join("report.json"),
-        &output::json_text("report.json", findings)?,
-    )?;
+/// The page of what a measure found, with the verdicts first, and all files: page, JSON, a CSV for each table, plots and rows.
+pub fn measure(experiment: &Experiment, findings: &Findings, rows: &str) -> Outcome<(String, Vec<NamedFile>)> {
+    let mut files = vec![NamedFile::new(
+        "report.json",
+        output::json_text("report.json", findings)?,
+    )];
     let Findings { tables, plots, .. } = findings;
     let mut page = format!(
         "# {}: {}\n\n{}{}\n",
@@ -42,18 +71,16 @@ pub fn measure(folder: &Path, experiment: &Experiment, findings: &Findings, rows
         verdicts_first(findings),
         experiment.about
     );
+    files.push(NamedFile::new("rows.json", rows));
     for plot in plots {
-        if let Some(svg) = plot.svg()? {
-            write(&folder.join(&plot.file), &svg)?;
-        }
+        files.extend(plot.svg()?.map(|svg| NamedFile::new(plot.file.clone(), svg)));
     }
     for (index, table) in tables.iter().enumerate() {
         page += &format!("\n{}", table.markdown());
-        write(&folder.join(format!("{}.csv", index + 1)), &table.csv())?;
+        files.push(NamedFile::new(format!("{}.csv", index + 1), table.csv()));
     }
-    write(&folder.join("report.md"), &page)?;
-    write(&folder.join("rows.json"), rows)?;
-    Ok(page)
+    files.push(NamedFile::new("report.md", page.clone()));
+    Ok((page, files))
 }
 
 /// Verdicts and the one number, with an empty line after; nothing of a measure without any.
@@ -64,25 +91,31 @@ fn verdicts_first(findings: &Findings) -> String {
     }
 }
 
-/// Writes everything of a sweep: page, Markdown, JSON, CSV, plots and picture strips. Returns the Markdown of verdicts, facts and tables.
-pub fn sweep(folder: &Path, experiment: &Experiment, results: &Results) -> Outcome<String> {
-    let (plots, strips) = (folder.join("plots"), folder.join("strips"));
-    for folder in [folder, &plots, &strips] {
-        make(folder)?;
-    }
+/// The Markdown of a sweep's verdicts, facts and tables, and all files: page, Markdown, JSON, CSV, plots and picture strips.
+pub fn sweep(experiment: &Experiment, results: &Results) -> Outcome<(String, Vec<NamedFile>)> {
     let scenes = series::of(results);
     let findings = sweep_criteria::findings(experiment, results, &scenes);
     let made: clerestory::Result<Vec<Option<Strip>>> = results.scenes.iter().map(strip::of).collect();
     let made = made?;
+    let document = serde_json::json!({
+        "verdicts": findings.verdicts,
+        "headline": findings.headline,
+        "results": results,
+        "statistics": scenes,
+    });
+    let mut files = vec![NamedFile::new(
+        "report.json",
+        output::json_text("report.json", &document)?,
+    )];
     for (scene, strip) in scenes.iter().zip(&made) {
         let name = slug(&scene.address);
         for work in Work::ALL {
-            if let Some(svg) = web_page::plot_of(scene, work)? {
-                write(&plots.join(format!("{name}-{}.svg", work.word())), &svg)?;
-            }
+            let svg = web_page::plot_of(scene, work)?;
+            files.extend(svg.map(|svg| NamedFile::new(format!("{PLOTS}/{name}-{}.svg", work.word()), svg)));
         }
         if let Some(strip) = strip {
-            png::write(strips.join(format!("{name}.png")), &strip.composed())?;
+            let strip = png::to_bytes(&strip.composed(), &name)?;
+            files.push(NamedFile::new(format!("{STRIPS}/{name}.png"), strip));
         }
     }
     let verdicts = verdicts_first(&findings);
@@ -91,22 +124,12 @@ pub fn sweep(folder: &Path, experiment: &Experiment, results: &Results) -> Outco
         "# {}: {}\n\n{verdicts}{}\n\n{text}",
         results.experiment, results.title, results.about
     );
-    let document = serde_json::json!({
-        "verdicts": findings.verdicts,
-        "headline": findings.headline,
-        "results": results,
-        "statistics": scenes,
-    });
-    write(
-        &folder.join("report.json"),
-        &output::json_text("report.json", &document)?,
-    )?;
-    write(&folder.join("report.md"), &page)?;
-    write(&folder.join("measurements.csv"), &summary::measurements(results).csv())?;
+    files.push(NamedFile::new("report.md", page));
+    files.push(NamedFile::new("measurements.csv", summary::measurements(results).csv()));
     // Last, so that a page that is there has all that stands beside it.
-    write(
-        &folder.join("index.html"),
-        &web_page::html(results, &scenes, &findings, &made)?,
-    )?;
-    Ok(verdicts + &text)
+    files.push(NamedFile::new(
+        "index.html",
+        web_page::html(results, &scenes, &findings, &made)?,
+    ));
+    Ok((verdicts + &text, files))
 }

@@ -4,9 +4,10 @@
 //! made.
 
 mod files;
+mod places;
 
 use std::cell::{Cell, RefCell};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -16,7 +17,7 @@ use clerestory::{Error, Result, scene};
 use clerestory_tools::experiments::findings::Findings;
 use clerestory_tools::experiments::measures::{self, Context};
 use clerestory_tools::experiments::pages::{self, Stored};
-use clerestory_tools::experiments::render_sweep::{self, Places};
+use clerestory_tools::experiments::render_sweep;
 use clerestory_tools::experiments::sweep::Sweep;
 use clerestory_tools::experiments::watch::Watch;
 use clerestory_tools::experiments::{self, Experiment, Kind};
@@ -26,7 +27,8 @@ use super::progress::Bar;
 use crate::failure::{Code, Failure, Outcome};
 use crate::options::DeviceOptions;
 use crate::output;
-use crate::outputs::{self, Inputs, Outputs, Overwriting};
+use crate::outputs::{Overwriting, Written};
+use places::Places;
 
 /// Runs experiments by name: error against time and work with plots, slopes and pictures, or tables of measured numbers
 #[derive(Debug, Args)]
@@ -95,12 +97,8 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     if arguments.list {
         return list();
     }
-    if arguments.pages || arguments.results {
-        needs_results()?;
-    }
     if arguments.pages {
-        pages::write_all(Path::new("."))?;
-        output::note(&format!("wrote {}", pages::FOLDER));
+        places::write_all(arguments.overwriting)?;
         return Ok(ExitCode::SUCCESS);
     }
     let found = wanted(arguments)?;
@@ -111,16 +109,16 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             return Err(Error::setting("experiment", &experiment.name, cause).into());
         }
     }
-    check_outputs(arguments, &found)?;
+    let all_places = places::plan(arguments, &found)?;
     let bar = Bar::start()?;
     // Opened for the first experiment that needs it, and kept: kernels compile once.
     let mut gpu = None;
-    for experiment in found {
+    for (experiment, places) in found.iter().zip(&all_places) {
         let about = format!("{}: {}", experiment.name, experiment.title);
         let interrupted = match experiment.kind()? {
             Kind::Measure(name) => {
                 output::note(&about);
-                measure(arguments, &experiment, name, &bar)?
+                measure(arguments, experiment, name, places, &bar)?
             }
             Kind::Sweep(sweep) => {
                 let gpu = match &mut gpu {
@@ -128,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
                     None => gpu.insert(arguments.device.open()?),
                 };
                 output::note(&about);
-                render(arguments, &experiment, &chosen(arguments, sweep), gpu, &bar)?
+                render(arguments, experiment, &chosen(arguments, sweep), places, gpu, &bar)?
             }
         };
         if interrupted {
@@ -142,32 +140,6 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         check_validation(&log)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Checks the folders of all experiments, before the first one runs.
-fn check_outputs(arguments: &Arguments, found: &[Experiment]) -> Outcome {
-    // Files of experiments; a name stands for none.
-    let mut inputs = Inputs::of(&arguments.experiments);
-    for address in &arguments.scenes {
-        inputs.add_address(address);
-    }
-    let overwrite = arguments.overwriting.overwrite;
-    for experiment in found {
-        let folder = folder(arguments, experiment);
-        outputs::check_folder(&folder, &inputs)?;
-        Outputs::plan(&files::NAMES.map(|name| folder.join(name)), &inputs, overwrite)?;
-    }
-    Ok(())
-}
-
-/// Pages are made where there are some: the repository's root.
-fn needs_results() -> Result<()> {
-    if Path::new(pages::FOLDER).is_dir() {
-        return Ok(());
-    }
-    let folder = std::env::current_dir().unwrap_or_default();
-    let cause = format!("has no {}/: run this in the repository's root", pages::FOLDER);
-    Err(Error::setting("working folder", folder.display().to_string(), cause))
 }
 
 /// The experiments to run. Scenes of the command line's stand in for those of one experiment.
@@ -226,7 +198,7 @@ fn folder(arguments: &Arguments, experiment: &Experiment) -> PathBuf {
 }
 
 /// Verdicts and tables go to standard output and, with all digits, into the folder. Says whether it was interrupted.
-fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar) -> Outcome<bool> {
+fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, places: &Places, bar: &Bar) -> Outcome<bool> {
     let device = RefCell::new(String::new());
     let open = || {
         let gpu = Gpu::headless(&arguments.device.options())?;
@@ -254,13 +226,19 @@ fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar
     if arguments.smoke {
         findings = findings.of_smoke_run();
     }
-    let page = files::measure(&folder, experiment, &findings, &rows)?;
-    output::print(&page)?;
-    output::note(&format!("wrote {}", folder.display()));
-    if arguments.results {
+    let (page, files) = files::measure(experiment, &findings, &rows)?;
+    // What was measured is printed whatever becomes of the files, and written whatever becomes of the printing.
+    let printed = output::print(&page);
+    let mut written = vec![places.folder.write(&files)];
+    if let Some(results) = &places.results {
         let run = begun.end(clock.elapsed().as_secs_f64(), device.take());
         let found = serde_json::from_str(&rows).map_err(|cause| Error::setting("rows", name, cause.to_string()))?;
-        keep(experiment, &Stored { run, found }, &folder, &findings)?;
+        written.push(results.keep(experiment, &Stored { run, found }, &folder, &findings)?);
+    }
+    Written::check_all(written)?;
+    printed?;
+    if places.results.is_some() {
+        places::write_summaries()?;
     }
     Ok(false)
 }
@@ -268,19 +246,6 @@ fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, bar: &Bar
 /// How an experiment is run that begins now.
 fn begun(experiment: &Experiment) -> pages::Run {
     pages::Run::begin(format!("clerestory report {} --results", experiment.name))
-}
-
-/// Keeps what was found, with the pictures that the run wrote into a folder of its own.
-fn keep(experiment: &Experiment, stored: &Stored, from: &Path, findings: &Findings) -> Outcome {
-    let folder = Path::new(pages::FOLDER).join(&experiment.name);
-    std::fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, error))?;
-    for plot in findings.plots.iter().filter(|plot| plot.is_file()) {
-        let (from, to) = (from.join(&plot.file), folder.join(&plot.file));
-        std::fs::copy(&from, &to).map_err(|error| Error::io(&from, error))?;
-    }
-    pages::keep(Path::new("."), experiment, stored)?;
-    output::note(&format!("wrote {}", folder.join(pages::PAGE).display()));
-    Ok(())
 }
 
 /// The sweep with the changes that the command line asks for.
@@ -298,16 +263,23 @@ fn chosen(arguments: &Arguments, sweep: &Sweep) -> Sweep {
 }
 
 /// Renders and writes everything; says whether it was interrupted.
-fn render(arguments: &Arguments, experiment: &Experiment, sweep: &Sweep, gpu: &Gpu, bar: &Bar) -> Outcome<bool> {
+fn render(
+    arguments: &Arguments,
+    experiment: &Experiment,
+    sweep: &Sweep,
+    places: &Places,
+    gpu: &Gpu,
+    bar: &Bar,
+) -> Outcome<bool> {
     let (begun, clock) = (begun(experiment), Instant::now());
-    let places = Places {
+    let of_sweep = render_sweep::Places {
         folder: folder(arguments, experiment),
         references: arguments.references.clone(),
         fresh: arguments.fresh,
     };
     let unread = Cell::new(false);
     let load = |address: &str| scene::load(address).inspect_err(|_| unread.set(true));
-    let results = render_sweep::run(gpu, experiment, sweep, arguments.smoke, &places, &load, bar);
+    let results = render_sweep::run(gpu, experiment, sweep, arguments.smoke, &of_sweep, &load, bar);
     bar.clear();
     let results = results.map_err(|error| {
         if unread.get() {
@@ -316,22 +288,28 @@ fn render(arguments: &Arguments, experiment: &Experiment, sweep: &Sweep, gpu: &G
             error.into()
         }
     })?;
-    let text = files::sweep(&places.folder, experiment, &results)?;
-    output::print(&text)?;
-    if arguments.results && !results.interrupted {
+    let (text, files) = files::sweep(experiment, &results)?;
+    let printed = output::print(&text);
+    let mut written = vec![places.folder.write(&files)];
+    let kept = places.results.as_ref().filter(|_| !results.interrupted);
+    if let Some(kept) = kept {
         let run = begun.end(
             clock.elapsed().as_secs_f64(),
             format!("{}, driver {}", results.device, results.driver),
         );
         let found = serde_json::to_value(&results)
             .map_err(|cause| Error::setting("results", &experiment.name, cause.to_string()))?;
-        keep(experiment, &Stored { run, found }, &places.folder, &Findings::default())?;
+        let stored = Stored { run, found };
+        written.push(kept.keep(experiment, &stored, &of_sweep.folder, &Findings::default())?);
+    }
+    Written::check_all(written)?;
+    printed?;
+    if kept.is_some() {
+        places::write_summaries()?;
     }
     output::note(&format!(
-        "{} pictures measured, {} found from earlier runs; wrote {}",
-        results.measured,
-        results.found,
-        places.folder.join("index.html").display()
+        "{} pictures measured, {} found from earlier runs",
+        results.measured, results.found
     ));
     Ok(results.interrupted)
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use clerestory::film::png::{self, Rgb8};
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result};
 
@@ -32,6 +33,13 @@ impl Context<'_> {
     pub fn file(&self, name: &str) -> Result<PathBuf> {
         std::fs::create_dir_all(self.folder).map_err(|error| Error::io(self.folder, error))?;
         Ok(self.folder.join(name))
+    }
+
+    /// Writes a picture beside the tables. What fails is only said, since it must not cost the rows.
+    pub fn picture(&self, name: &str, shown: &Rgb8) {
+        if let Err(cause) = self.file(name).and_then(|path| png::write(path, shown)) {
+            self.watch.note(&format!("a picture is left out: {cause}"));
+        }
     }
 
     /// One of two: in full, or of a smoke run.

@@ -9,6 +9,9 @@ use crate::experiments::findings::{Findings, Verdict};
 use crate::experiments::table::Cell;
 use crate::experiments::{self, Experiment};
 
+/// How every list begins, by which it is known.
+pub const MARK: &str = "# Results\n\nEvery experiment with its verdict, made by code";
+
 /// The list's head.
 const HEAD: &str = "\
 # Results
@@ -103,4 +106,14 @@ pub fn line(root: &Path, experiment: &Experiment, link: &str) -> Result<String> 
         experiment.name,
         verdict(&found, stored.is_some())
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_list_is_known_by_its_beginning() {
+        assert!(HEAD.starts_with(MARK));
+    }
 }

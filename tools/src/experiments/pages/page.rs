@@ -1,9 +1,6 @@
 //! The page of an experiment and the files beside it: verdicts first, then a plot, tables and how it was run.
 
-use std::path::Path;
-
 use clerestory::Result;
-use clerestory::atomic;
 
 use super::stored::{Stored, findings};
 use crate::experiments::Experiment;
@@ -105,17 +102,4 @@ fn how_it_was_run(Stored { run, .. }: &Stored, facts: &[String]) -> String {
         run.load[1],
         super::stored::FILE,
     )
-}
-
-/// Makes all files of an experiment's folder anew, but for what its run wrote.
-///
-/// # Errors
-/// As [`files`], and [`clerestory::Error::Io`].
-pub fn write(folder: &Path, experiment: &Experiment) -> Result<()> {
-    let stored = Stored::read(folder)?;
-    std::fs::create_dir_all(folder).map_err(|error| clerestory::Error::io(folder, error))?;
-    for File { name, text } in files(experiment, stored.as_ref())? {
-        atomic::write(&folder.join(name), text.as_bytes())?;
-    }
-    Ok(())
 }

@@ -129,12 +129,14 @@ impl Stored {
         json_file::read(&folder.join(FILE), KIND)
     }
 
-    /// Writes it into an experiment's folder, which is made.
+    /// The text of its file.
     ///
     /// # Errors
-    /// [`Error::Io`].
-    pub fn write(&self, folder: &Path) -> Result<()> {
-        json_file::write(&folder.join(FILE), KIND, serde_json::to_string(self))
+    /// [`Error::Setting`] for what JSON cannot hold.
+    pub fn text(&self) -> Result<String> {
+        let text = serde_json::to_string(self);
+        let text = text.map_err(|cause| json_file::malformed(Path::new(FILE), KIND, &cause))?;
+        Ok(text + "\n")
     }
 }
 
@@ -183,7 +185,7 @@ mod tests {
             run: Run::begin("clerestory report none".into()).end(1.5, "none".into()),
             found: serde_json::json!([0.1, "NaN", 1e-300]),
         };
-        stored.write(folder.path()).unwrap();
+        std::fs::write(folder.path().join(FILE), stored.text().unwrap()).unwrap();
         assert_eq!(Stored::read(folder.path()).unwrap(), Some(stored));
         std::fs::write(folder.path().join(FILE), "{\"run\": 1}").unwrap();
         assert!(Stored::read(folder.path()).is_err());

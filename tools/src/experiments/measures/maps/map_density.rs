@@ -3,7 +3,6 @@
 //! Oracle: exact solid angles of texels ([`clerestory::maps`]) and what T. Engelhardt's thesis states (2013, chapters 5 and 7), with its sums worked out.
 
 use clerestory::Result;
-use clerestory::film::png;
 use clerestory::maps::Parametrization;
 use clerestory::maps::packed_direction::{pack_octahedral, pack_octahedral_nearest, packed_error, unpack_octahedral};
 
@@ -128,10 +127,7 @@ fn word(bits: u32, count: u32) -> Word {
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let (rows, side, directions) = context.pick((ROWS, SIDE, 1 << 20), (32, 16, 2000));
-        png::write(
-            context.file("density.png")?,
-            &heat::strip(&STATED.map(|(map, _)| map), side),
-        )?;
+        context.picture("density.png", &heat::strip(&STATED.map(|(map, _)| map), side));
         let mut figures = Vec::new();
         let maps = context.each(
             &STATED,

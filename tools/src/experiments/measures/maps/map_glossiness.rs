@@ -4,7 +4,6 @@
 //! Source: T. Engelhardt, PhD thesis, KIT, 2013, §7.2.2 and Fig. 7.6. Oracle: the sum over all texels in f64, and means of boxes in f64.
 
 use clerestory::Result;
-use clerestory::film::png;
 use clerestory::gpu::Gpu;
 use clerestory::maps::box_lobe::Lobe;
 use clerestory::maps::spherical_sat::{SatImage, SatNumbers, SatRange, SphericalSat};
@@ -179,7 +178,7 @@ fn reflections(context: &Context<'_>, gpu: &Gpu) -> Result<Vec<Reflection>> {
     let by_levels = levels.look_up(&pixels)?;
     all.push(reflection("prefiltered levels".into(), &filter, &by_levels));
     row.push(shown(side, &pixels, &by_levels)?);
-    png::write(context.file("glossiness.png")?, &sheet(&[row]))?;
+    context.picture("glossiness.png", &sheet(&[row]));
     Ok(all)
 }
 

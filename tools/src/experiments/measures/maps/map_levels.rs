@@ -4,7 +4,6 @@
 //! direction, through those of the map's decoding.
 
 use clerestory::Result;
-use clerestory::film::png;
 use clerestory::maps::Parametrization;
 
 use super::seam_levels::{
@@ -140,7 +139,7 @@ impl Study for Found {
                     }
                 }
             }
-            png::write(context.file(file)?, &sheet(&[seen, shown]))?;
+            context.picture(file, &sheet(&[seen, shown]));
             Ok(rows)
         })
     }

@@ -337,7 +337,7 @@ fn spheres(context: &Context<'_>, gpu: &Gpu, python: &Path) -> Result<(Vec<Row>,
     })?;
     let is_shown = !shown.once[0].is_empty();
     if is_shown {
-        png::write(context.file(SHOWN)?, &sheet(&shown.rows()))?;
+        context.picture(SHOWN, &sheet(&shown.rows()));
     }
     Ok((rows, is_shown))
 }

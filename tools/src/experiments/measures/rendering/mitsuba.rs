@@ -258,7 +258,7 @@ impl Study for Found {
             Err(cause) => without_mitsuba(cause, std::env::var_os(PYTHON_VARIABLE).is_some()),
             Ok(version) => {
                 context.watch.note(&format!("Mitsuba {version}"));
-                let report = run_with(&(context.gpu)()?, &options, context.watch)?;
+                let report = run_with(&(context.gpu)()?, &options, context.watch, &mut |_| Ok(()))?;
                 Ok(Self::of(&report))
             }
         }
