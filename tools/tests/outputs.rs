@@ -141,7 +141,7 @@ fn duck() -> String {
 }
 
 /// Each command that writes, with each of its own inputs as output, or with a file there that is not the program's.
-const REFUSED: [(&str, &str); 44] = [
+const REFUSED: [(&str, &str); 48] = [
     ("render --spp 1 --reference a.exr -o a.exr", "reads it"),
     ("render --spp 1 --reference a.exr -o a.exr --overwrite", "reads it"),
     ("render --size 4 --spp 1 --reference c.png -o c.exr", "reads it"),

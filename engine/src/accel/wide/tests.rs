@@ -406,7 +406,10 @@ fn a_million_equal_triangles_are_one_flat_tree() {
         traversal.run(&bvh, &r, 30_000, &mut |_, _| true, &mut counters);
     }
     assert_eq!((traversal.hit.triangle, counters.triangles), (0, 1_000_000));
-    assert!(!bvh.closest_hit(&Ray::new(Vec3::new(0.75, 0.75, 1.0), -Vec3::Z)).is_hit());
+    assert!(
+        !bvh.closest_hit(&Ray::new(Vec3::new(0.75, 0.75, 1.0), -Vec3::Z))
+            .is_hit()
+    );
 }
 
 /// A chain of the binary tree: each next triangle many times as far and as large, so that every split cuts off one.
@@ -461,7 +464,11 @@ fn nothing_and_one_triangle_are_trees_too() {
             .0,
         1
     );
-    assert_eq!(one.closest_hit(&Ray::new(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z)).triangle, 0);
+    assert_eq!(
+        one.closest_hit(&Ray::new(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z))
+            .triangle,
+        0
+    );
     assert!(one.triangles().iter().all(|t| t.index != NO_HIT));
 }
 

@@ -511,7 +511,11 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
         return Ok(None);
     }
     let of_reference = RenderOptions {
-        spp: first.choice().spp.saturating_mul(REFERENCE_SAMPLES).min(most_reference_spp),
+        spp: first
+            .choice()
+            .spp
+            .saturating_mul(REFERENCE_SAMPLES)
+            .min(most_reference_spp),
         seed: REFERENCE_SEED,
         settings: serde_json::json!({ "sampler": "pcg" }).into(),
         ..base.clone()
