@@ -454,9 +454,9 @@ impl Rendering {
             path_set: Some(report.path_set.clone()),
             settings: Some(report.settings.to_string()),
             seed: Some(u64::from(report.seed)),
-            // Where some pixels have more than were asked for, others have fewer.
+            // The mean where pixels have differing numbers.
             spp: Some(match report.samples {
-                [_, most] if most > report.spp => report.mean_samples.round() as u64,
+                [fewest, most] if fewest < most => report.mean_samples.round() as u64,
                 [_, most] => most.into(),
             }),
             device: Some(report.device.clone()),

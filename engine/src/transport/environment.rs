@@ -128,7 +128,7 @@ pub struct EnvironmentTables {
 impl EnvironmentTables {
     /// The tables of a map; `compensated` where light sampling leaves the mean luminance to scattered rays.
     ///
-    /// Errors: a size that does not fit the texels, a radiance that is negative or not finite.
+    /// Errors: a size that does not fit the texels, a cell whose light is negative or not finite.
     pub fn build(environment: &Environment, compensated: bool) -> Result<Self> {
         let size = UVec2::new(environment.width, environment.height);
         let (width, height) = (size.x as usize, size.y as usize);

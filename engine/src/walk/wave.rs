@@ -229,7 +229,7 @@ impl WaveBuffers {
     }
 
     /// Set 0 with the queues in the roles of a bounce of this parity. Without media nothing is read or written through the bindings for them, and some
-    /// other buffer stands there; so it does without numbers.
+    /// other buffer stands there; without numbers it is the queue that is read.
     pub fn set(&self, parity: usize) -> WaveSet<'_> {
         let none = self.chunks.view();
         let media = |of: fn(&MediaBuffers) -> &Buffer| self.media.as_ref().map_or(none, |media| of(media).view());
@@ -256,7 +256,7 @@ impl WaveBuffers {
             walk_airlight_rays: media(|m| &m.airlight_rays),
             walk_shadow_states: media(|m| &m.shadow_states),
             medium_counters: media(|m| &m.counters),
-            walk_numbers_in: self.numbers.as_ref().unwrap_or(&self.flags),
+            walk_numbers_in: self.numbers.as_ref().unwrap_or(&self.queues[parity]),
         }
     }
 }

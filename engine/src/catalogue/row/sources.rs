@@ -67,8 +67,8 @@ sources! {
     JOLDES_2017 = "joldes-2017": "M. Joldes, J.-M. Muller, V. Popescu", "Tight and Rigorous Error Bounds for Basic Building Blocks of Double-Word Arithmetic", "ACM TOMS 44", 2017;
     KAJIYA_1986 = "kajiya-1986": "J. Kajiya", "The Rendering Equation", "SIGGRAPH", 1986;
     KARIS_2013 = "karis-2013": "B. Karis", "Real Shading in Unreal Engine 4", "SIGGRAPH course notes", 2013;
-    KARRAS_2012 = "karras-2012": "T. Karras", "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees", "HPG", 2012;
     KARLIK_2019 = "karlik-2019": "O. Karlík, M. Šik, P. Vévoda, T. Skřivan, J. Křivánek", "MIS Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling", "ACM TOG 38(6)", 2019;
+    KARRAS_2012 = "karras-2012": "T. Karras", "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees", "HPG", 2012;
     KAUTZ_2000 = "kautz-2000": "J. Kautz, P.-P. Vázquez, W. Heidrich, H.-P. Seidel", "A Unified Approach to Prefiltered Environment Maps", "EGWR", 2000;
     KAY_KAJIYA_1986 = "kay-kajiya-1986": "T. Kay, J. Kajiya", "Ray Tracing Complex Scenes", "SIGGRAPH", 1986;
     KELEMEN_SZIRMAY_KALOS_2001 = "kelemen-szirmay-kalos-2001": "C. Kelemen, L. Szirmay-Kalos", "A Microfacet Based Coupled Specular-Matte BRDF Model", "Eurographics short papers", 2001;

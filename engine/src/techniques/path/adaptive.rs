@@ -51,6 +51,8 @@ pub(super) struct AdaptiveSamples {
     /// Samples of each pixel before the round.
     taken: Vec<u32>,
     round: Option<Round>,
+    /// Rounds that are left until pixels have the samples asked for.
+    rounds: u64,
 }
 
 /// A round under way: some samples more for each pixel.
@@ -89,6 +91,7 @@ impl AdaptiveSamples {
             noise: None,
             taken: Vec::new(),
             round: None,
+            rounds: 0,
         };
         samples.restart(film);
         Ok(samples)
@@ -99,6 +102,7 @@ impl AdaptiveSamples {
         let [width, height] = film.size();
         self.taken = vec![0; width as usize * height as usize];
         (self.noise, self.round) = (None, None);
+        self.rounds = 0;
     }
 
     /// The kernels of their own.
@@ -168,9 +172,14 @@ impl AdaptiveSamples {
             }
             Some(noise) => {
                 let mut shares = shares(noise, &self.taken, film.size()[0] as usize, samples);
-                // Whole pictures early; the number of rounds must not follow from the noise.
-                let round = (pixels * u64::from(SAMPLES_TOGETHER)).max(slots.into()).min(ROUND_MOST);
-                let rounds = ((wanted - done) / round).max(1);
+                // Whole pictures early. How many rounds there are is decided where all pixels have as many, or the samples asked for: it must not
+                // follow from the noise.
+                if self.rounds == 0 {
+                    let round = (pixels * u64::from(SAMPLES_TOGETHER)).max(slots.into()).min(ROUND_MOST);
+                    self.rounds = ((wanted - done) / round).max(1);
+                }
+                let rounds = self.rounds;
+                self.rounds -= 1;
                 for (share, taken) in shares.iter_mut().zip(&self.taken) {
                     let more = u64::from(*share - taken).div_ceil(rounds);
                     *share = taken + more as u32;

@@ -7,7 +7,9 @@ use crate::catalogue::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
-use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resolve, path_shade};
+use crate::gpu::shaders::techniques::path::{
+    path_camera, path_medium, path_numbers, path_resolve, path_resolve_shares, path_shade,
+};
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
 use crate::gpu::{Buffer, PipelineInfo};
 use crate::scene::Camera;
@@ -74,7 +76,7 @@ fn law(settings: &Settings) -> Result<Law> {
 }
 
 /// What a picture may take, of whatever scene.
-pub(in crate::techniques) const KERNELS: [&ShaderInfo; 9] = [
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 11] = [
     &path_camera::INFO,
     &extend::INFO,
     &path_medium::INFO,
@@ -84,6 +86,8 @@ pub(in crate::techniques) const KERNELS: [&ShaderInfo; 9] = [
     &compact_scatter::INFO,
     &shadow::INFO,
     &path_resolve::INFO,
+    &path_numbers::INFO,
+    &path_resolve_shares::INFO,
 ];
 
 impl Technique for PathTracer {

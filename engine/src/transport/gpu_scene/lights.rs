@@ -256,14 +256,17 @@ fn environment_power(map: &Environment, radius: f64) -> f64 {
     integral * f64::from(map.strength) * std::f64::consts::PI * radius * radius
 }
 
-/// The tables of a map: its mean luminance is left to scattered rays, unless there would be nothing to sample at all.
+/// Luminance over the mean from which on a part of a map has to be aimed at, however little light it has.
+const NEARLY_EVEN: f64 = 2.0;
+
+/// The tables of a map: its mean luminance is left to scattered rays. Where next to nothing is left, a nearly even map is left to them whole if there are other
+/// lights to aim at; any other is sampled whole, since rays meet a small bright part too rarely.
 fn sampled_environment(map: &Environment, has_others: bool) -> Result<EnvironmentTables> {
-    let knob = std::env::var("CLERESTORY_KNOB").unwrap_or_default();
-    if knob == "none" {
-        return EnvironmentTables::build(map, false);
-    }
     let tables = EnvironmentTables::build(map, true)?;
-    if tables.share > 0.0 || has_others || knob == "all" {
+    let luminances = tables.texels.iter().map(|texel| luminance(texel.truncate().as_dvec3()));
+    let greatest = luminances.fold(0.0, f64::max);
+    let is_nearly_even = greatest <= NEARLY_EVEN * f64::from(tables.ambient);
+    if tables.share > 0.0 || has_others && is_nearly_even {
         return Ok(tables);
     }
     EnvironmentTables::build(map, false)

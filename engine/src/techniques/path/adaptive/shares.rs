@@ -37,27 +37,30 @@ pub(super) fn shares(noise: &[f32], taken: &[u32], width: usize, samples: u32) -
     shares
 }
 
-/// Makes the shares of a class, which sum up to `given`, sum up to `budget`, one sample a pixel after the other.
+/// Makes the shares of a class, which sum up to `given`, sum up to `budget`: as many samples for each pixel that has room, and what does not divide one by one.
 fn settle<I: Iterator<Item = usize>>(
     shares: &mut [u32],
     taken: &[u32],
     of_class: impl Fn() -> I,
-    mut given: u64,
+    given: u64,
     budget: u64,
 ) {
-    while given != budget {
-        let before = given;
-        for pixel in of_class() {
-            if given > budget && shares[pixel] > taken[pixel] {
-                shares[pixel] -= 1;
-                given -= 1;
-            } else if given < budget && shares[pixel] < u32::MAX {
-                shares[pixel] += 1;
-                given += 1;
-            }
-        }
-        if given == before {
+    let room = |share: u32, taken: u32| if given > budget { share - taken } else { u32::MAX - share };
+    let mut left = given.abs_diff(budget);
+    while left > 0 {
+        let pixels = of_class().filter(|pixel| room(shares[*pixel], taken[*pixel]) > 0).count() as u64;
+        if pixels == 0 {
             return;
+        }
+        let each = u32::try_from((left / pixels).max(1)).unwrap_or(u32::MAX);
+        for pixel in of_class() {
+            let moved = each.min(room(shares[pixel], taken[pixel])).min(u32::try_from(left).unwrap_or(u32::MAX));
+            if given > budget {
+                shares[pixel] -= moved;
+            } else {
+                shares[pixel] += moved;
+            }
+            left -= u64::from(moved);
         }
     }
 }
@@ -98,6 +101,17 @@ mod tests {
     use super::*;
     use crate::film::z_test::two_sided_p;
     use crate::test_random::Random;
+
+    // The most samples that can be asked for: pixels that would have more than fit give the rest to others, in few passes.
+    #[test]
+    fn shares_beyond_all_bounds_are_handed_on_at_once() {
+        let noise: Vec<f32> = (0..4096).map(|i| if i == 99 { 1e6 } else { 1.0 }).collect();
+        for samples in [u32::MAX, u32::MAX - 1, 1 << 30] {
+            let given = shares(&noise, &[256; 4096], 64, samples);
+            assert_eq!(total(&given), 4096 * u64::from(samples), "{samples}");
+            assert_eq!(given[99], u32::MAX, "{samples}");
+        }
+    }
 
     fn total(shares: &[u32]) -> u64 {
         shares.iter().map(|share| u64::from(*share)).sum()
