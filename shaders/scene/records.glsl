@@ -120,7 +120,7 @@ struct SceneEnvironment {
     vec3 up;
     uint height;
     vec3 back;
-    float ambient;  // luminance that light sampling leaves to scattered rays
+    float left_out;  // luminance that light sampling leaves to scattered rays
 };
 
 #endif

@@ -3,7 +3,7 @@
 // u = atan(x, -z) / 2 pi + 1/2, v = acos(y) / pi. Radiance is bilinear between the centres of texels, around in u; beyond the outer rows
 // the last one reaches to the pole. Light sampling chooses a cell between four centres by its share of the light and a direction in it
 // with a density bilinear in the luminances at its corners, over the azimuth and the height: even over solid angle where they are equal,
-// and finite at the poles. Where scattered rays find light, too, luminance below `ambient` is left to them. Method and tables:
+// and finite at the poles. Where scattered rays find light, too, luminance below `left_out` is left to them. Method and tables:
 // transport/environment.rs.
 // Expects, declared before the inclusion: `vec4 environment_texel(uint index)`, radiance and factor of the density by row, and what
 // distribution.glsl expects.
@@ -53,7 +53,7 @@ vec3 environment_interpolated(mat4 corners, vec2 within) {
 }
 
 // Luminances at the corners, above what is left to scattered rays.
-vec4 environment_luminances(mat4 corners, float ambient) { return max(LUMINANCE * corners - ambient, ENVIRONMENT_LUMINANCE_MIN); }
+vec4 environment_luminances(mat4 corners, float left_out) { return max(LUMINANCE * corners - left_out, ENVIRONMENT_LUMINANCE_MIN); }
 
 // Luminance at the left and the right side of a cell.
 vec2 environment_sides(vec4 luminances, float down) { return mix(luminances.xy, luminances.zw, down); }
@@ -67,7 +67,7 @@ vec2 environment_rims(uint row, uint height, out bool south) {
 }
 
 // Radiance from a direction, and in the last component the density of environment_sample there.
-vec4 environment_look_up(uvec2 size, float ambient, vec3 w) {
+vec4 environment_look_up(uvec2 size, float left_out, vec3 w) {
     vec2 within;
     uvec2 cell = environment_cell(environment_uv(w), size, within);
     mat4 corners = environment_corners(cell, size);
@@ -75,17 +75,17 @@ vec4 environment_look_up(uvec2 size, float ambient, vec3 w) {
     vec2 rims = environment_rims(cell.y, size.y, south);
     float rim = 0.5 * dot(w.xz, w.xz) / (1.0 + (south ? -w.y : w.y));
     float from_rim = clamp((rim - rims.x) / (rims.y - rims.x), 0.0, 1.0);
-    vec2 sides = environment_sides(environment_luminances(corners, ambient), south ? 1.0 - from_rim : from_rim);
+    vec2 sides = environment_sides(environment_luminances(corners, left_out), south ? 1.0 - from_rim : from_rim);
     return vec4(environment_interpolated(corners, within), corners[2].a * mix(sides.x, sides.y, within.x));
 }
 
 // A direction that two words choose; `found` is environment_look_up there. The tables of emission, which have all of the light, are not those
 // that the densities of look-ups are of: with them the density follows from the cell's probability.
-vec3 environment_sample(uint base, uvec2 size, float ambient, bool emission, uvec2 word, uvec2 fresh, out vec4 found) {
+vec3 environment_sample(uint base, uvec2 size, float left_out, bool emission, uvec2 word, uvec2 fresh, out vec4 found) {
     float probability;
     uvec2 cell = distribution_sample_2d(base, uvec2(size.x, size.y + 1u), word, fresh, probability);
     mat4 corners = environment_corners(cell, size);
-    vec4 luminances = environment_luminances(corners, emission ? 0.0 : ambient);
+    vec4 luminances = environment_luminances(corners, emission ? 0.0 : left_out);
     float down = linear_sample(unit_float(word.y), dot(luminances.xy, vec2(0.5)), dot(luminances.zw, vec2(0.5)));
     vec2 sides = environment_sides(luminances, down);
     float around = linear_sample(unit_float(word.x), sides.x, sides.y);

@@ -28,7 +28,7 @@ uvec2 environment_size(SceneEnvironment e) { return uvec2(e.width, e.height); }
 
 // Radiance from a direction in the environment's frame, and the density per solid angle with which light sampling that has chosen the
 // environment finds it.
-vec4 environment_look_up(SceneEnvironment e, vec3 local) { return environment_look_up(environment_size(e), e.ambient, local); }
+vec4 environment_look_up(SceneEnvironment e, vec3 local) { return environment_look_up(environment_size(e), e.left_out, local); }
 
 vec3 environment_radiance(SceneEnvironment e, vec3 local) { return environment_look_up(e, local).rgb; }
 
@@ -50,7 +50,7 @@ LightSample sample_light(vec3 from, uvec2 word, vec3 scene_lower, vec3 scene_upp
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         vec4 found;
         SceneEnvironment e = load_environment();
-        vec3 local = environment_sample(environment_cdf_base(), environment_size(e), e.ambient, false, word, fresh.yz, found);
+        vec3 local = environment_sample(environment_cdf_base(), environment_size(e), e.left_out, false, word, fresh.yz, found);
         result.direction = environment_to_world(e, local);
         result.pdf = found.a * probability;
         result.radiance = result.pdf > 0.0 ? found.rgb / result.pdf : vec3(0.0);

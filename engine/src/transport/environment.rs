@@ -93,9 +93,9 @@ pub fn environment_interpolated(corners: &[DVec4; 4], within: DVec2) -> DVec3 {
     a.lerp(b, within.x).lerp(c.lerp(d, within.x), within.y)
 }
 
-/// Luminances at the corners of a cell above `ambient`, what is left to scattered rays; [`ENVIRONMENT_LUMINANCE_MIN`] at least.
-pub fn environment_luminances(corners: &[DVec4; 4], ambient: f64) -> DVec4 {
-    DVec4::from_array(corners.map(|corner| (luminance(corner.truncate()) - ambient).max(ENVIRONMENT_LUMINANCE_MIN)))
+/// Luminances at the corners of a cell above `left_out`, what is left to scattered rays; [`ENVIRONMENT_LUMINANCE_MIN`] at least.
+pub fn environment_luminances(corners: &[DVec4; 4], left_out: f64) -> DVec4 {
+    DVec4::from_array(corners.map(|corner| (luminance(corner.truncate()) - left_out).max(ENVIRONMENT_LUMINANCE_MIN)))
 }
 
 /// Least share of the light of a map that is worth sampling; what is above the mean in less is a difference of f32 numbers, whose rounding
@@ -113,7 +113,7 @@ pub struct EnvironmentTables {
     /// Of the map, in texels.
     pub size: UVec2,
     /// Luminance that light sampling leaves to scattered rays; that of photons leaves none.
-    pub ambient: f32,
+    pub left_out: f32,
     /// How much light sampling has of the map's light, from 0 to 1; where it is 0, no density is positive.
     pub share: f64,
     /// Cumulative probabilities of the cells for light sampling: [`build_distribution_2d`] of one row more than the map has.
@@ -141,7 +141,7 @@ impl EnvironmentTables {
         let texels = (environment.radiance.iter().chain(last)).map(|c| (*c * environment.strength).extend(0.0));
         let mut tables = Self {
             size,
-            ambient: 0.0,
+            left_out: 0.0,
             share: 1.0,
             cdf: Vec::new(),
             emission_cdf: None,
@@ -153,8 +153,8 @@ impl EnvironmentTables {
         let total: f64 = all.iter().sum();
         if compensated && total > 0.0 {
             #[expect(clippy::cast_possible_truncation, reason = "the device computes in f32")]
-            let ambient = (total / (4.0 * PI)) as f32;
-            tables.ambient = ambient;
+            let left_out = (total / (4.0 * PI)) as f32;
+            tables.left_out = left_out;
             let rest = tables.cell_weights();
             let share = rest.iter().sum::<f64>() / total;
             tables.share = if share < LEAST_SHARE { 0.0 } else { share };
@@ -163,7 +163,7 @@ impl EnvironmentTables {
         }
         if tables.share > 0.0 {
             for (i, cell) in cells(size).enumerate() {
-                let luminances = environment_luminances(&tables.environment_corners(cell), tables.ambient.into());
+                let luminances = environment_luminances(&tables.environment_corners(cell), tables.left_out.into());
                 let solid_angle = environment_cell_solid_angle(size, cell.y);
                 let probability = distribution_probability_2d(&tables.cdf, 0, grid, cell);
                 #[expect(clippy::cast_possible_truncation, reason = "the device computes in f32")]
@@ -177,9 +177,9 @@ impl EnvironmentTables {
     /// Luminance above what is left to scattered rays, times solid angle.
     fn cell_weights(&self) -> Vec<f64> {
         let above = |corner: DVec4| {
-            let above = luminance(corner.truncate()) - f64::from(self.ambient);
+            let above = luminance(corner.truncate()) - f64::from(self.left_out);
             // What is not a number stays so.
-            if self.ambient > 0.0 && above < 0.0 { 0.0 } else { above }
+            if self.left_out > 0.0 && above < 0.0 { 0.0 } else { above }
         };
         cells(self.size)
             .map(|cell| {
@@ -205,7 +205,7 @@ impl EnvironmentTables {
         let rim = 0.5 * (w.x * w.x + w.z * w.z) / (1.0 + if south { -w.y } else { w.y });
         let from_rim = ((rim - first) / (last - first)).clamp(0.0, 1.0);
         let down = if south { 1.0 - from_rim } else { from_rim };
-        let sides = environment_sides(environment_luminances(&corners, self.ambient.into()), down);
+        let sides = environment_sides(environment_luminances(&corners, self.left_out.into()), down);
         let pdf = corners[2].w * (sides.x + (sides.y - sides.x) * within.x);
         environment_interpolated(&corners, within).extend(pdf)
     }
@@ -217,7 +217,7 @@ impl EnvironmentTables {
         let cdf = self.emission_cdf.as_ref().filter(|_| emission).unwrap_or(&self.cdf);
         let (cell, probability) = distribution_sample_2d(cdf, 0, size + UVec2::Y, &mut word, fresh);
         let corners = self.environment_corners(cell);
-        let luminances = environment_luminances(&corners, if emission { 0.0 } else { self.ambient.into() });
+        let luminances = environment_luminances(&corners, if emission { 0.0 } else { self.left_out.into() });
         let (upper, lower) = (luminances.x + luminances.y, luminances.z + luminances.w);
         let down = linear_sample(unit_float(word[1]), 0.5 * upper, 0.5 * lower);
         let sides = environment_sides(luminances, down);

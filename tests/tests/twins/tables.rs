@@ -108,7 +108,7 @@ fn environments_agree_with_their_twins() {
                     &random_word(r),
                     &random_word(r),
                     &direction(r).to_array(),
-                    &[unit(r), unit(r), tables.ambient, f32::from_bits(emission)],
+                    &[unit(r), unit(r), tables.left_out, f32::from_bits(emission)],
                 ])
             })
         };

@@ -265,7 +265,7 @@ fn sampled_environment(map: &Environment, has_others: bool) -> Result<Environmen
     let tables = EnvironmentTables::build(map, true)?;
     let luminances = tables.texels.iter().map(|texel| luminance(texel.truncate().as_dvec3()));
     let greatest = luminances.fold(0.0, f64::max);
-    let is_nearly_even = greatest <= NEARLY_EVEN * f64::from(tables.ambient);
+    let is_nearly_even = greatest <= NEARLY_EVEN * f64::from(tables.left_out);
     if tables.share > 0.0 || has_others && is_nearly_even {
         return Ok(tables);
     }
@@ -281,7 +281,7 @@ fn environment_block(map: &Environment, tables: &EnvironmentTables) -> Vec<u8> {
         up: axes[1],
         height: map.height,
         back: axes[2],
-        ambient: tables.ambient,
+        left_out: tables.left_out,
     };
     let mut block = bytemuck::bytes_of(&header).to_vec();
     block.extend_from_slice(bytemuck::cast_slice(&tables.texels));
@@ -328,6 +328,30 @@ mod tests {
         let mut shared = powers.clone();
         share_choices(&records, &mut shared);
         (shares(&powers), shares(&shared))
+    }
+
+    // A disc of a hundredth of a sky's light: rays meet it once in tens of thousands, lamps or not.
+    #[test]
+    fn small_bright_parts_of_a_sky_are_aimed_at_beside_lamps() {
+        let sky = |disc: f32| {
+            let (width, height) = (256, 128);
+            let mut radiance = vec![Vec3::ONE; width * height];
+            radiance[40 * width + 100] = Vec3::splat(disc);
+            Environment {
+                name: "sky".into(),
+                width: width as u32,
+                height: height as u32,
+                radiance,
+                ..Environment::uniform(Vec3::ONE)
+            }
+        };
+        for has_others in [false, true] {
+            let bright = sampled_environment(&sky(200.0), has_others).unwrap();
+            assert!(bright.share > 0.0, "{has_others}: {bright:?}");
+        }
+        // An even one is left to scattered rays only where there is something else to aim at.
+        assert!(sampled_environment(&sky(1.5), false).unwrap().share > 0.0);
+        assert_eq!(sampled_environment(&sky(1.5), true).unwrap().share, 0.0);
     }
 
     #[test]

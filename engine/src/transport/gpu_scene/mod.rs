@@ -118,13 +118,9 @@ fn index_for(
     {
         Ok(_) => Ok(asked),
         Err(Error::LimitExceeded { .. }) => {
-            let because = match asked.traversal {
-                DeviceTraversal::Wide => "a round of its rays is longer than the loops of a software device",
-                _ => "a leaf of the kd-tree is longer than the loops of a software device",
-            };
             drop(asked);
             let mut index = IndexKind::default().build_for(gpu, &corners)?;
-            index.report.instead_because = Some(because);
+            index.report.instead_because = Some("a leaf of the kd-tree is longer than the loops of a software device");
             Ok(index)
         }
         Err(error) => Err(error),
@@ -236,7 +232,7 @@ impl GpuScene {
             steps: match traversal {
                 // A step is a node or a triangle, of a texel or more, and none is met twice.
                 DeviceTraversal::Bvh2 => texels.min(quota.into()),
-                DeviceTraversal::Kd { .. } | DeviceTraversal::Wide => quota.into(),
+                DeviceTraversal::Kd { .. } => quota.into(),
             },
         })
     }
