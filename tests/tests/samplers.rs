@@ -247,7 +247,15 @@ fn environments_are_sampled_by_what_is_looked_up() {
                 .map(|(w, fresh)| {
                     let [a, b, c, d] = [w[0], w[1], fresh[0], fresh[1]].map(halves);
                     let size = [8, 4].map(f32::from_bits);
-                    let rest = [0.0, 0.0, 0.0, 0.0, 0.0, tables.left_out, f32::from_bits(emission.into())];
+                    let rest = [
+                        0.0,
+                        0.0,
+                        0.0,
+                        0.0,
+                        0.0,
+                        tables.left_out,
+                        f32::from_bits(emission.into()),
+                    ];
                     Case::new(&[&size[..], &a, &b, &c, &d, &rest].concat())
                 })
                 .collect();
