@@ -8,6 +8,7 @@ use clerestory::scene::{
     AlphaMode, Camera, Environment, Filter, Image, LightKind, Material, Mesh, Scene, Texture, Wrap,
 };
 use clerestory::techniques::{PathTracer, PathTracerSettings};
+use clerestory::transport::environment::EnvironmentTables;
 use clerestory_tests::render::{
     Rendered, builtin, camera_down, cuboid, finish, floor, independent, point_triangle, render, tracer,
 };
@@ -385,10 +386,14 @@ fn lights_that_are_compiled_in_without_need_change_no_bit() {
         let hidden_lamp = |s: &mut Scene| lamp(s, glowing(HIDDEN_EMISSION), CUPBOARD, (2.0 * HIDDEN_AREA).sqrt());
         // 4π·intensity.
         let hidden_point = |s: &mut Scene| point_light(s, CUPBOARD, 0.25 * HIDDEN_EMISSION * HIDDEN_AREA);
-        // 4π·radiance·π·(radius of the scene)².
+        // 4π·radiance·π·(radius of the scene)², of which light sampling has a share. An even sky would be left to scattered rays.
         let sky = |s: &mut Scene| {
-            let radiance = HIDDEN_EMISSION * HIDDEN_AREA / (4.0 * std::f32::consts::PI * 3.0 * ROOM * ROOM);
-            s.environment = Some(Environment::uniform(Vec3::splat(radiance)));
+            let mut map = Environment::uniform(Vec3::ZERO);
+            (map.width, map.height) = (2, 1);
+            map.radiance = vec![Vec3::ZERO, Vec3::splat(2.0)];
+            let share = EnvironmentTables::build(&map, true).expect("tables").share as f32;
+            map.strength = HIDDEN_EMISSION * HIDDEN_AREA / (4.0 * std::f32::consts::PI * 3.0 * ROOM * ROOM * share);
+            s.environment = Some(map);
         };
         // Of two triangles in one place, the first with alpha, the second shines but is not among the lights to choose from.
         let unsampled_lamp = |s: &mut Scene| {

@@ -263,8 +263,8 @@ fn environments_are_sampled_by_what_is_looked_up() {
             let points = directions.iter().map(|r| {
                 let w = r.vector(0);
                 [
-                    w.y.clamp(-1.0, 1.0).acos() / PI,
                     (turn(-w.z, w.x) + 0.5).rem_euclid(1.0),
+                    w.y.clamp(-1.0, 1.0).acos() / PI,
                 ]
             });
             grid(points, ROWS, COLUMNS)

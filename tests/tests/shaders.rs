@@ -246,7 +246,16 @@ fn no_kernel_reads_by_texels_what_it_writes() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
-    let of_walks = ["flags", "hits", "queue", "states", "waiting", "waiting_queue"].map(|name| format!("walk_{name}"));
+    let of_walks = [
+        "flags",
+        "hits",
+        "numbers",
+        "queue",
+        "states",
+        "waiting",
+        "waiting_queue",
+    ]
+    .map(|name| format!("walk_{name}"));
     let of_sorts = ["keys", "values"].map(|name| format!("radix_{name}"));
     let of_photons = ["photon_records".to_owned()];
     let known = of_photons.iter().chain(&of_sorts).chain(&of_walks);

@@ -86,7 +86,7 @@ fn fill(folder: &Path) -> Tested {
     std::fs::write(at("tables/notes.md"), "# Notes\n")?;
     std::fs::write(at("tables/empty-scene.png"), "no picture")?;
     std::fs::write(at("tables/tiny/tiny.toml"), EXPERIMENT)?;
-    for (name, file) in [("alpha", "rows.json"), ("ambient", "1.csv"), ("absorption", "map.svg")] {
+    for (name, file) in [("alpha", "rows.json"), ("roulette", "1.csv"), ("absorption", "map.svg")] {
         std::fs::create_dir_all(at("pages").join(name))?;
         std::fs::write(at("pages").join(name).join(file), "[1, 2]\n")?;
     }
@@ -169,7 +169,7 @@ const REFUSED: [(&str, &str); 48] = [
     ("report tables/tiny/tiny.toml --folder tables", "lies in the folder"),
     ("report samplers --folder pages", "did not write it"),
     ("report alpha --folder pages", "did not write it"),
-    ("report ambient --folder pages", "did not write it"),
+    ("report roulette --folder pages", "did not write it"),
     ("report absorption --folder pages", "did not write it"),
     (
         "report kd-or-bvh --scene tables/sort.json --folder new --references tables",
