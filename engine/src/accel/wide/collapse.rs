@@ -16,6 +16,10 @@ use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use glam::Vec3;
+use rayon::prelude::*;
+
+/// Subtrees that are written on their own, at least, where there are as many.
+const SUBTREES: usize = 64;
 
 /// Costs of a subtree by the number of slots that it may take, from one on.
 type Costs = [f32; SLOTS - 1];
@@ -103,12 +107,6 @@ impl<'a> Collapse<'a> {
         let [a, b] = self.nodes[0].bounds;
         let costs = children(&self.nodes[0]).map(|child| self.costs_of(&child));
         self.area(&a.union(b)) + distribute(&costs, SLOTS).0
-    }
-
-    /// What the slots of a node hold, as they come from left to right.
-    fn slots_of(&self, node: usize, found: &mut Vec<Subtree>) {
-        found.clear();
-        self.split(node, SLOTS, found);
     }
 
     /// A node's children in so many slots.
@@ -203,7 +201,44 @@ struct Writer<'a> {
     triangles: Vec<Bvh2Triangle>,
 }
 
-impl Writer<'_> {
+impl<'a> Writer<'a> {
+    /// With room for the root.
+    fn new(binary: &'a [Bvh2Triangle]) -> Self {
+        Self {
+            binary,
+            nodes: vec![WideNode::zeroed()],
+            triangles: Vec::new(),
+        }
+    }
+
+    /// Puts a subtree that was written apart behind what is there, its root to the place that it has.
+    fn append(&mut self, nodes: &[WideNode], triangles: Vec<Bvh2Triangle>, place: usize) {
+        // The first of the others comes next.
+        let others = self.nodes.len() as u32 - 1;
+        let first_triangle = self.triangles.len() as u32;
+        let place_of = |node: u32| if node == 0 { place as u32 } else { others + node };
+        self.triangles.extend(triangles);
+        for (index, node) in (0u32..).zip(nodes) {
+            let (parent, slot) = (
+                node.parent >> constants::WIDE_SLOT_BITS,
+                node.parent & constants::WIDE_SLOT_MASK,
+            );
+            let moved = WideNode {
+                children: others + node.children,
+                triangles: first_triangle + node.triangles,
+                parent: place_of(parent) << constants::WIDE_SLOT_BITS | slot,
+                ..*node
+            };
+            match index {
+                0 => {
+                    let parent = self.nodes[place].parent;
+                    self.nodes[place] = WideNode { parent, ..moved };
+                }
+                _ => self.nodes.push(moved),
+            }
+        }
+    }
+
     /// Fills a node, and makes room for its children, whose binary nodes and places it returns in the order of slots.
     fn fill(&mut self, place: usize, bounds: &Aabb, slots: &[Slot]) -> Vec<(usize, usize)> {
         let placed: Vec<Placed> = slots.iter().map(|slot| (slot.bounds, slot.node.is_some())).collect();
@@ -263,11 +298,7 @@ pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
     let mut watch = Stopwatch::start();
     let mut statistics = binary.statistics();
     let mut stages = binary.stages();
-    let mut writer = Writer {
-        binary: binary.triangles(),
-        nodes: vec![WideNode::zeroed()],
-        triangles: Vec::with_capacity(binary.triangles().len()),
-    };
+    let mut writer = Writer::new(binary.triangles());
     let [a, b] = binary.nodes()[0].bounds;
     let mut bounds = a.union(b);
     if statistics.triangles >= 2 {
@@ -316,20 +347,55 @@ pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
     })
 }
 
-/// Nodes depth first, children of one node side by side. The depth.
+/// A node to fill: the binary node, its place, its depth.
+type Pending = (usize, usize, u32);
+
+/// All nodes, those of the top level by level, the others subtree by subtree. The depth.
 fn write(tree: &Collapse<'_>, writer: &mut Writer<'_>) -> u32 {
     let mut deepest = 0;
-    let mut pending = vec![(0, 0, 1)];
-    let mut found = Vec::with_capacity(SLOTS);
-    while let Some((node, place, depth)) = pending.pop() {
+    let mut level = vec![(0, 0, 1)];
+    while !level.is_empty() && level.len() < SUBTREES {
+        deepest += 1;
+        level = level
+            .into_iter()
+            .flat_map(|next| write_node(tree, writer, next))
+            .collect();
+    }
+    let binary = writer.binary;
+    let parts = level.into_par_iter().map(|(node, place, depth)| {
+        let mut part = Writer::new(binary);
+        let depth = write_subtree(tree, &mut part, (node, 0, depth));
+        (part.nodes, part.triangles, place, depth)
+    });
+    for (nodes, triangles, place, depth) in parts.collect::<Vec<_>>() {
+        writer.append(&nodes, triangles, place);
         deepest = deepest.max(depth);
-        tree.slots_of(node, &mut found);
-        let slots: Vec<Slot> = found.iter().map(|subtree| slot_of(tree, subtree)).collect();
-        let [a, b] = tree.nodes[node].bounds;
-        let below = writer.fill(place, &a.union(b), &slots);
-        pending.extend(below.into_iter().rev().map(|(node, place)| (node, place, depth + 1)));
     }
     deepest
+}
+
+/// Nodes depth first, children of one node side by side. The depth.
+fn write_subtree(tree: &Collapse<'_>, writer: &mut Writer<'_>, root: Pending) -> u32 {
+    let mut deepest = 0;
+    let mut pending = vec![root];
+    while let Some(next) = pending.pop() {
+        deepest = deepest.max(next.2);
+        pending.extend(write_node(tree, writer, next).into_iter().rev());
+    }
+    deepest
+}
+
+/// Its children, which have places now.
+fn write_node(tree: &Collapse<'_>, writer: &mut Writer<'_>, (node, place, depth): Pending) -> Vec<Pending> {
+    let mut found = Vec::with_capacity(SLOTS);
+    tree.split(node, SLOTS, &mut found);
+    let slots: Vec<Slot> = found.iter().map(|subtree| slot_of(tree, subtree)).collect();
+    let [a, b] = tree.nodes[node].bounds;
+    let below = writer.fill(place, &a.union(b), &slots);
+    below
+        .into_iter()
+        .map(|(node, place)| (node, place, depth + 1))
+        .collect()
 }
 
 fn slot_of(tree: &Collapse<'_>, subtree: &Subtree) -> Slot {
