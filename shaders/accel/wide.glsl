@@ -133,19 +133,22 @@ uint wide_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
                      | (low.z ? WIDE_SLOT_HOLDS(2u) : 0u) | (low.w ? WIDE_SLOT_HOLDS(3u) : 0u)
                      | (high.x ? WIDE_SLOT_HOLDS(4u) : 0u) | (high.y ? WIDE_SLOT_HOLDS(5u) : 0u)
                      | (high.z ? WIDE_SLOT_HOLDS(6u) : 0u) | (high.w ? WIDE_SLOT_HOLDS(7u) : 0u);
-            holds = below.z;
-            first_triangle = below.y;
-            met &= holds;
-            triangles = met & WIDE_TRIANGLE_MASK;
+            met &= below.z;
+            uint found = met & WIDE_TRIANGLE_MASK;
             uint order = wide_in_order(met >> WIDE_INNER_SHIFT, octant);
             if (INDEX_RESUMES) {
                 // On the way back: what comes before it in the order has been gone through, triangles too.
                 bool replays = replay > 0u;
                 uint place = (wide_stack_slots[WIDE_MAX_DEPTH + 1u - replay] ^ octant) & WIDE_SLOT_MASK;
                 order = replays ? order & WIDE_ORDER_MASK << place : order;
-                triangles = replays ? 0u : triangles;
+                found = replays ? 0u : found;
                 replay = replays && (order >> place & 1u) != 0u ? replay - 1u : 0u;
             }
+            // Carried from iteration to iteration, since a lane that has left the loop sees, of what each iteration finds anew, what later ones make of its
+            // next node, on drivers that mask only what is carried.
+            triangles |= found;
+            holds = found != 0u ? below.z : holds;
+            first_triangle = found != 0u ? below.y : first_triangle;
             bool none_left = (slots & WIDE_ORDER_MASK) == 0u;
             if (order != 0u) {
                 if (!none_left) {
@@ -154,7 +157,7 @@ uint wide_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
                     ++top;
                 }
                 children = below.x;
-                slots = holds >> WIDE_INNER_SHIFT << WIDE_SLOTS | order;
+                slots = below.z >> WIDE_INNER_SHIFT << WIDE_SLOTS | order;
             } else if (none_left && top > 0u) {
                 --top;
                 children = wide_stack_children[top];
@@ -166,7 +169,7 @@ uint wide_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             slots = (slots & WIDE_ORDER_MASK) != 0u ? slots & slots - 1u : slots;
         } while (triangles == 0u && node != INDEX_FINISHED && iterations < INDEX_QUOTA);
         bool awaiting = false;
-        Hit awaited;
+        Hit awaited = hit;
         if (triangles != 0u) {
             do {
                 ++iterations;
