@@ -315,9 +315,9 @@ def write(path, text):
         (TREE / path).write_text(text)
 
 
-def prepare(commit):
-    """The tree of a commit with its faults; returns those that are in it, and says which are not."""
-    stamp = digest(commit, Path(__file__).read_bytes())
+def prepare(commit, few):
+    """The tree of a commit with its faults, all or `few` of them; returns those that are in it, and says which are not."""
+    stamp = digest(commit, few, Path(__file__).read_bytes())
     state = WORK / "prepared.json"
     known = json.loads(state.read_text()) if state.exists() else {}
     git("worktree", "prune")
@@ -332,10 +332,11 @@ def prepare(commit):
     mutants = read_mutants(TREE)
     texts = {path: (TREE / path).read_text() for path in [*by_path(mutants), SWITCH_FILE, LOADER]}
     left_out = {}
-    for mutant in compile_modules(TREE, mutants):
+    wanted = [mutant for mutant in mutants if mutant.is_of_few or not few]
+    for mutant in compile_modules(TREE, wanted):
         left_out[mutant.number] = "changes no module"
     for attempt in range(BUILD_ROUNDS):
-        inside = [mutant for mutant in mutants if mutant.number not in left_out]
+        inside = [mutant for mutant in wanted if mutant.number not in left_out]
         places = write_tree(inside, texts.__getitem__)
         say(f"checking {len(inside)} faults")
         run = cargo("check", "-q", "--package=clerestory", "--lib", "--color=never", capture_output=True)
@@ -590,7 +591,7 @@ def try_all(options):
     take_dependencies(Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug", WORK / "target" / "debug")
     os.environ.update(CARGO_TARGET_DIR=str(WORK / "target"), CLERESTORY_VALIDATION="off")
     commit = git("rev-parse", "HEAD")
-    mutants, left_out = prepare(commit)
+    mutants, left_out = prepare(commit, options.few)
     inside = [mutant for mutant in chosen(mutants, options) if mutant.number not in left_out]
     rows = read_rows()
     of_each = {mutant.number: tests_of(mutant, rows) for mutant in inside}
