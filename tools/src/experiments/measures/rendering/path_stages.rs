@@ -10,7 +10,7 @@ use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, g
 use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
 
-/// Diffuse, many triangles under a sky, smooth normals, metal inside a furnace, and a medium.
+/// Diffuse, many triangles under a sky, smooth normals, a ring of metal, and a medium.
 const SCENES: [&str; 5] = [
     "builtin:cornell-box",
     "builtin:box-city",
