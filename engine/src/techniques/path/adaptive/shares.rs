@@ -45,16 +45,26 @@ fn settle<I: Iterator<Item = usize>>(
     given: u64,
     budget: u64,
 ) {
-    let room = |share: u32, taken: u32| if given > budget { share - taken } else { u32::MAX - share };
+    let room = |share: u32, taken: u32| {
+        if given > budget {
+            share - taken
+        } else {
+            u32::MAX - share
+        }
+    };
     let mut left = given.abs_diff(budget);
     while left > 0 {
-        let pixels = of_class().filter(|pixel| room(shares[*pixel], taken[*pixel]) > 0).count() as u64;
+        let pixels = of_class()
+            .filter(|pixel| room(shares[*pixel], taken[*pixel]) > 0)
+            .count() as u64;
         if pixels == 0 {
             return;
         }
         let each = u32::try_from((left / pixels).max(1)).unwrap_or(u32::MAX);
         for pixel in of_class() {
-            let moved = each.min(room(shares[pixel], taken[pixel])).min(u32::try_from(left).unwrap_or(u32::MAX));
+            let moved = each
+                .min(room(shares[pixel], taken[pixel]))
+                .min(u32::try_from(left).unwrap_or(u32::MAX));
             if given > budget {
                 shares[pixel] -= moved;
             } else {
