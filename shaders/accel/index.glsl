@@ -7,9 +7,11 @@
 
 #include "accel/bvh2.glsl"
 #include "accel/kd.glsl"
+#include "accel/wide.glsl"
 
 const uint INDEX_BVH2 = 0u;
 const uint INDEX_KD = 1u;
+const uint INDEX_WIDE = 2u;
 
 layout(constant_id = 102) const uint INDEX_KIND = INDEX_BVH2;
 
@@ -18,6 +20,9 @@ uint closest_hit(Ray ray, uint resume, inout Hit hit) {
     if (INDEX_KIND == INDEX_KD) {
         return kd_traverse(ray, resume, false, hit);
     }
+    if (INDEX_KIND == INDEX_WIDE) {
+        return wide_traverse(ray, resume, false, hit);
+    }
     return bvh2_traverse(ray, resume, false, hit);
 }
 
@@ -25,6 +30,9 @@ uint closest_hit(Ray ray, uint resume, inout Hit hit) {
 uint any_hit(Ray ray, uint resume, inout Hit hit) {
     if (INDEX_KIND == INDEX_KD) {
         return kd_traverse(ray, resume, true, hit);
+    }
+    if (INDEX_KIND == INDEX_WIDE) {
+        return wide_traverse(ray, resume, true, hit);
     }
     return bvh2_traverse(ray, resume, true, hit);
 }

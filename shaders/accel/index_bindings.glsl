@@ -4,7 +4,7 @@
 
 // descriptor set 1: IndexSet
 
-// What the texels hold stands in bvh2.glsl and kd.glsl. A texel buffer, since software drivers fetch texels for all lanes at once, but load
+// What the texels hold stands in bvh2.glsl, kd.glsl and wide_layout.glsl. A texel buffer, since software drivers fetch texels for all lanes at once, but load
 // storage buffers lane by lane.
 layout(set = 1, binding = 0) uniform utextureBuffer index_texels;
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use clerestory::accel::bvh2::Bvh2Settings;
 use clerestory::accel::kd::KdSettings;
+use clerestory::accel::wide::WideSettings;
 use clerestory::film::picture::{NORMAL, VARIANCE};
 use clerestory::gpu::{DeviceKind, Gpu};
 use clerestory::render::{RenderOptions, Rendered, Renderer, RendererDesc};
@@ -100,45 +101,67 @@ fn pictures_are_the_same_to_the_bit_with_every_index() {
     });
 }
 
+/// Surfaces that let half of the light through.
+fn thin(address: &str) -> Scene {
+    let mut scene = builtin(address);
+    for material in scene.materials.iter_mut().filter(|material| !material.boundary) {
+        material.base_color.w = 0.5;
+        material.alpha_mode = AlphaMode::Blend;
+    }
+    scene
+}
+
+/// Pictures in an index against those in the default one; rays of the scenes that are named stop at the small quota, and only there.
+fn pictures_stay_the_same(gpu: &Gpu, index: &IndexKind, scenes: &[(&str, Scene)], stopping: &[&str]) {
+    let of = |scene: &Scene, index: &IndexKind, ray_quota| {
+        let settings = PathTracerSettings {
+            ray_quota,
+            ..PathTracerSettings::default()
+        };
+        let scene_there = Arc::new(GpuScene::with_index(gpu, scene, index).unwrap());
+        let mut tracer = PathTracer::new(gpu, scene_there, &scene.cameras[0], [24, 16], settings).unwrap();
+        finish(&mut tracer, 2)
+    };
+    for (what, scene) in scenes {
+        let truth = of(scene, &IndexKind::default(), 32_768);
+        assert!(truth.mean()[0].0 > 0.0, "{what}: dark");
+        for ray_quota in [32_768, SMALL_QUOTA] {
+            let picture = of(scene, index, ray_quota);
+            assert_eq!(picture.bits(), truth.bits(), "{what}, quota {ray_quota}");
+            let stalls = picture.counters.stalls;
+            assert!(
+                !stopping.contains(what) || (stalls > 0) == (ray_quota == SMALL_QUOTA),
+                "{what}, quota {ray_quota}: {stalls} stalls"
+            );
+        }
+    }
+}
+
 #[test]
 fn alpha_media_and_quotas_leave_pictures_of_kd_trees_the_same() {
     with_gpu(|gpu| {
-        let of = |scene: &Scene, index: &IndexKind, ray_quota| {
-            let settings = PathTracerSettings {
-                ray_quota,
-                ..PathTracerSettings::default()
-            };
-            let scene_there = Arc::new(GpuScene::with_index(gpu, scene, index).unwrap());
-            let mut tracer = PathTracer::new(gpu, scene_there, &scene.cameras[0], [24, 16], settings).unwrap();
-            finish(&mut tracer, 2)
-        };
-        let thin = |address: &str| {
-            let mut scene = builtin(address);
-            for material in scene.materials.iter_mut().filter(|material| !material.boundary) {
-                material.base_color.w = 0.5;
-                material.alpha_mode = AlphaMode::Blend;
-            }
-            scene
-        };
-        let kd = IndexKind::Kd(KdSettings::default());
-        for (what, scene) in [
+        let scenes = [
             ("city", builtin("builtin:box-city?n=60")),
             ("thin city", thin("builtin:box-city?n=60")),
             ("smoke", builtin("builtin:smoke")),
             ("smoke between thin walls", thin("builtin:smoke")),
-        ] {
-            let truth = of(&scene, &IndexKind::default(), 32_768);
-            assert!(truth.mean()[0].0 > 0.0, "{what}: dark");
-            for ray_quota in [32_768, SMALL_QUOTA] {
-                let picture = of(&scene, &kd, ray_quota);
-                assert_eq!(picture.bits(), truth.bits(), "{what}, quota {ray_quota}");
-                let stalls = picture.counters.stalls;
-                assert!(
-                    what.contains("smoke") || (stalls > 0) == (ray_quota == SMALL_QUOTA),
-                    "{what}, quota {ray_quota}: {stalls} stalls"
-                );
-            }
-        }
+        ];
+        let kd = IndexKind::Kd(KdSettings::default());
+        pictures_stay_the_same(gpu, &kd, &scenes, &["city", "thin city"]);
+    });
+}
+
+#[test]
+fn alpha_media_and_quotas_leave_pictures_of_wide_trees_the_same() {
+    with_gpu(|gpu| {
+        let soup = "builtin:triangle-soup?n=5000&size=0.3";
+        let scenes = [
+            ("soup", builtin(soup)),
+            ("thin soup", thin(soup)),
+            ("smoke between thin walls", thin("builtin:smoke")),
+        ];
+        let wide = IndexKind::Wide(WideSettings::default());
+        pictures_stay_the_same(gpu, &wide, &scenes, &["soup", "thin soup"]);
     });
 }
 

@@ -175,7 +175,7 @@ fn meshes() -> Vec<Mesh> {
     ]
 }
 
-fn kinds() -> [IndexKind; 5] {
+fn kinds() -> [IndexKind; 6] {
     IndexKind::NAMES.map(|name| name.parse().unwrap())
 }
 

@@ -615,7 +615,7 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     refuse(
         &["render", "--index", "octree"],
         2,
-        &["octree", "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd"],
+        &["octree", "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd, wide"],
     )?;
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;
     refuse(&["scenes", "nothing"], 2, &["ring"])?;
@@ -844,7 +844,7 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
         "breaks",
         "expects",
         "path (sobol), path (pcg), photon, ",
-        ", bvh2, lbvh, lbvh-high, kd",
+        ", bvh2, lbvh, lbvh-high, kd, wide",
         "degrades",
     ] {
         assert!(list.contains(word), "{word}: {list}");
@@ -857,7 +857,7 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
     for outcome in outcomes {
         // Techniques of a part of the light refuse what has another; whatever holds all light passes.
         let subject = outcome["subject"].as_str().ok_or("no subject")?;
-        let holds_all = ["path", "photon", "bvh2", "lbvh", "kd"]
+        let holds_all = ["path", "photon", "bvh2", "lbvh", "kd", "wide"]
             .iter()
             .any(|name| subject.starts_with(name));
         if holds_all || outcome["verdict"] == "pass" {

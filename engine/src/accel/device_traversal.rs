@@ -14,6 +14,8 @@ pub enum DeviceTraversal {
         /// Most triangles in a leaf, which rays are not stopped in.
         longest_leaf: u32,
     },
+    /// Wide hierarchies.
+    Wide,
 }
 
 /// What the rounds of a kd-tree's kernel hold beside a way down, a leaf, and a way to what is left.
@@ -31,6 +33,7 @@ impl DeviceTraversal {
         match self {
             Self::Bvh2 => constants::INDEX_BVH2,
             Self::Kd { .. } => constants::INDEX_KD,
+            Self::Wide => constants::INDEX_WIDE,
         }
     }
 
@@ -52,19 +55,31 @@ impl DeviceTraversal {
         (u64::from(quota) + count * round + way + leaves * triangle * u64::from(longest_leaf)) * u64::from(lanes)
     }
 
-    /// The quota up to `quota` with which a subgroup's rays stay within `iterations`, for kd-trees on software devices; elsewhere `quota`.
+    /// The same in a wide hierarchy: a ray that is below its quota begins a round, with a node and its triangles.
+    pub(crate) fn wide_iterations(quota: u32, lanes: u32, filters: bool) -> u64 {
+        let round = constants::WIDE_ROUND_ITERATIONS;
+        // A candidate ends the loop over a node's triangles: what is left of that is a round of its own.
+        let triangle = 1 + if filters { round } else { 0 };
+        let last_round = round + 1 + constants::WIDE_NODE_TRIANGLES * triangle;
+        let way_back = constants::WIDE_MAX_DEPTH + 1;
+        (u64::from(quota) + u64::from(last_round + way_back)) * u64::from(lanes)
+    }
+
+    /// The quota up to `quota` with which a subgroup's rays stay within `iterations`, for kd-trees and wide hierarchies on software devices; elsewhere `quota`.
     /// `filters` says whether kernels ask about candidates.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] where a leaf alone is too long.
     pub(crate) fn quota_within(self, caps: &Caps, quota: u32, iterations: u32, filters: bool) -> Result<u32> {
-        let Self::Kd { longest_leaf } = self else {
-            return Ok(quota);
-        };
         if caps.kind != DeviceKind::Cpu {
             return Ok(quota);
         }
         let lanes = caps.subgroup_size.max(1);
+        let longest_leaf = match self {
+            Self::Bvh2 => return Ok(quota),
+            Self::Wide => return wide_quota_within(quota, u64::from(iterations / lanes), filters),
+            Self::Kd { longest_leaf } => longest_leaf,
+        };
         let rounds = KdRounds { waits: false, filters };
         let unstopped = |leaf| Self::kd_iterations(leaf, 0, 1, rounds);
         let most = u64::from(iterations / lanes);
@@ -79,4 +94,20 @@ impl DeviceTraversal {
         }
         Ok(quota.min((most - unstopped(longest_leaf)) as u32))
     }
+}
+
+/// The quota up to `quota` with which a ray in a wide hierarchy stays within `most` iterations.
+fn wide_quota_within(quota: u32, most: u64, filters: bool) -> Result<u32> {
+    let unstopped = DeviceTraversal::wide_iterations(0, 1, filters);
+    // The way back to a node leaves no less than that node.
+    let least = unstopped + u64::from(constants::WIDE_MAX_DEPTH);
+    if most <= least {
+        return Err(Error::LimitExceeded {
+            name: "round of rays in a wide hierarchy".into(),
+            value: least + 1,
+            limit_name: "iterations of a software device's loops",
+            limit: most,
+        });
+    }
+    Ok(quota.min((most - unstopped) as u32))
 }

@@ -11,6 +11,7 @@ use std::time::Instant;
 use super::bvh2::{Bvh2, Bvh2Settings};
 use super::kd::{KdSettings, KdTree};
 use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
+use super::wide::{WideBvh, WideSettings};
 use super::{BuildStages, DeviceTraversal, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::{Category, Gpu, TexelView};
@@ -31,6 +32,8 @@ pub enum IndexKind {
     LbvhOnDevice(LbvhSettings),
     /// kd-tree: the longest build, and leaves in the order of the ray.
     Kd(KdSettings),
+    /// Eight children a node, compressed, made of the binary hierarchy.
+    Wide(WideSettings),
 }
 
 impl Default for IndexKind {
@@ -41,8 +44,8 @@ impl Default for IndexKind {
 
 impl IndexKind {
     /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
-    /// the device, and the kd-tree.
-    pub const NAMES: [&'static str; 5] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd"];
+    /// the device, the kd-tree, and the wide hierarchy.
+    pub const NAMES: [&'static str; 6] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide"];
 
     /// The linear hierarchy with default settings.
     pub fn lbvh(quality: BuildQuality) -> Self {
@@ -62,6 +65,7 @@ impl IndexKind {
             },
             Self::LbvhOnDevice(_) => "lbvh-device",
             Self::Kd(_) => "kd",
+            Self::Wide(_) => "wide",
         }
     }
 
@@ -69,7 +73,7 @@ impl IndexKind {
     /// place in it. Deterministic whatever the number of threads.
     ///
     /// # Errors
-    /// As [`Bvh2::build`], [`lbvh::build`] and [`KdTree::build`].
+    /// As [`Bvh2::build`], [`lbvh::build`], [`KdTree::build`] and [`WideBvh::build`].
     pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<Box<dyn RayIndex>> {
         Ok(match self {
             Self::Bvh2(settings) => Box::new(Bvh2::build(triangles, settings)?),
@@ -82,6 +86,7 @@ impl IndexKind {
                 Box::new(lbvh::build(triangles, &settings)?)
             }
             Self::Kd(settings) => Box::new(KdTree::build(triangles, settings)?),
+            Self::Wide(settings) => Box::new(WideBvh::build(triangles, settings)?),
         })
     }
 
@@ -192,6 +197,7 @@ impl FromStr for IndexKind {
             Self::lbvh(BuildQuality::High),
             Self::LbvhOnDevice(LbvhSettings::default()),
             Self::Kd(KdSettings::default()),
+            Self::Wide(WideSettings::default()),
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
@@ -274,7 +280,10 @@ mod tests {
                 [corner, corner + Vec3::X, corner + Vec3::Y]
             })
             .collect();
-        for (name, builder) in IndexKind::NAMES.into_iter().zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd"]) {
+        for (name, builder) in IndexKind::NAMES
+            .into_iter()
+            .zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide"])
+        {
             let (index, report) = name
                 .parse::<IndexKind>()
                 .unwrap()

@@ -40,6 +40,7 @@ mod stages;
 pub(crate) mod sweep;
 pub mod trace;
 pub mod triangle;
+pub mod wide;
 pub mod yardstick;
 
 #[cfg(test)]
@@ -162,7 +163,7 @@ pub struct IndexStatistics {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub struct TraversalCounters {
-    /// Inner nodes visited (two box tests each).
+    /// Inner nodes visited: two box tests each in binary hierarchies, eight in wide ones.
     pub nodes: u64,
     /// Triangle tests.
     pub triangles: u64,

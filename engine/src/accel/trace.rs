@@ -5,7 +5,7 @@
 //! Manycore Photon Mapping", 2011, §2.2.3.4 and appendix A.1 (both models beside each other). The kernels are
 //! `shaders/accel/trace_rays.comp`, `trace_queue.comp` and, where subgroups vote, `trace_queue_vote.comp`.
 //!
-//! Guarantees: all give the hits and, but for votes, the exact work of [`Traversal`](super::bvh2::Traversal) and [`KdTraversal`](super::kd::KdTraversal); no ray is lost and none is traced twice,
+//! Guarantees: all give the hits and, but for votes, the exact work of [`Traversal`](super::bvh2::Traversal), [`KdTraversal`](super::kd::KdTraversal) and [`WideTraversal`](super::wide::WideTraversal); no ray is lost and none is traced twice,
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
 //! differs from run to run, and shows in nothing but the time.
 

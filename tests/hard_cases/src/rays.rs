@@ -5,6 +5,7 @@ use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::kd::{KdSettings, KdTree};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::triangle::{intersect_triangle, ray_shear};
+use clerestory::accel::wide::{WideBvh, WideSettings};
 use clerestory::accel::yardstick::moller_trumbore;
 use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
 use glam::{DVec3, Vec3};
@@ -46,6 +47,10 @@ pub const INDEXES: &[IndexCase] = &[
     IndexCase {
         name: "kd",
         build: |triangles| Ok(Box::new(KdTree::build(triangles, &KdSettings::default())?)),
+    },
+    IndexCase {
+        name: "wide",
+        build: |triangles| Ok(Box::new(WideBvh::build(triangles, &WideSettings::default())?)),
     },
 ];
 

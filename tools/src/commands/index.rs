@@ -7,6 +7,7 @@ use clap::Args;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::kd::{KdSettings, KdTree};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
+use clerestory::accel::wide::{WideBvh, WideSettings};
 use clerestory::accel::{BuildStages, Ray, RayIndex, TraversalCounters};
 use clerestory::scene::Scene;
 use clerestory::{Error, Result, scene};
@@ -33,7 +34,7 @@ Examples:
 
 Build times are medians of wall-clock time, from triangles on the host to an index where it is built; times by stage are those of the \
 median build. Builds on the device include the copies to it. Steps are the nodes and triangles that a ray visits, exact counts over the same \
-rays for every index; a node of a kd-tree is one plane, though, not two boxes. Half of the rays leave the camera, half leave surfaces in random directions.")]
+rays for every index; a node of a kd-tree is one plane, though, not two boxes, and one of a wide tree is eight. Half of the rays leave the camera, half leave surfaces in random directions.")]
 pub struct Arguments {
     /// A scene; may be given several times
     #[arg(long = "scene", value_name = "SCENE", default_values = SCENES)]
@@ -123,7 +124,7 @@ const KD: &str = "kd";
 type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
 
 /// The indexes, the one that others are compared with first.
-const INDEXES: [(&str, Build); 6] = [
+const INDEXES: [(&str, Build); 7] = [
     ("bvh2, binned", |t| {
         Ok(Box::new(Bvh2::build(t, &Bvh2Settings::default())?))
     }),
@@ -136,6 +137,7 @@ const INDEXES: [(&str, Build); 6] = [
         Ok(Box::new(lbvh::build(t, &reinserted(3))?))
     }),
     (KD, |t| Ok(Box::new(KdTree::build(t, &KdSettings::default())?))),
+    ("wide", |t| Ok(Box::new(WideBvh::build(t, &WideSettings::default())?))),
 ];
 
 fn fast(code_bits: u32) -> LbvhSettings {

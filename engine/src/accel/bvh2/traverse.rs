@@ -25,7 +25,7 @@ pub struct Traversal {
 /// What an iteration of a traversal does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// Tests both boxes of an inner node.
+    /// Tests the boxes of an inner node.
     Node,
     /// Tests a triangle.
     Triangle,

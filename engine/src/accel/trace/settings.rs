@@ -159,6 +159,9 @@ impl TraceSettings {
                 };
                 DeviceTraversal::kd_iterations(longest_leaf, self.ray_quota, lanes_in_sum(caps, traversal), rounds)
             }
+            DeviceTraversal::Wide => {
+                DeviceTraversal::wide_iterations(self.ray_quota, lanes_in_sum(caps, traversal), false)
+            }
         };
         match self.execution {
             Execution::RayPerThread => ray,
@@ -223,6 +226,6 @@ fn group_size(caps: &Caps) -> u32 {
 fn lanes_in_sum(caps: &Caps, traversal: DeviceTraversal) -> u32 {
     match traversal {
         DeviceTraversal::Bvh2 => 1,
-        DeviceTraversal::Kd { .. } => caps.subgroup_size.max(1),
+        DeviceTraversal::Kd { .. } | DeviceTraversal::Wide => caps.subgroup_size.max(1),
     }
 }

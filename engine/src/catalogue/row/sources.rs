@@ -130,5 +130,6 @@ sources! {
     WONG_2010 = "wong-2010": "H. Wong et al.", "Demystifying GPU Microarchitecture through Microbenchmarking", "ISPASS", 2010;
     WOODCOCK_1965 = "woodcock-1965": "E. Woodcock et al.", "Techniques Used in the GEM Code for Monte Carlo Neutronics Calculations", "ANL-7050", 1965;
     WOOP_2013 = "woop-2013": "S. Woop, C. Benthin, I. Wald", "Watertight Ray/Triangle Intersection", "JCGT 2(1)", 2013;
+    YLITIE_2017 = "ylitie-2017": "H. Ylitie, T. Karras, S. Laine", "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", "HPG", 2017;
     ZHUKOV_1998 = "zhukov-1998": "S. Zhukov, A. Iones, G. Kronin", "An Ambient Light Illumination Model", "EGWR", 1998;
 }

@@ -136,6 +136,7 @@ fn work(found: &Found) -> Table {
             "rays",
             "nodes per ray",
             "triangles per ray",
+            "fetches per ray",
             "bytes per ray",
             "iterations per subgroup",
             "busy lanes (%)",
@@ -148,7 +149,10 @@ fn work(found: &Found) -> Table {
     );
     let mut costs: Vec<&Work> = Vec::new();
     for one in &found.work {
-        if costs.last().is_none_or(|last| last.scene != one.scene) {
+        if costs
+            .last()
+            .is_none_or(|last| (&last.scene, last.costs) != (&one.scene, one.costs))
+        {
             costs.push(one);
         }
         let [nodes, triangles, waiting, ends] = one.shares.map(|share| 100.0 * share);
@@ -158,6 +162,7 @@ fn work(found: &Found) -> Table {
             one.kind.into(),
             one.nodes.into(),
             one.triangles.into(),
+            one.fetches.into(),
             one.bytes.into(),
             one.iterations.into(),
             (100.0 * one.busy_lanes).into(),
@@ -171,15 +176,16 @@ fn work(found: &Found) -> Table {
     table.note(
         "Counts are exact: the twin of the kernel gives each ray's steps, and those of a subgroup's rays run side by side. Parts of the rays \
          are traced by themselves, and their times are fitted as a sum over counts, without negative costs: of subgroups, of \
-         iterations, and of what nodes and triangles add to these. An iteration's time belongs in equal shares to its lanes. Bytes \
-         are 64 per node and 48 per triangle, every access served by itself, without the stack.",
+         iterations, and of what nodes and triangles add to these. An iteration's time belongs in equal shares to its lanes. A fetch \
+         is 16 bytes: four per binary node, five per wide one, three per triangle, every access served by itself, without the stack.",
     );
     for one in costs {
         let [ends, nodes, triangles, both] = one.costs;
         table.note(format!(
-            "{}: {ends:.0} ns a subgroup, {nodes:.1} ns an iteration with nodes only, {triangles:.1} ns with triangles only, {both:.1} ns with \
+            "{}, {}: {ends:.0} ns a subgroup, {nodes:.1} ns an iteration with nodes only, {triangles:.1} ns with triangles only, {both:.1} ns with \
              both, all threads together; the parts' times are met within {:.1} % (root of the mean square).",
             one.scene,
+            if one.is_wide { "wide" } else { "binary" },
             100.0 * one.relative_error
         ));
     }

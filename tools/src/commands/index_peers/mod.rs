@@ -18,7 +18,6 @@ pub use files::{FILES, files, markdown};
 use std::process::ExitCode;
 
 use clerestory::accel::box_test::BOX_SLACK;
-use clerestory::accel::bvh2::Bvh2;
 use clerestory::accel::{NO_HIT, Ray, RayIndex};
 use clerestory::gpu::Gpu;
 use clerestory::transport::random::{pcg3d, unit_float};
@@ -136,7 +135,7 @@ pub struct Measured {
     triangles: usize,
     /// Seconds.
     build: Spread,
-    /// With unit costs; none for wide nodes.
+    /// With unit costs; none for peers' wide nodes.
     sah_cost: Option<f64>,
     /// Millions of rays per second: primary, diffuse.
     mrays_per_second: [Spread; 2],
@@ -262,7 +261,7 @@ fn one_scene(
 ) -> Result<()> {
     let repeat = found.repeat;
     let built = ours::build_all(triangles, repeat)?;
-    let rays = rays_of(&built[0].index, triangles, primary);
+    let rays = rays_of(built[0].index.index(), triangles, primary);
     if rays.iter().any(Vec::is_empty) {
         return Err(Error::setting("scene", address, "is met by no ray of its camera"));
     }
@@ -329,7 +328,7 @@ fn take_turns(contenders: &mut [Contender<'_>], rays: &[Vec<Ray>; 2], repeat: u3
 }
 
 /// Primary rays, and one that leaves what each of them meets.
-fn rays_of(index: &Bvh2, triangles: &[[Vec3; 3]], primary: &[(Vec3, Vec3)]) -> [Vec<Ray>; 2] {
+fn rays_of(index: &dyn RayIndex, triangles: &[[Vec3; 3]], primary: &[(Vec3, Vec3)]) -> [Vec<Ray>; 2] {
     let (low, high) = bounds_of(triangles);
     let offset = RELATIVE_OFFSET * (high - low).max_element();
     let primary: Vec<Ray> = primary.iter().map(|(o, d)| Ray::new(*o, *d)).collect();

@@ -2,6 +2,8 @@
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
+use clerestory::accel::trace::TraceSettings;
+use clerestory::accel::wide::{LEAF_SIZE, WideBvh, WideSettings};
 use clerestory::accel::{Hit, Ray, RayIndex};
 use clerestory::gpu::ash::vk::Format;
 use clerestory::gpu::shaders::accel::trace_rays;
@@ -15,26 +17,53 @@ use glam::Vec3;
 
 use super::{Contender, Intersection, Spread, built_in};
 
-/// Steps of a ray in one dispatch: few enough for software devices, which end long loops, and more than these rays need.
-const QUOTA: u32 = 50_000;
+/// An index of ours, whose traversal can be watched step by step.
+#[derive(Debug)]
+pub enum Ours {
+    /// Two children a node.
+    Binary(Bvh2),
+    /// Eight.
+    Wide(WideBvh),
+}
+
+impl Ours {
+    /// As any index.
+    pub fn index(&self) -> &dyn RayIndex {
+        match self {
+            Self::Binary(index) => index,
+            Self::Wide(index) => index,
+        }
+    }
+}
 
 /// Builds an index of ours.
-pub type Build = fn(&[[Vec3; 3]]) -> Result<Bvh2>;
+pub type Build = fn(&[[Vec3; 3]]) -> Result<Ours>;
 
 /// Our indexes; the first one's hits are those that others are compared with.
-pub const INDEXES: [(&str, Build); 3] = [
-    ("bvh2, binned", |t| Bvh2::build(t, &Bvh2Settings::default())),
-    ("lbvh, fast", |t| {
-        let quality = BuildQuality::Fast;
-        lbvh::build(
-            t,
-            &LbvhSettings {
-                quality,
-                ..LbvhSettings::default()
-            },
-        )
+pub const INDEXES: [(&str, Build); 5] = [
+    ("bvh2, binned", |t| {
+        Bvh2::build(t, &Bvh2Settings::default()).map(Ours::Binary)
     }),
-    ("lbvh, high", |t| lbvh::build(t, &LbvhSettings::default())),
+    ("lbvh, fast", |t| {
+        let settings = LbvhSettings {
+            quality: BuildQuality::Fast,
+            ..LbvhSettings::default()
+        };
+        lbvh::build(t, &settings).map(Ours::Binary)
+    }),
+    ("lbvh, high", |t| {
+        lbvh::build(t, &LbvhSettings::default()).map(Ours::Binary)
+    }),
+    ("wide, of binned", |t| {
+        WideBvh::build(t, &WideSettings::default()).map(Ours::Wide)
+    }),
+    ("wide, of lbvh, high", |t| {
+        let settings = LbvhSettings {
+            leaf_size: LEAF_SIZE,
+            ..LbvhSettings::default()
+        };
+        WideBvh::collapse(&lbvh::build(t, &settings)?, &WideSettings::default()).map(Ours::Wide)
+    }),
 ];
 
 /// An index that was built, with its seconds.
@@ -42,7 +71,7 @@ pub struct Built {
     /// Its name.
     pub name: &'static str,
     /// The index.
-    pub index: Bvh2,
+    pub index: Ours,
     /// Seconds of its build.
     pub build: Spread,
 }
@@ -74,10 +103,14 @@ pub struct Kernel<'a> {
 
 impl<'a> Kernel<'a> {
     /// Uploads them.
-    pub fn new(gpu: &'a Gpu, index: &Bvh2, sets: &[&[Ray]]) -> Result<Self> {
+    pub fn new(gpu: &'a Gpu, index: &dyn RayIndex, sets: &[&[Ray]]) -> Result<Self> {
+        let traversal = index.device_traversal();
+        // Few enough steps in one dispatch for software devices, which end long loops, and more than these rays need.
+        let settings = TraceSettings::ray_per_thread().fitted(gpu.caps(), traversal);
         let spec = trace_rays::Spec {
-            index_quota: QUOTA,
+            index_quota: settings.ray_quota,
             index_count: false,
+            index_kind: traversal.kind(),
             ..Default::default()
         };
         let buffers = |rays: &&[Ray]| {
@@ -111,7 +144,7 @@ impl<'a> Kernel<'a> {
             trace_resume: buffers.resume.view(),
             trace_status: buffers.status.view(),
         };
-        let bvh2 = IndexSet {
+        let index = IndexSet {
             index_texels: &self.quarters,
         };
         let mut recorder = self.gpu.recorder("trace")?;
@@ -127,7 +160,7 @@ impl<'a> Kernel<'a> {
                 ray_count: buffers.count,
             };
             let groups = [self.pipeline.groups_for(push.ray_count), 1, 1];
-            pass.dispatch(&self.pipeline, &[&set, &bvh2], &push, groups)?;
+            pass.dispatch(&self.pipeline, &[&set, &index], &push, groups)?;
             pass.barrier(&[rw_compute_to_compute(&buffers.hits)]);
             Ok(())
         })?;
@@ -160,11 +193,11 @@ impl<'a> Kernel<'a> {
 
 /// An index of ours that traces both kinds of rays.
 pub fn contender<'a>(gpu: &'a Gpu, built: &Built, rays: &[Vec<Ray>; 2]) -> Result<Contender<'a>> {
-    let kernel = Kernel::new(gpu, &built.index, &[&rays[0], &rays[1]])?;
+    let kernel = Kernel::new(gpu, built.index.index(), &[&rays[0], &rays[1]])?;
     Ok(Contender {
         name: built.name.into(),
         build: built.build,
-        sah_cost: Some(built.index.statistics().sah_cost),
+        sah_cost: Some(built.index.index().statistics().sah_cost),
         trace: Box::new(move |kind| {
             let seconds = kernel.trace(kind)?;
             Ok((seconds, kernel.met(kind)?))

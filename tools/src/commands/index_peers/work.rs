@@ -1,10 +1,11 @@
 //! Where the time of our rays goes on the device: steps at inner nodes, tests of triangles, lanes that wait, and what each ray costs besides.
 //!
-//! A subgroup goes through the kernel's loop until its last lane is done. The traversal's twin gives the steps of each ray, and of the rays of
+//! A subgroup goes through the kernel's loop until its last lane is done; in wide trees, through the nodes of each round until its last lane has triangles
+//! to test, and through these until its last lane has tested its own. The traversal's twin gives the steps of each ray, and of the rays of
 //! a subgroup side by side follows exactly how many iterations only visit nodes, only test triangles, or do both, and how many lanes
 //! do which. Parts of the rays are then traced by themselves, and the times of the parts are fitted, without negative costs and each part with
 //! the same relative weight, as a sum over these counts: one cost for a subgroup's begin and end, one for an iteration, and what nodes and
-//! triangles add to it, by scene, since what a step costs depends on the caches. The least time of some runs counts, which other work on
+//! triangles add to it, by scene, since what a step costs depends on the caches, and apart for binary and for wide trees. The least time of some runs counts, which other work on
 //! the machine changes least. An iteration's time belongs in equal shares to its lanes: those at nodes,
 //! those at triangles, and those that wait.
 //!
@@ -12,22 +13,25 @@
 //! them.
 
 use clerestory::Result;
-use clerestory::accel::bvh2::{Bvh2, Step, Traversal};
+use clerestory::accel::bvh2::{Step, Traversal};
+use clerestory::accel::wide::WideTraversal;
 use clerestory::accel::{Ray, TraversalCounters};
 use clerestory::gpu::Gpu;
 use clerestory_tools::least_squares::non_negative;
 use rayon::prelude::*;
 
 use super::KINDS;
-use super::ours::{Built, Kernel};
+use super::ours::{Built, Kernel, Ours};
 
 /// Parts of the rays of a kind.
 const PARTS: usize = 8;
 /// Parts have whole workgroups.
 const WORKGROUP: usize = 64;
-/// Bytes that the kernel reads of a node and of a triangle (the traffic model in which each access is served by itself).
-const NODE_BYTES: u64 = 64;
-const TRIANGLE_BYTES: u64 = 48;
+/// Texels that the kernel fetches of a node, binary or wide, and of a triangle (the traffic model in which each access is served by itself).
+const NODE_FETCHES: [u64; 2] = [4, 5];
+const TRIANGLE_FETCHES: u64 = 3;
+/// Bytes of a texel.
+const FETCH_BYTES: f64 = 16.0;
 /// Kinds of iterations: only nodes, only triangles, both.
 const ITERATIONS: usize = 3;
 /// Costs: of a subgroup, of an iteration, and what nodes and triangles add to one.
@@ -45,10 +49,13 @@ struct Lockstep {
 }
 
 impl Lockstep {
-    fn of(index: &Bvh2, rays: &[Ray], width: usize) -> Self {
+    fn of(index: &Ours, rays: &[Ray], width: usize) -> Self {
         let subgroups = rays.par_chunks(width).map(|rays| {
             let steps: Vec<Vec<Step>> = rays.iter().map(|ray| steps(index, ray)).collect();
-            Self::of_subgroup(&steps)
+            match index {
+                Ours::Binary(_) => Self::of_subgroup(&steps),
+                Ours::Wide(_) => Self::of_rounds(&steps),
+            }
         });
         subgroups.reduce(Self::default, Self::plus)
     }
@@ -72,6 +79,24 @@ impl Lockstep {
             found.lanes[kind][0] += nodes;
             found.lanes[kind][1] += triangles;
         }
+        found
+    }
+
+    /// Of a kernel whose rounds have a loop over nodes and one over triangles.
+    fn of_rounds(steps: &[Vec<Step>]) -> Self {
+        let rounds: Vec<Vec<[u64; 2]>> = steps.iter().map(|steps| rounds(steps)).collect();
+        let mut found = Self {
+            subgroups: 1,
+            ..Self::default()
+        };
+        for i in 0..rounds.iter().map(Vec::len).max().unwrap_or(0) {
+            for step in 0..2 {
+                let counts = rounds.iter().map(|rounds| rounds.get(i).map_or(0, |round| round[step]));
+                found.iterations[step] += counts.clone().max().unwrap_or(0);
+                found.lanes[step][step] += counts.sum::<u64>();
+            }
+        }
+        [found.nodes, found.triangles] = [found.lanes[0][0], found.lanes[1][1]];
         found
     }
 
@@ -122,13 +147,34 @@ fn by_kind([_, each, nodes, triangles]: &[f64; COSTS]) -> [f64; ITERATIONS] {
     [each + nodes, each + triangles, each + nodes + triangles]
 }
 
-fn steps(index: &Bvh2, ray: &Ray) -> Vec<Step> {
+fn steps(index: &Ours, ray: &Ray) -> Vec<Step> {
     let (mut steps, mut counters) = (Vec::new(), TraversalCounters::default());
-    let mut traversal = Traversal::closest(ray);
-    traversal.run_watched(index, ray, u64::MAX, &mut |_, _| true, &mut counters, |step| {
-        steps.push(step)
-    });
+    let watch = |step| steps.push(step);
+    match index {
+        Ours::Binary(index) => {
+            Traversal::closest(ray).run_watched(index, ray, u64::MAX, &mut |_, _| true, &mut counters, watch);
+        }
+        Ours::Wide(index) => {
+            WideTraversal::closest(ray).run_watched(index, ray, u64::MAX, &mut |_, _| true, &mut counters, watch);
+        }
+    }
     steps
+}
+
+/// Nodes and triangles of the rounds of a ray, each of which goes through nodes until there are triangles to test.
+fn rounds(steps: &[Step]) -> Vec<[u64; 2]> {
+    let mut rounds: Vec<[u64; 2]> = Vec::new();
+    let mut last = Step::Triangle;
+    for step in steps {
+        if *step == Step::Node && last == Step::Triangle {
+            rounds.push([0; 2]);
+        }
+        if let Some(round) = rounds.last_mut() {
+            round[usize::from(*step == Step::Triangle)] += 1;
+        }
+        last = *step;
+    }
+    rounds
 }
 
 /// The work of one kind of rays in one of our indexes.
@@ -138,13 +184,17 @@ pub struct Work {
     pub scene: String,
     /// Name of the index.
     pub index: &'static str,
+    /// Whether it has nodes of eight children.
+    pub is_wide: bool,
     /// Kind of rays.
     pub kind: &'static str,
     /// Inner nodes that a ray visits.
     pub nodes: f64,
     /// Triangles that a ray tests.
     pub triangles: f64,
-    /// Bytes of the index that a ray reads.
+    /// Texels of the index that a ray fetches.
+    pub fetches: f64,
+    /// Bytes of these.
     pub bytes: f64,
     /// Iterations of a subgroup.
     pub iterations: f64,
@@ -165,13 +215,15 @@ pub struct Work {
 /// Measures the indexes of one scene.
 pub fn measure(gpu: &Gpu, scene: &str, built: &[Built], rays: &[Vec<Ray>; 2], repeat: u32) -> Result<Vec<Work>> {
     let width = gpu.caps().subgroup_size.max(1) as usize;
-    let mut rows = Vec::new();
+    // Of binary and of wide trees.
+    let mut rows = [Vec::new(), Vec::new()];
     let mut all = Vec::new();
     for one in built {
+        let form = usize::from(matches!(one.index, Ours::Wide(_)));
         for (kind, rays) in rays.iter().enumerate() {
             let size = rays.len().div_ceil(PARTS).next_multiple_of(WORKGROUP);
             let parts: Vec<&[Ray]> = rays.chunks(size).collect();
-            let kernel = Kernel::new(gpu, &one.index, &parts)?;
+            let kernel = Kernel::new(gpu, one.index.index(), &parts)?;
             let mut seconds = vec![Vec::new(); parts.len()];
             for round in 0..=repeat {
                 for (part, seconds) in seconds.iter_mut().enumerate() {
@@ -184,23 +236,33 @@ pub fn measure(gpu: &Gpu, scene: &str, built: &[Built], rays: &[Vec<Ray>; 2], re
             let least = |times: Vec<f64>| times.into_iter().fold(f64::INFINITY, f64::min);
             let seconds: Vec<f64> = seconds.into_iter().map(least).collect();
             let steps: Vec<Lockstep> = parts.iter().map(|rays| Lockstep::of(&one.index, rays, width)).collect();
-            rows.extend(steps.iter().map(Lockstep::counts).zip(seconds.iter().copied()));
+            rows[form].extend(steps.iter().map(Lockstep::counts).zip(seconds.iter().copied()));
             let whole = steps.into_iter().fold(Lockstep::default(), Lockstep::plus);
-            all.push((one.name, kind, rays.len() as f64, whole, seconds.iter().sum::<f64>()));
+            all.push((
+                one.name,
+                form,
+                kind,
+                rays.len() as f64,
+                whole,
+                seconds.iter().sum::<f64>(),
+            ));
         }
     }
-    let fit = non_negative(&rows);
-    let costs = fit.coefficients;
-    let work = all.into_iter().map(|(index, kind, count, whole, seconds)| {
+    let fits = rows.map(|rows| non_negative(&rows));
+    let work = all.into_iter().map(|(index, form, kind, count, whole, seconds)| {
+        let costs = fits[form].coefficients;
+        let fetches = (NODE_FETCHES[form] * whole.nodes + TRIANGLE_FETCHES * whole.triangles) as f64 / count;
         let (fitted, parts) = (whole.seconds(&costs), whole.parts(&costs, width));
         let iterations: u64 = whole.iterations.iter().sum();
         Work {
             scene: scene.to_owned(),
             index,
+            is_wide: form == 1,
             kind: KINDS[kind],
             nodes: whole.nodes as f64 / count,
             triangles: whole.triangles as f64 / count,
-            bytes: (NODE_BYTES * whole.nodes + TRIANGLE_BYTES * whole.triangles) as f64 / count,
+            fetches,
+            bytes: FETCH_BYTES * fetches,
             iterations: iterations as f64 / whole.subgroups as f64,
             busy_lanes: (whole.nodes + whole.triangles) as f64 / (iterations * width as u64) as f64,
             nanoseconds: 1e9 * seconds / count,
@@ -210,7 +272,7 @@ pub fn measure(gpu: &Gpu, scene: &str, built: &[Built], rays: &[Vec<Ray>; 2], re
                 [costs[0], nodes, triangles, both].map(|cost| 1e9 * cost)
             },
             fitted: fitted / seconds,
-            relative_error: fit.relative_error,
+            relative_error: fits[form].relative_error,
         }
     });
     Ok(work.collect())
@@ -219,8 +281,8 @@ pub fn measure(gpu: &Gpu, scene: &str, built: &[Built], rays: &[Vec<Ray>; 2], re
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clerestory::accel::RayIndex;
-    use clerestory::accel::bvh2::Bvh2Settings;
+    use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+    use clerestory::accel::wide::{WideBvh, WideSettings};
     use glam::Vec3;
 
     #[test]
@@ -245,6 +307,24 @@ mod tests {
     }
 
     #[test]
+    fn rounds_wait_for_their_last_lane_at_nodes_and_at_triangles() {
+        use Step::{Node, Triangle};
+        let found = Lockstep::of_rounds(&[
+            vec![Node, Node, Triangle, Node, Triangle, Triangle],
+            vec![Node],
+            vec![Node, Triangle, Triangle, Triangle, Node],
+        ]);
+        let expected = Lockstep {
+            subgroups: 1,
+            nodes: 6,
+            triangles: 6,
+            iterations: [3, 5, 0],
+            lanes: [[6, 0], [0, 6], [0, 0]],
+        };
+        assert_eq!(found, expected);
+    }
+
+    #[test]
     fn steps_are_those_that_the_traversal_counts() {
         let mut stream = clerestory_tools::random::Random::new(7);
         let mut random = || stream.unit() as f32;
@@ -254,7 +334,8 @@ mod tests {
                 [0, 1, 2].map(|_| centre + 0.2 * Vec3::new(random(), random(), random()))
             })
             .collect();
-        let index = Bvh2::build(&triangles, &Bvh2Settings::default()).unwrap();
+        let binary = Bvh2::build(&triangles, &Bvh2Settings::default()).unwrap();
+        let wide = WideBvh::build(&triangles, &WideSettings::default()).unwrap();
         let rays: Vec<Ray> = (0..40)
             .map(|_| Ray {
                 origin: [random(), 3.0, random()],
@@ -263,15 +344,17 @@ mod tests {
                 t_max: f32::INFINITY,
             })
             .collect();
-        let mut counters = TraversalCounters::default();
-        for ray in &rays {
-            index.closest_hit_filtered(ray, &mut |_, _| true, &mut counters);
+        for (index, both_at_once) in [(Ours::Binary(binary), true), (Ours::Wide(wide), false)] {
+            let mut counters = TraversalCounters::default();
+            for ray in &rays {
+                index.index().closest_hit_filtered(ray, &mut |_, _| true, &mut counters);
+            }
+            let found = Lockstep::of(&index, &rays, 8);
+            assert_eq!(
+                (found.nodes, found.triangles, found.subgroups),
+                (counters.nodes, counters.triangles, 5)
+            );
+            assert!(found.triangles > 0 && (found.iterations[2] > 0) == both_at_once);
         }
-        let found = Lockstep::of(&index, &rays, 8);
-        assert_eq!(
-            (found.nodes, found.triangles, found.subgroups),
-            (counters.nodes, counters.triangles, 5)
-        );
-        assert!(found.triangles > 0 && found.iterations[2] > 0);
     }
 }

@@ -1,0 +1,373 @@
+//! A binary tree made wide: which of its nodes become nodes of eight slots and which become leaves, by least cost.
+//!
+//! Source: Ylitie, Karras and Laine, HPG 2017, §3.1. Cost: areas of nodes, and areas of leaves times their triangles times the cost of a test,
+//! relative to the root's. `costs[n][i]` is the least cost of a subtree as at most i + 1 slots of the node above; bottom-up first, then the choices
+//! that lead to the least cost are found again from the root on.
+//!
+//! Guarantee: nodes, triangles and bytes follow from the binary tree alone.
+
+use super::grid::GridAxis;
+use super::slots::{Placed, assign};
+use super::{Header, LEAF_SIZE, SLOTS, WideBvh, WideNode};
+use crate::accel::bvh2::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, COUNT_MASK};
+use crate::accel::stages::Stopwatch;
+use crate::accel::{Aabb, IndexStatistics, NO_HIT, RayIndex};
+use crate::gpu::shaders::constants;
+use crate::{Error, Result};
+use bytemuck::Zeroable;
+use glam::Vec3;
+
+/// Costs of a subtree by the number of slots that it may take, from one on.
+type Costs = [f32; SLOTS - 1];
+
+/// A child of a binary node: its word and its box.
+#[derive(Debug, Clone, Copy)]
+struct Subtree {
+    word: u32,
+    bounds: Aabb,
+}
+
+impl Subtree {
+    /// The inner node, unless it is a leaf.
+    fn node(&self) -> Option<usize> {
+        (self.word & COUNT_MASK == 0).then_some((self.word >> COUNT_BITS) as usize)
+    }
+}
+
+fn children(node: &Bvh2Node) -> [Subtree; 2] {
+    [0, 1].map(|side: usize| Subtree {
+        word: node.children[side],
+        bounds: node.bounds[side],
+    })
+}
+
+/// The binary tree with the costs of its subtrees.
+pub(super) struct Collapse<'a> {
+    nodes: &'a [Bvh2Node],
+    /// Triangles below each node, exact up to one above [`LEAF_SIZE`].
+    counts: Vec<u32>,
+    costs: Vec<Costs>,
+    root_area: f64,
+    triangle_cost: f32,
+}
+
+impl<'a> Collapse<'a> {
+    /// Of a tree of two triangles or more.
+    pub(super) fn of(nodes: &'a [Bvh2Node], triangle_cost: f32) -> Self {
+        let [a, b] = nodes[0].bounds;
+        let root_area = a.union(b).half_area();
+        let mut collapse = Self {
+            nodes,
+            counts: vec![0; nodes.len()],
+            costs: vec![[0.0; SLOTS - 1]; nodes.len()],
+            root_area: if root_area > 0.0 { root_area } else { 1.0 },
+            triangle_cost,
+        };
+        for index in parents_first(nodes).into_iter().rev() {
+            let node = &nodes[index];
+            let both = children(node);
+            let count = both.iter().map(|child| collapse.count(child)).sum::<u32>();
+            let costs = both.map(|child| collapse.costs_of(&child));
+            let area = collapse.area(&node.bounds[0].union(node.bounds[1]));
+            let own = &mut collapse.costs[index];
+            own[0] = (area + distribute(&costs, SLOTS).0).min(leaf_cost(area, count, triangle_cost));
+            for slots in 2..SLOTS {
+                own[slots - 1] = own[slots - 2].min(distribute(&costs, slots).0);
+            }
+            collapse.counts[index] = count.min(LEAF_SIZE + 1);
+        }
+        collapse
+    }
+
+    fn area(&self, bounds: &Aabb) -> f32 {
+        (bounds.half_area() / self.root_area) as f32
+    }
+
+    fn count(&self, subtree: &Subtree) -> u32 {
+        match subtree.node() {
+            Some(node) => self.counts[node],
+            None => subtree.word & COUNT_MASK,
+        }
+    }
+
+    fn costs_of(&self, subtree: &Subtree) -> Costs {
+        match subtree.node() {
+            Some(node) => self.costs[node],
+            None => [leaf_cost(self.area(&subtree.bounds), self.count(subtree), self.triangle_cost); SLOTS - 1],
+        }
+    }
+
+    /// Least cost of the whole tree under a root that is a node.
+    #[cfg(test)]
+    pub(super) fn root_cost(&self) -> f32 {
+        let [a, b] = self.nodes[0].bounds;
+        let costs = children(&self.nodes[0]).map(|child| self.costs_of(&child));
+        self.area(&a.union(b)) + distribute(&costs, SLOTS).0
+    }
+
+    /// What the slots of a node hold, as they come from left to right.
+    fn slots_of(&self, node: usize, found: &mut Vec<Subtree>) {
+        found.clear();
+        self.split(node, SLOTS, found);
+    }
+
+    /// A node's children in so many slots.
+    fn split(&self, node: usize, slots: usize, found: &mut Vec<Subtree>) {
+        let both = children(&self.nodes[node]);
+        let left = distribute(&both.map(|child| self.costs_of(&child)), slots).1;
+        self.place(&both[0], left, found);
+        self.place(&both[1], slots - left, found);
+    }
+
+    /// A subtree in at most so many slots.
+    fn place(&self, subtree: &Subtree, slots: usize, found: &mut Vec<Subtree>) {
+        let Some(node) = subtree.node() else {
+            found.push(*subtree);
+            return;
+        };
+        // As few as cost as little.
+        let costs = &self.costs[node];
+        let fewest = (1..=slots).find(|n| costs[n - 1] <= costs[slots - 1]).unwrap_or(slots);
+        match fewest {
+            1 => found.push(*subtree),
+            slots => self.split(node, slots, found),
+        }
+    }
+
+    /// Whether a subtree in one slot is a leaf.
+    fn is_leaf(&self, subtree: &Subtree) -> bool {
+        let Some(node) = subtree.node() else {
+            return true;
+        };
+        let area = self.area(&subtree.bounds);
+        leaf_cost(area, self.counts[node], self.triangle_cost) <= self.costs[node][0]
+    }
+
+    /// Words of the leaves below a subtree, from left to right.
+    fn leaves(&self, subtree: &Subtree, mut visit: impl FnMut(u32)) {
+        let mut pending = vec![*subtree];
+        while let Some(next) = pending.pop() {
+            match next.node() {
+                Some(node) => pending.extend(children(&self.nodes[node]).into_iter().rev()),
+                None => visit(next.word),
+            }
+        }
+    }
+}
+
+/// Nodes of a tree, parents before their children.
+fn parents_first(nodes: &[Bvh2Node]) -> Vec<usize> {
+    let mut order = Vec::with_capacity(nodes.len());
+    let mut pending = vec![0];
+    while let Some(node) = pending.pop() {
+        order.push(node);
+        pending.extend(children(&nodes[node]).iter().filter_map(Subtree::node));
+    }
+    order
+}
+
+/// Cost of a leaf; none of too many triangles.
+fn leaf_cost(area: f32, count: u32, triangle_cost: f32) -> f32 {
+    if count <= LEAF_SIZE {
+        area * count as f32 * triangle_cost
+    } else {
+        f32::INFINITY
+    }
+}
+
+/// Least cost of two subtrees in so many slots, two or more, and how many of these are for the first.
+fn distribute(costs: &[Costs; 2], slots: usize) -> (f32, usize) {
+    let cost = |left: usize| costs[0][left - 1] + costs[1][slots - left - 1];
+    let mut best = (cost(1), 1);
+    for left in 2..slots {
+        if cost(left) < best.0 {
+            best = (cost(left), left);
+        }
+    }
+    best
+}
+
+/// A slot before it is written.
+struct Slot {
+    bounds: Aabb,
+    /// Of a child node; where it is a leaf, its triangles.
+    node: Option<usize>,
+    triangles: [u32; LEAF_SIZE as usize],
+    count: usize,
+}
+
+/// The wide tree as it is written.
+struct Writer<'a> {
+    binary: &'a [Bvh2Triangle],
+    nodes: Vec<WideNode>,
+    triangles: Vec<Bvh2Triangle>,
+}
+
+impl Writer<'_> {
+    /// Fills a node, and makes room for its children, whose binary nodes and places it returns in the order of slots.
+    fn fill(&mut self, place: usize, bounds: &Aabb, slots: &[Slot]) -> Vec<(usize, usize)> {
+        let placed: Vec<Placed> = slots.iter().map(|slot| (slot.bounds, slot.node.is_some())).collect();
+        let assigned = assign(0.5 * bounds.lower + 0.5 * bounds.upper, &placed);
+        let grid = [0, 1, 2].map(|axis: usize| GridAxis::over(bounds.lower[axis], bounds.upper[axis]));
+        let mut node = WideNode {
+            corner: Vec3::from_array(grid.map(|axis| axis.corner)),
+            exponents: u32::from_le_bytes([grid[0].exponent, grid[1].exponent, grid[2].exponent, 0]),
+            children: self.nodes.len() as u32,
+            triangles: self.triangles.len() as u32,
+            ..self.nodes[place]
+        };
+        let mut below = Vec::new();
+        for at in 0..SLOTS {
+            let Some(slot) = (0..slots.len())
+                .find(|i| usize::from(assigned[*i]) == at)
+                .map(|i| &slots[i])
+            else {
+                continue;
+            };
+            for (axis, grid) in grid.iter().enumerate() {
+                let [lower, upper] = grid.planes(slot.bounds.lower[axis], slot.bounds.upper[axis]);
+                node.planes[axis][0][at] = lower;
+                node.planes[axis][1][at] = upper;
+            }
+            if let Some(child) = slot.node {
+                node.slots |= 1 << (constants::WIDE_INNER_SHIFT as usize + at);
+                below.push((child, self.nodes.len()));
+                self.nodes.push(WideNode {
+                    parent: (place as u32) << constants::WIDE_SLOT_BITS | at as u32,
+                    ..WideNode::zeroed()
+                });
+            } else {
+                node.slots |= ((1 << slot.count) - 1) << (LEAF_SIZE as usize * at);
+                let own = &slot.triangles[..slot.count];
+                self.triangles.extend(own.iter().map(|i| self.binary[*i as usize]));
+            }
+        }
+        self.nodes[place] = node;
+        below
+    }
+}
+
+pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
+    let largest = binary
+        .nodes()
+        .iter()
+        .flat_map(|node| node.children)
+        .map(|word| word & COUNT_MASK);
+    if let Some(size) = largest.max().filter(|size| *size > LEAF_SIZE) {
+        return Err(Error::setting(
+            "leaf size",
+            size,
+            format!("is above {LEAF_SIZE}, the most of a wide tree"),
+        ));
+    }
+    let mut watch = Stopwatch::start();
+    let mut statistics = binary.statistics();
+    let mut stages = binary.stages();
+    let mut writer = Writer {
+        binary: binary.triangles(),
+        nodes: vec![WideNode::zeroed()],
+        triangles: Vec::with_capacity(binary.triangles().len()),
+    };
+    let [a, b] = binary.nodes()[0].bounds;
+    let mut bounds = a.union(b);
+    if statistics.triangles >= 2 {
+        let tree = Collapse::of(binary.nodes(), triangle_cost);
+        statistics.max_depth = write(&tree, &mut writer);
+    } else {
+        // The binary tree has a sentinel beside one triangle or none.
+        let met: Vec<u32> = (0u32..)
+            .zip(binary.triangles())
+            .filter(|(_, t)| t.index != NO_HIT)
+            .map(|(i, _)| i)
+            .collect();
+        bounds = met.first().map_or(b, |_| a);
+        let slots: Vec<Slot> = met
+            .iter()
+            .map(|i| Slot {
+                bounds,
+                node: None,
+                triangles: [*i; LEAF_SIZE as usize],
+                count: 1,
+            })
+            .collect();
+        writer.fill(0, &bounds, &slots);
+        statistics.max_depth = 1;
+    }
+    stages.layout += watch.lap();
+    let Writer { nodes, triangles, .. } = writer;
+    measure(&nodes, &bounds, &mut statistics);
+    let header = Header {
+        lower: bounds.lower,
+        triangles: constants::WIDE_HEADER_TEXELS + constants::WIDE_NODE_TEXELS * nodes.len() as u32,
+        upper: bounds.upper,
+        zero: 0,
+    };
+    let mut texels: Vec<[u32; 4]> = Vec::with_capacity(header.triangles as usize + 3 * triangles.len());
+    texels.extend(bytemuck::cast::<Header, [[u32; 4]; 2]>(header));
+    texels.extend_from_slice(bytemuck::cast_slice(&nodes));
+    texels.extend_from_slice(bytemuck::cast_slice(&triangles));
+    statistics.bytes = size_of_val(texels.as_slice()) as u64;
+    stages.statistics += watch.lap();
+    Ok(WideBvh {
+        nodes: nodes.len(),
+        texels,
+        statistics,
+        stages,
+    })
+}
+
+/// Nodes depth first, children of one node side by side. The depth.
+fn write(tree: &Collapse<'_>, writer: &mut Writer<'_>) -> u32 {
+    let mut deepest = 0;
+    let mut pending = vec![(0, 0, 1)];
+    let mut found = Vec::with_capacity(SLOTS);
+    while let Some((node, place, depth)) = pending.pop() {
+        deepest = deepest.max(depth);
+        tree.slots_of(node, &mut found);
+        let slots: Vec<Slot> = found.iter().map(|subtree| slot_of(tree, subtree)).collect();
+        let [a, b] = tree.nodes[node].bounds;
+        let below = writer.fill(place, &a.union(b), &slots);
+        pending.extend(below.into_iter().rev().map(|(node, place)| (node, place, depth + 1)));
+    }
+    deepest
+}
+
+fn slot_of(tree: &Collapse<'_>, subtree: &Subtree) -> Slot {
+    let mut slot = Slot {
+        bounds: subtree.bounds,
+        node: None,
+        triangles: [0; LEAF_SIZE as usize],
+        count: 0,
+    };
+    if !tree.is_leaf(subtree) {
+        slot.node = subtree.node();
+        return slot;
+    }
+    tree.leaves(subtree, |word| {
+        let first = word >> COUNT_BITS;
+        for triangle in first..first + (word & COUNT_MASK) {
+            slot.triangles[slot.count] = triangle;
+            slot.count += 1;
+        }
+    });
+    slot
+}
+
+/// Counts nodes and leaves, and sums the SAH cost of decoded boxes.
+fn measure(nodes: &[WideNode], bounds: &Aabb, statistics: &mut IndexStatistics) {
+    let (mut cost, mut leaves) = (0.0, 0);
+    for node in nodes {
+        for slot in 0..SLOTS {
+            let count = node.leaf(slot).1;
+            let tests = if node.child(slot).is_some() { 1 } else { count };
+            let [lower, upper] = node.bounds(slot);
+            let e = upper - lower;
+            cost += f64::from(tests) * (e.x * e.y + e.y * e.z + e.z * e.x);
+            leaves += u64::from(count > 0);
+        }
+    }
+    let root = bounds.half_area();
+    statistics.nodes = nodes.len() as u64;
+    statistics.leaves = leaves;
+    statistics.sah_cost = if root > 0.0 { 1.0 + cost / root } else { 0.0 };
+}
