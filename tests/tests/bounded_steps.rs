@@ -204,27 +204,21 @@ enum Asked {
     Frame(u32, Part),
 }
 
-/// A frame method that falls into parts, fails once, and writes nothing.
-struct Parted {
-    asked: Arc<Mutex<Vec<Asked>>>,
-    parts: [u32; 2],
-    fails_at: Option<Asked>,
+/// A frame method that writes nothing: functions say in how many parts what frames share falls, and hear what was asked for.
+struct Hollow<C, H> {
+    begin_parts: C,
+    /// Of a frame.
+    parts: u32,
+    hear: H,
 }
 
-impl Parted {
-    fn note(&mut self, asked: Asked) -> Result<()> {
-        if self.fails_at == Some(asked) {
-            self.fails_at = None;
-            return Err(Error::setting("part", "asked for", "fails once"));
-        }
-        self.asked.lock().unwrap().push(asked);
-        Ok(())
-    }
-}
-
-impl FrameMethod for Parted {
+impl<C, H> FrameMethod for Hollow<C, H>
+where
+    C: FnMut() -> Option<u32> + Send,
+    H: FnMut(Asked) -> Result<()> + Send,
+{
     fn begin_parts(&mut self, _: &Gpu) -> Result<Option<u32>> {
-        Ok(Some(self.parts[0]))
+        Ok((self.begin_parts)())
     }
 
     fn begin(&mut self, recorder: &mut Recorder) -> Result<()> {
@@ -232,15 +226,15 @@ impl FrameMethod for Parted {
     }
 
     fn begin_part(&mut self, _: &mut Recorder, part: Part) -> Result<()> {
-        self.note(Asked::Begin(part))
+        (self.hear)(Asked::Begin(part))
     }
 
     fn parts(&mut self, _: &Gpu, _: &Camera, _: [u32; 2]) -> Result<u32> {
-        Ok(self.parts[1])
+        Ok(self.parts)
     }
 
     fn record(&mut self, _: &mut Recorder, frame: &Frame<'_>, _: &FrameTarget<'_>) -> Result<()> {
-        self.note(Asked::Frame(frame.number, frame.part))
+        (self.hear)(Asked::Frame(frame.number, frame.part))
     }
 
     fn path_set(&self) -> PathSet {
@@ -269,10 +263,19 @@ fn parts_of_frames_are_asked_for_in_order_each_in_a_submission_of_its_own() {
             let expected: Vec<_> = begin().chain(frame(0)).chain(frame(1)).collect();
             for fails_at in std::iter::once(None).chain(expected.iter().copied().map(Some)) {
                 let asked = Arc::new(Mutex::new(Vec::new()));
-                let method = Parted {
-                    asked: Arc::clone(&asked),
-                    parts,
-                    fails_at,
+                let (heard, mut fails_next) = (Arc::clone(&asked), fails_at);
+                let method = Hollow {
+                    begin_parts: move || Some(parts[0]),
+                    parts: parts[1],
+                    hear: move |asked: Asked| -> Result<()> {
+                        // Once.
+                        if fails_next == Some(asked) {
+                            fails_next = None;
+                            return Err(Error::setting("part", "asked for", "fails once"));
+                        }
+                        heard.lock().unwrap().push(asked);
+                        Ok(())
+                    },
                 };
                 let mut technique = Accumulated::new(gpu, &view, method).unwrap();
                 let (mut submissions, mut failures) = (0, 0);
@@ -311,37 +314,6 @@ fn counted_parts(gpu: &Gpu, method: &mut impl FrameMethod) -> (u32, u32) {
     asked.find_map(|(times, of)| Some((times, of?))).unwrap()
 }
 
-/// A method that takes longer than a step has to count a part.
-struct Slow {
-    counted: Arc<AtomicU32>,
-    drawn: Arc<AtomicU32>,
-}
-
-impl FrameMethod for Slow {
-    fn begin_parts(&mut self, _: &Gpu) -> Result<Option<u32>> {
-        std::thread::sleep(Duration::from_millis(300));
-        let counted = self.counted.fetch_add(1, Ordering::Relaxed) + 1;
-        Ok((counted == 3).then_some(2))
-    }
-
-    fn begin_part(&mut self, _: &mut Recorder, _: Part) -> Result<()> {
-        self.drawn.fetch_add(1, Ordering::Relaxed);
-        Ok(())
-    }
-
-    fn record(&mut self, _: &mut Recorder, _: &Frame<'_>, _: &FrameTarget<'_>) -> Result<()> {
-        Ok(())
-    }
-
-    fn path_set(&self) -> PathSet {
-        PathSet::EMITTED
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        Vec::new()
-    }
-}
-
 #[test]
 fn steps_end_between_two_counts_of_parts() {
     with_gpu(|gpu| {
@@ -353,9 +325,21 @@ fn steps_end_between_two_counts_of_parts() {
             aovs: false,
         };
         let (counted, drawn) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicU32::new(0)));
-        let method = Slow {
-            counted: Arc::clone(&counted),
-            drawn: Arc::clone(&drawn),
+        let (counts, draws) = (Arc::clone(&counted), Arc::clone(&drawn));
+        let method = Hollow {
+            // Takes longer than a step has, and knows at the third time.
+            begin_parts: move || {
+                std::thread::sleep(Duration::from_millis(300));
+                let counted = counts.fetch_add(1, Ordering::Relaxed) + 1;
+                (counted == 3).then_some(2)
+            },
+            parts: 1,
+            hear: move |asked: Asked| -> Result<()> {
+                if let Asked::Begin(_) = asked {
+                    draws.fetch_add(1, Ordering::Relaxed);
+                }
+                Ok(())
+            },
         };
         let mut technique = Accumulated::new(gpu, &view, method).unwrap();
         let now = || [&counted, &drawn].map(|count| count.load(Ordering::Relaxed));

@@ -12,7 +12,7 @@ use clerestory::gpu::shaders::film::display;
 use clerestory::gpu::shaders::kernels::histogram;
 use clerestory::gpu::{
     Access, Buffer, BufferDesc, BufferView, Category, ColorTarget, Gpu, GpuOptions, GraphicsDesc, Image, ImageBarrier,
-    ImageDesc, Lesser, OptionalFeatures, Pass, Residency, Sampler, SamplerDesc, Targets, rw_compute_to_compute,
+    ImageDesc, Lesser, OptionalFeatures, Pass, Render, Residency, Sampler, SamplerDesc, Targets, rw_compute_to_compute,
 };
 use clerestory_tests::shaders::{cube_probe, layer_geom, out_of_bounds, quad_frag, quad_vert, value_frag, value_vert};
 use clerestory_tests::{gpu, gpu_with, with_gpu};
@@ -53,6 +53,20 @@ fn to_layout(image: &Image, new_layout: vk::ImageLayout) -> ImageBarrier<'_> {
         old_layout: vk::ImageLayout::UNDEFINED,
         new_layout,
     }
+}
+
+/// Renders into a whole image, and clears nothing.
+fn render_into<'a>(
+    pass: &mut Pass<'a>,
+    image: &Image,
+    record: impl FnOnce(&mut Render<'_, 'a>) -> clerestory::Result<()>,
+) -> clerestory::Result<()> {
+    let colors = [Some(ColorTarget { image, clear: None })];
+    let targets = Targets {
+        colors: &colors,
+        ..Targets::default()
+    };
+    pass.render(&targets, record)
 }
 
 /// Each must be refused by a setting whose cause holds the words.
@@ -240,17 +254,7 @@ fn what_belongs_to_another_device_is_refused() {
             pass.image_barrier(&[to_layout(&picture, vk::ImageLayout::TRANSFER_DST_OPTIMAL)]);
             Ok(())
         });
-        refused(gpu, words, "target", |pass| {
-            let colors = [Some(ColorTarget {
-                image: &picture,
-                clear: None,
-            })];
-            let targets = Targets {
-                colors: &colors,
-                ..Targets::default()
-            };
-            pass.render(&targets, |_| Ok(()))
-        });
+        refused(gpu, words, "target", |pass| render_into(pass, &picture, |_| Ok(())));
         let texels = other
             .storage_texels("texels", Category::Work, vk::Format::R32_UINT, 4)
             .unwrap();
@@ -290,17 +294,7 @@ fn images_are_used_as_they_were_made_to_be() {
         refused(gpu, words, "buffer to image", |pass| {
             pass.copy_buffer_to_image(rows.view(), &drawn)
         });
-        refused(gpu, words, "target", |pass| {
-            let colors = [Some(ColorTarget {
-                image: &copied,
-                clear: None,
-            })];
-            let targets = Targets {
-                colors: &colors,
-                ..Targets::default()
-            };
-            pass.render(&targets, |_| Ok(()))
-        });
+        refused(gpu, words, "target", |pass| render_into(pass, &copied, |_| Ok(())));
         refused(gpu, words, "layout", |pass| {
             pass.image_barrier(&[to_layout(&copied, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)]);
             Ok(())
@@ -557,14 +551,6 @@ fn what_a_panic_left_in_the_middle_of_a_pass_is_not_submitted() {
 fn a_rendering_whose_closure_panics_ends() {
     with_gpu(|gpu| {
         let picture = image(gpu, vk::ImageUsageFlags::COLOR_ATTACHMENT);
-        let colors = [Some(ColorTarget {
-            image: &picture,
-            clear: None,
-        })];
-        let targets = Targets {
-            colors: &colors,
-            ..Targets::default()
-        };
         let words = storage(gpu, "words", 64);
         let mut recorder = gpu.recorder("panics").unwrap();
         recorder
@@ -574,7 +560,7 @@ fn a_rendering_whose_closure_panics_ends() {
                     ..to_layout(&picture, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
                 }]);
                 let panicked = catch_unwind(AssertUnwindSafe(|| {
-                    pass.render(&targets, |_| -> clerestory::Result<()> { panic!("a planned panic") })
+                    render_into(pass, &picture, |_| panic!("a planned panic"))
                 }));
                 assert!(panicked.is_err());
                 // Not allowed inside of a rendering.

@@ -10,6 +10,7 @@ import argparse
 import concurrent.futures
 import hashlib
 import json
+import math
 import os
 import re
 import shutil
@@ -423,33 +424,40 @@ class Programs:
             start_new_session=True,
         )
 
-    def run(self, tests, number, limit):
-        """Runs tests with a fault, as many at once as there are processors, to the first that fails. That one with what it said, `None` where all
-        pass, and whether they ended in time."""
+    def run(self, tests, number, limit=math.inf, seconds=None):
+        """Runs tests with a fault (0 for none), as many at once as there are processors, to the first that fails. That one with what it said, `None`
+        where all pass, and whether they ended in time. `seconds` gets those of each that passes."""
         end = time.monotonic() + limit
-        waiting, failed, late = list(tests), [], []
+        failed, late, stopped = [], [], threading.Event()
 
-        def work():
-            while waiting and not failed and not late:
-                test = waiting.pop(0)
-                child = self.start(test, number)
-                while True:
-                    try:
-                        output, _ = child.communicate(timeout=0.2)
-                        if child.returncode != 0:
-                            failed.append((test, output))
-                        break
-                    except subprocess.TimeoutExpired:
-                        if failed or late or time.monotonic() > end:
-                            ended(child)
-                            late.append(test)
-                            break
+        def work(test):
+            if stopped.is_set():
+                return
+            start = time.monotonic()
+            child = self.start(test, number)
+            while True:
+                try:
+                    output, _ = child.communicate(timeout=0.2)
+                    break
+                except subprocess.TimeoutExpired:
+                    if time.monotonic() > end:
+                        late.append(test)
+                        stopped.set()
+                    if stopped.is_set():
+                        ended(child)
+                        return
+            if child.returncode != 0:
+                failed.append((test, output))
+                stopped.set()
+            elif seconds is not None:
+                seconds[" ".join(test)] = time.monotonic() - start
 
-        workers = [threading.Thread(target=work) for _ in range(os.cpu_count() or 1)]
-        for worker in workers:
-            worker.start()
-        for worker in workers:
-            worker.join()
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+            try:
+                list(pool.map(work, tests))
+            finally:
+                # An interrupt ends the tests that are running, too.
+                stopped.set()
         return (failed[0] if failed else None), bool(failed) or not late
 
 
@@ -475,27 +483,22 @@ def durations(programs, wanted, stamp):
     if known.get("stamp") != stamp:
         known = {"stamp": stamp, "seconds": {}}
     seconds = known["seconds"]
-    missing = [test for test in wanted if " ".join(test) not in seconds]
+    missing = []
+    for test in (test for test in wanted if " ".join(test) not in seconds):
+        if programs.names_of(*test):
+            missing.append(test)
+        else:
+            say(f"{' '.join(test)}: is left out, since it is no test, or ignored")
     if missing:
         say(f"running {len(missing)} tests without faults")
-
-        def timed(test):
-            if not programs.names_of(*test):
-                say(f"{' '.join(test)}: is left out, since it is no test, or ignored")
-                return
-            start = time.monotonic()
-            child = programs.start(test, 0)
-            output, _ = child.communicate()
-            if child.returncode != 0:
-                (WORK / "sound.log").write_text(output)
-                raise Unsound(f"{' '.join(test)} fails without faults: see {WORK}/sound.log")
-            seconds[" ".join(test)] = time.monotonic() - start
-
-        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            try:
-                list(pool.map(timed, missing))
-            finally:
-                file.write_text(json.dumps(known, indent=1))
+        try:
+            failed, _ = programs.run(missing, 0, seconds=seconds)
+        finally:
+            file.write_text(json.dumps(known, indent=1))
+        if failed:
+            test, output = failed
+            (WORK / "sound.log").write_text(output)
+            raise Unsound(f"{' '.join(test)} fails without faults: see {WORK}/sound.log")
     return seconds
 
 

@@ -1,5 +1,7 @@
 //! Rays and triangle sets that the tests of this floor share.
 
+pub mod awkward;
+
 pub use crate::test_random::Random;
 
 use super::{Hit, NO_HIT, Ray, triangle};

@@ -5,17 +5,18 @@
 //! and a device that lacks it is an error that names the way round. Bindings of all stages are checked against barriers as those of
 //! compute passes are.
 
+mod checks;
+
 use std::marker::PhantomData;
 use std::sync::Arc;
 
 use ash::vk;
 
 use super::device::{Gpu, Inner};
-use super::image::texel_bytes;
-use super::interface::{Capability, FragmentShader, GeometryShader, ShaderInfo, SpecConstants, Stage, VertexShader};
+use super::interface::{FragmentShader, GeometryShader, ShaderInfo, SpecConstants, Stage, VertexShader};
 use super::layout::{PipelineObjects, ShaderModule, specialization_data, stage_flags};
 use super::pipeline::PipelineInfo;
-use crate::{Error, Result};
+use crate::Result;
 
 /// Which triangles are dropped; front faces are counter-clockwise in the picture (y downwards).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -184,12 +185,12 @@ impl Gpu {
     /// none.
     ///
     /// # Errors
-    /// [`Error::Shader`] when the shaders do not agree on a binding or on the push constants, [`Error::MissingFeature`] on a queue without
-    /// graphics, when a shader needs what the device lacks (geometry shaders, clip distances, views, layers from vertex shaders), writes
-    /// buffers or images from a stage that cannot, when the descriptors, attachments or views are more than the device allows, or for a format that
-    /// the device cannot render into, [`Error::Setting`] for a topology or comparison beyond those of pipelines without tessellation
-    /// or a topology that the geometry shader does not take,
-    /// [`Error::OutOfMemory`], [`Error::Vulkan`].
+    /// [`Error::Shader`](crate::Error::Shader) when the shaders do not agree on a binding or on the push constants,
+    /// [`Error::MissingFeature`](crate::Error::MissingFeature) on a queue without graphics, when a shader needs what the device lacks (geometry
+    /// shaders, clip distances, views, layers from vertex shaders), writes buffers or images from a stage that cannot, when the descriptors,
+    /// attachments or views are more than the device allows, or for a format that the device cannot render into,
+    /// [`Error::Setting`](crate::Error::Setting) for a topology or comparison beyond those of pipelines without tessellation or a topology that the
+    /// geometry shader does not take, [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Vulkan`](crate::Error::Vulkan).
     pub fn graphics_pipeline<V: VertexShader, F: FragmentShader, G: GeometryStage>(
         &self,
         desc: &GraphicsDesc<'_, V, F, G>,
@@ -199,10 +200,7 @@ impl Gpu {
             .flatten()
             .collect();
         self.inner.check_alive()?;
-        check_shaders(&self.inner, &shaders)?;
-        check_attachments(&self.inner, shaders[0].name, desc.colors, desc.view_mask)?;
-        check_state(&self.inner, shaders[0].name, desc)?;
-        check_topology(desc.topology, G::info())?;
+        checks::check(&self.inner, &shaders, desc)?;
         let attachments = desc.colors.len() as u32;
         let mut objects = PipelineObjects::new(&self.inner, &shaders, attachments)?;
         let name = shaders[0].name;
@@ -230,215 +228,6 @@ impl Gpu {
             shaders: PhantomData,
         })
     }
-}
-
-fn missing(gpu: &Inner, feature: impl Into<String>, needed_by: &str, instead: &str) -> Error {
-    Error::MissingFeature {
-        feature: feature.into(),
-        needed_by: needed_by.into(),
-        device: gpu.caps.device.clone(),
-        instead: instead.into(),
-    }
-}
-
-fn check_shaders(gpu: &Inner, shaders: &[&'static ShaderInfo]) -> Result<()> {
-    let vertex = shaders[0];
-    if !gpu.caps.graphics {
-        let instead = "choose a device that has one";
-        return Err(missing(gpu, "a graphics queue", vertex.name, instead));
-    }
-    for shader in shaders {
-        for capability in shader.capabilities {
-            check_capability(gpu, shader, *capability)?;
-        }
-        let (stores, feature) = match shader.stage {
-            Stage::Fragment => (gpu.caps.fragment_stores, "fragmentStoresAndAtomics"),
-            _ => (gpu.caps.vertex_stores, "vertexPipelineStoresAndAtomics"),
-        };
-        if !stores && shader.used_bindings().any(|binding| binding.writes) {
-            return Err(missing(gpu, feature, shader.name, "write from a compute shader"));
-        }
-        let disagree = |message| {
-            Err(Error::Shader {
-                name: shader.name.into(),
-                message,
-            })
-        };
-        if shader.push_constant_bytes > 0 && shader.push_constant_bytes != vertex.push_constant_bytes {
-            return disagree(format!(
-                "its push constants have {} bytes, those of {} have {}",
-                shader.push_constant_bytes, vertex.name, vertex.push_constant_bytes
-            ));
-        }
-        for binding in shader.bindings {
-            let place = (binding.set, binding.binding);
-            let same_place = |other: &&'static ShaderInfo| {
-                let found = other.bindings.iter().find(|b| (b.set, b.binding) == place)?;
-                (found.kind != binding.kind).then_some(other.name)
-            };
-            if let Some(other) = shaders.iter().find_map(same_place) {
-                return disagree(format!(
-                    "binding {} is a {:?} here and another thing in {other}",
-                    binding.name, binding.kind
-                ));
-            }
-        }
-    }
-    Ok(())
-}
-
-fn check_capability(gpu: &Inner, shader: &ShaderInfo, capability: Capability) -> Result<()> {
-    let (offered, feature, instead) = match capability {
-        Capability::Geometry => (
-            gpu.caps.geometry_shader,
-            "geometryShader",
-            "render once for each layer, or by views",
-        ),
-        Capability::ClipDistance => (
-            gpu.caps.max_clip_distances > 0,
-            "shaderClipDistance",
-            "discard fragments by the distance instead",
-        ),
-        Capability::MultiView => (
-            gpu.caps.max_views > 0,
-            "multiview",
-            "render once for each view, with the view's number in the push constants",
-        ),
-        Capability::VertexLayer => (
-            gpu.caps.vertex_layer,
-            "shaderOutputLayer with VK_EXT_shader_viewport_index_layer",
-            "choose the layer in a geometry shader, or render once for each layer",
-        ),
-    };
-    if offered {
-        Ok(())
-    } else {
-        Err(missing(gpu, feature, shader.name, instead))
-    }
-}
-
-fn check_attachments(gpu: &Inner, name: &str, colors: &[vk::Format], view_mask: u32) -> Result<()> {
-    let views = u32::BITS - view_mask.leading_zeros();
-    for (wanted, offered, limit, instead) in [
-        (
-            colors.len() as u32,
-            gpu.caps.max_color_attachments,
-            "maxColorAttachments",
-            "render in several passes",
-        ),
-        (
-            views,
-            gpu.caps.max_views,
-            "maxMultiviewViewCount",
-            "render once for each view",
-        ),
-    ] {
-        if wanted > offered {
-            return Err(missing(gpu, format!("{limit} >= {wanted}"), name, instead));
-        }
-    }
-    Ok(())
-}
-
-/// Fails for formats, topologies and comparisons that the device, or no device, has pipelines of.
-fn check_state<V: VertexShader, F: FragmentShader, G: GeometryStage>(
-    gpu: &Inner,
-    name: &str,
-    desc: &GraphicsDesc<'_, V, F, G>,
-) -> Result<()> {
-    let blended = if desc.additive {
-        vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND
-    } else {
-        vk::FormatFeatureFlags::empty()
-    };
-    let colors = desc.colors.iter().filter(|format| **format != vk::Format::UNDEFINED);
-    let colors = colors.map(|format| (*format, vk::FormatFeatureFlags::COLOR_ATTACHMENT | blended));
-    let depth = desc
-        .depth
-        .map(|format| (format, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT));
-    for (format, wanted) in colors.chain(depth) {
-        // Others have no image here, and drivers need not know what to answer.
-        let known = texel_bytes(format).is_some();
-        // SAFETY: the physical device belongs to the instance.
-        let offered = known.then(|| unsafe {
-            gpu.instance
-                .raw
-                .get_physical_device_format_properties(gpu.physical_device, format)
-        });
-        if !offered.is_some_and(|offered| offered.optimal_tiling_features.contains(wanted)) {
-            let feature = format!("{wanted:?} for format {format:?}");
-            return Err(missing(gpu, feature, name, "choose another format"));
-        }
-    }
-    let topologies = [
-        vk::PrimitiveTopology::POINT_LIST,
-        vk::PrimitiveTopology::LINE_LIST,
-        vk::PrimitiveTopology::LINE_STRIP,
-        vk::PrimitiveTopology::TRIANGLE_LIST,
-        vk::PrimitiveTopology::TRIANGLE_STRIP,
-        vk::PrimitiveTopology::TRIANGLE_FAN,
-    ];
-    let comparisons = vk::CompareOp::NEVER.as_raw()..=vk::CompareOp::ALWAYS.as_raw();
-    for (setting, value, known) in [
-        (
-            "topology",
-            format!("{:?}", desc.topology),
-            topologies.contains(&desc.topology),
-        ),
-        (
-            "depth_compare",
-            format!("{:?}", desc.depth_compare),
-            comparisons.contains(&desc.depth_compare.as_raw()),
-        ),
-    ] {
-        if !known {
-            let cause = format!("is not one that the pipeline of {name} can have");
-            return Err(Error::setting(setting, value, cause));
-        }
-    }
-    Ok(())
-}
-
-/// Fails for primitives that are not those that the geometry shader takes, by its module's own word.
-fn check_topology(topology: vk::PrimitiveTopology, geometry: Option<&'static ShaderInfo>) -> Result<()> {
-    let Some(shader) = geometry else {
-        return Ok(());
-    };
-    let input = match topology {
-        vk::PrimitiveTopology::POINT_LIST => INPUT_POINTS,
-        vk::PrimitiveTopology::LINE_LIST | vk::PrimitiveTopology::LINE_STRIP => INPUT_LINES,
-        _ => INPUT_TRIANGLES,
-    };
-    if execution_modes(shader.spirv).any(|mode| mode == input) {
-        return Ok(());
-    }
-    let cause = format!("is not what the geometry shader {} takes", shader.name);
-    Err(Error::setting("topology", format!("{topology:?}"), cause))
-}
-
-/// Execution modes of SPIR-V that say what a geometry shader takes ("SPIR-V Specification", "Execution Mode").
-const INPUT_POINTS: u32 = 19;
-const INPUT_LINES: u32 = 20;
-const INPUT_TRIANGLES: u32 = 22;
-
-/// The execution modes of a module ("SPIR-V Specification", §2.3, and OpExecutionMode).
-fn execution_modes(spirv: &[u8]) -> impl Iterator<Item = u32> {
-    const HEADER_WORDS: usize = 5;
-    const OP_EXECUTION_MODE: u32 = 16;
-    let word = move |index: usize| {
-        let bytes = spirv.get(4 * index..4 * index + 4)?;
-        Some(u32::from_le_bytes(bytes.try_into().ok()?))
-    };
-    let mut at = HEADER_WORDS;
-    let instructions = std::iter::from_fn(move || {
-        let first = word(at)?;
-        let mode = word(at + 2);
-        // No instruction has no words; a module that says so ends here.
-        let length = (first >> 16) as usize;
-        at = if length == 0 { usize::MAX / 8 } else { at + length };
-        Some((first & 0xFFFF, mode))
-    });
-    instructions.filter_map(|(operation, mode)| mode.filter(|_| operation == OP_EXECUTION_MODE))
 }
 
 fn make<V: VertexShader, F: FragmentShader, G: GeometryStage>(

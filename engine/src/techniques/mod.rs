@@ -17,6 +17,7 @@
 //!    need is left out, and said by `skipped`.
 //! 2. A constant [`Card`]. Its [`create`](Card::create) is called once device and scene have been found fit.
 
+mod accumulated;
 mod device_needs;
 mod foresight;
 pub mod frame;

@@ -1,5 +1,8 @@
 //! Ray indexes against a search through all triangles, bit for bit, and against Möller and Trumbore's test in f64.
 
+#[path = "../../../engine/src/accel/test_support/awkward.rs"]
+mod awkward;
+
 use clerestory::Result;
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::kd::{KdSettings, KdTree};
@@ -11,6 +14,7 @@ use clerestory::accel::{Hit, MAX_COORDINATE, Ray, RayIndex};
 use glam::{DVec3, Vec3};
 
 use crate::Judgement;
+use crate::random::Random;
 
 /// Builds a ray index with default settings.
 type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
@@ -169,9 +173,8 @@ pub(crate) fn judge(kind: &IndexCase, sets: &[RaySet]) -> Result<Judgement> {
     Ok(judgement)
 }
 
-/// Rays of every awkward kind about triangles: along axes with signed zeros, through vertices and edges, starting on them, bounded.
+/// Rays of every awkward kind about triangles.
 pub fn awkward_rays(seed: u64, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray> {
-    let mut random = crate::random::Random(seed);
     let sound: Vec<_> = triangles
         .iter()
         .filter(|triangle| can_be_met(triangle))
@@ -182,29 +185,5 @@ pub fn awkward_rays(seed: u64, triangles: &[[Vec3; 3]], count: usize) -> Vec<Ray
     } else {
         sound
     };
-    let negative_zero = Vec3::splat(-0.0);
-    (0..count)
-        .map(|i| {
-            let (a, b) = (random.choose(&sound), random.choose(&sound));
-            let size = (a[0] - b[0]).length().max((a[1] - a[0]).length());
-            let outside = b[1] + random.vector() * size;
-            let axis = random.choose(&Vec3::AXES) * random.choose(&[1.0, -1.0]);
-            match i % 10 {
-                0 => Ray::new(outside, random.vector()),
-                1 => Ray::new(outside, a[0] - outside),
-                2 => Ray::new(outside, (a[0] + a[1]) * 0.5 - outside),
-                3 => Ray::new(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
-                4 => Ray::new(a[0] - axis * size, axis),
-                5 => Ray::new((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
-                6 => Ray::new(a[0].with_x(b[0].x), axis),
-                7 => Ray::new(a[0], random.vector()),
-                8 => Ray::new(a[0], a[1] - a[0]),
-                _ => Ray {
-                    t_min: 0.25,
-                    t_max: 1.0,
-                    ..Ray::new(outside, a[0] - outside)
-                },
-            }
-        })
-        .collect()
+    awkward::rays(&mut Random(seed), count, |random| random.choose(&sound))
 }

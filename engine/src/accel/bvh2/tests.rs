@@ -1,5 +1,5 @@
 use super::*;
-use crate::accel::test_support::{Random, Sheared, U, brute_force};
+use crate::accel::test_support::{Random, Sheared, U, awkward, brute_force};
 use crate::accel::{FINISHED, NO_HIT, triangle};
 
 fn build(triangles: &[[Vec3; 3]]) -> Bvh2 {
@@ -104,41 +104,13 @@ pub(in crate::accel) fn hard_rays(random: &mut Random, triangles: &[[Vec3; 3]], 
         .filter(|t| t.iter().all(|v| v.abs().max_element() < 1e9))
         .collect();
     let fallback = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let mut rays = Vec::new();
-    for i in 0..count {
-        let pick = |random: &mut Random| {
-            if valid.is_empty() {
-                fallback
-            } else {
-                *valid[random.below(valid.len())]
-            }
-        };
-        let (a, b) = (pick(random), pick(random));
-        let size = (a[0] - b[0]).length().max((a[1] - a[0]).length());
-        let outside = b[1] + random.vector() * size;
-        let axis = Vec3::AXES[random.below(3)] * if random.below(2) == 0 { 1.0 } else { -1.0 };
-        let negative_zero = Vec3::new(-0.0, -0.0, -0.0);
-        let r = match i % 10 {
-            0 => Ray::new(outside, random.vector()),
-            1 => Ray::new(outside, a[0] - outside),
-            2 => Ray::new(outside, (a[0] + a[1]) * 0.5 - outside),
-            3 => Ray::new(outside, ((a[0] + a[1] + a[2]) / 3.0 - outside).normalize_or_zero()),
-            // Parallel to an axis, through a vertex, an edge, a box face.
-            4 => Ray::new(a[0] - axis * size, axis),
-            5 => Ray::new((a[0] + a[1]) * 0.5 - axis * size, axis + negative_zero),
-            6 => Ray::new(a[0].with_x(b[0].x), axis),
-            // Starting on a vertex; along an edge.
-            7 => Ray::new(a[0], random.vector()),
-            8 => Ray::new(a[0], a[1] - a[0]),
-            _ => Ray {
-                t_min: 0.25,
-                t_max: 1.0,
-                ..Ray::new(outside, a[0] - outside)
-            },
-        };
-        rays.push(r);
-    }
-    rays
+    awkward::rays(random, count, |random| {
+        if valid.is_empty() {
+            fallback
+        } else {
+            *valid[random.below(valid.len())]
+        }
+    })
 }
 
 fn usable(triangles: &[[Vec3; 3]], bvh: &Bvh2) -> Vec<bool> {

@@ -277,6 +277,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/adaptive.rs::pictures_of_one_pixel_and_without_noise_are_even",
         "tests/tests/adaptive.rs::adaptive_pictures_are_unbiased",
         "tests/tests/adaptive.rs::slots_get_the_samples_of_their_places",
+        "engine/src/techniques/path/adaptive.rs::pilots_are_a_quarter_of_the_samples_and_powers_of_two",
         "tests/tests/non_finite.rs::they_are_counted_by_kind_and_left_out",
         "engine/src/techniques/path/adaptive/noise.rs::the_noise_of_a_pixel_is_that_of_the_other_class",
         "engine/src/techniques/path/adaptive/noise.rs::neighbourhoods_are_as_wide_as_few_pixels_have_the_noise",
