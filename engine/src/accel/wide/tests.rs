@@ -490,8 +490,13 @@ fn invalid_rays_and_settings_are_refused() {
     for (t_min, t_max) in [(f32::NAN, 10.0), (0.0, f32::NAN), (6.0, 5.0)] {
         assert!(!bvh.any_hit(&Ray { t_min, t_max, ..good }));
     }
-    for (bins, triangle_cost) in [(1, 0.4), (65, 0.4), (16, -1.0), (16, f32::NAN)] {
-        assert!(WideBvh::build(&triangles, &WideSettings { bins, triangle_cost }).is_err());
+    for (leaf_size, triangle_cost) in [(0, 0.4), (LEAF_SIZE + 1, 0.4), (LEAF_SIZE, -1.0), (LEAF_SIZE, f32::NAN)] {
+        let mut settings = WideSettings {
+            triangle_cost,
+            ..WideSettings::default()
+        };
+        settings.binary.leaf_size = leaf_size;
+        assert!(WideBvh::build(&triangles, &settings).is_err());
     }
     // Heaps of leaves that a slot cannot hold.
     let heap = vec![triangles[0]; 40];

@@ -26,6 +26,7 @@ use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
+use crate::accel::bvh2::Bvh2Settings;
 use crate::accel::{DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
@@ -118,9 +119,13 @@ fn index_for(
     {
         Ok(_) => Ok(asked),
         Err(Error::LimitExceeded { .. }) => {
+            let because = match asked.traversal {
+                DeviceTraversal::Wide => "a round of its rays is longer than the loops of a software device",
+                _ => "a leaf of the kd-tree is longer than the loops of a software device",
+            };
             drop(asked);
-            let mut index = IndexKind::default().build_for(gpu, &corners)?;
-            index.report.instead_because = Some("a leaf of the kd-tree is longer than the loops of a software device");
+            let mut index = IndexKind::Bvh2(Bvh2Settings::default()).build_for(gpu, &corners)?;
+            index.report.instead_because = Some(because);
             Ok(index)
         }
         Err(error) => Err(error),
@@ -232,6 +237,8 @@ impl GpuScene {
             steps: match traversal {
                 // A step is a node or a triangle, of a texel or more, and none is met twice.
                 DeviceTraversal::Bvh2 => texels.min(quota.into()),
+                // A round's further iterations beside a node's five texels and a triangle's three.
+                DeviceTraversal::Wide => (2 * texels).min(quota.into()),
                 DeviceTraversal::Kd { .. } => quota.into(),
             },
         })

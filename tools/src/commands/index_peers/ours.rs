@@ -55,14 +55,14 @@ pub const INDEXES: [(&str, Build); 5] = [
         lbvh::build(t, &LbvhSettings::default()).map(Ours::Binary)
     }),
     ("wide, of binned", |t| {
-        WideBvh::build(t, &WideSettings::default()).map(Ours::Wide)
+        let settings = Bvh2Settings {
+            leaf_size: LEAF_SIZE,
+            ..Bvh2Settings::default()
+        };
+        WideBvh::collapse(&Bvh2::build(t, &settings)?, &WideSettings::default()).map(Ours::Wide)
     }),
     ("wide, of lbvh, high", |t| {
-        let settings = LbvhSettings {
-            leaf_size: LEAF_SIZE,
-            ..LbvhSettings::default()
-        };
-        WideBvh::collapse(&lbvh::build(t, &settings)?, &WideSettings::default()).map(Ours::Wide)
+        WideBvh::build(t, &WideSettings::default()).map(Ours::Wide)
     }),
 ];
 

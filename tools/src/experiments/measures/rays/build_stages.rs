@@ -1,6 +1,7 @@
 //! Builds of hierarchies for rays by stage, on the host and on the device, beside the binned surface area heuristic on the same threads.
 
 use clerestory::Result;
+use clerestory::accel::bvh2::Bvh2Settings;
 use clerestory::accel::lbvh::{BuildQuality, LbvhSettings};
 use clerestory::accel::{BuildStages, IndexKind};
 use clerestory::gpu::{DeviceKind, Gpu};
@@ -28,7 +29,7 @@ const ON_DEVICE: &str = "linear, device";
 /// What builds, the one that others are compared with first.
 fn kinds() -> [(&'static str, IndexKind); 4] {
     [
-        ("binned, host", IndexKind::default()),
+        ("binned, host", IndexKind::Bvh2(Bvh2Settings::default())),
         (ON_HOST, IndexKind::lbvh(BuildQuality::Fast)),
         ("linear and optimised, host", IndexKind::lbvh(BuildQuality::High)),
         (ON_DEVICE, IndexKind::LbvhOnDevice(LbvhSettings::default())),
