@@ -513,11 +513,11 @@ fn rays_through_equal_triangles_are_parted_and_none_is_lost() {
             let (picture, _) = path.picture().unwrap();
             (picture.require("radiance").unwrap().values().to_vec(), path.counters())
         };
-        let (whole, one) = of(0, 32_768);
+        let (whole, one) = of(0, 60_000);
         println!("{one:?}");
         assert_eq!((one.stalls, one.postponed), (0, 0));
         // Rays that wait for work, those that a quota stops, and both.
-        for (work, quota) in [(1 << 14, 32_768), (0, 1024), (1 << 14, 1024)] {
+        for (work, quota) in [(1 << 14, 60_000), (0, 1024), (1 << 14, 1024)] {
             let (parted, many) = of(work, quota);
             println!("{many:?}");
             assert!(whole == parted, "work {work}, quota {quota}");

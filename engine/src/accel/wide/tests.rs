@@ -3,8 +3,8 @@ use super::slots::assign;
 use super::traverse::{wide_grid, wide_in_order};
 use super::*;
 use crate::accel::box_test::{BOX_SLACK, BoxTest};
+use crate::accel::bvh2::Bvh2Settings;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
-use crate::accel::lbvh::{self, LbvhSettings};
 use crate::accel::test_support::{Random, U, brute_force};
 use crate::accel::{FINISHED, NO_HIT};
 use crate::gpu::shaders::constants;
@@ -13,13 +13,13 @@ fn build(triangles: &[[Vec3; 3]]) -> WideBvh {
     WideBvh::build(triangles, &WideSettings::default()).expect("valid input")
 }
 
-/// The same of an optimised linear hierarchy.
-fn of_lbvh(triangles: &[[Vec3; 3]]) -> WideBvh {
-    let settings = LbvhSettings {
+/// The same of a tree by the binned heuristic.
+fn of_binned(triangles: &[[Vec3; 3]]) -> WideBvh {
+    let settings = Bvh2Settings {
         leaf_size: LEAF_SIZE,
-        ..LbvhSettings::default()
+        ..Bvh2Settings::default()
     };
-    let binary = lbvh::build(triangles, &settings).expect("valid input");
+    let binary = Bvh2::build(triangles, &settings).expect("valid input");
     WideBvh::collapse(&binary, &WideSettings::default()).expect("valid tree")
 }
 
@@ -36,7 +36,7 @@ fn usable(triangles: &[[Vec3; 3]], bvh: &WideBvh) -> Vec<bool> {
 fn traversal_equals_trying_all_triangles_bit_for_bit() {
     let mut random = Random(21);
     for (name, triangles) in hard_scenes() {
-        for bvh in [build(&triangles), of_lbvh(&triangles)] {
+        for bvh in [build(&triangles), of_binned(&triangles)] {
             let usable = usable(&triangles, &bvh);
             let mut hits = 0;
             for ray in hard_rays(&mut random, &triangles, 1000) {
@@ -79,7 +79,7 @@ fn held(bvh: &WideBvh) -> Vec<(usize, usize, Aabb)> {
 #[test]
 fn trees_are_well_formed() {
     for (name, triangles) in hard_scenes() {
-        for bvh in [build(&triangles), of_lbvh(&triangles)] {
+        for bvh in [build(&triangles), of_binned(&triangles)] {
             let statistics = bvh.statistics();
             let used = usable(&triangles, &bvh).iter().filter(|used| **used).count() as u64;
             assert_eq!(statistics.triangles, used, "{name}");
