@@ -55,6 +55,12 @@ fn device_builds_are_the_twins_on_soups() {
                 }
                 check(&format!("soup of {count}"), &builder, &settings, &triangles);
             }
+            // Two in each cell along an axis, the last one first: the order of places is not that of codes anywhere.
+            let row: Vec<[Vec3; 3]> = (0..2048u16)
+                .rev()
+                .map(|i| [0.0, 0.1, 0.2].map(|y| Vec3::new(f32::from(i), y, y * y)))
+                .collect();
+            check("row", &builder, &settings, &row);
         }
     });
 }

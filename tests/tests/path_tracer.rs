@@ -376,6 +376,22 @@ fn environments_light_a_plane_by_their_cosine_integral() {
             .sum();
         let picture = render(gpu, &scene, SMALL, 256, &independent());
         picture.expect_values("rows", &floor_picture(16, |_, _| irradiance));
+
+        // Light sampling that chooses the environment in a part of its choices alone.
+        let (height, intensity) = (1.5f32, 3.0f32);
+        scene.add_light(
+            "point",
+            LightKind::Point {
+                position: height * Vec3::Y,
+                intensity: Vec3::splat(intensity),
+            },
+        );
+        let law = |x: f64, z: f64| {
+            let height = f64::from(height);
+            irradiance + f64::from(intensity) * height / (x * x + z * z + height * height).powf(1.5)
+        };
+        let picture = render(gpu, &scene, SMALL, 256, &independent());
+        picture.expect_values("rows and a point", &floor_picture(16, law));
     });
 }
 

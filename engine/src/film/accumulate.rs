@@ -168,6 +168,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     shaders: &["shaders/film/two_float.glsl"],
     tests: &[
         "engine/src/film/accumulate.rs::a_million_equal_samples_do_not_stall",
+        "engine/src/film/accumulate.rs::few_samples_have_their_unbiased_variance",
         "engine/src/film/accumulate.rs::alternating_magnitudes_agree_with_an_integer_sum",
         "tests/tests/twins/sums.rs::sums_in_pairs_are_equal_bit_for_bit",
     ],
@@ -248,6 +249,16 @@ mod tests {
             (sum.to_f64() - exact).abs() <= exact * f64::from(f32::EPSILON) / 2.0,
             "{sum:?} {exact}"
         );
+    }
+
+    #[test]
+    fn few_samples_have_their_unbiased_variance() {
+        let mut statistics = Accumulator::default();
+        for (x, variance) in [(3.0, 0.0), (5.0, 2.0), (1.0, 4.0), (7.0, 20.0 / 3.0)] {
+            statistics.add(x);
+            assert!((statistics.variance() - variance).abs() < 1e-14, "{x}");
+            assert!((statistics.variance_of_mean() - variance / statistics.count as f64).abs() < 1e-14, "{x}");
+        }
     }
 
     #[test]

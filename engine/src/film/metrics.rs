@@ -317,6 +317,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     sources: &[sources::ROUSSELLE_2011.whole(), sources::ANDERSSON_2020.whole()],
     tests: &[
         "engine/src/film/metrics.rs::formulas_give_what_hand_calculation_gives",
+        "engine/src/film/metrics.rs::quantile_is_the_value_at_its_rank",
         "engine/src/film/metrics.rs::relative_errors_are_the_same_in_every_unit",
         "engine/src/film/metrics.rs::flip_sees_what_tone_mapping_shows",
         "engine/src/film/metrics.rs::pixels_per_degree_are_in_their_range_and_finite_there",

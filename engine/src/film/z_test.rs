@@ -338,6 +338,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/film/z_test.rs::false_alarms_come_at_the_stated_rate",
         "engine/src/film/z_test.rs::students_t_is_that_of_the_tables",
+        "engine/src/film/z_test/distributions.rs::counts_have_the_quantiles_of_the_tables",
         "engine/src/film/z_test.rs::estimated_variances_keep_the_rate_of_false_alarms",
         "engine/src/film/z_test.rs::ten_wrong_pixels_among_4096_differ",
         "engine/src/film/z_test.rs::heavy_tails_are_named_and_no_agreement",

@@ -398,6 +398,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/model.rs::pictures_that_cannot_move_show_no_bias",
         "engine/src/plan/bias.rs::known_biases_are_recovered",
         "engine/src/plan/bias.rs::noise_is_seldom_taken_for_bias",
+        "engine/src/plan/bias.rs::drifts_are_told_from_noise_that_both_stages_share",
         "engine/src/techniques/path/unseen.rs::caustics_of_lights_without_area_are_said_to_be_missed",
         "engine/src/plan/verdict.rs::what_cannot_be_had_is_said",
         "tests/tests/automatic_choice.rs::predictions_come_true",

@@ -179,6 +179,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/distribution.rs::what_is_left_of_a_word_is_even_in_each_entry",
         "engine/src/transport/choice.rs::what_is_left_is_even_in_each_alternative",
         "tests/tests/samplers.rs::lights_are_chosen_by_their_power",
+        "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
         "engine/src/transport/gpu_scene/lights.rs::no_light_loses_more_than_half_of_its_choices",
         "tests/tests/twins/tables.rs::distributions_agree_with_their_twins",
     ],

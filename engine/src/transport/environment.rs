@@ -260,6 +260,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/environment.rs::samples_have_the_density_that_is_looked_up",
         "engine/src/transport/environment.rs::density_is_in_proportion_to_luminance",
         "engine/src/transport/environment.rs::light_is_never_missed_and_bad_maps_are_errors",
+        "engine/src/transport/environment.rs::uniform_maps_are_sampled_uniformly",
+        "engine/src/transport/gpu_scene/lights.rs::small_bright_parts_of_a_sky_are_aimed_at_beside_lamps",
         "tests/tests/samplers.rs::environments_are_sampled_by_what_is_looked_up",
         "tests/tests/path_tracer.rs::environments_light_a_plane_by_their_cosine_integral",
         "tests/tests/preview/technique.rs::the_environment_is_read_back_as_it_was",

@@ -179,6 +179,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/media/homogeneous.rs::rays_past_a_source_have_the_exact_multiple_scattering",
             "tests/tests/media/mechanics.rs::parts_of_everything_sum_to_the_whole",
             "tests/tests/twins/media.rs::free_flight_agrees_with_its_twin",
+            "engine/src/transport/medium.rs::extremes_stay_finite",
         ],
         api: &["clerestory::transport::medium"],
         ..Row::of(file!())

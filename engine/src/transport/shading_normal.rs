@@ -43,6 +43,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/transport/shading_normal.rs::adapted_normals_face_the_viewer_and_show_no_more_light_than_arrives",
         "engine/src/transport/shading_normal.rs::beams_scatter_more_energy_than_they_bring",
+        "engine/src/transport/shading_normal.rs::directions_between_the_two_surfaces_are_rejected",
         "engine/src/scene/normal_map.rs::flat_maps_keep_the_normal",
         "tests/tests/twins/reflection.rs::shading_normals_agree_with_their_twins",
     ],
@@ -110,6 +111,20 @@ mod tests {
         println!("brightest {brightest}, within {sharpest}");
         // Where nothing is lost, a gain of a few per cent would be seen.
         assert!(brightest > 0.95 && sharpest < 0.04);
+    }
+
+    #[test]
+    fn directions_between_the_two_surfaces_are_rejected() {
+        let (ns, ng) = (DVec3::new(0.6, 0.0, 0.8), DVec3::Z);
+        // Above both, above the one or the other, below both.
+        for (wi, agree) in [
+            (DVec3::new(0.0, 0.6, 0.8), true),
+            (DVec3::new(0.8, 0.0, -0.28).normalize(), false),
+            (DVec3::new(-0.96, 0.0, 0.28), false),
+            (DVec3::new(0.0, 0.6, -0.8), true),
+        ] {
+            assert_eq!(sides_agree(ns, ng, wi), agree, "{wi}");
+        }
     }
 
     /// The known defect of shading normals: what holds for what is seen does not hold for a beam.

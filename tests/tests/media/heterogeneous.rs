@@ -15,14 +15,17 @@ fn gradients_attenuate_by_their_integral() {
     with_gpu(|gpu| {
         // Densities rise linearly from cell to cell; interpolation keeps their mean along the axis, however many cells a block of
         // majorants has. The eye's rays go by ratio tracking, and so do shadow rays.
-        for cells in [1u32, 2, 7, 40] {
+        let thin = [0.25, 1.0, 2.0];
+        // Which few rays pass is decided by roulette.
+        let thick = [2.0, 2.5, 3.0];
+        for (cells, sigma_a) in [(1u32, thin), (2, thin), (7, thin), (40, thin), (7, thick)] {
             let grid = layers(cells, LOW, HIGH, |y| 2.0 * y);
             let absorber = Medium {
-                sigma_a: Vec3::new(0.25, 1.0, 2.0),
+                sigma_a: Vec3::from_array(sigma_a),
                 density: Some(grid),
                 ..Medium::default()
             };
-            let expected = [0.25, 1.0, 2.0].map(|s: f64| (-2.0 * s).exp());
+            let expected = sigma_a.map(|s| (-2.0 * f64::from(s)).exp());
             let mut scene = Scene {
                 environment: Some(Environment::uniform(Vec3::ONE)),
                 ..Scene::default()

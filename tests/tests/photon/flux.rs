@@ -141,6 +141,49 @@ fn photons_that_leave_are_counted() {
     });
 }
 
+#[test]
+fn spots_send_photons_into_their_cone_alone() {
+    with_gpu(|gpu| {
+        let mut scene = room(Vec3::splat(0.5));
+        scene.add_light(
+            "spot",
+            LightKind::Spot {
+                position: Vec3::ZERO,
+                direction: Vec3::NEG_Y,
+                intensity: Vec3::ONE,
+                inner: 0.2,
+                outer: 0.4,
+            },
+        );
+        let (photons, _) = all_photons(gpu, &scene, 0);
+        let first: Vec<&MappedPhoton> = photons.iter().filter(|photon| photon.bounce == 0).collect();
+        assert_eq!(first.len(), PHOTONS as usize);
+        assert!(first.iter().all(|photon| photon.record.flux.x > 0.0));
+    });
+}
+
+#[test]
+fn photons_end_where_no_picture_asks_for_more() {
+    with_gpu(|gpu| {
+        let mut scene = room(Vec3::ONE);
+        add_point(&mut scene, Vec3::new(0.3, 0.2, -0.4), Vec3::ONE);
+        for most in 1..4 {
+            let settings = PhotonSettings {
+                photons: PHOTONS,
+                direct_photons: true,
+                ..settings(&format!("bounces=0..{most}"))
+            };
+            let mut mapper = mapper(gpu, &scene, &settings);
+            let photons = mapper.photons(0).unwrap_or_else(|error| panic!("{error}"));
+            // The eye's own hit is the last of the bounces.
+            let last = photons.iter().map(|photon| photon.bounce).max();
+            assert_eq!(last, Some(most - 1), "{most}");
+            let c = mapper.counts().photons;
+            assert!(c.rays <= u64::from(most * PHOTONS) && c.rays > u64::from((most - 1) * PHOTONS), "{c:?}");
+        }
+    });
+}
+
 /// From a square of side 1 to one of side 2 that faces it at a distance of 3: midpoints of 24 × 24 and 48 × 48 cells.
 fn form_factor() -> f64 {
     let middles =

@@ -30,17 +30,30 @@ struct Made {
     stalls: u64,
 }
 
-/// Sixteen samples per pixel, so that a wave has as many places as two workgroups of the queue in blocks walk.
-fn made(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, (queue, query): (MapQueue, MapQuery)) -> Made {
+/// Samples per pixel of a pass, so that a wave has as many places as two workgroups of the queue in blocks walk.
+const SAMPLES: u32 = 16;
+
+/// By one pass.
+fn made(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, form: (MapQueue, MapQuery)) -> Made {
+    made_by(gpu, scene, settings, form, 1)
+}
+
+fn made_by(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &PhotonSettings,
+    (queue, query): (MapQueue, MapQuery),
+    passes: u32,
+) -> Made {
     let settings = PhotonSettings {
         queue,
         query,
-        samples_per_pass: 16,
+        samples_per_pass: SAMPLES,
         ..settings.clone()
     };
     let mut mapper = mapper(gpu, scene, &settings);
     Made {
-        bits: bits(&advance(&mut mapper, 16)),
+        bits: bits(&advance(&mut mapper, passes * SAMPLES)),
         gather: mapper.counts().gather,
         stalls: mapper.eye_counters().stalls,
     }
@@ -86,7 +99,7 @@ fn seen_little() -> Scene {
 }
 
 /// Paths that could ask at each of their places.
-const PLACES: u64 = 16 * (SIDE * SIDE) as u64;
+const PLACES: u64 = SAMPLES as u64 * (SIDE * SIDE) as u64;
 
 #[test]
 fn every_queue_gives_the_same_picture() {
@@ -113,6 +126,19 @@ fn every_queue_gives_the_same_picture() {
         };
         expect_alike(gpu, &seen_little(), &settings);
         expect_alike(gpu, &builtin("builtin:ring"), &queued());
+    });
+}
+
+// Behind the end of a list that is not full are places of the pass before.
+#[test]
+fn nothing_is_asked_behind_the_end_of_a_queue() {
+    with_gpu(|gpu| {
+        let by = |form| made_by(gpu, &seen_little(), &direct(), form, 4);
+        let slots = by(FORMS[0]);
+        assert!(slots.gather.queries > 0 && slots.gather.queries < PLACES);
+        for form in &FORMS[1..3] {
+            assert!(by(*form) == slots, "{form:?}");
+        }
     });
 }
 

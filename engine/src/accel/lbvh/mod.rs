@@ -40,6 +40,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     ],
     tests: &[
         "engine/src/accel/lbvh/tests.rs::trees_are_valid_on_hard_boxes",
+        "engine/src/accel/morton.rs::cells_fill_the_grid_and_keep_order",
         "engine/src/accel/lbvh/tests.rs::the_order_of_climbing_never_shows",
         "engine/src/accel/lbvh/tests.rs::hits_are_those_of_the_binned_tree",
         "engine/src/accel/lbvh/tests.rs::refitted_trees_have_the_hits_of_new_ones",

@@ -72,3 +72,26 @@ pub(super) fn poisson_quantile(mean: f64, probability: f64) -> u64 {
     }
     count
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // By sums of the probabilities exp(-m) m^k / k!.
+    #[test]
+    fn counts_have_the_quantiles_of_the_tables() {
+        for (mean, probability, count) in [
+            (0.0, 0.99, 0),
+            (0.5, 0.99, 3),
+            (2.0, 0.94, 4),
+            (2.0, 0.95, 5),
+            (10.0, 0.95, 15),
+            (10.0, 0.999, 21),
+        ] {
+            assert_eq!(poisson_quantile(mean, probability), count, "{mean}, {probability}");
+        }
+        // The sum and the normal distribution meet where the one takes over from the other.
+        let [below, above] = [499.9, 500.1].map(|mean| poisson_quantile(mean, 0.99));
+        assert!(above.abs_diff(below) <= 3, "{below}, {above}");
+    }
+}

@@ -424,6 +424,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/techniques/photon_mapping/kernel/tests.rs::equal_disks_are_the_estimator_of_fixed_bandwidth",
             "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
+            "tests/tests/photon/materials.rs::floors_of_all_kinds_gather",
             "tests/tests/photon/traps.rs::thin_walls_let_no_photon_through",
             "tests/tests/photon/traps.rs::colours_bleed_through_the_passage_as_they_should",
         ],
@@ -476,6 +477,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/photon/determinism.rs::queries_that_a_quota_stops_go_through_all_records",
             "tests/tests/photon/flux.rs::the_picture_has_the_flux_of_the_map",
+            "tests/tests/photon/materials.rs::light_goes_through_what_lets_it_through",
             "tests/tests/photon/determinism.rs::threads_never_show",
         ],
         settings: &["query"],

@@ -277,6 +277,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/photons.rs::weights_agree_with_their_twins",
             "tests/tests/photon/sphere.rs::all_reflections_sum_up_for_every_kernel",
             "tests/tests/photon/convergence.rs::bias_and_variance_fall_as_radii_foretell",
+            "engine/src/techniques/photon_mapping/card.rs::laws_follow_the_settings",
         ],
         settings: &["profile"],
         ..Row::of(file!())

@@ -238,6 +238,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
             "tests/tests/photon/queues.rs::queues_take_places_that_all_lie_in_the_same_thousand_kernels",
+            "tests/tests/photon/queues.rs::nothing_is_asked_behind_the_end_of_a_queue",
         ],
         settings: &["queue"],
         ..Row::of(file!())

@@ -448,6 +448,8 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/photon/flux.rs::closed_rooms_keep_every_photon_and_lose_flux_by_reflection_alone",
             "tests/tests/photon/flux.rs::photons_that_leave_are_counted",
+            "tests/tests/photon/flux.rs::spots_send_photons_into_their_cone_alone",
+            "tests/tests/photon/flux.rs::photons_end_where_no_picture_asks_for_more",
             "tests/tests/photon/lights.rs::points_spots_and_suns_shine_as_they_should",
             "tests/tests/photon/lights.rs::lamps_and_skies_shine_as_they_should",
             "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
