@@ -499,7 +499,7 @@ fn automatic_choices_end_where_first_pilots_do_not() {
 #[test]
 fn rays_through_equal_triangles_are_parted_and_none_is_lost() {
     with_gpu(|gpu| {
-        let scene = equal_triangles(10_000);
+        let scene = equal_triangles(4_000);
         let of = |submission_work, ray_quota| {
             let settings = PathTracerSettings {
                 submission_work,
@@ -513,17 +513,17 @@ fn rays_through_equal_triangles_are_parted_and_none_is_lost() {
             let (picture, _) = path.picture().unwrap();
             (picture.require("radiance").unwrap().values().to_vec(), path.counters())
         };
-        let (whole, one) = of(0, 60_000);
+        let (whole, one) = of(0, 32_768);
         println!("{one:?}");
         assert_eq!((one.stalls, one.postponed), (0, 0));
         // Rays that wait for work, those that a quota stops, and both.
-        for (work, quota) in [(1 << 14, 60_000), (0, 1024), (1 << 14, 1024)] {
+        for (work, quota) in [(1 << 14, 32_768), (0, 1024), (1 << 14, 1024)] {
             let (parted, many) = of(work, quota);
             println!("{many:?}");
             assert!(whole == parted, "work {work}, quota {quota}");
             assert_eq!((many.extend_rays, many.shadow_rays), (one.extend_rays, one.shadow_rays));
             assert_eq!(many.postponed > 0, work > 0);
-            assert_eq!(many.stalls > 0, quota < 10_000);
+            assert_eq!(many.stalls > 0, quota < 4_000);
         }
     });
 }
