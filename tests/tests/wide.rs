@@ -222,7 +222,7 @@ fn rays_among(triangles: &[[Vec3; 3]], eye: Vec3, count: usize, random: &mut Ran
         };
         Ray {
             origin: origin.into(),
-            t_min: if i % 2 == 0 { 0.0 } else { 1e-4 },
+            t_min: if i.is_multiple_of(2) { 0.0 } else { 1e-4 },
             direction: direction.into(),
             t_max: f32::INFINITY,
         }

@@ -257,7 +257,10 @@ mod tests {
         for (x, variance) in [(3.0, 0.0), (5.0, 2.0), (1.0, 4.0), (7.0, 20.0 / 3.0)] {
             statistics.add(x);
             assert!((statistics.variance() - variance).abs() < 1e-14, "{x}");
-            assert!((statistics.variance_of_mean() - variance / statistics.count as f64).abs() < 1e-14, "{x}");
+            assert!(
+                (statistics.variance_of_mean() - variance / statistics.count as f64).abs() < 1e-14,
+                "{x}"
+            );
         }
     }
 

@@ -179,7 +179,10 @@ fn photons_end_where_no_picture_asks_for_more() {
             let last = photons.iter().map(|photon| photon.bounce).max();
             assert_eq!(last, Some(most - 1), "{most}");
             let c = mapper.counts().photons;
-            assert!(c.rays <= u64::from(most * PHOTONS) && c.rays > u64::from((most - 1) * PHOTONS), "{c:?}");
+            assert!(
+                c.rays <= u64::from(most * PHOTONS) && c.rays > u64::from((most - 1) * PHOTONS),
+                "{c:?}"
+            );
         }
     });
 }
