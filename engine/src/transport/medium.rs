@@ -194,7 +194,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "BG-4",
         name: "free flight and transmittance: analytic, delta and ratio tracking, equi-angular",
         role: Role::PartOf("BG-3"),
-        limits: "Equi-angular samples are taken of one light a way, chosen by its power alone; not inside solids that refract, nor of area lights where all are larger than half a mean free path: those gain nothing by them. In grids the looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
+        limits: "Equi-angular samples are taken of one light a way, chosen by its power alone; not inside solids that refract, nor of area lights where all are larger than half a mean free path; in grids the looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
         sources: &[
             sources::WOODCOCK_1965.whole(),
             sources::KULLA_FAJARDO_2012.whole(),
