@@ -28,7 +28,8 @@ SceneMedium load_medium(uint index) {
     uvec4 q8 = medium_quarter(index, 8u);
     return SceneMedium(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), uintBitsToFloat(q1.w), uintBitsToFloat(q2.xyz),
                        uintBitsToFloat(q2.w), uintBitsToFloat(q3.xyz), q3.w, uintBitsToFloat(q4.xyz), q4.w,
-                       uintBitsToFloat(q5.xyz), q5.w, uintBitsToFloat(q6.xyz), uintBitsToFloat(q6.w), q7.xyz, q7.w, q8.xyz, q8.w);
+                       uintBitsToFloat(q5.xyz), q5.w, uintBitsToFloat(q6.xyz), uintBitsToFloat(q6.w), q7.xyz, uintBitsToFloat(q7.w), q8.xyz,
+                       uintBitsToFloat(q8.w));
 }
 
 // A direction of world space in cells of the grid.

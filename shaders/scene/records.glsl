@@ -108,9 +108,9 @@ struct SceneMedium {
     vec3 offset;
     float block;           // cells along the side of a block with one majorant
     uvec3 cells;
-    uint spare;
+    float density_max;     // of the grid
     uvec3 blocks;
-    uint spare_blocks;
+    float tightness;       // mean density over the mean of the blocks' greatest ones
 };
 
 // What stands before an environment's texels: its axes in world space, its size, where its probabilities begin.

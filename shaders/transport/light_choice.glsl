@@ -41,12 +41,73 @@ float triangle_light_pdf(Surface s, vec3 direction, float t) {
     return area_to_solid_angle(2.0 * choice / s.double_area, t * t, abs(dot(s.geometric_normal, direction)));
 }
 
+// A point of a light with a place in the scene, as it is chosen whatever it lights.
+struct LightPoint {
+    SceneLight light;
+    float probability;  // of the light
+    Surface surface;    // of a triangle
+    SurfacePoint point;
+    vec3 normal;        // of a triangle; zero otherwise
+};
+
+LightSample no_light() { return LightSample(vec3(0.0), vec3(0.0), 0.0, SurfacePoint(vec3(0.0), vec3(0.0)), vec3(0.0), false); }
+
+// A light by the first of two words, which becomes the place within that light's share.
+SceneLight choose_light(inout uvec2 word, uint fresh, out float probability) {
+    return load_light(distribution_sample(0u, light_count(), word.x, fresh, probability));
+}
+
+// The point of a triangle that two words choose, evenly by area, or that of a point or spot.
+LightPoint light_point(SceneLight light, float probability, uvec2 word, vec3 scene_lower, vec3 scene_upper) {
+    LightPoint p;
+    p.light = light;
+    p.probability = probability;
+    p.point = SurfacePoint(light.position, vec3(0.0));
+    p.normal = vec3(0.0);
+    if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
+        vec2 u = vec2(unit_float(word.x), unit_float(word.y));
+        p.surface = surface_at(Hit(0.0, square_to_triangle(u).yz, light.triangle), scene_lower, scene_upper);
+        p.point = p.surface.point;
+        p.normal = p.surface.geometric_normal;
+    }
+    return p;
+}
+
+// The light of a point of a light seen from `from`.
+LightSample light_seen(LightPoint p, vec3 from) {
+    LightSample result = no_light();
+    result.point = p.point;
+    result.normal = p.normal;
+    vec3 to = p.point.position - from;
+    float squared = dot(to, to);
+    if (squared <= 0.0) {
+        return result;
+    }
+    result.direction = to * inversesqrt(squared);
+    if (HAS_AREA_LIGHTS && p.light.kind == LIGHT_TRIANGLE) {
+        result.pdf = area_to_solid_angle(2.0 * p.probability / p.surface.double_area, squared, abs(dot(p.normal, result.direction)));
+        SceneMaterial m = load_material(p.surface.material);
+        if (result.pdf > 0.0) {
+            result.radiance = surface_emission(m, p.surface, -result.direction) / result.pdf;
+        }
+        if (HAS_ALPHA) {
+            // What a ray would meet there only in part, light sampling must not find in full.
+            result.radiance *= material_coverage(m, surface_base_color(m, p.surface).a);
+        }
+    } else if (HAS_PUNCTUAL_LIGHTS) {
+        float cos_angle = -dot(p.light.direction, result.direction);
+        float falloff = p.light.kind == LIGHT_SPOT ? spot_falloff(cos_angle, p.light.cos_inner, p.light.cos_outer) : 1.0;
+        result.radiance = p.light.strength * (falloff / (squared * p.probability));
+    }
+    return result;
+}
+
 // A light, and a point or a direction of it, by one point of the unit square in two words. Zero radiance when there is nothing to see.
 LightSample sample_light(vec3 from, uvec2 word, vec3 scene_lower, vec3 scene_upper) {
-    LightSample result = LightSample(vec3(0.0), vec3(0.0), 0.0, SurfacePoint(vec3(0.0), vec3(0.0)), vec3(0.0), false);
     uvec3 fresh = pcg3d(uvec3(word, 0u));
     float probability;
-    SceneLight light = load_light(distribution_sample(0u, light_count(), word.x, fresh.x, probability));
+    SceneLight light = choose_light(word, fresh.x, probability);
+    LightSample result = no_light();
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         vec4 found;
         SceneEnvironment e = load_environment();
@@ -63,36 +124,7 @@ LightSample sample_light(vec3 from, uvec2 word, vec3 scene_lower, vec3 scene_upp
         result.infinite = true;
         return result;
     }
-    Surface s;
-    result.point.position = light.position;
-    if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
-        vec2 u = vec2(unit_float(word.x), unit_float(word.y));
-        s = surface_at(Hit(0.0, square_to_triangle(u).yz, light.triangle), scene_lower, scene_upper);
-        result.point = s.point;
-        result.normal = s.geometric_normal;
-    }
-    vec3 to = result.point.position - from;
-    float squared = dot(to, to);
-    if (squared <= 0.0) {
-        return result;
-    }
-    result.direction = to * inversesqrt(squared);
-    if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
-        result.pdf = area_to_solid_angle(2.0 * probability / s.double_area, squared, abs(dot(result.normal, result.direction)));
-        SceneMaterial m = load_material(s.material);
-        if (result.pdf > 0.0) {
-            result.radiance = surface_emission(m, s, -result.direction) / result.pdf;
-        }
-        if (HAS_ALPHA) {
-            // What a ray would meet there only in part, light sampling must not find in full.
-            result.radiance *= material_coverage(m, surface_base_color(m, s).a);
-        }
-    } else if (HAS_PUNCTUAL_LIGHTS) {
-        float cos_angle = -dot(light.direction, result.direction);
-        float falloff = light.kind == LIGHT_SPOT ? spot_falloff(cos_angle, light.cos_inner, light.cos_outer) : 1.0;
-        result.radiance = light.strength * (falloff / (squared * probability));
-    }
-    return result;
+    return light_seen(light_point(light, probability, word, scene_lower, scene_upper), from);
 }
 
 #endif

@@ -23,6 +23,11 @@ const float RATIO_ROULETTE_SURVIVAL = 0.5;
 // Least component of a direction, as a share of the largest one.
 const float GRID_COMPONENT_MIN = 1e-18;
 
+// Whether walks keep GridWalk.bound: a bool constant.
+#ifndef CLERESTORY_GRID_BOUNDS
+#define CLERESTORY_GRID_BOUNDS false
+#endif
+
 const uint GRID_LEFT = 0u;      // at the end of the segment
 const uint GRID_STOPPED = 1u;   // by the quota
 const uint GRID_COLLIDED = 2u;
@@ -37,9 +42,15 @@ struct GridWalk {
     float t_end;   // of the segment within the grid
     uint draw;     // random numbers so far
     uint nulls;    // tentative collisions that were none
+    float bound;   // integral along the way of the greatest densities of its blocks, m
 };
 
 uvec4 grid_draw(uvec4 key, uint draw) { return pcg4d(pcg4d(key) + uvec4(draw, 0u, 0u, 0u)); }
+
+// The block of a walk's place at t.
+ivec3 grid_block(SceneMedium m, GridWalk w, float t) {
+    return clamp(ivec3(floor((w.origin + t * w.direction) / m.block)), ivec3(0), ivec3(m.blocks) - 1);
+}
 
 GridWalk begin_grid_walk(SceneMedium m, vec3 origin, vec3 direction, float t, float t_end) {
     GridWalk w;
@@ -56,9 +67,10 @@ GridWalk begin_grid_walk(SceneMedium m, vec3 origin, vec3 direction, float t, fl
     w.t = 0.0;
     w.t_end = min(t_end, min(far.x, min(far.y, far.z))) - w.entry;
     w.origin += w.entry * w.direction;
-    w.block = clamp(ivec3(floor(w.origin / m.block)), ivec3(0), ivec3(m.blocks) - 1);
+    w.block = grid_block(m, w, 0.0);
     w.draw = 0u;
     w.nulls = 0u;
+    w.bound = 0.0;
     return w;
 }
 
@@ -74,17 +86,22 @@ uint next_tentative_collision(SceneMedium m, float scale, float depth, inout Gri
         }
         --iterations;
         ++grid_iterations;
-        majorant = m.majorant * fetch_majorant(m, w.block);
+        float greatest = fetch_majorant(m, w.block);
+        majorant = m.majorant * greatest;
         vec3 faces = ((vec3(w.block) + ahead) * m.block - w.origin) * w.inverse;
         float face = min(faces.x, min(faces.y, faces.z));
         float leave = max(min(face, w.t_end), w.t);
         float through = (leave - w.t) * majorant * scale;
-        if (depth < through) {
-            w.t = min(w.t + depth / (majorant * scale), leave);
+        bool within = depth < through;
+        float reached = within ? min(w.t + depth / (majorant * scale), leave) : leave;
+        if (CLERESTORY_GRID_BOUNDS) {
+            w.bound += (reached - w.t) * greatest * scale;
+        }
+        w.t = reached;
+        if (within) {
             return GRID_COLLIDED;
         }
         depth -= through;
-        w.t = leave;
         bvec3 crossed = bvec3(faces.x <= face, faces.y <= face && faces.x > face, faces.z <= face && min(faces.x, faces.y) > face);
         w.block += ivec3(crossed) * step;
         if (any(lessThan(w.block, ivec3(0))) || any(greaterThanEqual(w.block, ivec3(m.blocks)))) {

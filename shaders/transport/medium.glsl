@@ -15,6 +15,8 @@
 const float EXPONENT_MAX = 80.0;
 // Below this optical depth the attenuated length is taken from its series.
 const float SERIES_DEPTH = 0.05;
+// Density of equi-angular samples over that of collisions from which on they are taken: below, both together vary as much as collisions alone.
+const float EQUI_ANGULAR_GAIN = 0.5;
 
 // The band that u in [0, 1) chooses; never one of probability zero.
 uint choose_band(vec3 bands, float u) {
@@ -89,6 +91,12 @@ float equi_angular_sample(EquiAngular e, float t_max, float u) {
 float equi_angular_pdf(EquiAngular e, float t) {
     float d = t - e.along;
     return e.range > 0.0 ? e.off / (e.range * (e.off * e.off + d * d)) : 0.0;
+}
+
+// Whether a sample of the segment is worth a ray of its own beside the collision of a free flight, whose density is at most `extinction`: by the
+// densities where the segment is nearest to the light. Of an endless ray that is the case within two thirds of a mean free path.
+bool equi_angular_helps(EquiAngular e, float t_max, float extinction) {
+    return equi_angular_pdf(e, clamp(e.along, 0.0, t_max)) > EQUI_ANGULAR_GAIN * extinction;
 }
 
 // A tentative collision with an extinction of `real` (at most 1) shares of the majorant: whether u in [0, 1) makes it a real one. Multiplies

@@ -12,6 +12,8 @@ const uint DIMENSION_LIGHT = 2u;      // light, and point or direction of it
 // Ways through media have slots of their own, far behind those of all bounces.
 const uint DIMENSION_FIRST_MEDIUM = 1u << 24;
 const uint DIMENSIONS_PER_WAY = 2u;
-const uint DIMENSION_AIRLIGHT = 1u;  // which light, and where on the way; the first is for the free flight
+const uint DIMENSION_AIRLIGHT = 1u;  // which light, and where on it or, of a light without extent, on the way; the first is for the free flight
+// Where on a way light of a point of an area light is sampled, a slot for each way: two dimensions choose that point already.
+const uint DIMENSION_FIRST_PLACE = 1u << 25;
 
 #endif

@@ -152,6 +152,7 @@ void main() {
         out_bits(5u, sample_null_collision(in3(15u), in3(18u), in1(10u), bands, weight) ? 1u : 0u);
         out3(6u, bands);
         out3(9u, weight);
+        out_bits(12u, equi_angular_helps(e, in1(9u), in1(21u)) ? 1u : 0u);
         break;
     }
     }

@@ -12,6 +12,7 @@ use glam::DVec3;
 pub const FAR_AWAY: f64 = constants::FAR_AWAY as f64;
 const EXPONENT_MAX: f64 = constants::EXPONENT_MAX as f64;
 const SERIES_DEPTH: f64 = constants::SERIES_DEPTH as f64;
+const EQUI_ANGULAR_GAIN: f64 = constants::EQUI_ANGULAR_GAIN as f64;
 
 /// The band that `u` in [0, 1) chooses; never one of probability zero.
 pub fn choose_band(bands: DVec3, u: f64) -> usize {
@@ -102,7 +103,7 @@ pub struct EquiAngular {
     pub range: f64,
 }
 
-/// The place of `light` by a segment of length `t_max` ([`FAR_AWAY`]: endless). The path tracer samples so in homogeneous media alone.
+/// The place of `light`, a point of it, by a segment of length `t_max` ([`FAR_AWAY`]: endless).
 pub fn equi_angular(start: DVec3, direction: DVec3, t_max: f64, light: DVec3) -> EquiAngular {
     let to = light - start;
     let along = to.dot(direction);
@@ -139,6 +140,12 @@ pub fn equi_angular_pdf(e: EquiAngular, t: f64) -> f64 {
     } else {
         0.0
     }
+}
+
+/// Whether a sample of the segment is worth a ray of its own beside the collision of a free flight, whose density is at most `extinction` m⁻¹: by
+/// the densities where the segment is nearest to the light. Of an endless ray that is the case within two thirds of a mean free path.
+pub fn equi_angular_helps(e: EquiAngular, t_max: f64, extinction: f64) -> bool {
+    equi_angular_pdf(e, e.along.clamp(0.0, t_max)) > EQUI_ANGULAR_GAIN * extinction
 }
 
 /// Whether `u` in [0, 1) makes a tentative collision with an extinction of `real` shares (at most 1) of the majorant a real one; the
@@ -188,7 +195,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "BG-4",
         name: "free flight and transmittance: analytic, delta and ratio tracking, equi-angular",
         role: Role::PartOf("BG-3"),
-        limits: "Equi-angular sampling is for homogeneous media alone; in grids the looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
+        limits: "Equi-angular samples are taken of one light a way, chosen by its power alone; not inside solids that refract, nor of area lights where all are larger than half a mean free path; in grids the looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
         sources: &[
             sources::WOODCOCK_1965.whole(),
             sources::KULLA_FAJARDO_2012.whole(),
@@ -205,7 +212,13 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/medium.rs::null_collisions_keep_the_expectation",
             "engine/src/transport/medium.rs::equi_angular_samples_follow_their_density",
             "tests/tests/twins/media.rs::free_flight_agrees_with_its_twin",
+            "tests/tests/twins/media.rs::equi_angular_samples_and_null_collisions_agree_with_their_twins",
             "tests/tests/media/homogeneous.rs::single_scattering_is_the_airlight_integral",
+            "engine/src/transport/gpu_scene/airlight.rs::small_lamps_in_thin_open_media_are_worth_samples",
+            "tests/tests/media/area_lights.rs::single_scattering_beside_a_lamp_is_its_integral",
+            "tests/tests/media/area_lights.rs::lamps_among_bodies_glass_and_alpha_keep_their_expectation",
+            "tests/tests/media/area_lights.rs::ways_through_grids_of_loose_bounds_are_cut_without_a_trace",
+            "tests/tests/media/area_lights.rs::without_lights_that_have_a_place_nothing_of_it_exists",
             "tests/tests/media/heterogeneous.rs::gradients_attenuate_by_their_integral",
             "tests/tests/media/heterogeneous.rs::constant_grids_are_homogeneous_media",
             "tests/tests/media/heterogeneous.rs::layered_slabs_depend_on_their_optical_depth_alone",

@@ -4,14 +4,15 @@
 //
 // BG-1, BG-3, BG-4, PM-F-3: volumetric path tracing by analytic free flight (homogeneous media) and delta tracking (grids); methods and
 // sources in transport/medium.glsl and transport/media_tracking.glsl. Emission of homogeneous media is integrated along the way in closed
-// form, that of grids is collected at tentative collisions. Light from points and spots is in homogeneous media also sampled
-// equi-angularly, combined by the power heuristic. Unbiased. Light from infinity does not pass an endless medium that extinguishes.
+// form, that of grids is collected at tentative collisions. Light of points, spots and points of area lights is also sampled equi-angularly
+// where that helps, combined by the power heuristic. Unbiased. Light from infinity does not pass an endless medium that extinguishes.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 64) in;
 
 layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular samples
+#define CLERESTORY_GRID_BOUNDS HAS_AIRLIGHT
 
 #include "transport/features.glsl"
 #include "transport/media_features.glsl"
@@ -36,6 +37,10 @@ struct Way {
 // What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
 vec3 place_on_way(WalkState path, Way way, float t) { return path.origin + max(way.start + t, 0.0) * path.direction; }
 
+// Weight of light sampling of density `light_pdf` (0: of a light without extent) against the phase function's directions, which meet the light, too.
+// Equi-angular samples and collisions share it: what directions find is weighted without regard to how their place was found.
+float light_weight(float light_pdf, float phase) { return light_pdf > 0.0 ? power_heuristic(light_pdf, phase) : 1.0; }
+
 ShadowRay shadow_ray(uint slot, WalkState path, vec3 from, vec3 to, vec3 contribution) {
     ShadowRay ray;
     ray.origin = from;
@@ -47,51 +52,115 @@ ShadowRay shadow_ray(uint slot, WalkState path, vec3 from, vec3 to, vec3 contrib
     return ray;
 }
 
-// Light of a point or spot scattered once on the way, at a place chosen by the angle under which the light sees it. True where there is some.
-bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, uvec2 word) {
+// Tentative collisions on a segment in a grid, on average and at most.
+const float AIRLIGHT_DEPTH = 96.0;
+// Iterations of a walk to an equi-angular sample: those, and through the blocks of a grid, at most 63 along each axis. With all of them a walk
+// fails to arrive once in 10^150.
+const uint AIRLIGHT_QUOTA = 512u;
+
+// What equi-angular samples are taken of: the way, or the part of it that lies in the grid.
+struct Segment {
+    float start;
+    float reach;  // FAR_AWAY: endless
+};
+
+// Whether light from outside reaches the inside of a body unbent: what is inside a solid that refracts has none but that of lamps inside.
+bool is_open(uint interior) { return interior == OUTSIDE || (material_quarter(interior, 7u).z & MATERIAL_BOUNDARY) != 0u; }
+
+// Whether light has points that samples can be taken of.
+bool has_place(uint kind) {
+    return (HAS_AREA_LIGHTS && kind == LIGHT_TRIANGLE) || (HAS_PUNCTUAL_LIGHTS && (kind == LIGHT_POINT || kind == LIGHT_SPOT));
+}
+
+// Where a light's point is by a segment. It has no range where samples are not worth their rays: whether they are depends on the segment and the
+// point alone, so that it is the same for all ways to sample that point's light.
+EquiAngular airlight_from(WalkState path, vec3 bands, SceneMedium m, Segment segment, GridWalk walk, vec3 light) {
+    EquiAngular e = equi_angular(path.origin + segment.start * path.direction, path.direction, segment.reach, light);
+    float density = 1.0;
+    if (HAS_GRIDS && m.has_grid != 0u) {
+        density = m.tightness * fetch_majorant(m, grid_block(m, walk, clamp(e.along, 0.0, segment.reach)));
+    }
+    e.range = equi_angular_helps(e, segment.reach, density * dot(bands, m.sigma_t)) ? e.range : 0.0;
+    return e;
+}
+
+// Density of collisions that weights reckon with, per metre, t from the start of the segment. In grids, where it is not known, the transmittance of
+// the bounds of the density stands in for it, these scaled by their tightness: each t has one value, which is all that unbiased weights need.
+float reckoned_collision_density(SceneMedium m, vec3 bands, float t, GridWalk walk) {
+    if (HAS_GRIDS && m.has_grid != 0u) {
+        return grid_density(m, walk) * collision_density(m.sigma_t, bands, m.tightness * walk.bound);
+    }
+    return collision_density(m.sigma_t, bands, t);
+}
+
+// Light scattered once on the way, at a place chosen by the angle under which a point of a light sees it (Kulla and Fajardo 2012, 4.1 and 4.2).
+// True where there is some.
+bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, uint interior, Segment segment, GridWalk walk) {
+    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * status.rounds + DIMENSION_AIRLIGHT;
+    uvec2 word = sampler_bits(walk_sampler(slot, dimension));
+    uint place_word = word.y;
     float probability;
-    SceneLight light = load_light(distribution_sample(0u, light_count(), word.x, 0u, probability));
-    if (light.kind != LIGHT_POINT && light.kind != LIGHT_SPOT) {
+    SceneLight light = choose_light(word, pcg3d(uvec3(word, 0u)).x, probability);
+    if (!has_place(light.kind)) {
         return false;
     }
-    float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
-    vec3 start = path.origin + way.start * path.direction;
-    EquiAngular e = equi_angular(start, path.direction, t_max, light.position);
-    float t = equi_angular_sample(e, t_max, unit_float(word.y));
+    if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
+        place_word = sampler_bits(walk_sampler(slot, DIMENSION_FIRST_PLACE + status.rounds)).x;
+    }
+    LightPoint point = light_point(light, probability, word, push.scene_lower, push.scene_upper);
+    EquiAngular e = airlight_from(path, bands, m, segment, walk, point.point.position);
+    float t = equi_angular_sample(e, segment.reach, unit_float(place_word));
     float pdf = equi_angular_pdf(e, t);
-    vec3 from = place_on_way(path, way, t);
-    vec3 to = light.position - from;
-    float squared = dot(to, to);
-    if (!(pdf > 0.0) || squared <= 0.0) {
+    if (!(pdf > 0.0)) {
         return false;
     }
-    vec3 wi = to * inversesqrt(squared);
-    float falloff = light.kind == LIGHT_SPOT ? spot_falloff(-dot(light.direction, wi), light.cos_inner, light.cos_outer) : 1.0;
-    float phase = phase_function(m.phase, m.phase_parameter, path.direction, wi);
-    float weight = power_heuristic(pdf, collision_density(m.sigma_t, bands, t));
-    vec3 contribution = path.throughput * m.sigma_s * transmittance(m.sigma_t, t) * light.strength
-        * (falloff * phase * weight / (squared * probability * pdf));
+    vec3 from = path.origin + max(segment.start + t, 0.0) * path.direction;
+    LightSample seen = light_seen(point, from);
+    if (seen.radiance == vec3(0.0)) {
+        return false;
+    }
+    vec3 scattered = m.sigma_s;
+    vec3 passed = vec3(1.0);
+    if (HAS_GRIDS && m.has_grid != 0u) {
+        uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
+        uint iterations = AIRLIGHT_QUOTA;
+        walk.t_end = t;
+        if (ratio_tracking(m, key, 1.0, walk, iterations, passed) != GRID_LEFT) {
+            return false;
+        }
+        COUNT_MEDIUM(density_lookups, walk.nulls + 1u)
+        scattered *= grid_density(m, walk);
+    } else {
+        passed = transmittance(m.sigma_t, t);
+    }
+    float phase = phase_function(m.phase, m.phase_parameter, path.direction, seen.direction);
+    float weight = light_weight(seen.pdf, phase) * power_heuristic(pdf, reckoned_collision_density(m, bands, t, walk));
+    vec3 contribution = path.throughput * passed * scattered * seen.radiance * (phase * weight / pdf);
     if (contribution == vec3(0.0)) {
         return false;
     }
-    walk_airlight_rays[place] = shadow_ray(slot, path, from, light.position, contribution);
-    walk_shadow_starts[place].airlight_interior = way.interior;
+    ShadowRay ray = shadow_ray(slot, path, from, seen.point.position, contribution);
+    shadow_segment(SurfacePoint(from, vec3(0.0)), vec3(0.0), seen.point, seen.normal, ray.origin, ray.direction);
+    walk_airlight_rays[place] = ray;
+    walk_shadow_starts[place].airlight_interior = interior;
     return true;
 }
 
-// Light that a collision at `from`, t from the start of the way, scatters into the path. The flags of the place where there is some, or 0.
-uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
+// Light that a collision at `from`, t from the start of the segment, scatters into the path. The flags of the place where there is some, or 0.
+uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, uint interior, vec3 from, float t, Segment segment,
+                            GridWalk walk) {
     uvec2 word = bounce_words(slot, path.bounce, DIMENSION_LIGHT);
     LightSample light = sample_light(from, word, push.scene_lower, push.scene_upper);
     if (light.radiance == vec3(0.0)) {
         return 0u;
     }
     float phase = phase_function(m.phase, m.phase_parameter, path.direction, light.direction);
-    float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, phase) : 1.0;
-    if (HAS_AIRLIGHT && light.pdf == 0.0 && !light.infinite && m.has_grid == 0u) {
-        float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
-        EquiAngular e = equi_angular(path.origin + way.start * path.direction, path.direction, t_max, light.point.position);
-        weight = power_heuristic(collision_density(m.sigma_t, bands, t), equi_angular_pdf(e, t));
+    float weight = light_weight(light.pdf, phase);
+    if (HAS_AIRLIGHT && segment.reach > 0.0 && !light.infinite) {
+        EquiAngular e = airlight_from(path, bands, m, segment, walk, light.point.position);
+        if (e.range > 0.0) {
+            weight *= power_heuristic(reckoned_collision_density(m, bands, t, walk), equi_angular_pdf(e, t));
+        }
     }
     ShadowRay ray = shadow_ray(slot, path, from, light.point.position, path.throughput * light.radiance * (phase * weight));
     if (light.infinite) {
@@ -100,7 +169,7 @@ uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, S
     } else {
         shadow_segment(SurfacePoint(from, vec3(0.0)), vec3(0.0), light.point, light.normal, ray.origin, ray.direction);
     }
-    return store_shadow_ray(place, ray, way.interior, 0.0);
+    return store_shadow_ray(place, ray, interior, 0.0);
 }
 
 // The path's new direction at a collision; false when it ends.
@@ -156,6 +225,10 @@ void main() {
     SceneMedium m;
     float t = 0.0;  // of a collision, from the start of the way
     float reached = 0.0;  // by a walk that stopped
+    // Without a reach where no equi-angular samples are taken.
+    Segment segment = Segment(0.0, 0.0);
+    GridWalk start_of_grid;
+    GridWalk walk;
     vec3 bands = state.bands;
     bool counted = path_set_contains(push.path_set, path.bounce);
     bool scattering = path_set_continues(push.path_set, path.bounce) && (path_set_lobes(push.path_set) & LOBE_VOLUME) != 0u;
@@ -174,18 +247,14 @@ void main() {
         m = load_medium(medium);
         // Where collisions would only end the path, it goes on in proportion to the transmittance instead.
         bool passes = !scattering || m.sigma_s == vec3(0.0);
+        bool airlit = HAS_AIRLIGHT && lighting && m.sigma_s != vec3(0.0) && is_open(way.interior);
         if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
             float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
             if (m.emission != vec3(0.0)) {
                 emitted = path.throughput * m.emission * vec3(attenuated_length(m.sigma_t.x, t_max), attenuated_length(m.sigma_t.y, t_max),
                                                               attenuated_length(m.sigma_t.z, t_max));
             }
-            if (HAS_AIRLIGHT && lighting && m.sigma_s != vec3(0.0)) {
-                Sampler s = walk_sampler(slot, dimension + DIMENSION_AIRLIGHT);
-                if (sample_airlight(slot, place, path, bands, m, way, sampler_bits(s))) {
-                    flags |= FLAG_AIRLIGHT | FLAG_WAITING;
-                }
-            }
+            segment = Segment(way.start, airlit ? t_max : 0.0);
             if (passes) {
                 weight = transmittance(m.sigma_t, t_max);
             } else {
@@ -198,15 +267,31 @@ void main() {
             }
         } else if (HAS_GRIDS) {
             uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
-            GridWalk walk = begin_grid_walk(m, path.origin, path.direction, way.start, way.end);
+            walk = begin_grid_walk(m, path.origin, path.direction, way.start, way.end);
+            bool cut = false;
+            if (airlit) {
+                // Beyond, the way goes on as after a stop, with samples of its own.
+                float longest = AIRLIGHT_DEPTH / (m.majorant * m.density_max);
+                cut = walk.t_end > longest;
+                walk.t_end = min(walk.t_end, longest);
+            }
+            segment = Segment(walk.entry, airlit ? max(walk.t_end, 0.0) : 0.0);
+            start_of_grid = walk;
             outcome = delta_tracking(m, key, path.throughput, passes, walk, state.bands, weight, emitted);
             t = (walk.entry - way.start) + walk.t;
+            outcome = cut && outcome == GRID_LEFT ? GRID_STOPPED : outcome;
             reached = resumed_start(way.start, walk.entry + walk.t);
             // The search that goes on from the surface itself would miss it.
             outcome = outcome == GRID_STOPPED && reached >= way.end ? GRID_LEFT : outcome;
-            count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
             COUNT_MEDIUM(null_collisions, walk.nulls)
             COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == GRID_COLLIDED ? 1u : 0u))
+        }
+        if (HAS_AIRLIGHT && segment.reach > 0.0
+            && sample_airlight(slot, place, path, bands, m, way.interior, segment, start_of_grid)) {
+            flags |= FLAG_AIRLIGHT | FLAG_WAITING;
+        }
+        if (HAS_GRIDS) {
+            count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
         }
         COUNT_MEDIUM(collisions, outcome == GRID_COLLIDED ? 1u : 0u)
         if (counted && emitted != vec3(0.0)) {
@@ -224,7 +309,7 @@ void main() {
         if (path.throughput != vec3(0.0)) {
             vec3 at = place_on_way(path, way, t);
             if (lighting) {
-                flags |= sample_collision_light(slot, place, path, bands, m, way, at, t);
+                flags |= sample_collision_light(slot, place, path, bands, m, way.interior, at, t - (segment.start - way.start), segment, walk);
             }
             alive = scatter(slot, m, at, path);
             automaton = after;

@@ -5,6 +5,7 @@
 //! difference is allowed besides, its reason stands with it. Each test prints what it found, for `--nocapture`.
 
 mod absorption;
+mod area_lights;
 mod boundaries;
 mod furnace;
 mod heterogeneous;

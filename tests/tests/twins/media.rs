@@ -1,8 +1,8 @@
 //! Free flight, null collisions and equi-angular sampling.
 
 use clerestory::transport::medium::{
-    FAR_AWAY, attenuated_length, collision_density, equi_angular, equi_angular_pdf, equi_angular_sample,
-    sample_free_flight, sample_null_collision,
+    FAR_AWAY, attenuated_length, collision_density, equi_angular, equi_angular_helps, equi_angular_pdf,
+    equi_angular_sample, sample_free_flight, sample_null_collision,
 };
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Tolerance, U, trigonometric_error};
@@ -74,6 +74,7 @@ fn equi_angular_samples_and_null_collisions_agree_with_their_twins() {
                 &bands(r),
                 &real,
                 &scattered,
+                &[r.choose(&[0.0, 0.1, 1.0, 10.0])],
             ])
         });
         // The angle under which a segment is seen, and its sine and cosine, are each wrong by the device's trigonometric error; of angles of
@@ -106,6 +107,7 @@ fn equi_angular_samples_and_null_collisions_agree_with_their_twins() {
                     ],
                     bands.to_array(),
                     weight.to_array(),
+                    [flag(equi_angular_helps(e, x[9], x[21]))],
                 ]
             },
         );

@@ -130,7 +130,7 @@ impl PathTracer {
         let needs = WaveNeeds {
             waiting: scene.has_lights(),
             media: has_media,
-            airlight: has_media && settings.equiangular && scene.has_punctual_lights(),
+            airlight: settings.equiangular && scene.airlight_helps(),
         };
         // Beside what reading the film takes.
         let band = film.bands().iter().map(|band| u64::from(band.pixels())).max();

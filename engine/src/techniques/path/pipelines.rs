@@ -74,11 +74,7 @@ impl Pipelines {
             numbered: shade.numbered,
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
-            has_airlight: settings.equiangular
-                && profile.media.homogeneous
-                && profile.media.scatters
-                && profile.lights.point + profile.lights.spot > 0
-                && shade.has_punctual_lights,
+            has_airlight: settings.equiangular && scene.airlight_helps(),
             ..Default::default()
         };
         let medium = shade.has_media.then(|| gpu.compute_pipeline(&medium)).transpose()?;

@@ -38,9 +38,10 @@ crate::settings! {
         pub multiple_scattering: bool = true;
         /// Uncorrelated instead of height-correlated Smith masking of microfacets; changes the picture.
         pub separable_masking: bool = false;
-        /// Also samples light of points and spots in homogeneous media by the angle under which they see the ray; changes the noise only.
+        /// Also samples light in media by the angle under which a point of a lamp sees the ray; changes the noise only.
         ///
-        /// Grids of densities have no such samples: light close to a lamp in them is as noisy with it as without.
+        /// Of points and spots, and of area lights in scenes where one is smaller than half a mean free path; in homogeneous media and in grids of
+        /// densities, on ways that pass a lamp within about two thirds of a mean free path. Media inside solids that refract have none.
         pub equiangular: bool = true;
         /// After a pilot, more samples for pixels with more noise, relative or absolute, as many in all; changes the noise only.
         ///

@@ -99,7 +99,32 @@ fn record(medium: &Medium, densities: &mut Vec<f32>, majorants: &mut Vec<f32>) -
     record.block = block as f32;
     record.cells = grid.size;
     record.blocks = bounds.size;
+    record.density_max = grid.max();
+    record.tightness = tightness(&grid.values, &bounds.maxima);
     densities.extend_from_slice(&grid.values);
     majorants.extend_from_slice(&bounds.maxima);
     record
+}
+
+/// How well bounds follow what they bound: the mean of `values` over that of `maxima`; 0 where all are.
+fn tightness(values: &[f32], maxima: &[f32]) -> f32 {
+    let mean = |of: &[f32]| of.iter().map(|v| f64::from(*v)).sum::<f64>() / of.len().max(1) as f64;
+    match mean(maxima) {
+        bound if bound > 0.0 => (mean(values) / bound).min(1.0) as f32,
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_as_tight_as_their_means_say() {
+        assert_eq!(tightness(&[2.0; 4], &[2.0]), 1.0);
+        assert_eq!(tightness(&[0.0, 1.0, 0.0, 3.0], &[1.0, 3.0]), 0.5);
+        assert_eq!(tightness(&[0.0; 4], &[0.0]), 0.0);
+        // Blocks that are cut short may count for more than their cells.
+        assert_eq!(tightness(&[1.0, 1.0, 0.0], &[1.0, 0.0]), 1.0);
+    }
 }

@@ -3,6 +3,7 @@
 //! What a scene lacks is not allocated: its binding holds one texel that no specialized kernel reads. Deterministic:
 //! equal scenes give equal bytes.
 
+mod airlight;
 mod bodies;
 mod geometry;
 mod lights;
@@ -47,6 +48,7 @@ pub struct GpuScene {
     surface_area: f64,
     light_power: f64,
     light_kinds: LightKinds,
+    airlight_helps: bool,
     /// What photons choose by, where light sampling leaves some to scattered rays.
     emission_cdf: Option<Vec<f32>>,
     punctual_lights: PunctualLights,
@@ -190,6 +192,7 @@ impl GpuScene {
             surface_area: geometry.surface_area(),
             light_power: lights.power,
             light_kinds: lights.kinds(),
+            airlight_helps: airlight::airlight_helps(scene),
             emission_cdf: lights.emission_cdf,
             punctual_lights: lights.punctual,
             index,
@@ -285,6 +288,12 @@ impl GpuScene {
     /// True when some point, spot or directional light has power.
     pub fn has_punctual_lights(&self) -> bool {
         self.light_kinds.punctual
+    }
+
+    /// Whether light on ways through media is worth equi-angular samples: that of lamps smaller than half a mean free path, in media that light
+    /// enters unbent.
+    pub(crate) fn airlight_helps(&self) -> bool {
+        self.airlight_helps && (self.light_kinds.area || self.light_kinds.punctual)
     }
 
     /// Moves or turns a point, spot or directional light, by its index in [`Scene::lights`]: as if the scene had been made with the light like
