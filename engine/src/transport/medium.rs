@@ -195,7 +195,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "BG-4",
         name: "free flight and transmittance: analytic, delta and ratio tracking, equi-angular",
         role: Role::PartOf("BG-3"),
-        limits: "Equi-angular samples are taken of one light a way, chosen by its power alone; not inside solids that refract, nor of area lights where all are larger than half a mean free path; in grids the looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
+        limits: "Equi-angular samples are taken of one light a way, chosen by its power alone; not inside solids that refract, nor of area lights where all are larger than half a mean free path, nor where a grid's densest cell would make ways through it deeper than 6144; in grids the looser the bound of the density, the more steps tracking takes and the more noise ratio tracking has.",
         sources: &[
             sources::WOODCOCK_1965.whole(),
             sources::KULLA_FAJARDO_2012.whole(),
@@ -215,6 +215,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/media.rs::equi_angular_samples_and_null_collisions_agree_with_their_twins",
             "tests/tests/media/homogeneous.rs::single_scattering_is_the_airlight_integral",
             "engine/src/transport/gpu_scene/airlight.rs::small_lamps_in_thin_open_media_are_worth_samples",
+            "engine/src/transport/gpu_scene/airlight.rs::grids_of_one_very_dense_cell_have_none",
             "tests/tests/media/area_lights.rs::single_scattering_beside_a_lamp_is_its_integral",
             "tests/tests/media/area_lights.rs::lamps_among_bodies_glass_and_alpha_keep_their_expectation",
             "tests/tests/media/area_lights.rs::ways_through_grids_of_loose_bounds_are_cut_without_a_trace",

@@ -10,6 +10,10 @@ use glam::DVec3;
 /// Size of a lamp in mean free paths below which samples are taken. By squared error × time they gain 1.2 at a fifth of one, and lose a fifth at one.
 const LAMP_MEAN_FREE_PATHS: f64 = 0.5;
 
+/// Optical depth through a grid as dense as its densest cell everywhere above which samples are not taken. Kernels cut such ways each 96 of it, and
+/// each part costs a search for the surface: in a plume with one very dense cell, far more than the noise is worth.
+const GRID_DEPTH_MOST: f64 = 64.0 * 96.0;
+
 /// Whether some lamp's light is, in some medium.
 pub(super) fn airlight_helps(scene: &Scene) -> bool {
     let placed = |instance: &Instance| scene.meshes[instance.mesh as usize].material;
@@ -17,9 +21,16 @@ pub(super) fn airlight_helps(scene: &Scene) -> bool {
         let material = &scene.materials[material as usize];
         material.interior.filter(|_| material.boundary)
     });
-    let longest = inside
+    let media: Vec<&Medium> = inside
         .chain(scene.surrounding)
-        .filter_map(|index| mean_free_path(&scene.media[index as usize]))
+        .map(|index| &scene.media[index as usize])
+        .collect();
+    if media.iter().any(|medium| greatest_depth(medium) > GRID_DEPTH_MOST) {
+        return false;
+    }
+    let longest = media
+        .iter()
+        .filter_map(|medium| mean_free_path(medium))
         .fold(0.0, f64::max);
     let has_point = scene.lights.iter().any(|light| {
         let (LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. }) = light.kind else {
@@ -29,6 +40,15 @@ pub(super) fn airlight_helps(scene: &Scene) -> bool {
     });
     let mut lamps = scene.instances.iter().filter_map(|instance| lamp_size(scene, instance));
     longest > 0.0 && (has_point || lamps.any(|size| size < LAMP_MEAN_FREE_PATHS * longest))
+}
+
+/// Optical depth across a grid's diagonal by its greatest density; 0 of a homogeneous medium.
+fn greatest_depth(medium: &Medium) -> f64 {
+    medium.density.as_ref().map_or(0.0, |grid| {
+        let axes = grid.to_world.matrix3;
+        let diagonal = axes.x_axis.length() + axes.y_axis.length() + axes.z_axis.length();
+        f64::from(medium.sigma_t().max_element() * grid.max()) * diagonal
+    })
 }
 
 /// Mean free path at the mean density, in metres; `None` of what does not scatter.
@@ -83,6 +103,7 @@ mod tests {
             // Smoke is thin on average; there light flies as far as its panel is wide in dense smoke only.
             ("smoke", true),
             ("smoke?sigma_t=100", false),
+            ("smoke?sigma_t=1e6", false),
             ("smoke?light=0", false),
             // Lit from infinity.
             ("cloud", false),
@@ -91,6 +112,16 @@ mod tests {
         ] {
             let scene = crate::scene::load(&format!("builtin:{address}")).expect("scene");
             assert_eq!(airlight_helps(&scene), expected, "{address}");
+        }
+    }
+
+    #[test]
+    fn grids_of_one_very_dense_cell_have_none() {
+        for (densest, expected) in [(1.0, true), (1e5, false)] {
+            let mut scene = crate::scene::load("builtin:smoke").expect("scene");
+            let grid = scene.media[0].density.as_mut().expect("a grid");
+            grid.values[0] = densest;
+            assert_eq!(airlight_helps(&scene), expected, "{densest}");
         }
     }
 }
