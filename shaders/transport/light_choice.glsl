@@ -1,4 +1,5 @@
-// Direct light: choosing a light by its power, a point or direction on it, and the densities that multiple importance sampling needs.
+// Direct light: choosing a light by its power or, among many, for the point that it is to light; a point or direction on it; and the
+// densities that multiple importance sampling needs.
 //
 // One point of the unit square chooses the light and the place on it, so that the points of a sequence keep their strata on each light;
 // triangles are sampled uniformly by area, the environment by its luminance above what is left to scattered rays. BG-2, BG-3.
@@ -8,6 +9,8 @@
 
 #include "scene/bindings.glsl"
 #include "transport/environment.glsl"
+#include "transport/light_receiver.glsl"
+#include "transport/light_tree.glsl"
 #include "transport/lights.glsl"
 #include "transport/surface.glsl"
 
@@ -18,6 +21,8 @@ struct LightSample {
     SurfacePoint point;  // the far end
     vec3 normal;         // of a triangle; zero otherwise
     bool infinite;       // the far end is a direction only
+    uint light;
+    float choice;        // its probability
 };
 
 vec3 world_to_environment(SceneEnvironment e, vec3 w) { return vec3(dot(e.right, w), dot(e.up, w), dot(e.back, w)); }
@@ -32,21 +37,36 @@ vec4 environment_look_up(SceneEnvironment e, vec3 local) { return environment_lo
 
 vec3 environment_radiance(SceneEnvironment e, vec3 local) { return environment_look_up(e, local).rgb; }
 
-// The environment is the last light.
-float environment_choice_probability() { return distribution_probability(0u, light_count() - 1u); }
+// Probability with which light sampling chooses a light for a point.
+float light_choice_probability(uint light, LightReceiver r) {
+    if (HAS_LIGHT_TREE) {
+        return light_tree_probability(light, r.position, r.normal);
+    }
+    return distribution_probability(0u, light);
+}
 
-// Density with which light sampling finds the point of a triangle light that a ray has hit at distance t.
-float triangle_light_pdf(Surface s, vec3 direction, float t) {
-    float choice = distribution_probability(0u, s.light);
+// The environment is the last light, whose probability is the same everywhere.
+float environment_choice_probability() { return light_choice_probability(light_count() - 1u, LightReceiver(vec3(0.0), vec3(0.0))); }
+
+// Density with which light sampling for a point finds that of a triangle light which a ray from there has hit at distance t.
+float triangle_light_pdf(LightReceiver r, Surface s, vec3 direction, float t) {
+    float choice = light_choice_probability(s.light, r);
     return area_to_solid_angle(2.0 * choice / s.double_area, t * t, abs(dot(s.geometric_normal, direction)));
 }
 
 // A light, and a point or a direction of it, by one point of the unit square in two words. Zero radiance when there is nothing to see.
-LightSample sample_light(vec3 from, uvec2 word, vec3 scene_lower, vec3 scene_upper) {
-    LightSample result = LightSample(vec3(0.0), vec3(0.0), 0.0, SurfacePoint(vec3(0.0), vec3(0.0)), vec3(0.0), false);
+LightSample sample_light(LightReceiver receiver, uvec2 word, vec3 scene_lower, vec3 scene_upper) {
+    LightSample result = LightSample(vec3(0.0), vec3(0.0), 0.0, SurfacePoint(vec3(0.0), vec3(0.0)), vec3(0.0), false, 0u, 0.0);
     uvec3 fresh = pcg3d(uvec3(word, 0u));
     float probability;
-    SceneLight light = load_light(distribution_sample(0u, light_count(), word.x, fresh.x, probability));
+    vec3 from = receiver.position;
+    if (HAS_LIGHT_TREE) {
+        result.light = light_tree_sample(from, receiver.normal, word.x, fresh.x, probability);
+    } else {
+        result.light = distribution_sample(0u, light_count(), word.x, fresh.x, probability);
+    }
+    result.choice = probability;
+    SceneLight light = load_light(result.light);
     if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
         vec4 found;
         SceneEnvironment e = load_environment();

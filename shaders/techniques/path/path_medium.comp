@@ -17,6 +17,7 @@ layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular sample
 #include "transport/media_features.glsl"
 #include "transport/path_set.glsl"
 #include "techniques/path/path_bounce.glsl"
+#include "techniques/path/path_slots.glsl"
 #include "walk/hand_on.glsl"
 #include "walk/media.glsl"
 
@@ -50,7 +51,8 @@ ShadowRay shadow_ray(uint slot, WalkState path, vec3 from, vec3 to, vec3 contrib
 // Light of a point or spot scattered once on the way, at a place chosen by the angle under which the light sees it. True where there is some.
 bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, uvec2 word) {
     float probability;
-    SceneLight light = load_light(distribution_sample(0u, light_count(), word.x, 0u, probability));
+    uint index = distribution_sample(0u, light_count(), word.x, 0u, probability);
+    SceneLight light = load_light(index);
     if (light.kind != LIGHT_POINT && light.kind != LIGHT_SPOT) {
         return false;
     }
@@ -68,7 +70,9 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
     vec3 wi = to * inversesqrt(squared);
     float falloff = light.kind == LIGHT_SPOT ? spot_falloff(-dot(light.direction, wi), light.cos_inner, light.cos_outer) : 1.0;
     float phase = phase_function(m.phase, m.phase_parameter, path.direction, wi);
-    float weight = power_heuristic(pdf, collision_density(m.sigma_t, bands, t));
+    // Both strategies choose the same light, each for its own reason.
+    float choice = HAS_LIGHT_TREE ? light_tree_probability(index, from, vec3(0.0)) / probability : 1.0;
+    float weight = power_heuristic(pdf, choice * collision_density(m.sigma_t, bands, t));
     vec3 contribution = path.throughput * m.sigma_s * transmittance(m.sigma_t, t) * light.strength
         * (falloff * phase * weight / (squared * probability * pdf));
     if (contribution == vec3(0.0)) {
@@ -82,7 +86,7 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
 // Light that a collision at `from`, t from the start of the way, scatters into the path. The flags of the place where there is some, or 0.
 uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, Way way, vec3 from, float t) {
     uvec2 word = bounce_words(slot, path.bounce, DIMENSION_LIGHT);
-    LightSample light = sample_light(from, word, push.scene_lower, push.scene_upper);
+    LightSample light = sample_light(LightReceiver(from, vec3(0.0)), word, push.scene_lower, push.scene_upper);
     if (light.radiance == vec3(0.0)) {
         return 0u;
     }
@@ -91,7 +95,8 @@ uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, S
     if (HAS_AIRLIGHT && light.pdf == 0.0 && !light.infinite && m.has_grid == 0u) {
         float t_max = way.end >= FAR_AWAY ? FAR_AWAY : way.end - way.start;
         EquiAngular e = equi_angular(path.origin + way.start * path.direction, path.direction, t_max, light.point.position);
-        weight = power_heuristic(collision_density(m.sigma_t, bands, t), equi_angular_pdf(e, t));
+        float choice = HAS_LIGHT_TREE ? light.choice / distribution_probability(0u, light.light) : 1.0;
+        weight = power_heuristic(choice * collision_density(m.sigma_t, bands, t), equi_angular_pdf(e, t));
     }
     ShadowRay ray = shadow_ray(slot, path, from, light.point.position, path.throughput * light.radiance * (phase * weight));
     if (light.infinite) {
@@ -110,6 +115,9 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
     vec3 wi = normalize(phase_direction(path.direction, c, u.y));
     path.pdf = phase_function(m.phase, m.phase_parameter, path.direction, wi);
+    if (HAS_LIGHT_TREE) {
+        path_receivers[slot] = LightReceiver(at, vec3(0.0));
+    }
     path.origin = at;
     path.direction = wi;
     path.bounce += 1u;
