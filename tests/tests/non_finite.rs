@@ -2,7 +2,7 @@
 
 use clerestory::film::{GpuFilm, NonFiniteSamples};
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::sets::{PathSlotSet, PathShareSet, WaveSet};
+use clerestory::gpu::shaders::sets::{PathShareSet, PathSlotSet, WaveSet};
 use clerestory::gpu::shaders::techniques::path::{path_resolve, path_resolve_shares};
 use clerestory::gpu::shaders::types::{GatheredLight, PathShare};
 use clerestory::gpu::{Access, Category, Pass};

@@ -49,7 +49,9 @@ fn kernels_load_every_word_of_a_record() {
             trails: trails.to_vec(),
         };
         let format = vk::Format::R32G32B32A32_UINT;
-        let tree = gpu.texels_with("tree", Category::Staging, format, &tree.bytes()).unwrap();
+        let tree = gpu
+            .texels_with("tree", Category::Staging, format, &tree.bytes())
+            .unwrap();
         let no_words = texels(gpu, [0u32; 4]);
         let no_floats = gpu
             .texels_with("none", Category::Staging, vk::Format::R32_SFLOAT, &[0.0f32])

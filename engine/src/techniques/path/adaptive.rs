@@ -19,7 +19,7 @@ use super::wave::{Cursor, Places, SAMPLES_PER_WAVE, SAMPLES_TOGETHER, Wave, samp
 use crate::Result;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::film::{FilmBand, GpuFilm};
-use crate::gpu::shaders::sets::{PathSlotSet, PathShareSet, WaveSet};
+use crate::gpu::shaders::sets::{PathShareSet, PathSlotSet, WaveSet};
 use crate::gpu::shaders::techniques::path::{path_numbers, path_resolve_shares};
 use crate::gpu::shaders::types::PathShare;
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};

@@ -25,8 +25,8 @@ use std::sync::Arc;
 
 use self::adaptive::AdaptiveSamples;
 pub(super) use self::card::CARD;
-use self::pipelines::{Pipelines, camera_pipeline};
 use self::kept::KeptBySlot;
+use self::pipelines::{Pipelines, camera_pipeline};
 use self::record::{EyeStages, ResolveTarget, record_resolve};
 pub use self::settings::{Adaptive, LightTreeUse, PathTracerSettings};
 pub(crate) use self::wave::SAMPLES_PER_WAVE;

@@ -107,7 +107,11 @@ impl WalkStages for EyeStages<'_> {
     /// What happens on the way through media, and where paths have arrived.
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let p = self.pipelines;
-        let (scene, items, push) = (self.scene.light_tree_set(self.light_tree), bounce.places.items, self.push());
+        let (scene, items, push) = (
+            self.scene.light_tree_set(self.light_tree),
+            bounce.places.items,
+            self.push(),
+        );
         if let Some(medium) = &p.medium {
             recorder.pass("path: medium", |pass| {
                 let (media, push) = (self.scene.media_set(), bytemuck::cast(push));

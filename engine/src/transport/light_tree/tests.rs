@@ -220,7 +220,7 @@ fn cones_of_unions_hold_both() {
     let mut random = Random(74);
     for i in 0..2000 {
         let cone = |random: &mut Random| LightCone {
-            axis: random.direction().as_dvec3(),
+            axis: random.direction().as_dvec3().normalize(),
             spread: f64::from(random.choose(&[0.0f32, 1e-3, 0.5, 1.5, 3.0, std::f32::consts::PI])),
             reach: FRAC_PI_2 * f64::from(random.unit()),
         };
