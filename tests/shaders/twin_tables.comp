@@ -18,26 +18,8 @@ float albedo_table(uint index) { return twin_table[index]; }
 // A word travels as two halves: its bits must not pass through floating-point registers that could quieten a NaN.
 uint in_word(uint i) { return uint(in1(i)) << 16u | uint(in1(i + 1u)); }
 
-#include "scene/records.glsl"
 #include "transport/albedo.glsl"
 #include "transport/environment.glsl"
-
-// Nodes are quarters as texels are. Words that are no numbers travel as such: children, leaves as -1 - light, and trails, -1 for none.
-SceneLightNode load_light_node(uint index) {
-    uint first = LIGHT_NODE_QUARTERS * index;
-    vec4 q0 = environment_texel(first);
-    vec4 q1 = environment_texel(first + 1u);
-    vec4 q2 = environment_texel(first + 2u);
-    vec4 q3 = environment_texel(first + 3u);
-    uint child = q3.z < 0.0 ? LIGHT_NODE_LEAF | uint(-1.0 - q3.z) : uint(q3.z);
-    return SceneLightNode(q0.xyz, q0.w, q1.xyz, q1.w, q2.xyz, q2.w, q3.x, q3.y, child, uint(q3.w));
-}
-uint load_light_trail(uint light) {
-    float trail = twin_table[16u * uint(twin_table[15]) + light];
-    return trail < 0.0 ? LIGHT_TRAIL_NONE : uint(trail);
-}
-
-#include "transport/light_tree.glsl"
 
 void main() {
     if (twin_case() >= push.case_count) {
@@ -80,23 +62,6 @@ void main() {
         out1(0u, choose_first(u, in1(1u)) ? 1.0 : 0.0);
         out1(1u, u);
         out1(2u, linear_sample(in1(0u), in1(2u), in1(3u)));
-        break;
-    }
-    case 4u: {  // choice among lights
-        vec3 from = in3(0u);
-        vec3 normal = in3(3u);
-        SceneLightNode node = load_light_node(in_bits(11u));
-        float probability;
-        uint word = in_word(6u);
-        out1(0u, light_node_importance(node, from, normal));
-        out1(1u, (node.child & LIGHT_NODE_LEAF) != 0u ? 0.0
-                     : light_node_share(load_light_node(node.child), load_light_node(node.child + 1u), node.share, from, normal));
-        out1(2u, light_tree_probability(in_bits(10u), from, normal));
-        uint light = light_tree_sample(from, normal, word, in_word(8u), probability);
-        out_bits(3u, light);
-        out1(4u, probability);
-        out1(5u, light_tree_probability(light, from, normal));
-        out1(6u, unit_float(word));
         break;
     }
     }

@@ -13,7 +13,7 @@ use clerestory_tests::{twin_kernel, with_gpu};
 use crate::tables::{halves, word};
 use crate::{cases, join, ulps, v3};
 
-twin_kernel!(twin_tables);
+twin_kernel!(twin_light_tree);
 
 /// Lights with a place, and distant ones.
 const NEAR: u32 = 60;
@@ -92,7 +92,7 @@ fn choices_by_a_tree_agree_with_their_twins() {
             let node = f32::from_bits(r.below(tree.nodes.len()) as u32);
             join(&[&(8.0 * r.vector()).to_array(), &normal, &a, &b, &[light, node]])
         });
-        let results = twin_tables(gpu, 4, &table, &floats(&tree));
+        let results = twin_light_tree(gpu, 0, &table, &floats(&tree));
         let of = |x: &[f64]| {
             let bits = |i: usize| (x[i] as f32).to_bits();
             (v3(x, 0), v3(x, 3), bits(10), tree.nodes[bits(11) as usize])
