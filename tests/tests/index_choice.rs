@@ -111,7 +111,7 @@ fn thin(address: &str) -> Scene {
     scene
 }
 
-/// Pictures in an index against those in the default one; rays of the scenes that are named stop at the small quota, and only there.
+/// Pictures in an index against those in the binary one; rays of the scenes that are named stop at the small quota, and only there.
 fn pictures_stay_the_same(gpu: &Gpu, index: &IndexKind, scenes: &[(&str, Scene)], stopping: &[&str]) {
     let of = |scene: &Scene, index: &IndexKind, ray_quota| {
         let settings = PathTracerSettings {
@@ -123,7 +123,7 @@ fn pictures_stay_the_same(gpu: &Gpu, index: &IndexKind, scenes: &[(&str, Scene)]
         finish(&mut tracer, 2)
     };
     for (what, scene) in scenes {
-        let truth = of(scene, &IndexKind::default(), 32_768);
+        let truth = of(scene, &IndexKind::Bvh2(Bvh2Settings::default()), 32_768);
         assert!(truth.mean()[0].0 > 0.0, "{what}: dark");
         for ray_quota in [32_768, SMALL_QUOTA] {
             let picture = of(scene, index, ray_quota);

@@ -10,8 +10,7 @@ use clerestory::accel::{FINISHED, Hit, Ray, RayIndex};
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::constants::{KD_HEAP_LEVELS, KD_LEAF, KD_STACK_CACHE_BYTES, KD_STACK_CACHE_NONE};
 use clerestory::gpu::{Category, DeviceKind, Gpu};
-use clerestory_hard_cases::misses;
-use clerestory_tests::random::Random;
+use clerestory_hard_cases::{hit_bits, misses, soup_with_rays};
 use clerestory_tests::shaders::kd_cache_probe;
 use clerestory_tests::shaders::sets::IndexSet;
 use clerestory_tests::with_gpu;
@@ -90,26 +89,7 @@ fn chain(levels: u32) -> Case {
 }
 
 fn soup() -> (Vec<[Vec3; 3]>, Vec<Ray>) {
-    let mut random = Random(41);
-    let triangles = (0..1500)
-        .map(|_| {
-            let centre = 10.0 * random.vector();
-            [0; 3].map(|_| centre + 0.5 * random.vector())
-        })
-        .collect();
-    let rays = (0..1200)
-        .map(|i| {
-            let mut r = Ray::new(
-                12.0 * random.vector(),
-                random.direction() * random.choose(&[1.0, 1e-3, 1e4]),
-            );
-            if i % 3 == 0 {
-                (r.t_min, r.t_max) = (random.range(0.0, 5.0), random.range(3.0, 20.0));
-            }
-            r
-        })
-        .collect();
-    (triangles, rays)
+    soup_with_rays(41, 1500, 1200)
 }
 
 fn cases() -> Vec<Case> {
@@ -137,11 +117,6 @@ fn cases() -> Vec<Case> {
     cases.push(Case::new("nothing", Vec::new(), rays[..40].to_vec(), &default));
     cases.extend([1, 31, 32].map(chain));
     cases
-}
-
-fn bits(hit: &Hit) -> [u32; 4] {
-    let [u, v] = hit.barycentrics.map(f32::to_bits);
-    [hit.t.to_bits(), u, v, hit.triangle]
 }
 
 /// Hits and work of the twin, and how often a ray was stopped.
@@ -187,7 +162,7 @@ fn check(gpu: &Gpu, cases: &[Case], settings: &TraceSettings) -> u64 {
         let (hits, work, stops) = twin(case, settings);
         for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
             if exact {
-                assert_eq!(bits(found), bits(expected), "{what}: {ray:?}");
+                assert_eq!(hit_bits(found), hit_bits(expected), "{what}: {ray:?}");
             } else if settings.query == Query::Closest || !found.is_hit() {
                 assert!(!misses(&case.triangles, ray, found), "{what}: {ray:?}");
             }
@@ -467,7 +442,12 @@ fn votes_change_no_hit() {
                 let (hits, ..) = twin(case, &settings);
                 for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
                     if exact {
-                        assert_eq!(bits(found), bits(expected), "{}, {settings:?}: {ray:?}", case.what);
+                        assert_eq!(
+                            hit_bits(found),
+                            hit_bits(expected),
+                            "{}, {settings:?}: {ray:?}",
+                            case.what
+                        );
                     } else if query == Query::Closest || !found.is_hit() {
                         assert!(!misses(&case.triangles, ray, found), "{}: {ray:?}", case.what);
                     }

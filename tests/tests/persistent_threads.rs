@@ -13,7 +13,7 @@ use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::accel::trace_queue;
 use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{Category, DeviceKind, Gpu, SOFTWARE_LOOP_CAP};
-use clerestory_hard_cases::misses;
+use clerestory_hard_cases::{hit_bits, misses};
 use clerestory_tests::driver::caps_loops;
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
@@ -49,18 +49,13 @@ fn twin(bvh: &Bvh2, rays: &[Ray], quota: u32) -> (Vec<Hit>, TraversalCounters, u
     (hits, counters, stops)
 }
 
-fn bits(hit: &Hit) -> [u32; 4] {
-    let [u, v] = hit.barycentrics.map(f32::to_bits);
-    [hit.t.to_bits(), u, v, hit.triangle]
-}
-
 fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], bvh: &Bvh2, rays: &[Ray], settings: &TraceSettings) -> Traced {
     let traced = RayTracer::new(gpu, bvh, settings).unwrap().trace(rays).unwrap();
     assert_eq!(traced.hits.len(), rays.len(), "{what}");
     if gpu.caps().kind == DeviceKind::Cpu {
         let (hits, work, stops) = twin(bvh, rays, settings.ray_quota);
         for (i, (found, expected)) in traced.hits.iter().zip(&hits).enumerate() {
-            assert_eq!(bits(found), bits(expected), "{what}: ray {i}");
+            assert_eq!(hit_bits(found), hit_bits(expected), "{what}: ray {i}");
         }
         assert_eq!((traced.work, traced.unfinished), (work, stops), "{what}");
     } else {
@@ -117,7 +112,7 @@ fn both_models_trace_every_ray_once_and_find_what_the_twin_finds() {
                         "{what}"
                     );
                     for (a, b) in queue.hits.iter().zip(&one.hits) {
-                        assert_eq!(bits(a), bits(b), "{what}: the models differ");
+                        assert_eq!(hit_bits(a), hit_bits(b), "{what}: the models differ");
                     }
                 }
             }

@@ -10,7 +10,7 @@ use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{
     Category, DeviceKind, Gpu, compute_to_transfer, rw_compute_to_compute, transfer_to_compute, wide_counter,
 };
-use clerestory_hard_cases::misses;
+use clerestory_hard_cases::{hit_bits, misses};
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
 use glam::Vec3;
@@ -128,15 +128,6 @@ fn twin(bvh: &Bvh2, rays: &[Ray], quota: u32, any: bool) -> Traced {
     traced
 }
 
-fn bits(hit: &Hit) -> [u32; 4] {
-    [
-        hit.t.to_bits(),
-        hit.barycentrics[0].to_bits(),
-        hit.barycentrics[1].to_bits(),
-        hit.triangle,
-    ]
-}
-
 fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[Ray], quotas: &[u32]) {
     let exact = gpu.caps().kind == DeviceKind::Cpu;
     let bvh = Bvh2::build(triangles, &Bvh2Settings::default()).unwrap();
@@ -144,10 +135,10 @@ fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[Ray], quotas: &
     for quota in quotas {
         let closest = trace(gpu, &bvh, rays, *quota, false);
         let any = trace(gpu, &bvh, rays, *quota, true);
-        let same = first.get_or_insert_with(|| closest.hits.iter().map(bits).collect());
+        let same = first.get_or_insert_with(|| closest.hits.iter().map(hit_bits).collect());
         for (i, ray) in rays.iter().enumerate() {
             assert_eq!(
-                bits(&closest.hits[i]),
+                hit_bits(&closest.hits[i]),
                 same[i],
                 "{what}: quota {quota} changes the hit of {ray:?}"
             );
@@ -163,8 +154,8 @@ fn check(gpu: &Gpu, what: &str, triangles: &[[Vec3; 3]], rays: &[Ray], quotas: &
                 let twin = twin(&bvh, rays, *quota, any_hit);
                 for (i, ray) in rays.iter().enumerate() {
                     assert_eq!(
-                        bits(&traced.hits[i]),
-                        bits(&twin.hits[i]),
+                        hit_bits(&traced.hits[i]),
+                        hit_bits(&twin.hits[i]),
                         "{what}, quota {quota}, any {any_hit}: {ray:?}"
                     );
                 }

@@ -10,7 +10,7 @@ use clerestory::accel::wide::{WideBvh, WideSettings, WideTraversal};
 use clerestory::accel::{FINISHED, Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::{DeviceKind, Gpu};
 use clerestory::scene::{Instance, Scene};
-use clerestory_hard_cases::misses;
+use clerestory_hard_cases::{hit_bits, misses, soup_with_rays};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::builtin;
 use clerestory_tests::with_gpu;
@@ -40,28 +40,7 @@ impl Case {
 }
 
 fn soup() -> (Vec<[Vec3; 3]>, Vec<Ray>) {
-    let mut random = Random(51);
-    let triangles = (0..3000)
-        .map(|_| {
-            let centre = 10.0 * random.vector();
-            [0; 3].map(|_| centre + 0.5 * random.vector())
-        })
-        .collect();
-    let rays = (0..2048)
-        .map(|i| {
-            let mut ray = Ray {
-                origin: (12.0 * random.vector()).into(),
-                t_min: 0.0,
-                direction: (random.direction() * random.choose(&[1.0, 1e-3, 1e4])).into(),
-                t_max: f32::INFINITY,
-            };
-            if i % 3 == 0 {
-                (ray.t_min, ray.t_max) = (random.range(0.0, 5.0), random.range(3.0, 20.0));
-            }
-            ray
-        })
-        .collect();
-    (triangles, rays)
+    soup_with_rays(51, 3000, 2048)
 }
 
 fn cases() -> Vec<Case> {
@@ -78,11 +57,6 @@ fn cases() -> Vec<Case> {
     cases.push(Case::new("nothing", Vec::new(), few));
     cases.push(Case::new("soup", triangles, rays));
     cases
-}
-
-fn bits(hit: &Hit) -> [u32; 4] {
-    let [u, v] = hit.barycentrics.map(f32::to_bits);
-    [hit.t.to_bits(), u, v, hit.triangle]
 }
 
 /// Hits and work of the twin, and how often a ray was stopped.
@@ -122,7 +96,7 @@ fn check(gpu: &Gpu, cases: &[Case], asked: &TraceSettings) -> u64 {
         let (hits, work, stops) = twin(case, settings);
         for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
             if exact {
-                assert_eq!(bits(found), bits(expected), "{what}: {ray:?}");
+                assert_eq!(hit_bits(found), hit_bits(expected), "{what}: {ray:?}");
             } else if settings.query == Query::Closest || !found.is_hit() {
                 assert!(!misses(&case.triangles, ray, found), "{what}: {ray:?}");
             }
@@ -257,7 +231,7 @@ fn kernels_give_a_million_rays_the_hits_of_the_binary_tree() {
             let met = expected.iter().filter(|hit| hit.is_hit()).count();
             assert!(met > count / 4, "{address}: {met} hits");
             for ((ray, expected), found) in rays.iter().zip(&expected).zip(&found) {
-                assert_eq!(bits(expected), bits(found), "{address}: {ray:?}");
+                assert_eq!(hit_bits(expected), hit_bits(found), "{address}: {ray:?}");
             }
         }
     });

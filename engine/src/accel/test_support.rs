@@ -10,6 +10,15 @@ use glam::{DVec3, Vec3};
 /// Unit roundoff of f32.
 pub const U: f64 = 1.0 / 16_777_216.0;
 
+/// What is made by so many threads.
+pub fn with_threads<T: Send>(threads: usize, make: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("threads");
+    pool.install(make)
+}
+
 /// Tries all triangles in index order with the kernels' test.
 pub fn brute_force(triangles: &[[Vec3; 3]], usable: impl Fn(usize) -> bool, ray: &Ray) -> Hit {
     let mut hit = Hit::none(ray.t_max);

@@ -20,6 +20,7 @@ pub mod tangents;
 pub mod texture;
 
 pub use files::{LoadOptions, Loaded, load, load_with};
+pub(crate) use medium::mean_density;
 pub use medium::{DensityGrid, MajorantGrid, Medium, Phase};
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, MediaUse, PhaseUse, SceneProfile, TransmissionUse};
 

@@ -52,8 +52,6 @@ ShadowRay shadow_ray(uint slot, WalkState path, vec3 from, vec3 to, vec3 contrib
     return ray;
 }
 
-// Tentative collisions on a segment in a grid, on average and at most.
-const float AIRLIGHT_DEPTH = 96.0;
 // Iterations of a walk to an equi-angular sample: those, and through the blocks of a grid, at most 63 along each axis. With all of them a walk
 // fails to arrive once in 10^150.
 const uint AIRLIGHT_QUOTA = 512u;

@@ -29,7 +29,7 @@ pub use easel::{Easel, Painted};
 pub use judgement::{FALSE_ALARM, Figure, Judgement};
 pub use lobes::{LOBES, Lobe};
 pub use page::{PAGE, PICTURES, Row, case_section, markdown, promises};
-pub use rays::{INDEXES, IndexCase, RaySet, misses};
+pub use rays::{INDEXES, IndexCase, RaySet, hit_bits, misses, soup_with_rays};
 pub use run::{Outcome, Subject, Verdict, judge, subjects};
 
 use clerestory::Result;

@@ -99,7 +99,32 @@ fn closest_of_all(triangles: &[[Vec3; 3]], ray: &Ray) -> Hit {
     hit
 }
 
-fn bits(hit: &Hit) -> [u32; 4] {
+/// Triangles with edges of up to 1 m at random places within 10 m of the origin, and rays from within 12 m of it, of which every third one is bounded.
+pub fn soup_with_rays(seed: u64, triangles: usize, rays: usize) -> (Vec<[Vec3; 3]>, Vec<Ray>) {
+    let mut random = Random(seed);
+    let triangles = (0..triangles)
+        .map(|_| {
+            let centre = 10.0 * random.vector();
+            [0; 3].map(|_| centre + 0.5 * random.vector())
+        })
+        .collect();
+    let rays = (0..rays)
+        .map(|i| {
+            let mut ray = Ray::new(
+                12.0 * random.vector(),
+                random.direction() * random.choose(&[1.0, 1e-3, 1e4]),
+            );
+            if i % 3 == 0 {
+                (ray.t_min, ray.t_max) = (random.range(0.0, 5.0), random.range(3.0, 20.0));
+            }
+            ray
+        })
+        .collect();
+    (triangles, rays)
+}
+
+/// What makes two hits the same to the bit.
+pub fn hit_bits(hit: &Hit) -> [u32; 4] {
     let [u, v] = hit.barycentrics;
     [hit.t.to_bits(), u.to_bits(), v.to_bits(), hit.triangle]
 }
@@ -152,7 +177,7 @@ pub(crate) fn judge(kind: &IndexCase, sets: &[RaySet]) -> Result<Judgement> {
         let mut first = String::new();
         for ray in rays {
             let hit = index.closest_hit(ray);
-            differ += usize::from(bits(&hit) != bits(&closest_of_all(triangles, ray)));
+            differ += usize::from(hit_bits(&hit) != hit_bits(&closest_of_all(triangles, ray)));
             disagree += usize::from(index.any_hit(ray) != hit.is_hit());
             if misses(triangles, ray, &hit) {
                 missed += 1;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::accel::test_support::{Random, Sheared, U, awkward, brute_force};
+use crate::accel::test_support::{Random, Sheared, U, awkward, brute_force, with_threads};
 use crate::accel::{FINISHED, NO_HIT, triangle};
 
 fn build(triangles: &[[Vec3; 3]]) -> Bvh2 {
@@ -269,16 +269,10 @@ fn tree_is_well_formed() {
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
     let triangles = soup(&mut Random(14), 30_000, 0.02, 1.0, Vec3::ZERO);
-    let with_threads = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| build(&triangles))
-    };
-    let one = with_threads(1);
+    let built = |threads| with_threads(threads, || build(&triangles));
+    let one = built(1);
     for threads in [2, 5] {
-        assert!(one.texels() == with_threads(threads).texels(), "{threads} threads");
+        assert!(one.texels() == built(threads).texels(), "{threads} threads");
     }
 }
 

@@ -3,7 +3,7 @@ use super::*;
 use crate::accel::FINISHED;
 use crate::accel::box_test::BoxTest;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
-use crate::accel::test_support::{Random, brute_force};
+use crate::accel::test_support::{Random, brute_force, with_threads};
 
 const SCHEMES: [Scheme; 7] = [
     Scheme::Stack,
@@ -237,12 +237,8 @@ fn every_point_of_a_triangle_lies_in_a_leaf_that_holds_it() {
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
     let triangles = soup(&mut Random(63), 6000, 0.05, 1.0, Vec3::ZERO);
-    let build_with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| build(&triangles, &KdSettings::default()))
+    let build_with = |threads| {
+        with_threads(threads, || build(&triangles, &KdSettings::default()))
             .texels()
             .to_vec()
     };

@@ -68,6 +68,7 @@ fn targets<'a, T>(mut rest: &'a mut [T], counts: &[Vec<u32>]) -> Vec<Vec<std::sl
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::test_support::with_threads;
     use crate::test_random::Random;
 
     #[test]
@@ -83,12 +84,8 @@ mod tests {
                     let mut expected = items.clone();
                     expected.sort_by_key(|item| item.0 & (u64::MAX >> (64 - bits)));
                     for threads in [1, 3] {
-                        let pool = rayon::ThreadPoolBuilder::new()
-                            .num_threads(threads)
-                            .build()
-                            .expect("threads");
                         let mut sorted = items.clone();
-                        pool.install(|| sort_by_key(&mut sorted, bits, |item| item.0));
+                        with_threads(threads, || sort_by_key(&mut sorted, bits, |item| item.0));
                         assert!(sorted == expected, "{count} of {bits} bits, mask {mask:x}");
                     }
                 }

@@ -3,7 +3,7 @@ use super::*;
 use crate::accel::box_tree::{BoxTree, Child, TreeShape};
 use crate::accel::bvh2::{Bvh2, Bvh2Settings, MAX_DEPTH};
 use crate::accel::leaf_rule::half_area;
-use crate::accel::test_support::Random;
+use crate::accel::test_support::{Random, with_threads};
 use crate::accel::{Aabb, LeafRule, Ray, RayIndex};
 use glam::Vec3;
 
@@ -294,16 +294,10 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
             quality,
             ..LbvhSettings::default()
         };
-        let with_threads = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .expect("threads");
-            pool.install(|| build(&triangles, &settings).expect("valid"))
-        };
-        let one = with_threads(1);
+        let built = |threads| with_threads(threads, || build(&triangles, &settings).expect("valid"));
+        let one = built(1);
         for threads in [2, 5] {
-            assert!(one.texels() == with_threads(threads).texels(), "{threads} threads");
+            assert!(one.texels() == built(threads).texels(), "{threads} threads");
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::accel::bvh2::MAX_DEPTH;
 use crate::accel::lbvh::SortedCodes;
 use crate::accel::lbvh::hard_boxes;
 use crate::accel::lbvh::radix_tree::hierarchy;
-use crate::accel::test_support::Random;
+use crate::accel::test_support::{Random, with_threads};
 use glam::Vec3;
 
 const RULE: LeafRule = LeafRule::Area(4);
@@ -112,13 +112,14 @@ fn trees_do_not_depend_on_the_number_of_threads() {
     let boxes = with_wall(&mut Random(78), 6000);
     let given = linear_tree(&boxes, MAX_DEPTH);
     for (rounds, mini_tree, reinsertions) in STEPS {
-        let with_threads = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| optimise(&given, &boxes, &optimisation(rounds, mini_tree, reinsertions)))
+        let optimised = |threads| {
+            with_threads(threads, || {
+                optimise(&given, &boxes, &optimisation(rounds, mini_tree, reinsertions))
+            })
         };
-        let one = with_threads(1);
+        let one = optimised(1);
         for threads in [2, 4] {
-            assert!(one == with_threads(threads), "{rounds} {mini_tree} {reinsertions}");
+            assert!(one == optimised(threads), "{rounds} {mini_tree} {reinsertions}");
         }
     }
 }

@@ -5,7 +5,7 @@ use super::*;
 use crate::accel::box_test::{BOX_SLACK, BoxTest};
 use crate::accel::bvh2::Bvh2Settings;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
-use crate::accel::test_support::{Random, U, brute_force};
+use crate::accel::test_support::{Random, U, brute_force, with_threads};
 use crate::accel::{FINISHED, NO_HIT};
 use crate::gpu::shaders::constants;
 
@@ -382,15 +382,9 @@ fn filter_decides_which_candidates_count() {
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
     let triangles = soup(&mut Random(28), 30_000, 0.02, 1.0, Vec3::ZERO);
-    let with_threads = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| build(&triangles))
-    };
-    let one = with_threads(1);
-    assert!(one.texels() == with_threads(3).texels());
+    let built = |threads| with_threads(threads, || build(&triangles));
+    let one = built(1);
+    assert!(one.texels() == built(3).texels());
     assert!(one.statistics().bytes < 65 * 30_000, "{} bytes", one.statistics().bytes);
 }
 

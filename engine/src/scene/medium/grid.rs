@@ -52,6 +52,11 @@ impl DensityGrid {
         self.values.iter().copied().fold(0.0, f32::max)
     }
 
+    /// Mean density of the cells; 0 of none.
+    pub fn mean(&self) -> f64 {
+        mean_density(&self.values)
+    }
+
     /// Density at a point of world space.
     ///
     /// Inverts [`DensityGrid::to_world`] for each call; for many points, invert it once and use [`DensityGrid::density_in_cube`].
@@ -88,6 +93,11 @@ impl DensityGrid {
         let index = (z as usize * ny + y as usize) * nx + x as usize;
         f64::from(self.values.get(index).copied().unwrap_or(0.0))
     }
+}
+
+/// Mean of densities; 0 of none.
+pub(crate) fn mean_density(densities: &[f32]) -> f64 {
+    densities.iter().map(|v| f64::from(*v)).sum::<f64>() / densities.len().max(1) as f64
 }
 
 #[cfg(test)]

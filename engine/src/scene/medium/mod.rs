@@ -17,6 +17,7 @@ pub mod vol;
 pub(super) use check::check;
 pub use check::{MAX_DENSITY_CELLS, MAX_GRID_DEPTH, MAX_MEDIA};
 pub use grid::DensityGrid;
+pub(crate) use grid::mean_density;
 pub use majorant::MajorantGrid;
 
 use glam::Vec3;

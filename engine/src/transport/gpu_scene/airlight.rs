@@ -4,15 +4,16 @@
 //! flies freely, collisions and next-event estimation find it as well, and a medium that light enters bent alone has no light to sample. The rule
 //! decides about noise and time alone, never about what a picture converges to.
 
-use crate::scene::{Instance, LightKind, Medium, Scene};
+use crate::gpu::shaders::constants;
+use crate::scene::{DensityGrid, Instance, LightKind, Medium, Scene};
 use glam::DVec3;
 
 /// Size of a lamp in mean free paths below which samples are taken. By squared error × time they gain 1.2 at a fifth of one, and lose a fifth at one.
 const LAMP_MEAN_FREE_PATHS: f64 = 0.5;
 
-/// Optical depth through a grid as dense as its densest cell everywhere above which samples are not taken. Kernels cut such ways each 96 of it, and
-/// each part costs a search for the surface: in a plume with one very dense cell, far more than the noise is worth.
-const GRID_DEPTH_MOST: f64 = 64.0 * 96.0;
+/// Parts that a way through a grid may have, were the grid as dense as its densest cell everywhere. Kernels cut ways into parts of one depth, and each
+/// costs a search for the surface: in a plume with one very dense cell, far more than the noise is worth.
+const GRID_PARTS_MOST: f64 = 64.0;
 
 /// Whether some lamp's light is, in some medium.
 pub(super) fn airlight_helps(scene: &Scene) -> bool {
@@ -25,7 +26,10 @@ pub(super) fn airlight_helps(scene: &Scene) -> bool {
         .chain(scene.surrounding)
         .map(|index| &scene.media[index as usize])
         .collect();
-    if media.iter().any(|medium| greatest_depth(medium) > GRID_DEPTH_MOST) {
+    if media
+        .iter()
+        .any(|medium| greatest_depth(medium) > GRID_PARTS_MOST * f64::from(constants::AIRLIGHT_DEPTH))
+    {
         return false;
     }
     let longest = media
@@ -54,10 +58,7 @@ fn greatest_depth(medium: &Medium) -> f64 {
 /// Mean free path at the mean density, in metres; `None` of what does not scatter.
 fn mean_free_path(medium: &Medium) -> Option<f64> {
     let scatters = !medium.is_empty() && medium.sigma_s.max_element() > 0.0;
-    let density = medium.density.as_ref().map_or(1.0, |grid| {
-        let sum: f64 = grid.values.iter().map(|value| f64::from(*value)).sum();
-        sum / grid.values.len().max(1) as f64
-    });
+    let density = medium.density.as_ref().map_or(1.0, DensityGrid::mean);
     let extinction = f64::from(medium.sigma_t().element_sum()) / 3.0 * density;
     (scatters && extinction > 0.0).then(|| extinction.recip())
 }

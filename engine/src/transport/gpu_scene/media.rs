@@ -9,7 +9,7 @@ use crate::gpu::shaders::constants::{PHASE_HENYEY_GREENSTEIN, PHASE_ISOTROPIC, P
 use crate::gpu::shaders::sets::MediaSet;
 use crate::gpu::shaders::types::SceneMedium;
 use crate::gpu::{Category, Gpu, TexelView};
-use crate::scene::{MajorantGrid, Medium, Phase, Scene};
+use crate::scene::{MajorantGrid, Medium, Phase, Scene, mean_density};
 
 /// Blocks along the longest side of a grid, about, and the least number of cells along a side of one.
 const BLOCKS_PER_SIDE: u32 = 32;
@@ -108,9 +108,8 @@ fn record(medium: &Medium, densities: &mut Vec<f32>, majorants: &mut Vec<f32>) -
 
 /// How well bounds follow what they bound: the mean of `values` over that of `maxima`; 0 where all are.
 fn tightness(values: &[f32], maxima: &[f32]) -> f32 {
-    let mean = |of: &[f32]| of.iter().map(|v| f64::from(*v)).sum::<f64>() / of.len().max(1) as f64;
-    match mean(maxima) {
-        bound if bound > 0.0 => (mean(values) / bound).min(1.0) as f32,
+    match mean_density(maxima) {
+        bound if bound > 0.0 => (mean_density(values) / bound).min(1.0) as f32,
         _ => 0.0,
     }
 }
