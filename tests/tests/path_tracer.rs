@@ -392,6 +392,14 @@ fn environments_light_a_plane_by_their_cosine_integral() {
         };
         let picture = render(gpu, &scene, SMALL, 256, &independent());
         picture.expect_values("rows and a point", &floor_picture(16, law));
+
+        // One that shines on nothing seen takes most of the choices.
+        scene.lights[0].kind = LightKind::Point {
+            position: -height * Vec3::Y,
+            intensity: Vec3::splat(100.0 * intensity),
+        };
+        let picture = render(gpu, &scene, SMALL, 256, &independent());
+        picture.expect_values("rows and a point below", &floor_picture(16, |_, _| irradiance));
     });
 }
 

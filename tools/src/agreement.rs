@@ -22,6 +22,7 @@ use std::sync::Arc;
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE};
 use clerestory::film::{CompareOptions, Picture, ToneMap, compare, exr, png, z_test};
 use clerestory::gpu::Gpu;
+use clerestory::techniques::path::Adaptive;
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::GpuScene;
 use clerestory::transport::random::SamplerKind;
@@ -58,6 +59,9 @@ pub struct AgreementOptions {
     pub timing_pictures: u32,
     /// Samples per pixel of a timed picture, a square number for Mitsuba's multijittered sampler; a power of four suits Sobol' points too.
     pub timing_samples: u32,
+    /// Whether pixels of this engine's pictures get samples by their noise.
+    #[serde(default)]
+    pub adaptive: Adaptive,
     /// The Python that has Mitsuba.
     #[serde(skip)]
     pub python: PathBuf,
@@ -86,6 +90,7 @@ impl Default for AgreementOptions {
             timing_rounds: 3,
             timing_pictures: 2,
             timing_samples: 256,
+            adaptive: Adaptive::Off,
             python: std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from),
             output: "out/agreement".into(),
             results: None,
@@ -281,6 +286,7 @@ fn settings(options: &AgreementOptions) -> PathTracerSettings {
         roulette_start: ROULETTE_START,
         multiple_scattering: false,
         separable_masking: true,
+        adaptive: options.adaptive,
         ..PathTracerSettings::default()
     }
 }

@@ -18,6 +18,17 @@ pub enum ValidationMode {
     Gpu,
 }
 
+/// By which error adaptive samples are shared out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Adaptive {
+    /// That of the relative MSE.
+    Relative,
+    /// That of the MSE.
+    Absolute,
+    /// Every pixel gets as many.
+    Off,
+}
+
 /// Options of every command.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Global options")]

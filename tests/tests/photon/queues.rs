@@ -129,13 +129,18 @@ fn every_queue_gives_the_same_picture() {
     });
 }
 
-// Behind the end of a list that is not full are places of the pass before.
+// Behind the end of a list that is not full are places of the pass before. One that asks in this pass, too, would be asked for twice by one subgroup if
+// the list had grown shorter by a place or two: seldom, so passes are many.
 #[test]
 fn nothing_is_asked_behind_the_end_of_a_queue() {
     with_gpu(|gpu| {
-        let by = |form| made_by(gpu, &seen_little(), &direct(), form, 4);
+        let settings = PhotonSettings {
+            photons: 1 << 6,
+            ..direct()
+        };
+        let by = |form| made_by(gpu, &seen_little(), &settings, form, 96);
         let slots = by(FORMS[0]);
-        assert!(slots.gather.queries > 0 && slots.gather.queries < PLACES);
+        assert!(slots.gather.queries > 0 && slots.gather.queries < 96 * PLACES);
         for form in &FORMS[1..3] {
             assert!(by(*form) == slots, "{form:?}");
         }

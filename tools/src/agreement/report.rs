@@ -7,6 +7,7 @@ use clerestory::film::ZTest;
 use clerestory::film::z_test::{ACCEPTED_FRACTION, Verdict};
 use clerestory::gpu::Caps;
 use clerestory::input::read_text;
+use clerestory::techniques::path::Adaptive;
 use clerestory::{Error, Result};
 
 use super::AgreementOptions;
@@ -220,11 +221,12 @@ impl AgreementReport {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "- {} with Mitsuba in z-tests of every value and of blocks: {1} × {1} pixels, {2} samples per pixel on both sides; bias is between these \
-             pictures.",
+            "- {} with Mitsuba in z-tests of every value and of blocks: {1} × {1} pixels, {2} samples per pixel on both sides{3}; bias is between \
+             these pictures.",
             self.counted(),
             o.size,
-            o.passes * o.samples_per_pass
+            o.passes * o.samples_per_pass,
+            sharing(o.adaptive)
         );
         for line in self.uncompared_lines() {
             let _ = writeln!(text, "- {line}");
@@ -282,11 +284,12 @@ impl AgreementReport {
         );
         let _ = writeln!(
             page,
-            "- Pictures of {0} × {0} pixels, {1} samples per pixel on both sides, Mitsuba's in {2} independent passes; independent (PCG) samples, single \
-             scattering and separable masking here.",
+            "- Pictures of {0} × {0} pixels, {1} samples per pixel on both sides{3}, Mitsuba's in {2} independent passes; independent (PCG) samples, \
+             single scattering and separable masking here.",
             o.size,
             o.passes * o.samples_per_pass,
             o.passes,
+            sharing(o.adaptive)
         );
         if let Some(first) = self.scenes.first() {
             let _ = writeln!(
@@ -409,6 +412,15 @@ fn millions(one: &Contender) -> String {
 fn ratio(of: &EqualError) -> String {
     let cpu = of.cpu_ratio.map_or("–".into(), |cpu| format!("{cpu:.2}"));
     format!("{:.2} ± {:.2} ({cpu})", of.ratio, of.ratio_error)
+}
+
+/// How this engine shares its samples out, where not evenly.
+fn sharing(adaptive: Adaptive) -> &'static str {
+    match adaptive {
+        Adaptive::Off => "",
+        Adaptive::Relative => ", this engine's shared out by relative noise",
+        Adaptive::Absolute => ", this engine's shared out by absolute noise",
+    }
 }
 
 #[cfg(test)]

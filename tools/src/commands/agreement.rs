@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use clerestory::techniques::path;
 use clerestory_tools::agreement::{AgreementOptions, run_with};
 use clerestory_tools::experiments::watch::Watch;
 use clerestory_tools::mitsuba::scenes::scenes;
@@ -12,7 +13,7 @@ use clerestory_tools::page::Block;
 use super::check_validation;
 use super::progress::Bar;
 use crate::failure::{Code, Failure, Outcome};
-use crate::options::DeviceOptions;
+use crate::options::{Adaptive, DeviceOptions};
 use crate::output;
 use crate::outputs::{self, Inputs, OutputPage, Outputs, Overwriting, Repeated, Written};
 
@@ -53,6 +54,9 @@ pub struct Arguments {
     /// Samples per pixel of a timed picture, a square number
     #[arg(long, value_name = "N", default_value_t = AgreementOptions::default().timing_samples)]
     timing_spp: u32,
+    /// Gives pixels of this engine's pictures samples by their noise, as `clerestory render --adaptive` does
+    #[arg(long, value_enum, value_name = "ERROR", num_args = 0..=1, require_equals = true, default_missing_value = "relative")]
+    adaptive: Option<Adaptive>,
     /// The Python that has Mitsuba; by default CLERESTORY_MITSUBA_PYTHON, else python3
     #[arg(long, value_name = "FILE")]
     python: Option<PathBuf>,
@@ -108,6 +112,11 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         timing_rounds: arguments.timing_rounds,
         timing_pictures: arguments.timing_pictures,
         timing_samples: arguments.timing_spp,
+        adaptive: match arguments.adaptive {
+            Some(Adaptive::Relative) => path::Adaptive::Relative,
+            Some(Adaptive::Absolute) => path::Adaptive::Absolute,
+            Some(Adaptive::Off) | None => path::Adaptive::Off,
+        },
         python: arguments.python.clone().unwrap_or(defaults.python),
         output: arguments.output.clone(),
         results: arguments.results.clone(),

@@ -27,7 +27,7 @@ use serde_json::{Map, Value};
 use super::check_validation;
 use super::compare::finite;
 use crate::failure::{Code, Failure, Outcome};
-use crate::options::{DeviceOptions, Size, parse_duration, parse_size};
+use crate::options::{Adaptive, DeviceOptions, Size, parse_duration, parse_size};
 use crate::outputs::{Inputs, Outputs, Overwriting, Written};
 use crate::{frame_report, output, pictures};
 use choice::ChoiceReport;
@@ -171,17 +171,6 @@ enum Sampler {
     Sobol,
     /// Independent samples.
     Pcg,
-}
-
-/// By which error adaptive samples are shared out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Adaptive {
-    /// That of the relative MSE.
-    Relative,
-    /// That of the MSE.
-    Absolute,
-    /// Every pixel gets as many.
-    Off,
 }
 
 /// Layers of the EXR.

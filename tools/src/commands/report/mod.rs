@@ -15,6 +15,7 @@ use clap::Args;
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result, scene};
 use clerestory_tools::experiments::findings::Findings;
+use clerestory_tools::experiments::kept_rows;
 use clerestory_tools::experiments::measures::{self, Context};
 use clerestory_tools::experiments::pages::{self, Stored};
 use clerestory_tools::experiments::render_sweep;
@@ -130,7 +131,9 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
             }
         };
         if interrupted {
-            output::note("interrupted; the same command goes on where a sweep stopped, and takes a measure anew");
+            output::note(
+                "interrupted; the same command goes on where a sweep or one of the longest measures stopped, and takes other measures anew",
+            );
             return Ok(Code::Interrupted.into());
         }
     }
@@ -207,6 +210,9 @@ fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, places: &
     };
     let (begun, clock) = (begun(experiment), Instant::now());
     let folder = folder(arguments, experiment);
+    if arguments.fresh {
+        kept_rows::forget(&folder)?;
+    }
     let context = Context {
         smoke: arguments.smoke,
         scenes: &arguments.scenes,
@@ -236,6 +242,7 @@ fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, places: &
         written.push(results.keep(experiment, &Stored { run, found }, &folder, &findings)?);
     }
     Written::check_all(written)?;
+    kept_rows::forget(&folder)?;
     printed?;
     if places.results.is_some() {
         places::write_summaries()?;

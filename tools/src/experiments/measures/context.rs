@@ -5,7 +5,11 @@ use std::path::{Path, PathBuf};
 use clerestory::film::png::{self, Rgb8};
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
+use crate::experiments::findings::Sheet;
+use crate::experiments::kept_rows::KeptRows;
 use crate::experiments::watch::Watch;
 
 /// Turns of a smoke run.
@@ -86,6 +90,40 @@ impl Context<'_> {
             all.extend(rows(case)?);
         }
         Ok(all)
+    }
+
+    /// [`Context::each`] for cases that take minutes: rows of each are kept in the folder as soon as they are there, and a run that follows one that was
+    /// stopped begins with the first case that has none. Smoke runs keep nothing.
+    ///
+    /// # Errors
+    /// The first of a case; [`Error::Io`].
+    pub fn each_kept<C, R: Sheet + Serialize + DeserializeOwned>(
+        &self,
+        cases: &[C],
+        name: impl Fn(&C) -> String,
+        mut rows: impl FnMut(&C) -> Result<Vec<R>>,
+    ) -> Result<Vec<R>> {
+        if self.smoke {
+            return self.each(cases, name, rows);
+        }
+        let kept = KeptRows::open(self.folder, R::TITLE)?;
+        let placed: Vec<(usize, String, &C)> = cases
+            .iter()
+            .enumerate()
+            .map(|(i, case)| (i, name(case), case))
+            .collect();
+        let name = |(_, name, _): &(usize, String, &C)| name.clone();
+        self.each(&placed, name, |(place, name, case)| {
+            if let Some(known) = kept.get(*place, name) {
+                return Ok(known);
+            }
+            let measured = rows(case)?;
+            // A case that was stopped has no rows, or not all of them.
+            if self.watch.stopped() {
+                return Ok(measured);
+            }
+            kept.add(*place, name, measured)
+        })
     }
 
     /// Values of so many contenders that take turns: after a turn that warms up, `turns` turns (two in a smoke run), each begun by the next

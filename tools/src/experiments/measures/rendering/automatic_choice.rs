@@ -309,12 +309,12 @@ impl Study for Found {
         let contests: &[Contest] = context.pick(&CONTESTS, &SMOKE_CONTESTS);
         let pairs: &[(&str, Asked)] = context.pick(&PAIRS, &SMOKE_PAIRS);
         Ok(Self {
-            contests: context.each(
+            contests: context.each_kept(
                 contests,
                 |contest| contest.address.into(),
                 |contest| Ok(contest.held(context, &gpu)?.into_iter().collect()),
             )?,
-            goals: context.each(
+            goals: context.each_kept(
                 pairs,
                 |(address, _)| (*address).into(),
                 |(address, asked)| Ok(goal(context, &gpu, address, *asked)?.into_iter().collect()),
