@@ -393,13 +393,28 @@ fn environments_light_a_plane_by_their_cosine_integral() {
         let picture = render(gpu, &scene, SMALL, 256, &independent());
         picture.expect_values("rows and a point", &floor_picture(16, law));
 
-        // One that shines on nothing seen takes most of the choices.
+        // Of a small bright part of the sky, which scattered rays hardly meet, a point that shines on nothing seen takes choices.
+        let mut radiance = vec![Vec3::splat(0.05); 32 * 16];
+        radiance[4 * 32 + 9] = Vec3::splat(300.0);
+        scene.environment = Some(Environment {
+            name: "sun".into(),
+            width: 32,
+            height: 16,
+            radiance,
+            ..Environment::uniform(Vec3::ONE)
+        });
         scene.lights[0].kind = LightKind::Point {
             position: -height * Vec3::Y,
-            intensity: Vec3::splat(100.0 * intensity),
+            intensity: Vec3::splat(10.0 * intensity),
         };
-        let picture = render(gpu, &scene, SMALL, 256, &independent());
-        picture.expect_values("rows and a point below", &floor_picture(16, |_, _| irradiance));
+        let both = render(gpu, &scene, SMALL, 256, &independent());
+        scene.lights.clear();
+        let other_seed = PathTracerSettings {
+            seed: 71,
+            ..independent()
+        };
+        let alone = render(gpu, &scene, SMALL, 256, &other_seed);
+        both.expect_same_as("sun and a point below", &alone.radiance, &alone.variance);
     });
 }
 

@@ -477,7 +477,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/photon/determinism.rs::queries_that_a_quota_stops_go_through_all_records",
             "tests/tests/photon/flux.rs::the_picture_has_the_flux_of_the_map",
-            "tests/tests/photon/materials.rs::light_goes_through_what_lets_it_through",
+            "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
             "tests/tests/photon/determinism.rs::threads_never_show",
         ],
         settings: &["query"],
