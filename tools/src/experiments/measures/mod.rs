@@ -153,6 +153,7 @@ measures! {
     on_host "sphere-tests" rays::sphere_tests;
     on_device "stops" rendering::stops;
     on_host "tangents" surfaces::tangents;
+    on_device "technique-choice" rendering::technique_choice;
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
 }

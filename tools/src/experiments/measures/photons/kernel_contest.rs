@@ -6,7 +6,7 @@ use clerestory::{Result, scene};
 use serde_json::{Value, json};
 
 use crate::experiments::measures::Context;
-use crate::experiments::measures::rendering::automatic_choice::render;
+use crate::experiments::measures::rendering::technique_choice::render;
 use crate::experiments::reference::SEED;
 use crate::experiments::unbiased;
 

@@ -12,4 +12,5 @@ pub mod sample_sums;
 pub mod scene_profile;
 pub mod stops;
 mod sums;
+pub mod technique_choice;
 mod unseen_features;
