@@ -28,6 +28,8 @@ layout(set = 2, binding = 10) uniform textureBuffer scene_cdf;
 // of light sampling per solid angle; the last row is there twice (transport/environment.glsl).
 layout(set = 2, binding = 11) uniform utextureBuffer scene_environment;
 layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
+// The tree of lights, where a kernel chooses by one: its nodes, the first of which is the root, then by light its trail, four in a quarter.
+layout(set = 2, binding = 13) uniform utextureBuffer scene_light_tree;
 
 float distribution_cdf(uint index) { return texelFetch(scene_cdf, int(index)).x; }
 vec4 environment_texel(uint index) {
@@ -83,6 +85,22 @@ SceneLight load_light(uint index) {
     vec4 q2 = uintBitsToFloat(texelFetch(scene_lights, first + 2));
     vec4 q3 = uintBitsToFloat(texelFetch(scene_lights, first + 3));
     return SceneLight(q0.x, q0.y, q0.zw, q1.xyz, q1.w, q2.xyz, q2.w, q3.xyz, q3.w);
+}
+
+SceneLightNode load_light_node(uint index) {
+    int first = int(LIGHT_NODE_QUARTERS * index);
+    vec4 q0 = uintBitsToFloat(texelFetch(scene_light_tree, first));
+    vec4 q1 = uintBitsToFloat(texelFetch(scene_light_tree, first + 1));
+    vec4 q2 = uintBitsToFloat(texelFetch(scene_light_tree, first + 2));
+    uvec4 q3 = texelFetch(scene_light_tree, first + 3);
+    return SceneLightNode(q0.xyz, q0.w, q1.xyz, q1.w, q2.xyz, q2.w, uintBitsToFloat(q3.x), uintBitsToFloat(q3.y), q3.z, q3.w);
+}
+
+// The way from the root to a light: a bit a step, the first step last, set where it goes to the second child.
+uint load_light_trail(uint light) {
+    uint nodes = texelFetch(scene_light_tree, int(LIGHT_NODE_QUARTERS - 1u)).w;
+    uint quarter = LIGHT_NODE_QUARTERS * nodes + light / LIGHT_TRAILS_PER_QUARTER;
+    return texelFetch(scene_light_tree, int(quarter))[light % LIGHT_TRAILS_PER_QUARTER];
 }
 
 SceneEnvironment load_environment() {

@@ -16,6 +16,8 @@ layout(set = 0, binding = 0, scalar) restrict writeonly buffer SceneRecords {
     SceneLight light;
     SceneEnvironment environment;
     SceneMedium medium;
+    SceneLightNode light_node;
+    uint trails[2];
 } records;
 
 void main() {
@@ -25,4 +27,7 @@ void main() {
     records.light = load_light(0u);
     records.environment = load_environment();
     records.medium = load_medium(0u);
+    records.light_node = load_light_node(0u);
+    records.trails[0] = load_light_trail(0u);
+    records.trails[1] = load_light_trail(5u);
 }

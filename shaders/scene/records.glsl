@@ -26,6 +26,12 @@ const uint TEXTURE_QUARTERS = 3u;
 const uint LIGHT_QUARTERS = 4u;
 const uint ENVIRONMENT_HEADER_QUARTERS = 3u;
 const uint MEDIUM_QUARTERS = 9u;
+const uint LIGHT_NODE_QUARTERS = 4u;
+
+const uint LIGHT_NODE_LEAF = 0x80000000u;     // in `child`: what remains is a light
+const uint LIGHT_TREE_DEPTH_MAX = 30u;        // steps from the root to a light, a bit of its trail each
+const uint LIGHT_TRAIL_NONE = 0xFFFFFFFFu;    // of a light that is not in the tree
+const uint LIGHT_TRAILS_PER_QUARTER = 4u;
 
 const uint PHASE_ISOTROPIC = 0u;
 const uint PHASE_HENYEY_GREENSTEIN = 1u;
@@ -89,6 +95,20 @@ struct SceneLight {
     float cos_outer;
     vec3 strength;      // W/sr, W/m2; unused for triangles and the environment
     float spare_strength;
+};
+
+// A node of the tree of lights: what its lights send, from where and to where.
+struct SceneLightNode {
+    vec3 center;       // of the box around them
+    float strength;    // sum of their greatest intensities, 1 for that of the strongest light
+    vec3 half_extent;  // of the box
+    float radius;      // half of its diagonal
+    vec3 axis;         // of the cone of their normals
+    float cos_spread;  // cosine of its half angle; -1 for all directions
+    float cos_reach;   // cosine of how far beyond their normals they shine
+    float share;       // probability of the first child where it is fixed; 0 where it follows from the importances
+    uint child;        // first child, which the second one is behind; of a leaf its light, with LIGHT_NODE_LEAF
+    uint node_count;   // of the tree, in the root; the trails of all lights follow
 };
 
 // A medium: coefficients at density 1, and where the grid of its density is.

@@ -25,6 +25,8 @@ layout(constant_id = 25) const bool HAS_LOBE_LABELS = false;           // and te
 
 layout(constant_id = 26) const bool HAS_PHONG = true;                  // modified Phong lobes
 
+layout(constant_id = 23) const bool HAS_LIGHT_TREE = false;            // lights are chosen by a tree, for the point that they are to light
+
 layout(constant_id = 19) const bool HAS_MEDIA = true;                  // paths know which medium they are in
 
 #define CLERESTORY_SAMPLER SAMPLER_KIND

@@ -2,7 +2,7 @@
 
 use clerestory::film::{GpuFilm, NonFiniteSamples};
 use clerestory::gpu::ash::vk;
-use clerestory::gpu::shaders::sets::{PathAovSet, PathShareSet, WaveSet};
+use clerestory::gpu::shaders::sets::{PathShareSet, PathSlotSet, WaveSet};
 use clerestory::gpu::shaders::techniques::path::{path_resolve, path_resolve_shares};
 use clerestory::gpu::shaders::types::{GatheredLight, PathShare};
 use clerestory::gpu::{Access, Category, Pass};
@@ -57,7 +57,10 @@ fn they_are_counted_by_kind_and_left_out() {
             medium_counters: none,
             walk_numbers_in: &texels,
         };
-        let aovs = PathAovSet { path_aovs: none };
+        let aovs = PathSlotSet {
+            path_aovs: none,
+            path_receivers: none,
+        };
         let spec = path_resolve::Spec { write_aovs: false };
         let kernel = gpu.compute_pipeline::<path_resolve::Kernel>(&spec).unwrap();
         let push = path_resolve::Push {

@@ -5,6 +5,7 @@ use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::scene::records;
 use clerestory::gpu::shaders::sets::{MediaSet, SceneSet};
 use clerestory::gpu::{Access, BufferDesc, Category, Gpu, TexelView};
+use clerestory::transport::light_tree::LightTree;
 use clerestory_tests::with_gpu;
 
 /// A record in which each word is another float, so that no word passes for its neighbour.
@@ -32,12 +33,25 @@ fn kernels_load_every_word_of_a_record() {
         wanted.light = numbered(301);
         wanted.environment = numbered(401);
         wanted.medium = numbered(501);
+        wanted.light_node = numbered(601);
+        // One node, which the trails of eight lights stand behind.
+        wanted.light_node.node_count = 1;
+        let trails: [u32; 8] = std::array::from_fn(|light| 700 + light as u32);
+        wanted.trails = [trails[0], trails[5]];
         let triangles = texels(gpu, wanted.triangle);
         let materials = texels(gpu, wanted.material);
         let textures = texels(gpu, wanted.texture_record);
         let lights = texels(gpu, wanted.light);
         let environment = texels(gpu, wanted.environment);
         let medium = texels(gpu, wanted.medium);
+        let tree = LightTree {
+            nodes: vec![wanted.light_node],
+            trails: trails.to_vec(),
+        };
+        let format = vk::Format::R32G32B32A32_UINT;
+        let tree = gpu
+            .texels_with("tree", Category::Staging, format, &tree.bytes())
+            .unwrap();
         let no_words = texels(gpu, [0u32; 4]);
         let no_floats = gpu
             .texels_with("none", Category::Staging, vk::Format::R32_SFLOAT, &[0.0f32])
@@ -56,6 +70,7 @@ fn kernels_load_every_word_of_a_record() {
             scene_cdf: &no_floats,
             scene_environment: &environment,
             scene_albedo_table: &no_floats,
+            scene_light_tree: &tree,
         };
         let media = MediaSet {
             media_records: &medium,

@@ -77,6 +77,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::transport::free_flight::ROWS,
     crate::transport::fresnel::ROWS,
     crate::transport::ggx::ROWS,
+    crate::transport::light_tree::ROWS,
     crate::transport::lights::ROWS,
     crate::transport::medium::ROWS,
     crate::transport::path_set::ROWS,

@@ -10,6 +10,7 @@ pub mod free_flight;
 pub mod fresnel;
 pub mod ggx;
 pub mod gpu_scene;
+pub mod light_tree;
 pub mod lights;
 pub mod medium;
 pub mod packing;

@@ -30,7 +30,7 @@ pub use surface_spec;
 
 /// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
 /// is off where nothing else is known.
-pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 20] = [
+pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 21] = [
     ("has_metal", METAL_LOBES, "no material is metal"),
     (
         "has_conductor",
@@ -59,6 +59,11 @@ pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 20] = [
         "has_punctual_lights",
         "point, spot and directional lights",
         "the scene has none",
+    ),
+    (
+        "has_light_tree",
+        "choice of lights for the point that they are to light",
+        "the scene has few lights",
     ),
     ("has_media", "participating media", "the scene has none"),
     (

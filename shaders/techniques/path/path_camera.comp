@@ -15,7 +15,7 @@ layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel 
 #define CLERESTORY_NUMBERED NUMBERED
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 
-#include "techniques/path/path_aovs.glsl"
+#include "techniques/path/path_slots.glsl"
 #include "transport/warp.glsl"
 #include "walk/wave.glsl"
 

@@ -18,6 +18,7 @@ layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular sample
 #include "transport/media_features.glsl"
 #include "transport/path_set.glsl"
 #include "techniques/path/path_bounce.glsl"
+#include "techniques/path/path_slots.glsl"
 #include "walk/hand_on.glsl"
 #include "walk/media.glsl"
 
@@ -97,15 +98,14 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
     uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * status.rounds + DIMENSION_AIRLIGHT;
     uvec2 word = sampler_bits(walk_sampler(slot, dimension));
     uint place_word = word.y;
-    float probability;
-    SceneLight light = choose_light(word, pcg3d(uvec3(word, 0u)).x, probability);
-    if (!has_place(light.kind)) {
+    LightChoice choice = choose_light_by_power(word, pcg3d(uvec3(word, 0u)).x);
+    if (!has_place(choice.light.kind)) {
         return false;
     }
-    if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
+    if (HAS_AREA_LIGHTS && choice.light.kind == LIGHT_TRIANGLE) {
         place_word = sampler_bits(walk_sampler(slot, DIMENSION_FIRST_PLACE + status.rounds)).x;
     }
-    LightPoint point = light_point(light, probability, word, push.scene_lower, push.scene_upper);
+    LightPoint point = light_point(choice, word, push.scene_lower, push.scene_upper);
     EquiAngular e = airlight_from(path, bands, m, segment, walk, point.point.position);
     float t = equi_angular_sample(e, segment.reach, unit_float(place_word));
     float pdf = equi_angular_pdf(e, t);
@@ -132,7 +132,9 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
         passed = transmittance(m.sigma_t, t);
     }
     float phase = phase_function(m.phase, m.phase_parameter, path.direction, seen.direction);
-    float weight = light_weight(seen.pdf, phase) * power_heuristic(pdf, reckoned_collision_density(m, bands, t, walk));
+    // Collisions choose the light for their place, these samples by its power.
+    float gain = light_choice_gain(choice, LightReceiver(from, vec3(0.0)));
+    float weight = light_weight(gain * seen.pdf, phase) * power_heuristic(pdf, gain * reckoned_collision_density(m, bands, t, walk));
     vec3 contribution = path.throughput * passed * scattered * seen.radiance * (phase * weight / pdf);
     if (contribution == vec3(0.0)) {
         return false;
@@ -148,7 +150,7 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
 uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, uint interior, vec3 from, float t, Segment segment,
                             GridWalk walk) {
     uvec2 word = bounce_words(slot, path.bounce, DIMENSION_LIGHT);
-    LightSample light = sample_light(from, word, push.scene_lower, push.scene_upper);
+    LightSample light = sample_light(LightReceiver(from, vec3(0.0)), word, push.scene_lower, push.scene_upper);
     if (light.radiance == vec3(0.0)) {
         return 0u;
     }
@@ -157,7 +159,8 @@ uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, S
     if (HAS_AIRLIGHT && segment.reach > 0.0 && !light.infinite) {
         EquiAngular e = airlight_from(path, bands, m, segment, walk, light.point.position);
         if (e.range > 0.0) {
-            weight *= power_heuristic(reckoned_collision_density(m, bands, t, walk), equi_angular_pdf(e, t));
+            float gain = HAS_LIGHT_TREE ? light.choice.probability / distribution_probability(0u, light.choice.index) : 1.0;
+            weight *= power_heuristic(gain * reckoned_collision_density(m, bands, t, walk), equi_angular_pdf(e, t));
         }
     }
     ShadowRay ray = shadow_ray(slot, path, from, light.point.position, path.throughput * light.radiance * (phase * weight));
@@ -177,6 +180,9 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
     vec3 wi = normalize(phase_direction(path.direction, c, u.y));
     path.pdf = phase_function(m.phase, m.phase_parameter, path.direction, wi);
+    if (HAS_LIGHT_TREE) {
+        path_receivers[slot] = LightReceiver(at, vec3(0.0));
+    }
     path.origin = at;
     path.direction = wi;
     path.bounce += 1u;

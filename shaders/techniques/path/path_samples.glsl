@@ -4,7 +4,7 @@
 #define CLERESTORY_TECHNIQUES_PATH_PATH_SAMPLES_GLSL
 
 #include "film/film_bindings.glsl"
-#include "techniques/path/path_aovs.glsl"
+#include "techniques/path/path_slots.glsl"
 #include "walk/wave.glsl"
 
 // Adds what the paths in `count` neighbouring slots have gathered to a pixel of the film.

@@ -9,7 +9,7 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
-#include "techniques/path/path_aovs.glsl"
+#include "techniques/path/path_slots.glsl"
 #include "transport/arrival.glsl"
 #include "transport/bsdf_label.glsl"
 #include "transport/light_choice.glsl"
@@ -29,6 +29,15 @@ float way_left_out(Surface s, vec3 origin, vec3 direction) {
 
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
+
+// Density with which light sampling, where the path in a slot was scattered last, would have found the lamp that it has met.
+float emitter_pdf(uint slot, WalkState path, Surface s, float t) {
+    if (!HAS_LIGHT_TREE) {
+        return triangle_light_pdf(LightReceiver(vec3(0.0), vec3(0.0)), s, path.direction, t);
+    }
+    // Emission that counts in full has no need of it.
+    return path.pdf > 0.0 ? triangle_light_pdf(path_receivers[slot], s, path.direction, t) : 0.0;
+}
 
 // Shades the hit of the path in a slot. What it meets is added to `radiance`; `flags` say what waits at the place, and whether the path goes on.
 void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uint flags) {
@@ -65,7 +74,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     if ((HAS_AREA_LIGHTS || HAS_UNLIT) && counted) {
         vec3 emission = surface_emission(m, s, a.wo);
         if (emission != vec3(0.0)) {
-            float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? triangle_light_pdf(s, path.direction, hit.t) : 0.0;
+            float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? emitter_pdf(slot, path, s, hit.t) : 0.0;
             radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
         }
     }
@@ -92,11 +101,14 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     ScatteringFrame frame = scattering_frame(a, normal);
     uint bounce = path.bounce;
 
+    // Through what transmits, light comes from the other side, too.
+    bool transmits = HAS_TRANSMISSION && m.transmission > 0.0;
+    LightReceiver receiver = LightReceiver(s.point.position, transmits ? vec3(0.0) : frame.z);
     bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
     lit = lit && (!HAS_PATH_AUTOMATON || lit_mask != 0u);
     if (lit && path_set_contains(push.path_set, bounce + 1u)) {
         uvec2 word = bounce_words(slot, bounce, DIMENSION_LIGHT);
-        LightSample light = sample_light(s.point.position, word, push.scene_lower, push.scene_upper);
+        LightSample light = sample_light(receiver, word, push.scene_lower, push.scene_upper);
         vec3 wi = light.direction;
         if (light.radiance != vec3(0.0) && sides_agree(frame.z, frame.outward, wi)) {
             // The density is that of the directions sampled below, whatever part of them finds light that counts.
@@ -152,6 +164,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     path.origin = departure(a, wi, path.throughput);
     path.direction = normalize(wi);
     path.pdf = scattered.pdf;
+    if (HAS_LIGHT_TREE) {
+        path_receivers[slot] = receiver;
+    }
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);
     }

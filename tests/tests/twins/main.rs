@@ -5,6 +5,7 @@
 
 mod directions;
 mod geometry;
+mod light_tree;
 mod lights;
 mod maps;
 mod media;

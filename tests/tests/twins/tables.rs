@@ -17,7 +17,7 @@ use crate::{cases, direction, join, ulps, unit, v2, v3};
 twin_kernel!(twin_tables);
 
 /// A word as it travels, in two halves.
-fn halves(word: u32) -> [f32; 2] {
+pub(super) fn halves(word: u32) -> [f32; 2] {
     [(word >> 16) as f32, (word & 0xffff) as f32]
 }
 
@@ -25,7 +25,7 @@ fn random_word(r: &mut Random) -> [f32; 2] {
     halves(r.word())
 }
 
-fn word(x: &[f64], i: usize) -> u32 {
+pub(super) fn word(x: &[f64], i: usize) -> u32 {
     ((x[i] as u32) << 16) | x[i + 1] as u32
 }
 

@@ -29,6 +29,7 @@ sources! {
     CIGOLLE_2014 = "cigolle-2014": "Z. Cigolle et al.", "A Survey of Efficient Representations for Independent Unit Vectors", "JCGT 3(2)", 2014;
     CLARBERG_2008 = "clarberg-2008": "P. Clarberg", "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", "JGT 13(3)", 2008;
     COLEMAN_1968 = "coleman-1968": "W. Coleman", "Mathematical Verification of a Certain Monte Carlo Sampling Technique", "Nuclear Science and Engineering 32", 1968;
+    CONTY_KULLA_2018 = "conty-kulla-2018": "A. Conty Estevez, C. Kulla", "Importance Sampling of Many Lights with Adaptive Tree Splitting", "PACMCGIT 1(2) (HPG)", 2018;
     CORNELL_BOX_DATA = "cornell-box-data": "Cornell University Program of Computer Graphics", "Cornell Box Data", "graphics.cornell.edu/online/box/data.html", 0;
     CROW_1984 = "crow-1984": "F. Crow", "Summed-Area Tables for Texture Mapping", "SIGGRAPH", 1984;
     DEERING_1988 = "deering-1988": "M. Deering et al.", "The Triangle Processor and Normal Vector Shader", "SIGGRAPH", 1988;
@@ -122,6 +123,7 @@ sources! {
     WALD_2007 = "wald-2007": "I. Wald", "On fast Construction of SAH-based Bounding Volume Hierarchies", "IEEE RT", 2007;
     WALD_GUENTHER_2004 = "wald-guenther-2004": "I. Wald, J. Günther, P. Slusallek", "Balancing Considered Harmful: Faster Photon Mapping using the Voxel Volume Heuristic", "Eurographics", 2004;
     WALD_HAVRAN_2006 = "wald-havran-2006": "I. Wald, V. Havran", "On building fast kd-Trees for Ray Tracing, and on doing that in O(N log N)", "IEEE RT", 2006;
+    WALTER_2005 = "walter-2005": "B. Walter et al.", "Lightcuts: A Scalable Approach to Illumination", "SIGGRAPH", 2005;
     WALTER_2007 = "walter-2007": "B. Walter, S. Marschner, H. Li, K. Torrance", "Microfacet Models for Refraction through Rough Surfaces", "EGSR", 2007;
     WARD_1991 = "ward-1991": "G. Ward", "Real Pixels", "Graphics Gems II", 1991;
     WAVEFRONT_OBJ = "wavefront-obj": "Wavefront", "OBJ and MTL", "", 0;

@@ -10,6 +10,7 @@ mod fog;
 mod forest;
 mod furnace;
 mod halls;
+mod lamp_hall;
 mod materials;
 mod media;
 pub mod noise;
@@ -62,6 +63,7 @@ pub fn catalogue() -> &'static [Entry] {
         furnace::FURNACE_BOX,
         media::FURNACE_MEDIUM,
         furnace::FURNACE_SPHERE,
+        lamp_hall::LAMP_HALL,
         materials::MATERIALS,
         media::MEDIUM_SLAB,
         rooms::PASSAGE,

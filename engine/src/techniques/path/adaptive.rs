@@ -19,7 +19,7 @@ use super::wave::{Cursor, Places, SAMPLES_PER_WAVE, SAMPLES_TOGETHER, Wave, samp
 use crate::Result;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::film::{FilmBand, GpuFilm};
-use crate::gpu::shaders::sets::{PathAovSet, PathShareSet, WaveSet};
+use crate::gpu::shaders::sets::{PathShareSet, PathSlotSet, WaveSet};
 use crate::gpu::shaders::techniques::path::{path_numbers, path_resolve_shares};
 use crate::gpu::shaders::types::PathShare;
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};
@@ -230,7 +230,7 @@ impl AdaptiveSamples {
         &self,
         pass: &mut Pass<'_>,
         walks: &WaveSet<'_>,
-        aovs: &PathAovSet<'_>,
+        kept: &PathSlotSet<'_>,
         band: &FilmBand,
         wave: &Wave,
     ) -> Result<()> {
@@ -243,7 +243,7 @@ impl AdaptiveSamples {
         };
         let groups = [self.resolve.groups_for(wave.pixels), 1, 1];
         let shares = self.share_set(wave);
-        pass.dispatch(&self.resolve, &[walks, aovs, &shares, &band.set()], &push, groups)
+        pass.dispatch(&self.resolve, &[walks, kept, &shares, &band.set()], &push, groups)
     }
 
     fn share_set(&self, wave: &Wave) -> PathShareSet<'_> {

@@ -14,6 +14,7 @@
 
 mod adaptive;
 pub(super) mod card;
+mod kept;
 mod pipelines;
 mod record;
 mod settings;
@@ -24,9 +25,10 @@ use std::sync::Arc;
 
 use self::adaptive::AdaptiveSamples;
 pub(super) use self::card::CARD;
+use self::kept::KeptBySlot;
 use self::pipelines::{Pipelines, camera_pipeline};
 use self::record::{EyeStages, ResolveTarget, record_resolve};
-pub use self::settings::{Adaptive, PathTracerSettings};
+pub use self::settings::{Adaptive, LightTreeUse, PathTracerSettings};
 pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::Result;
@@ -35,8 +37,8 @@ use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::WALK_GROUP;
-use crate::gpu::shaders::types::{FilmAov, FilmPixel, PathAov};
-use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Timings};
+use crate::gpu::shaders::types::{FilmAov, FilmPixel};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, TexelView, Timings};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::settings::TypedSettings;
@@ -85,7 +87,9 @@ pub struct PathTracer {
     eye: DVec3,
     pipelines: Pipelines,
     walker: Walker,
-    aovs: Buffer,
+    kept: KeptBySlot,
+    /// By which lights are chosen, where there are more than a few.
+    light_tree: Option<TexelView>,
     film: GpuFilm,
     /// Where pixels get differing numbers of samples.
     adaptive: Option<AdaptiveSamples>,
@@ -125,7 +129,12 @@ impl PathTracer {
         };
         let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
         let frame = CameraFrame::new(camera, size)?;
-        let pipelines = Pipelines::new(gpu, &scene, &settings, &frame, camera)?;
+        let light_tree = if settings.light_tree.is_for(scene.near_light_count()) {
+            scene.light_tree(gpu)?
+        } else {
+            None
+        };
+        let pipelines = Pipelines::new(gpu, &scene, &settings, light_tree.is_some(), &frame, camera)?;
         let has_media = scene.profile().media.any();
         let needs = WaveNeeds {
             waiting: scene.has_lights(),
@@ -137,13 +146,12 @@ impl PathTracer {
         let pixel_bytes = size_of::<FilmPixel>().max(size_of::<FilmAov>()) as u64;
         let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
         let numbered = settings.adaptive != Adaptive::Off;
-        let (mut buffers, (aovs, numbers)) = WaveBuffers::within_memory(gpu, slots, needs, |slots| {
-            let bytes = size_of::<PathAov>() as u64 * if film.has_aovs() { u64::from(slots) } else { 0 };
-            let aovs = gpu.buffer(&BufferDesc::storage("path aovs", bytes, Category::Work))?;
+        let (mut buffers, (kept, numbers)) = WaveBuffers::within_memory(gpu, slots, needs, |slots| {
+            let kept = KeptBySlot::new(gpu, slots, film.has_aovs(), light_tree.is_some())?;
             let numbers = numbered
                 .then(|| gpu.storage_texels("path numbers", Category::Work, vk::Format::R32G32_UINT, slots.into()));
             let numbers = numbers.transpose()?;
-            gpu.buffer(&reading).map(|_| (aovs, numbers))
+            gpu.buffer(&reading).map(|_| (kept, numbers))
         })?;
         let adaptive = match numbers {
             Some(numbers) => {
@@ -168,7 +176,8 @@ impl PathTracer {
             eye: camera.transform.translation,
             pipelines,
             walker,
-            aovs,
+            kept,
+            light_tree,
             film,
             adaptive,
             pending: None,
@@ -190,8 +199,7 @@ impl PathTracer {
         self.pipelines.camera = pipeline;
         self.frame = frame;
         self.eye = camera.transform.translation;
-        self.begin_anew();
-        Ok(())
+        self.begin_anew()
     }
 
     /// Forgets everything gathered so far and goes on with another seed: an independent picture of the same view, with the kernels there are.
@@ -201,17 +209,20 @@ impl PathTracer {
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear()?;
         self.settings.seed = seed;
-        self.begin_anew();
-        Ok(())
+        self.begin_anew()
     }
 
-    /// Forgets which samples are there, the film being clear.
-    fn begin_anew(&mut self) {
+    /// Forgets which samples are there, the film being clear, and sees where lights have moved to.
+    fn begin_anew(&mut self) -> Result<()> {
         (self.pending, self.in_flight) = (None, None);
         self.cursor = Cursor::default();
         if let Some(adaptive) = &mut self.adaptive {
             adaptive.restart(&self.film);
         }
+        if self.light_tree.is_some() {
+            self.light_tree = self.scene.light_tree(&self.gpu)?;
+        }
+        Ok(())
     }
 
     /// Makes one submission towards `samples` samples per pixel, a bounded piece of work whatever the scene; `None` when all samples are there. A wave that takes
@@ -362,7 +373,8 @@ impl PathTracer {
             pipelines: &self.pipelines,
             film: &self.film,
             adaptive: self.adaptive.as_ref(),
-            aovs: &self.aovs,
+            kept: &self.kept,
+            light_tree: self.light_tree.as_ref(),
             wave: *wave,
             arrival,
             pending: &mut self.pending,
@@ -397,7 +409,7 @@ impl PathTracer {
             film: &self.film,
             adaptive: self.adaptive.as_ref(),
         };
-        record_resolve(&mut recorder, &self.pipelines, target, buffers, &self.aovs, wave)?;
+        record_resolve(&mut recorder, &self.pipelines, target, buffers, &self.kept, wave)?;
         let submission = recorder.submit()?;
         self.pending = None;
         submission.wait()?;

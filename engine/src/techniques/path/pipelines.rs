@@ -38,6 +38,7 @@ impl Pipelines {
         gpu: &Gpu,
         scene: &GpuScene,
         settings: &PathTracerSettings,
+        has_light_tree: bool,
         frame: &CameraFrame,
         camera: &Camera,
     ) -> Result<Self> {
@@ -54,6 +55,7 @@ impl Pipelines {
             numbered: settings.adaptive != Adaptive::Off,
             has_alpha: profile.has_alpha(),
             has_media: profile.media.any(),
+            has_light_tree,
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
         });
@@ -69,6 +71,7 @@ impl Pipelines {
             has_area_lights: shade.has_area_lights,
             has_punctual_lights: shade.has_punctual_lights,
             has_alpha: shade.has_alpha,
+            has_light_tree,
             sampler_kind: shade.sampler_kind,
             has_path_automaton: shade.has_path_automaton,
             numbered: shade.numbered,

@@ -1,15 +1,16 @@
 //! The passes of a wave of eye paths beside those of all walks: what each stage reads, and the barriers between them.
 
 use super::adaptive::AdaptiveSamples;
+use super::kept::KeptBySlot;
 use super::pipelines::Pipelines;
 use super::settings::PathTracerSettings;
 use super::wave::Wave;
 use crate::Result;
 use crate::film::GpuFilm;
 use crate::gpu::shaders::constants::{NO_MEDIUM, OUTSIDE};
-use crate::gpu::shaders::sets::{PathAovSet, WaveSet};
+use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::techniques::path::{path_camera, path_resolve, path_shade};
-use crate::gpu::{Access, Buffer, Recorder};
+use crate::gpu::{Access, Recorder, TexelView};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
 use crate::walk::{ArrivalStage, Bounce, WalkStages, WaveBuffers, stage_barrier};
@@ -24,7 +25,8 @@ pub(super) struct EyeStages<'a> {
     pub pipelines: &'a Pipelines,
     pub film: &'a GpuFilm,
     pub adaptive: Option<&'a AdaptiveSamples>,
-    pub aovs: &'a Buffer,
+    pub kept: &'a KeptBySlot,
+    pub light_tree: Option<&'a TexelView>,
     pub wave: Wave,
     pub arrival: Option<&'a dyn ArrivalStage>,
     /// The last wave, until it has reached the film.
@@ -32,12 +34,6 @@ pub(super) struct EyeStages<'a> {
 }
 
 impl EyeStages<'_> {
-    fn aov_set(&self) -> PathAovSet<'_> {
-        PathAovSet {
-            path_aovs: self.aovs.view(),
-        }
-    }
-
     /// What the stages of a bounce are told, both the same.
     fn push(&self) -> path_shade::Push {
         let (scene, settings) = (self.scene, self.settings);
@@ -65,7 +61,7 @@ impl WalkStages for EyeStages<'_> {
                     film: self.film,
                     adaptive: self.adaptive,
                 };
-                record_resolve(recorder, self.pipelines, target, buffers, self.aovs, pending)
+                record_resolve(recorder, self.pipelines, target, buffers, self.kept, pending)
             }
             None => Ok(()),
         }
@@ -98,7 +94,7 @@ impl WalkStages for EyeStages<'_> {
         let camera = &self.pipelines.camera;
         recorder.pass("path: camera", |pass| {
             let groups = [camera.groups_for(self.wave.paths()), 1, 1];
-            pass.dispatch(camera, &[wave, &self.aov_set()], &push, groups)?;
+            pass.dispatch(camera, &[wave, &self.kept.set()], &push, groups)?;
             stage_barrier(pass);
             Ok(())
         })
@@ -111,17 +107,21 @@ impl WalkStages for EyeStages<'_> {
     /// What happens on the way through media, and where paths have arrived.
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let p = self.pipelines;
-        let (scene, items, push) = (self.scene.scene_set(), bounce.places.items, self.push());
+        let (scene, items, push) = (
+            self.scene.light_tree_set(self.light_tree),
+            bounce.places.items,
+            self.push(),
+        );
         if let Some(medium) = &p.medium {
             recorder.pass("path: medium", |pass| {
                 let (media, push) = (self.scene.media_set(), bytemuck::cast(push));
-                pass.dispatch_indirect(medium, &[&bounce.wave, &scene, &media], &push, items)?;
+                pass.dispatch_indirect(medium, &[&bounce.wave, &self.kept.set(), &scene, &media], &push, items)?;
                 stage_barrier(pass);
                 Ok(())
             })?;
         }
         recorder.pass("path: shade", |pass| {
-            pass.dispatch_indirect(&p.shade, &[&bounce.wave, &scene, &self.aov_set()], &push, items)?;
+            pass.dispatch_indirect(&p.shade, &[&bounce.wave, &scene, &self.kept.set()], &push, items)?;
             stage_barrier(pass);
             Ok(())
         })
@@ -150,14 +150,14 @@ pub(super) fn record_resolve(
     pipelines: &Pipelines,
     target: ResolveTarget<'_>,
     buffers: &WaveBuffers,
-    aovs: &Buffer,
+    kept: &KeptBySlot,
     wave: &Wave,
 ) -> Result<()> {
     let band = &target.film.bands()[wave.band];
-    let (walks, aovs) = (buffers.set(0), PathAovSet { path_aovs: aovs.view() });
+    let (walks, kept) = (buffers.set(0), kept.set());
     recorder.pass("path: resolve", |pass| {
         if let Some(adaptive) = target.adaptive {
-            adaptive.resolve(pass, &walks, &aovs, band, wave)?;
+            adaptive.resolve(pass, &walks, &kept, band, wave)?;
         } else {
             let push = path_resolve::Push {
                 first_film_pixel: wave.first_pixel - band.first_pixel(),
@@ -165,7 +165,7 @@ pub(super) fn record_resolve(
                 sample_count: wave.samples,
             };
             let groups = [pipelines.resolve.groups_for(wave.pixels), 1, 1];
-            pass.dispatch(&pipelines.resolve, &[&walks, &aovs, &band.set()], &push, groups)?;
+            pass.dispatch(&pipelines.resolve, &[&walks, &kept, &band.set()], &push, groups)?;
         }
         pass.memory_barrier(
             Access::COMPUTE,

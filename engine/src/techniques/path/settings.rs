@@ -18,6 +18,33 @@ pub enum Adaptive {
     Absolute,
 }
 
+/// Whether lights are chosen by a tree, for the point that they are to light, or by their power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LightTreeUse {
+    /// By a tree where more than 16 lights have a place.
+    #[default]
+    Auto,
+    /// By a tree wherever a light has a place.
+    On,
+    /// By power.
+    Off,
+}
+
+/// Lights with a place up to which power alone chooses among them.
+const FEW_LIGHTS: usize = 16;
+
+impl LightTreeUse {
+    /// Whether there is a tree of so many lights that have a place.
+    pub(super) fn is_for(self, lights: usize) -> bool {
+        match self {
+            Self::Auto => lights > FEW_LIGHTS,
+            Self::On => lights > 0,
+            Self::Off => false,
+        }
+    }
+}
+
 crate::settings! {
     /// Settings of the path tracer.
     pub struct PathTracerSettings {
@@ -43,6 +70,10 @@ crate::settings! {
         /// Of points and spots, and of area lights in scenes where one is smaller than half a mean free path; in homogeneous media and in grids of
         /// densities, on ways that pass a lamp within about two thirds of a mean free path. Media inside solids that refract have none.
         pub equiangular: bool = true;
+        /// Chooses lights for the point that they are to light, by a tree of them, instead of by power; changes the noise only.
+        ///
+        /// `auto` does so where more than 16 lights have a place: emissive triangles, points and spots.
+        pub light_tree: LightTreeUse = LightTreeUse::Auto;
         /// After a pilot, more samples for pixels with more noise, relative or absolute, as many in all; changes the noise only.
         ///
         /// The pilot is a quarter of the samples, a power of two of 256 at most; pictures of fewer than 8 samples per pixel have none, and are those without. Every

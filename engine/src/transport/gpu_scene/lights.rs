@@ -5,6 +5,7 @@ use glam::{DVec3, Mat3, Quat, UVec2, Vec3};
 
 use super::LightKinds;
 use super::geometry::{Geometry, corners_of, is_traceable};
+use super::light_tree::{TreeOfLights, punctual_bounds, triangle_bounds};
 use super::punctual::PunctualLights;
 use crate::Result;
 use crate::gpu::shaders::constants::{
@@ -31,6 +32,8 @@ pub(super) struct Lights {
     pub(super) environment: Vec<u8>,
     /// Sum of their powers, W of luminance.
     pub(super) power: f64,
+    /// What a tree of them is made of.
+    pub(super) tree: TreeOfLights,
     /// Some surface shines that is not among the records.
     has_unsampled: bool,
 }
@@ -45,6 +48,7 @@ impl Lights {
     ) -> Result<Self> {
         let mut records = Vec::new();
         let mut powers = Vec::new();
+        let mut bounds = Vec::new();
         let emits = |triangle: &SceneTriangle| {
             let material = &materials[triangle.material as usize];
             material.emission.iter().any(|e| *e > 0.0) && material.flags & MATERIAL_UNLIT == 0
@@ -86,6 +90,7 @@ impl Lights {
                 let double_sided = material.flags & MATERIAL_DOUBLE_SIDED != 0;
                 geometry.triangles[index].light = records.len() as u32;
                 powers.push(luminance(triangle_power(emission, area, double_sided)));
+                bounds.push(Some(triangle_bounds([a, b, c], luminance(emission), double_sided)));
                 records.push(SceneLight {
                     kind: LIGHT_TRIANGLE,
                     triangle: index as u32,
@@ -99,6 +104,7 @@ impl Lights {
             let power = punctual.add(&light.kind, records.len());
             if power > 0.0 {
                 powers.push(power);
+                bounds.push(punctual_bounds(&light.kind));
                 records.push(light_record(&light.kind));
             }
         }
@@ -107,6 +113,7 @@ impl Lights {
         if let Some(map) = scene.environment.as_ref().filter(|_| profile.has_environment()) {
             let found = sampled_environment(map, !records.is_empty())?;
             powers.push(environment_power(map, radius));
+            bounds.push(None);
             records.push(SceneLight {
                 kind: LIGHT_ENVIRONMENT,
                 ..SceneLight::default()
@@ -122,6 +129,7 @@ impl Lights {
         }
         share_choices(&records, &mut powers);
         share_choices(&records, &mut sampled);
+        let tree = TreeOfLights::new(&bounds, &sampled);
         if has_unsampled && records.is_empty() {
             // Kernels that know of emission also sample lights: a dark one to choose.
             sampled.push(0.0);
@@ -151,6 +159,7 @@ impl Lights {
             emission_cdf,
             environment,
             power,
+            tree,
             has_unsampled,
         })
     }

@@ -6,6 +6,7 @@
 mod airlight;
 mod bodies;
 mod geometry;
+mod light_tree;
 mod lights;
 mod materials;
 mod media;
@@ -19,6 +20,7 @@ use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
 use self::geometry::{Geometry, check_placed, visible_objects};
+use self::light_tree::TreeOfLights;
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
 use self::materials::{material_record, materials_by_use};
@@ -52,6 +54,7 @@ pub struct GpuScene {
     /// What photons choose by, where light sampling leaves some to scattered rays.
     emission_cdf: Option<Vec<f32>>,
     punctual_lights: PunctualLights,
+    light_tree: TreeOfLights,
     index: IndexOnDevice,
     buffers: SceneBuffers,
     media: Option<GpuMedia>,
@@ -195,6 +198,7 @@ impl GpuScene {
             airlight_helps: airlight::airlight_helps(scene),
             emission_cdf: lights.emission_cdf,
             punctual_lights: lights.punctual,
+            light_tree: lights.tree,
             index,
             buffers,
             media,
@@ -296,8 +300,22 @@ impl GpuScene {
         self.airlight_helps && (self.light_kinds.area || self.light_kinds.punctual)
     }
 
+    /// How many lights have a place, emissive triangles and points and spots with power, so that a tree can choose among them.
+    pub fn near_light_count(&self) -> usize {
+        self.light_tree.near_count()
+    }
+
+    /// The tree by which light sampling may choose among the lights that have a place ([`light_tree`](crate::transport::light_tree)), for
+    /// [`Self::light_tree_set`]: made when it is first asked for, and anew where lights have moved since. `None` where no light has a place.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], [`Error::LimitExceeded`] for more lights than a buffer of the device holds, [`Error::DeviceLost`].
+    pub fn light_tree(&self, gpu: &Gpu) -> Result<Option<TexelView>> {
+        self.light_tree.on_device(gpu)
+    }
+
     /// Moves or turns a point, spot or directional light, by its index in [`Scene::lights`]: as if the scene had been made with the light like
-    /// this. The probabilities by which light sampling chooses stay, so its kind and its power must.
+    /// this. Where light sampling chooses by power, its probabilities stay, so the light's kind and its power must.
     ///
     /// Pictures under way must be restarted ([`PathTracer::restart`](crate::techniques::PathTracer::restart),
     /// [`PhotonMapper::restart`](crate::techniques::photon_mapping::PhotonMapper::restart) or
@@ -311,6 +329,7 @@ impl GpuScene {
         let offset = u64::from(index) * size_of::<SceneLight>() as u64;
         gpu.upload(self.buffers.lights.buffer(), offset, &[record])?;
         self.punctual_lights.keep(light, kind);
+        self.light_tree.moved(index, kind);
         Ok(())
     }
 
@@ -378,6 +397,17 @@ impl GpuScene {
             scene_cdf: &b.cdf,
             scene_environment: &b.environment,
             scene_albedo_table: &b.albedo_table,
+            // Of the same format; kernels without a tree do not read it.
+            scene_light_tree: &b.materials,
+        }
+    }
+
+    /// Set 2 for kernels that choose lights by [`Self::light_tree`], where there is one.
+    pub fn light_tree_set<'a>(&'a self, tree: Option<&'a TexelView>) -> SceneSet<'a> {
+        let set = self.scene_set();
+        SceneSet {
+            scene_light_tree: tree.unwrap_or(set.scene_light_tree),
+            ..set
         }
     }
 }

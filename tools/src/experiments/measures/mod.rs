@@ -121,6 +121,7 @@ measures! {
     on_device "live-maps" preview::live_maps.of_any_scenes();
     on_host "map-borders" maps::map_borders;
     on_host "map-choice" maps::map_choice;
+    on_device "many-lamps" rendering::many_lamps;
     on_device "map-construction" photon_maps::map_construction;
     on_host "map-density" maps::map_density;
     on_host "map-error" maps::map_error;

@@ -1,9 +1,10 @@
-//! Whole pictures: whether they are what was asked for, how their lights are chosen, what they cost and where, how they stop, their sums and files, and agreement with
+//! Whole pictures: whether they are what was asked for, how their lights are chosen, what many lamps cost, what they cost and where, how they stop, their sums and files, and agreement with
 //! Mitsuba 3 and with Cycles.
 
 pub mod automatic_choice;
 pub mod cycles;
 pub mod light_choice;
+pub mod many_lamps;
 pub mod mitsuba;
 pub mod path_sets;
 pub mod path_stages;

@@ -1,0 +1,21 @@
+// What paths keep by slot beside their walks: the first surface that they see, and where they were scattered last.
+#ifndef CLERESTORY_TECHNIQUES_PATH_PATH_SLOTS_GLSL
+#define CLERESTORY_TECHNIQUES_PATH_PATH_SLOTS_GLSL
+
+#include "transport/light_receiver.glsl"
+
+// descriptor set 1: PathSlotSet
+
+struct PathAov {
+    vec3 albedo;
+    float depth;  // distance along the ray; 0 without a hit
+    vec3 normal;
+    uint filled;
+};
+
+layout(set = 1, binding = 0, scalar) restrict buffer PathAovs { PathAov path_aovs[]; };
+// For which lights would have been chosen there; where that does not depend on the place, some other buffer is bound, and nothing may be read or
+// written.
+layout(set = 1, binding = 1, scalar) restrict buffer PathReceivers { LightReceiver path_receivers[]; };
+
+#endif

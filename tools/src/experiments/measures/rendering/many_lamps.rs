@@ -1,0 +1,142 @@
+//! What many lamps cost beside one: time to equal error where each place has a lamp that outshines all others, by the tree of lights and by power.
+//!
+//! Oracle: a picture of many more samples. The hall, its desks and the view are the same; all of its lamps shine, or that of the desk in view alone.
+
+use clerestory::film::Picture;
+use clerestory::film::metrics::{CompareOptions, compare};
+use clerestory::gpu::Gpu;
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory::{Result, scene};
+use serde_json::json;
+
+use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
+use crate::experiments::measures::Context;
+
+/// Lamps of a hall, and in a smoke run.
+const LAMPS: [u32; 2] = [4096, 25];
+/// Halls: what their lamps are, by a name and the parameters of the generated scene.
+const HALLS: [(&str, &str); 3] = [
+    ("panels", "source=panel"),
+    ("shaded lamps", "source=spot"),
+    ("bare lamps between walls", "source=point&walls=yes"),
+];
+/// Of what shines, and by what lamps are chosen.
+const WAYS: [(&str, &str, &str); 3] = [(ONE, "one", "off"), (TREE, "all", "on"), (POWER, "all", "off")];
+const ONE: &str = "one lamp";
+const TREE: &str = "all by the tree";
+const POWER: &str = "all by power";
+/// The reference's seed; pictures have those after it.
+const SEED: u32 = 1;
+
+rows! {
+    /// A hall with its lamps chosen in one way.
+    struct Row = "Time to equal error" by [hall, lamps] {
+        hall: String = "hall",
+        lamps: String = "lamps",
+        shining: u64 = "lamps that shine",
+        samples: u64 = "samples per pixel",
+        error: Repeats = "relative MSE",
+        time: Repeats = "GPU time (s)",
+        cost: Repeats = "relative MSE × GPU time (s)",
+        time_over: Repeats = "GPU time over one lamp's",
+        cost_over: Repeats = "time to equal error over one lamp's",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "many lamps by the tree take at most twice one lamp's time to equal error: over one lamp's",
+        Bound::AtMost(2.0),
+        |row: &Row| (&row.cost_over).into(),
+    )
+    .among(|row| row.lamps == TREE),
+    Criterion::each("power does not: over one lamp's", Bound::AtLeast(2.0), |row: &Row| {
+        (&row.cost_over).into()
+    })
+    .among(|row| row.lamps == POWER)
+    .because("else there would be nothing to gain by a tree"),
+];
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let name = |hall: &(&str, &str)| hall.0.to_owned();
+        context.each(context.first(&HALLS, 1), name, |hall| of_hall(context, &gpu, hall))
+    }
+
+    fn findings(&self) -> Findings {
+        let by_tree = self.iter().filter(|row| row.lamps == TREE);
+        Findings::of(self, CRITERIA)
+            .headline(
+                "time to equal error of many lamps by the tree over one lamp's, geometric mean",
+                geometric_mean(by_tree.map(|row| row.cost_over.measured())),
+            )
+            .note(
+                "The mean squared error falls as the number of samples grows, so that its product with the time is the time to equal error. Pictures in turns, a \
+                 seed for each turn; the relative MSE is that of `clerestory compare`. By power the rare samples that find the lamp in view carry most of the \
+                 error, so that few pictures show less of it than there is.",
+            )
+            .bars(
+                "cost",
+                "Time to equal error over one lamp's",
+                self,
+                |row| [row.hall.clone(), row.lamps.clone()],
+                |row| row.cost_over.measured(),
+            )
+    }
+}
+
+/// A picture and its GPU time, s.
+fn render(renderer: &Renderer, side: u32, spp: u32, seed: u32, light_tree: &str) -> Result<(Picture, f64)> {
+    let rendered = renderer.render(&RenderOptions {
+        technique: Some("path".into()),
+        size: [side; 2],
+        spp,
+        seed,
+        settings: json!({ "light_tree": light_tree }).into(),
+        ..RenderOptions::default()
+    })?;
+    Ok((rendered.picture, rendered.report.gpu_seconds))
+}
+
+/// The ways of a hall.
+fn of_hall(context: &Context<'_>, gpu: &Gpu, (hall, parameters): &(&str, &str)) -> Result<Vec<Row>> {
+    let (side, spp, of_reference) = context.pick((48, 32, 4096), (8, 4, 16));
+    let lamps = context.pick(LAMPS[0], LAMPS[1]);
+    let mut renderers = Vec::new();
+    let mut references = Vec::new();
+    for shining in ["one", "all"] {
+        let address = format!("builtin:lamp-hall?n={lamps}&lamps={shining}&{parameters}");
+        let renderer = Renderer::new(gpu, &scene::load(&address)?)?;
+        // By the tree in both, which finds what there is with the least error.
+        references.push(render(&renderer, side, of_reference, SEED, "on")?.0);
+        renderers.push(renderer);
+    }
+    let mut turns = [0; WAYS.len()];
+    let found = context.in_turns(5, WAYS.len(), |i| {
+        let (_, shining, light_tree) = WAYS[i];
+        let which = usize::from(shining == "all");
+        turns[i] += 1;
+        let (picture, seconds) = render(&renderers[which], side, spp, SEED + turns[i], light_tree)?;
+        let error = compare(&picture, &references[which], &CompareOptions::default())?.relative_mse;
+        Ok([error, seconds, error * seconds])
+    })?;
+    let parts: Vec<[Repeats; 3]> = found.iter().map(|turns| Repeats::by_part(turns)).collect();
+    let rows = WAYS
+        .iter()
+        .zip(&parts)
+        .map(|((way, shining, _), [error, time, cost])| Row {
+            hall: (*hall).into(),
+            lamps: (*way).into(),
+            shining: if *shining == "all" { lamps.into() } else { 1 },
+            samples: spp.into(),
+            error: error.clone(),
+            time: time.clone(),
+            cost: cost.clone(),
+            time_over: time.over(&parts[0][1]),
+            cost_over: cost.over(&parts[0][2]),
+        });
+    Ok(rows.collect())
+}
