@@ -1,4 +1,5 @@
-//! What many lamps cost beside one: time to equal error where each place has a lamp that outshines all others, by the tree of lights and by power.
+//! What many lamps cost beside one: time to equal error where each place has a lamp that outshines all others, by the tree of lights and by power; and
+//! from how many lights on the tree wins.
 //!
 //! Oracle: a picture of many more samples. The hall, its desks and the view are the same; all of its lamps shine, or that of the desk in view alone.
 
@@ -11,6 +12,7 @@ use serde_json::json;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::reference::short_name;
 
 /// Lamps of a hall, and in a smoke run.
 const LAMPS: [u32; 2] = [4096, 25];
@@ -25,6 +27,11 @@ const WAYS: [(&str, &str, &str); 3] = [(ONE, "one", "off"), (TREE, "all", "on"),
 const ONE: &str = "one lamp";
 const TREE: &str = "all by the tree";
 const POWER: &str = "all by power";
+/// Lamps of smaller halls, and scenes whose lamps are of many triangles.
+const FEW: [u32; 5] = [2, 4, 9, 16, 36];
+const MESHES: [&str; 1] = ["builtin:sphere-light"];
+/// Above so many lights the path tracer takes the tree by itself.
+const AUTO: u64 = 16;
 /// The reference's seed; pictures have those after it.
 const SEED: u32 = 1;
 
@@ -42,10 +49,25 @@ rows! {
         cost_over: Repeats = "time to equal error over one lamp's",
     }
 }
-/// What was found.
-pub type Found = Vec<Row>;
+rows! {
+    /// A scene of fewer lights, by the tree and by power.
+    struct Few = "From few lights on" by [scene, lights] {
+        scene: String = "scene",
+        lights: u64 = "lights with a place",
+        tree: Repeats = "by the tree: relative MSE × GPU time (s)",
+        power: Repeats = "by power: relative MSE × GPU time (s)",
+        tree_over: Repeats = "time to equal error by the tree over that by power",
+    }
+}
 
-const CRITERIA: &[Criterion<Row>] = &[
+/// What was found.
+#[derive(Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    halls: Vec<Row>,
+    few: Vec<Few>,
+}
+
+const OF_HALLS: &[Criterion<Row>] = &[
     Criterion::each(
         "many lamps by the tree take at most twice one lamp's time to equal error: over one lamp's",
         Bound::AtMost(2.0),
@@ -58,17 +80,34 @@ const CRITERIA: &[Criterion<Row>] = &[
     .among(|row| row.lamps == POWER)
     .because("else there would be nothing to gain by a tree"),
 ];
+const OF_FEW: &[Criterion<Few>] = &[Criterion::each(
+    "where the path tracer takes the tree by itself, above 16 lights, it loses nothing: time to equal error over that by power",
+    Bound::AtMost(1.0),
+    |row: &Few| (&row.tree_over).into(),
+)
+.among(|row| row.lights > AUTO)];
 
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
         let name = |hall: &(&str, &str)| hall.0.to_owned();
-        context.each(context.first(&HALLS, 1), name, |hall| of_hall(context, &gpu, hall))
+        let sizes = context.first(&FEW, 1);
+        let of_halls = HALLS.iter().flat_map(|(_, parameters)| {
+            let address = move |n: &u32| format!("builtin:lamp-hall?n={n}&{parameters}");
+            sizes.iter().map(address)
+        });
+        let few: Vec<String> = of_halls.chain(MESHES.map(str::to_owned)).collect();
+        Ok(Self {
+            halls: context.each_kept(context.first(&HALLS, 1), name, |hall| of_hall(context, &gpu, hall))?,
+            few: context.each_kept(context.first(&few, 2), String::clone, |address| {
+                of_few(context, &gpu, address)
+            })?,
+        })
     }
 
     fn findings(&self) -> Findings {
-        let by_tree = self.iter().filter(|row| row.lamps == TREE);
-        Findings::of(self, CRITERIA)
+        let by_tree = self.halls.iter().filter(|row| row.lamps == TREE);
+        Findings::of(&self.halls, OF_HALLS)
             .headline(
                 "time to equal error of many lamps by the tree over one lamp's, geometric mean",
                 geometric_mean(by_tree.map(|row| row.cost_over.measured())),
@@ -81,10 +120,11 @@ impl Study for Found {
             .bars(
                 "cost",
                 "Time to equal error over one lamp's",
-                self,
+                &self.halls,
                 |row| [row.hall.clone(), row.lamps.clone()],
                 |row| row.cost_over.measured(),
             )
+            .and(Findings::of(&self.few, OF_FEW))
     }
 }
 
@@ -139,4 +179,26 @@ fn of_hall(context: &Context<'_>, gpu: &Gpu, (hall, parameters): &(&str, &str)) 
             cost_over: cost.over(&parts[0][2]),
         });
     Ok(rows.collect())
+}
+
+/// A scene by the tree and by power.
+fn of_few(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Few>> {
+    let (side, spp, of_reference) = context.pick((48, 32, 4096), (8, 4, 16));
+    let renderer = Renderer::new(gpu, &scene::load(address)?)?;
+    let reference = render(&renderer, side, of_reference, SEED, "on")?.0;
+    let mut seed = SEED;
+    let found = context.in_turns(5, 2, |i| {
+        seed += 1;
+        let (picture, seconds) = render(&renderer, side, spp, seed, ["on", "off"][i])?;
+        let error = compare(&picture, &reference, &CompareOptions::default())?.relative_mse;
+        Ok(error * seconds)
+    })?;
+    let [tree, power] = [0, 1].map(|i| Repeats(found[i].clone()));
+    Ok(vec![Few {
+        scene: short_name(address).into(),
+        lights: renderer.gpu_scene().near_light_count() as u64,
+        tree_over: tree.over(&power),
+        tree,
+        power,
+    }])
 }
