@@ -9,67 +9,26 @@
 
 layout(local_size_x_id = 0) in;
 
-#include "kernels/radix_digit.glsl"
-#include "kernels/stream_scratch.glsl"
-#include "kernels/wrapping_sum.glsl"
+#include "kernels/radix_few.glsl"
+#include "kernels/radix_places.glsl"
 
 layout(constant_id = 4) const uint CAPACITY = 1024u;
 
-layout(set = 0, binding = 1, scalar) restrict readonly buffer StreamCounts { uint stream_counts[]; };
 layout(set = 0, binding = 2, scalar) restrict readonly buffer RadixKeysFrom { uint radix_keys_from[]; };
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer RadixKeysTo { uint radix_keys_to[]; };
 layout(set = 0, binding = 4, scalar) restrict readonly buffer RadixValuesFrom { uint radix_values_from[]; };
 layout(set = 0, binding = 5, scalar) restrict writeonly buffer RadixValuesTo { uint radix_values_to[]; };
 
-layout(push_constant, scalar) uniform Push {
-    uint count;       // keys, or STREAM_COUNT_ON_DEVICE
-    uint capacity;    // keys at most
-    uint first_bit;   // compared, and the one past the last
-    uint last_bit;
-    uint descending;  // 1 or 0
-} push;
-
 const bool KEYS_MOVE = KEY_WORDS == 1u && !HAS_VALUES;
 
 // Two sides, each digit goes from one to the other.
 shared uint moving[2u * CAPACITY];
-// By digit, then invocation: how many there are; after the scan, the place of the next.
-shared uint places[BINS * LANES];
 
 uvec2 key_of(uint element) {
     if (KEYS_MOVE) {
         return uvec2(element, 0u);
     }
     return uvec2(radix_keys_from[KEY_WORDS * element], KEY_WORDS == 2u ? radix_keys_from[2u * element + 1u] : 0u);
-}
-
-uint keys_to_sort() {
-    if (push.count != STREAM_COUNT_ON_DEVICE) {
-        return push.count;
-    }
-    uint wanted = stream_counts[0];
-    uint count = wanted <= push.capacity ? wanted : 0u;
-    if (gl_LocalInvocationID.x == 0u) {
-        stream_count = count;
-        stream_wanted = wanted;
-    }
-    return count;
-}
-
-// Counts become the places of the first of each digit and invocation.
-void scan_places() {
-    uint first = gl_LocalInvocationID.x * BINS;
-    uint own = 0u;
-    for (uint i = first; i < first + BINS; ++i) {
-        own += places[i];
-    }
-    uint total;
-    uint before = team_exclusive(own, total);
-    for (uint i = first; i < first + BINS; ++i) {
-        uint count = places[i];
-        places[i] = before;
-        before += count;
-    }
 }
 
 void put(uint place, uint element, uvec2 key) {
@@ -91,27 +50,26 @@ void main() {
     for (uint at = first; at < last; ++at) {
         moving[at] = KEYS_MOVE ? radix_keys_from[at] : at;
     }
-    uint digit_bits = uint(findMSB(BINS));
     uint from = 0u;
-    for (uint bit = push.first_bit; bit < push.last_bit; bit += digit_bits) {
-        uint mask = (1u << min(digit_bits, push.last_bit - bit)) - 1u;
+    for (uint bit = push.first_bit; bit < push.last_bit; bit += digit_bits()) {
+        uint mask = mask_of_digit(bit);
         uint flip = push.descending * mask;
         for (uint digit = 0u; digit < BINS; ++digit) {
-            places[digit * LANES + lane] = 0u;
+            places[place_slot(digit)] = 0u;
         }
         for (uint at = first; at < last; ++at) {
             uvec2 key = key_of(moving[from + at]);
-            places[radix_digit_at(key.x, key.y, bit, mask, flip) * LANES + lane] += 1u;
+            places[place_slot(radix_digit_at(key.x, key.y, bit, mask, flip))] += 1u;
         }
         barrier();
         scan_places();
         barrier();
-        bool is_last = bit + digit_bits >= push.last_bit;
+        bool is_last = bit + digit_bits() >= push.last_bit;
         uint to = CAPACITY - from;
         for (uint at = first; at < last; ++at) {
             uint element = moving[from + at];
             uvec2 key = key_of(element);
-            uint slot = radix_digit_at(key.x, key.y, bit, mask, flip) * LANES + lane;
+            uint slot = place_slot(radix_digit_at(key.x, key.y, bit, mask, flip));
             uint place = places[slot];
             places[slot] = place + 1u;
             if (is_last) {

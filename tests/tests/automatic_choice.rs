@@ -159,10 +159,13 @@ fn adaptive_pictures_have_the_error_asked_for() {
             assert!(candidate.reason.contains("no setting adaptive"), "{candidate:?}");
         }
         // Without adaptive samples, whose own noise, a twelfth of theirs, is subtracted from squared errors.
-        let reference = render(&renderer, &RenderOptions {
-            technique: Some("path".into()),
-            ..of(12 * choice.spp, 99, "off")
-        });
+        let reference = render(
+            &renderer,
+            &RenderOptions {
+                technique: Some("path".into()),
+                ..of(12 * choice.spp, 99, "off")
+            },
+        );
         let own = relative_mse_by_variance(&reference.picture, RELATIVE_MSE_OFFSET).unwrap();
         for seed in [201, 202] {
             let rendered = render(&renderer, &plan.options(&of(1, seed, "relative")));

@@ -473,7 +473,11 @@ mod tests {
             let reason = lacks_adaptive(photon, &fixed).unwrap_or_default();
             assert!(reason.contains("adaptive") && reason.contains(kind), "{reason}");
         }
-        for fixed in [Value::Null, serde_json::json!({}), serde_json::json!({ "adaptive": "off" })] {
+        for fixed in [
+            Value::Null,
+            serde_json::json!({}),
+            serde_json::json!({ "adaptive": "off" }),
+        ] {
             assert_eq!(lacks_adaptive(photon, &fixed), None, "{fixed}");
         }
     }
