@@ -5,6 +5,9 @@
 #include "kernels/radix_digit.glsl"
 #include "kernels/stream_scratch.glsl"
 
+// Bits of a counter where a word has two: there are fewer than 2^16 keys.
+const uint PAIR_BITS = 16u;
+
 layout(set = 0, binding = 1, scalar) restrict readonly buffer StreamCounts { uint stream_counts[]; };
 
 layout(push_constant, scalar) uniform Push {

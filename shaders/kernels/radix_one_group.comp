@@ -4,14 +4,15 @@
 // them take longer than the keys do.
 //
 // Each invocation walks a block of its own with counters of its own, so equal digits keep their order. After Satish, Harris and Garland,
-// Designing efficient sorting algorithms for manycore GPUs (2009), section 4, with invocations for blocks.
+// Designing efficient sorting algorithms for manycore GPUs (2009), section 4, with invocations for blocks. A word counts two digits, which
+// halves the work of the scan.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x_id = 0) in;
 
 #include "kernels/radix_few.glsl"
-#include "kernels/radix_places.glsl"
+#include "kernels/wrapping_sum.glsl"
 
 // By four words, which software drivers load together. Other invocations read what one has written.
 layout(set = 0, binding = 2, scalar) restrict coherent buffer RadixKeysA { uvec4 radix_keys_a[]; };
@@ -19,12 +20,17 @@ layout(set = 0, binding = 3, scalar) restrict coherent buffer RadixKeysB { uvec4
 layout(set = 0, binding = 4, scalar) restrict coherent buffer RadixValuesA { uvec4 radix_values_a[]; };
 layout(set = 0, binding = 5, scalar) restrict coherent buffer RadixValuesB { uvec4 radix_values_b[]; };
 
-// How many there are of each digit in the block; then the place of the next.
-uint next_places[BINS];
+// Digits d and d + PAIRS share a word.
+const uint PAIRS = BINS / 2u;
+
+// By pair of digits: how many there are in the block; then the place of the next.
+uint own_places[PAIRS];
+// By pair, then invocation: the same.
+shared uint places[PAIRS * LANES];
 
 uvec4 key_words(uint side, uint at) { return side == 0u ? radix_keys_a[at] : radix_keys_b[at]; }
 
-// Low and high words of the keys `first` to `first` + 3 of a side, as far as there are some.
+// Low and high words of the keys `first` to `first` + 3 of a side, as far as they lie before `last`.
 void load_keys(uint side, uint first, uint last, out uvec4 low, out uvec4 high) {
     if (KEY_WORDS == 1u) {
         low = key_words(side, first / 4u);
@@ -53,15 +59,49 @@ void store_value(uint side, uint place, uint value) {
     }
 }
 
-void place(uint side, uint digit, uint low, uint high, uint value) {
-    uint target = next_places[digit];
-    next_places[digit] = target + 1u;
-    store_key_word(side, KEY_WORDS * target, low);
+uint pair_of(uint digit) { return digit % PAIRS; }
+uint shift_of(uint digit) { return digit < PAIRS ? 0u : PAIR_BITS; }
+
+// Counts become the places of the first of each digit in the block.
+void scan_places() {
+    uint lane = gl_LocalInvocationID.x;
+    for (uint pair = 0u; pair < PAIRS; ++pair) {
+        places[pair * LANES + lane] = own_places[pair];
+    }
+    barrier();
+    uint first = lane * PAIRS;
+    uint own = 0u;
+    for (uint i = first; i < first + PAIRS; ++i) {
+        own += places[i];
+    }
+    uint total;
+    uint before = team_exclusive(own, total);
+    // The second digits of all pairs come after the first ones.
+    before += total << PAIR_BITS;
+    for (uint i = first; i < first + PAIRS; ++i) {
+        uint count = places[i];
+        places[i] = before;
+        before += count;
+    }
+    barrier();
+    for (uint pair = 0u; pair < PAIRS; ++pair) {
+        own_places[pair] = places[pair * LANES + lane];
+    }
+}
+
+void count_digit(uint digit, bool live) { own_places[pair_of(digit)] += uint(live) << shift_of(digit); }
+
+void put(uint side, uint digit, uint low, uint high, uint value) {
+    uint pair = pair_of(digit);
+    uint both = own_places[pair];
+    own_places[pair] = both + (1u << shift_of(digit));
+    uint place = bitfieldExtract(both, int(shift_of(digit)), int(PAIR_BITS));
+    store_key_word(side, KEY_WORDS * place, low);
     if (KEY_WORDS == 2u) {
-        store_key_word(side, 2u * target + 1u, high);
+        store_key_word(side, 2u * place + 1u, high);
     }
     if (HAS_VALUES) {
-        store_value(side, target, value);
+        store_value(side, place, value);
     }
 }
 
@@ -75,25 +115,18 @@ void main() {
     for (uint bit = push.first_bit; bit < push.last_bit; bit += digit_bits()) {
         uint mask = mask_of_digit(bit);
         uint flip = push.descending * mask;
-        for (uint digit = 0u; digit < BINS; ++digit) {
-            next_places[digit] = 0u;
+        for (uint pair = 0u; pair < PAIRS; ++pair) {
+            own_places[pair] = 0u;
         }
         uvec4 low, high;
         for (uint at = first; at < last; at += KEYS_PER_READ) {
             load_keys(from, at, last, low, high);
-            for (uint i = 0u; i < KEYS_PER_READ; ++i) {
-                next_places[radix_digit_at(low[i], high[i], bit, mask, flip)] += uint(at + i < last);
-            }
+            count_digit(radix_digit_at(low.x, high.x, bit, mask, flip), true);
+            count_digit(radix_digit_at(low.y, high.y, bit, mask, flip), at + 1u < last);
+            count_digit(radix_digit_at(low.z, high.z, bit, mask, flip), at + 2u < last);
+            count_digit(radix_digit_at(low.w, high.w, bit, mask, flip), at + 3u < last);
         }
-        for (uint digit = 0u; digit < BINS; ++digit) {
-            places[place_slot(digit)] = next_places[digit];
-        }
-        barrier();
         scan_places();
-        barrier();
-        for (uint digit = 0u; digit < BINS; ++digit) {
-            next_places[digit] = places[place_slot(digit)];
-        }
         uint to = 1u - from;
         for (uint at = first; at < last; at += KEYS_PER_READ) {
             load_keys(from, at, last, low, high);
@@ -101,10 +134,15 @@ void main() {
             if (HAS_VALUES) {
                 values = from == 0u ? radix_values_a[at / 4u] : radix_values_b[at / 4u];
             }
-            for (uint i = 0u; i < KEYS_PER_READ; ++i) {
-                if (at + i < last) {
-                    place(to, radix_digit_at(low[i], high[i], bit, mask, flip), low[i], high[i], values[i]);
-                }
+            put(to, radix_digit_at(low.x, high.x, bit, mask, flip), low.x, high.x, values.x);
+            if (at + 1u < last) {
+                put(to, radix_digit_at(low.y, high.y, bit, mask, flip), low.y, high.y, values.y);
+            }
+            if (at + 2u < last) {
+                put(to, radix_digit_at(low.z, high.z, bit, mask, flip), low.z, high.z, values.z);
+            }
+            if (at + 3u < last) {
+                put(to, radix_digit_at(low.w, high.w, bit, mask, flip), low.w, high.w, values.w);
             }
         }
         from = to;

@@ -10,7 +10,7 @@
 layout(local_size_x_id = 0) in;
 
 #include "kernels/radix_few.glsl"
-#include "kernels/radix_places.glsl"
+#include "kernels/wrapping_sum.glsl"
 
 layout(constant_id = 4) const uint CAPACITY = 1024u;
 
@@ -23,12 +23,30 @@ const bool KEYS_MOVE = KEY_WORDS == 1u && !HAS_VALUES;
 
 // Two sides, each digit goes from one to the other.
 shared uint moving[2u * CAPACITY];
+// By digit, then invocation: how many there are; after the scan, the place of the next.
+shared uint places[BINS * LANES];
 
 uvec2 key_of(uint element) {
     if (KEYS_MOVE) {
         return uvec2(element, 0u);
     }
     return uvec2(radix_keys_from[KEY_WORDS * element], KEY_WORDS == 2u ? radix_keys_from[2u * element + 1u] : 0u);
+}
+
+// Counts become the places of the first of each digit and invocation.
+void scan_places() {
+    uint first = gl_LocalInvocationID.x * BINS;
+    uint own = 0u;
+    for (uint i = first; i < first + BINS; ++i) {
+        own += places[i];
+    }
+    uint total;
+    uint before = team_exclusive(own, total);
+    for (uint i = first; i < first + BINS; ++i) {
+        uint count = places[i];
+        places[i] = before;
+        before += count;
+    }
 }
 
 void put(uint place, uint element, uvec2 key) {
@@ -55,11 +73,11 @@ void main() {
         uint mask = mask_of_digit(bit);
         uint flip = push.descending * mask;
         for (uint digit = 0u; digit < BINS; ++digit) {
-            places[place_slot(digit)] = 0u;
+            places[digit * LANES + lane] = 0u;
         }
         for (uint at = first; at < last; ++at) {
             uvec2 key = key_of(moving[from + at]);
-            places[place_slot(radix_digit_at(key.x, key.y, bit, mask, flip))] += 1u;
+            places[radix_digit_at(key.x, key.y, bit, mask, flip) * LANES + lane] += 1u;
         }
         barrier();
         scan_places();
@@ -69,7 +87,7 @@ void main() {
         for (uint at = first; at < last; ++at) {
             uint element = moving[from + at];
             uvec2 key = key_of(element);
-            uint slot = place_slot(radix_digit_at(key.x, key.y, bit, mask, flip));
+            uint slot = radix_digit_at(key.x, key.y, bit, mask, flip) * LANES + lane;
             uint place = places[slot];
             places[slot] = place + 1u;
             if (is_last) {

@@ -8,7 +8,7 @@ use super::form::{BLOCK_ITERATIONS, Form};
 use super::radix_sort::{Order, RadixSortOptions, SortBuffers};
 use super::stream::Count;
 use crate::Result;
-use crate::gpu::shaders::constants::{KEYS_PER_READ, STREAM_COUNT_ON_DEVICE};
+use crate::gpu::shaders::constants::{KEYS_PER_READ, PAIR_BITS, STREAM_COUNT_ON_DEVICE};
 use crate::gpu::shaders::kernels::{radix_one_group, radix_small};
 use crate::gpu::{Buffer, Caps, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo};
 
@@ -16,9 +16,10 @@ use crate::gpu::{Buffer, Caps, ComputePipeline, DeviceKind, Gpu, Pass, PipelineI
 const MAX_KEYS: u32 = 2048;
 /// The same in the buffers of a software device.
 const MAX_KEYS_IN_BUFFERS: u32 = 1 << 14;
+const _: () = assert!(MAX_KEYS_IN_BUFFERS < 1 << PAIR_BITS);
 /// Capacities are a multiple of this.
 const CAPACITY_STEP: u32 = 256;
-/// Loops over the keys of a block and over the bins, for each digit.
+/// Loops over the keys of a block and over pairs of bins, for each digit.
 const KEY_LOOPS: u32 = 2;
 const BIN_LOOPS: u32 = 5;
 
@@ -59,10 +60,11 @@ fn counters(lanes: u32, bins: u32) -> u32 {
 
 /// Keys in buffers beside counters in shared memory of so many bytes: no loop over them may be longer than software drivers let loops be.
 fn capacity_in_buffers(shared_bytes: u32, lanes: u32, bins: u32, digits: u32) -> u32 {
-    if 4 * counters(lanes, bins) > shared_bytes {
+    let pairs = bins / 2;
+    if 4 * counters(lanes, pairs) > shared_bytes {
         return 0;
     }
-    let of_keys = (BLOCK_ITERATIONS / digits).saturating_sub(BIN_LOOPS * bins) / KEY_LOOPS;
+    let of_keys = (BLOCK_ITERATIONS / digits).saturating_sub(BIN_LOOPS * pairs) / KEY_LOOPS;
     let keys = lanes * KEYS_PER_READ * of_keys;
     keys.min(MAX_KEYS_IN_BUFFERS) / CAPACITY_STEP * CAPACITY_STEP
 }
@@ -220,8 +222,9 @@ mod tests {
             (32 << 10, 8, 256, 8, 1 << 14),
             (32 << 10, 4, 256, 8, 1 << 14),
             (32 << 10, 16, 256, 8, 1 << 14),
-            (16 << 10, 16, 256, 8, 0),
-            (16 << 10, 1, 256, 8, 5632),
+            (16 << 10, 16, 256, 8, 1 << 14),
+            (16 << 10, 32, 256, 8, 0),
+            (16 << 10, 1, 256, 8, 6912),
             (16 << 10, 8, 2, 1, 1 << 14),
         ] {
             let keys = capacity_in_buffers(bytes, lanes, bins, digits);
@@ -230,7 +233,7 @@ mod tests {
                 "{bytes} bytes, {lanes} lanes, {bins} bins, {digits} digits"
             );
             let block = keys.div_ceil(lanes * KEYS_PER_READ);
-            assert!(digits * (KEY_LOOPS * block + BIN_LOOPS * bins) <= BLOCK_ITERATIONS || keys == 0);
+            assert!(digits * (KEY_LOOPS * block + BIN_LOOPS * bins / 2) <= BLOCK_ITERATIONS || keys == 0);
         }
     }
 }
