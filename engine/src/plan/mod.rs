@@ -412,6 +412,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/model.rs::slopes_are_believed_alike_to_either_side_of_the_law",
         "engine/src/plan/model.rs::the_last_pair_alone_says_how_large_the_error_is",
         "engine/src/plan/model.rs::neither_stopping_nor_choosing_makes_predictions_optimistic",
+        "engine/src/plan/rounds.rs::the_last_pair_is_under_the_law_of_the_picture",
         "engine/src/plan/rounds.rs::pilots_keep_to_a_quarter_of_what_is_long",
         "engine/src/plan/model.rs::biases_fall_as_they_were_seen_to",
         "engine/src/plan/model.rs::pictures_that_cannot_move_show_no_bias",
