@@ -24,8 +24,8 @@
 //! faster, is the clock's.
 //!
 //! Adaptive samples are taken where the settings ask for them: pilots have them too, so that noise and cost are those of such pictures. Rounds with fewer samples
-//! than the law of their error holds from ([`Law`](crate::techniques::Law)) tell it only where there are no others, and the last pair has as many, too, unless the picture
-//! has fewer. Techniques without such a setting are refused by name then.
+//! than the law of their error holds from ([`Law`](crate::techniques::Law)) tell it only where there are no others; the last pair has as many as that where rounds had,
+//! unless the picture has fewer. Techniques without such a setting are refused by name then.
 //!
 //! Predictions are estimates: a pilot does not see what is rarer than its samples (a caustic of one path in a million), nor how a picture of more pixels
 //! differs from a small one, and times are those of a machine that does nothing else. The interval does not know of these either.
