@@ -161,12 +161,12 @@ fn adaptive_pictures_have_the_error_asked_for() {
         for candidate in plan.candidates.iter().filter(|candidate| candidate.technique != "path") {
             assert!(candidate.reason.contains("no setting adaptive"), "{candidate:?}");
         }
-        // Without adaptive samples, whose own noise, a twelfth of theirs, is subtracted from squared errors.
+        // Without adaptive samples; its own noise, an eighth of theirs, is subtracted from squared errors.
         let reference = render(
             &renderer,
             &RenderOptions {
                 technique: Some("path".into()),
-                ..of(12 * choice.spp, 99, "off")
+                ..of(8 * choice.spp, 99, "off")
             },
         );
         let own = relative_mse_by_variance(&reference.picture, RELATIVE_MSE_OFFSET).unwrap();
