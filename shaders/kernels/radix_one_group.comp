@@ -1,7 +1,7 @@
 #version 460
 // Radix sort of few keys by one workgroup, in one dispatch: the three stages of every digit, with keys and values that go from one side of the
 // buffers to the other. For software devices, where shared memory is memory like any other, and where dispatches and the barriers between
-// them take longer than the keys do.
+// them are a large part of what few keys take.
 //
 // Each invocation walks a block of its own with counters of its own, so equal digits keep their order. After Satish, Harris and Garland,
 // Designing efficient sorting algorithms for manycore GPUs (2009), section 4, with invocations for blocks. A word counts two digits, which

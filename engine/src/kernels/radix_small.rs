@@ -14,7 +14,7 @@ use crate::gpu::{Buffer, Caps, ComputePipeline, DeviceKind, Gpu, Pass, PipelineI
 
 /// Keys at most in shared memory, where that allows: with more, one workgroup takes longer than many do with their barriers.
 const MAX_KEYS: u32 = 2048;
-/// The same in the buffers of a software device.
+/// The same in the buffers of a software device: an estimate by what dispatches and keys take there, not a measurement.
 const MAX_KEYS_IN_BUFFERS: u32 = 1 << 14;
 const _: () = assert!(MAX_KEYS_IN_BUFFERS < 1 << PAIR_BITS);
 /// Capacities are a multiple of this.
