@@ -10,6 +10,9 @@ layout(constant_id = 1) const uint BINS = 16u;
 layout(constant_id = 2) const uint KEY_WORDS = 1u;
 layout(constant_id = 3) const bool HAS_VALUES = false;
 
+// Keys that an invocation which walks a block reads together: texels or vectors of four words, one or two.
+const uint KEYS_PER_READ = 4u;
+
 // The digit whose lowest bit is `first`, as wide as `mask`; `flip` is the mask for descending order, and 0 else.
 uint radix_digit_at(uint low, uint high, uint first, uint mask, uint flip) {
     uint shift = first & 31u;

@@ -13,9 +13,6 @@ layout(set = 0, binding = 2, scalar) restrict buffer RadixKeysOut { uint radix_k
 layout(set = 0, binding = 3) uniform utextureBuffer radix_values_in;
 layout(set = 0, binding = 4, scalar) restrict buffer RadixValuesOut { uint radix_values_out[]; };
 
-// Keys that are read together.
-const uint KEYS_PER_READ = 4u;
-
 // Low and high words of the keys `first` to `first` + 3, as far as they lie before `last`.
 void load_keys(uint first, uint last, out uvec4 low, out uvec4 high) {
     if (KEY_WORDS == 1u) {

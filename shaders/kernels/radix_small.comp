@@ -9,25 +9,15 @@
 
 layout(local_size_x_id = 0) in;
 
-#include "kernels/radix_digit.glsl"
-#include "kernels/stream_scratch.glsl"
+#include "kernels/radix_few.glsl"
 #include "kernels/wrapping_sum.glsl"
 
 layout(constant_id = 4) const uint CAPACITY = 1024u;
 
-layout(set = 0, binding = 1, scalar) restrict readonly buffer StreamCounts { uint stream_counts[]; };
 layout(set = 0, binding = 2, scalar) restrict readonly buffer RadixKeysFrom { uint radix_keys_from[]; };
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer RadixKeysTo { uint radix_keys_to[]; };
 layout(set = 0, binding = 4, scalar) restrict readonly buffer RadixValuesFrom { uint radix_values_from[]; };
 layout(set = 0, binding = 5, scalar) restrict writeonly buffer RadixValuesTo { uint radix_values_to[]; };
-
-layout(push_constant, scalar) uniform Push {
-    uint count;       // keys, or STREAM_COUNT_ON_DEVICE
-    uint capacity;    // keys at most
-    uint first_bit;   // compared, and the one past the last
-    uint last_bit;
-    uint descending;  // 1 or 0
-} push;
 
 const bool KEYS_MOVE = KEY_WORDS == 1u && !HAS_VALUES;
 
@@ -41,19 +31,6 @@ uvec2 key_of(uint element) {
         return uvec2(element, 0u);
     }
     return uvec2(radix_keys_from[KEY_WORDS * element], KEY_WORDS == 2u ? radix_keys_from[2u * element + 1u] : 0u);
-}
-
-uint keys_to_sort() {
-    if (push.count != STREAM_COUNT_ON_DEVICE) {
-        return push.count;
-    }
-    uint wanted = stream_counts[0];
-    uint count = wanted <= push.capacity ? wanted : 0u;
-    if (gl_LocalInvocationID.x == 0u) {
-        stream_count = count;
-        stream_wanted = wanted;
-    }
-    return count;
 }
 
 // Counts become the places of the first of each digit and invocation.
@@ -91,10 +68,9 @@ void main() {
     for (uint at = first; at < last; ++at) {
         moving[at] = KEYS_MOVE ? radix_keys_from[at] : at;
     }
-    uint digit_bits = uint(findMSB(BINS));
     uint from = 0u;
-    for (uint bit = push.first_bit; bit < push.last_bit; bit += digit_bits) {
-        uint mask = (1u << min(digit_bits, push.last_bit - bit)) - 1u;
+    for (uint bit = push.first_bit; bit < push.last_bit; bit += digit_bits()) {
+        uint mask = mask_of_digit(bit);
         uint flip = push.descending * mask;
         for (uint digit = 0u; digit < BINS; ++digit) {
             places[digit * LANES + lane] = 0u;
@@ -106,7 +82,7 @@ void main() {
         barrier();
         scan_places();
         barrier();
-        bool is_last = bit + digit_bits >= push.last_bit;
+        bool is_last = bit + digit_bits() >= push.last_bit;
         uint to = CAPACITY - from;
         for (uint at = first; at < last; ++at) {
             uint element = moving[from + at];

@@ -130,6 +130,61 @@ fn pictures_have_the_error_that_was_predicted() {
     });
 }
 
+// Adaptive samples, which pilots have as the picture has them, and as much error as was asked for.
+#[test]
+fn adaptive_pictures_have_the_error_asked_for() {
+    with_gpu(|gpu| {
+        let renderer = Renderer::new(gpu, &scene::load("builtin:box-room").unwrap()).unwrap();
+        let asked = 0.3;
+        let of = |spp, seed, adaptive: &str| RenderOptions {
+            size: [40, 40],
+            spp,
+            seed,
+            settings: serde_json::json!({ "sampler": "pcg", "roulette_start": 4, "adaptive": adaptive }).into(),
+            technique: None,
+            ..options()
+        };
+        let plan_of = |options: &RenderOptions| plan(&renderer, options, goal(asked), &mut || true).unwrap();
+        let plan = plan_of(&of(1, 7, "relative"));
+        let choice = plan.choice();
+        assert_eq!(
+            (choice.technique, &choice.settings["adaptive"], choice.reason.as_str()),
+            ("path", &"relative".into(), ""),
+            "{plan:?}"
+        );
+        assert!(choice.error <= asked * 1.001 && plan.shortfall.is_empty(), "{plan:?}");
+        // Where rounds had as many, so has the last pair: a pilot as large a part of its samples as of the picture's.
+        assert!(
+            choice.spp >= 16 && choice.last_pilot_spp >= choice.pilot_spp.min(16),
+            "{choice:?}"
+        );
+        for candidate in plan.candidates.iter().filter(|candidate| candidate.technique != "path") {
+            assert!(candidate.reason.contains("no setting adaptive"), "{candidate:?}");
+        }
+        // Without adaptive samples; its own noise, an eighth of theirs, is subtracted from squared errors.
+        let reference = render(
+            &renderer,
+            &RenderOptions {
+                technique: Some("path".into()),
+                ..of(8 * choice.spp, 99, "off")
+            },
+        );
+        let own = relative_mse_by_variance(&reference.picture, RELATIVE_MSE_OFFSET).unwrap();
+        for seed in [201, 202] {
+            let rendered = render(&renderer, &plan.options(&of(1, seed, "relative")));
+            let [fewest, most] = rendered.report.samples;
+            assert!(fewest < choice.spp && choice.spp < most, "{fewest} to {most}");
+            let error = compare(&rendered.picture, &reference.picture, &CompareOptions::default()).unwrap();
+            let error = (error.relative_mse - own).sqrt();
+            println!("seed {seed}: {error}, predicted {choice:?}");
+            assert!(
+                error < FACTOR * asked && asked < FACTOR * error,
+                "{error} for {asked}, {choice:?}"
+            );
+        }
+    });
+}
+
 // One round of pilots of one candidate, as many in every run.
 #[test]
 fn the_unit_of_radiance_changes_neither_choice_nor_error() {

@@ -59,6 +59,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("kernels/partition_subgroup.comp", "SpecConstantOp"),
     ("kernels/permute.comp", "SpecConstantOp"),
     ("kernels/radix_count_subgroup.comp", "SpecConstantOp"),
+    ("kernels/radix_one_group.comp", "SpecConstantOp"),
     ("kernels/radix_scan.comp", "SpecConstantOp"),
     ("kernels/radix_small.comp", "SpecConstantOp"),
     ("kernels/radix_scatter_subgroup.comp", "SpecConstantOp"),

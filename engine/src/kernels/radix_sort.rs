@@ -19,8 +19,8 @@ use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::kernels::{
-    radix_count_serial, radix_count_subgroup, radix_scan, radix_scatter_serial, radix_scatter_subgroup, radix_small,
-    stream_prepare,
+    radix_count_serial, radix_count_subgroup, radix_one_group, radix_scan, radix_scatter_serial,
+    radix_scatter_subgroup, radix_small, stream_prepare,
 };
 use crate::gpu::shaders::types::StreamPlan;
 use crate::gpu::{Buffer, Category, Gpu, Pass, PipelineInfo, TexelView};
@@ -67,8 +67,8 @@ pub struct RadixSortOptions {
     pub order: Order,
     /// The bits of keys that are compared, counted from the lowest; fewer bits take fewer passes.
     pub bits: Range<u32>,
-    /// What teams are. [`Form::Auto`] sorts up to some 2,000 keys, as shared memory allows, by one workgroup in one dispatch.
-    /// [`Form::Shared`] does so too, and is the serial form for more.
+    /// What teams are. [`Form::Auto`] sorts few keys by one workgroup in one dispatch: some 2,000, as shared memory allows, and more on
+    /// software devices ([`RadixSort::one_dispatch_up_to`]). [`Form::Shared`] does so too, always in shared memory, and is the serial form for more.
     pub form: Form,
 }
 
@@ -115,9 +115,10 @@ pub struct RadixSort {
 
 impl RadixSort {
     /// The kernels that a sort may take, on whatever device.
-    pub const KERNELS: [&'static ShaderInfo; 7] = [
+    pub const KERNELS: [&'static ShaderInfo; 8] = [
         &stream_prepare::INFO,
         &radix_small::INFO,
+        &radix_one_group::INFO,
         &radix_count_serial::INFO,
         &radix_count_subgroup::INFO,
         &radix_scan::INFO,
@@ -221,7 +222,7 @@ impl RadixSort {
     /// The side of the buffers that holds the result of a sort of up to `capacity` keys.
     pub fn result_side(&self, capacity: u32) -> usize {
         match self.small(capacity) {
-            Some(_) => 1,
+            Some(small) => small.result_side(),
             None => self.plan(capacity).digits(&self.options.bits).len() % 2,
         }
     }
@@ -250,7 +251,7 @@ impl RadixSort {
         }
         if let Some(small) = self.small(capacity) {
             small.record(pass, &self.options, buffers, count, scratch)?;
-            return Ok(1);
+            return Ok(small.result_side());
         }
         let plan = self.plan(capacity);
         let stream = self.prepare.begin(pass, &plan.shape, count, scratch)?;
@@ -350,6 +351,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     shaders: &[
         "shaders/kernels/radix_count_serial.comp",
         "shaders/kernels/radix_count_subgroup.comp",
+        "shaders/kernels/radix_one_group.comp",
         "shaders/kernels/radix_scan.comp",
         "shaders/kernels/radix_scatter_serial.comp",
         "shaders/kernels/radix_scatter_subgroup.comp",

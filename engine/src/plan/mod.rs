@@ -23,6 +23,10 @@
 //! [`Plan::pilot_share`] says what share they took. What they find is the same in every run for as many rounds; how many there are, and what is predicted to be
 //! faster, is the clock's.
 //!
+//! Adaptive samples are taken where the settings ask for them: pilots have them too, so that noise and cost are those of such pictures. Rounds with fewer samples
+//! than the law of their error holds from ([`Law`](crate::techniques::Law)) tell it only where there are no others; the last pair has as many as that where rounds had,
+//! unless the picture has fewer. Techniques without such a setting are refused by name then.
+//!
 //! Predictions are estimates: a pilot does not see what is rarer than its samples (a caustic of one path in a million), nor how a picture of more pixels
 //! differs from a small one, and times are those of a machine that does nothing else. The interval does not know of these either.
 
@@ -54,6 +58,10 @@ use judgement::reference_trial;
 use rounds::{PILOT_SHARE, is_late, run_last_pair, run_rounds, seconds_of_rounds};
 use trial::{Asked, Trial};
 use verdict::{score, shortfall};
+
+/// The setting that gives pixels differing numbers of samples, and its value without.
+const ADAPTIVE: &str = "adaptive";
+const ADAPTIVE_OFF: &str = "off";
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
@@ -219,7 +227,10 @@ pub fn plan_among(
         // Settings can be left out, techniques only where a time is to be kept.
         let can_wait = goal.time.is_some() || trials.iter().flatten().any(|trial| trial.card.id == card.id);
         let late = can_wait && is_late(&trials, goal, start.elapsed().as_secs_f64());
-        let trial = if asked.gave_up.get() || (tried && (late || !asked.proceeds())) {
+        let trial = if let Some(reason) = lacks_adaptive(card, &fixed) {
+            candidate.reason = reason;
+            None
+        } else if asked.gave_up.get() || (tried && (late || !asked.proceeds())) {
             candidate.reason = "there was no time to try it".into();
             None
         } else {
@@ -319,6 +330,14 @@ fn wanted_path_set(settings: &Value) -> Result<PathSet> {
     }
 }
 
+/// Why a technique cannot be chosen where adaptive samples are asked for: its pictures would be another thing, without a word. `None` where they are not, or
+/// where it has them.
+fn lacks_adaptive(card: &Card, fixed: &Value) -> Option<String> {
+    let kind = fixed.get(ADAPTIVE)?.as_str()?;
+    let asked = kind != ADAPTIVE_OFF && !card.settings.has(ADAPTIVE);
+    asked.then(|| format!("it has no setting {ADAPTIVE}, which was asked for as {kind}"))
+}
+
 /// Every technique with each of its variants. What is fixed is fixed; variants that it makes equal are listed once.
 fn candidates<'a>(cards: &[&'a Card], fixed: &Value) -> Vec<(&'a Card, Candidate)> {
     let mut found: Vec<(&Card, Candidate)> = Vec::new();
@@ -393,6 +412,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/model.rs::slopes_are_believed_alike_to_either_side_of_the_law",
         "engine/src/plan/model.rs::the_last_pair_alone_says_how_large_the_error_is",
         "engine/src/plan/model.rs::neither_stopping_nor_choosing_makes_predictions_optimistic",
+        "engine/src/plan/rounds.rs::the_last_pair_is_under_the_law_of_the_picture",
         "engine/src/plan/rounds.rs::pilots_keep_to_a_quarter_of_what_is_long",
         "engine/src/plan/model.rs::biases_fall_as_they_were_seen_to",
         "engine/src/plan/model.rs::pictures_that_cannot_move_show_no_bias",
@@ -403,6 +423,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/verdict.rs::what_cannot_be_had_is_said",
         "tests/tests/automatic_choice.rs::predictions_come_true",
         "tests/tests/automatic_choice.rs::pictures_have_the_error_that_was_predicted",
+        "tests/tests/automatic_choice.rs::adaptive_pictures_have_the_error_asked_for",
         "tests/tests/automatic_choice.rs::the_unit_of_radiance_changes_neither_choice_nor_error",
         "tests/tests/automatic_choice.rs::what_cannot_be_chosen_says_why",
         "tests/tests/automatic_choice.rs::what_cannot_be_made_is_no_end_of_the_choice",
@@ -441,6 +462,24 @@ mod tests {
         for (_, candidate) in fixed {
             assert_eq!(candidate.settings["sampler"], "pcg");
             assert_eq!(candidate.settings["path_set"], "direct");
+        }
+    }
+
+    #[test]
+    fn adaptive_samples_are_asked_of_every_technique() {
+        let [path, photon] = ["path", "photon"].map(|id| techniques::by_id(id).unwrap());
+        for kind in ["relative", "absolute"] {
+            let fixed = serde_json::json!({ "adaptive": kind });
+            assert_eq!(lacks_adaptive(path, &fixed), None);
+            let reason = lacks_adaptive(photon, &fixed).unwrap_or_default();
+            assert!(reason.contains("adaptive") && reason.contains(kind), "{reason}");
+        }
+        for fixed in [
+            Value::Null,
+            serde_json::json!({}),
+            serde_json::json!({ "adaptive": "off" }),
+        ] {
+            assert_eq!(lacks_adaptive(photon, &fixed), None, "{fixed}");
         }
     }
 }

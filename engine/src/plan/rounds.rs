@@ -56,11 +56,17 @@ pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, spent: f64, round
     let wanted = trial.samples(asked.goal, spent);
     let picture = trial.cost.seconds(f64::from(wanted));
     let fits = trial.pair_samples(room(1.0, asked.goal, picture, spent, rounds));
-    if !trial.lit || asked.goal.time.is_some() && fits < ROUNDS[0] {
+    let least = least_of_last_pair(trial.law.samples_least, trial.spp, wanted);
+    if !trial.lit || asked.goal.time.is_some() && fits < least {
         return Ok(());
     }
-    // Where nothing is to be kept, as many as the first round had.
-    trial.conclude(asked, fits.min(wanted).clamp(ROUNDS[0], LAST_PAIR))
+    trial.conclude(asked, fits.min(wanted).clamp(least, LAST_PAIR))
+}
+
+/// Fewest samples per pixel of the last pair of a picture of `wanted`: as many as the first round had, and as the error's law holds from, unless the picture has
+/// fewer, or the last of the `rounds`, for which there was no time.
+fn least_of_last_pair(samples_least: u32, rounds: u32, wanted: u32) -> u32 {
+    samples_least.min(rounds).min(wanted).clamp(ROUNDS[0], LAST_PAIR)
 }
 
 /// Further rounds for what can still be chosen, and for what that is held against, as long as they cost little beside the picture itself. Every trial is
@@ -155,6 +161,20 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+
+    // Adaptive pictures of few samples have another pilot, or none: they say nothing of those of more.
+    #[test]
+    fn the_last_pair_is_under_the_law_of_the_picture() {
+        let of = least_of_last_pair;
+        assert_eq!([of(1, 4, 1), of(1, 256, 1000)], [ROUNDS[0]; 2]);
+        assert_eq!(
+            [of(16, 64, 1), of(16, 64, 10), of(16, 16, 16), of(16, 256, 1000)],
+            [4, 10, 16, 16]
+        );
+        // Where rounds had no time for as many, the last pair has none, either.
+        assert_eq!(of(16, 4, 1000), ROUNDS[0]);
+        assert_eq!(of(1 << 20, 1 << 20, 1 << 20), LAST_PAIR);
+    }
 
     #[test]
     fn pilots_keep_to_a_quarter_of_what_is_long() {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use clerestory::Error;
-use clerestory::gpu::{Gpu, rw_compute_to_compute};
+use clerestory::gpu::{DeviceKind, Gpu, rw_compute_to_compute};
 use clerestory::kernels::{
     Count, Form, KeyWidth, Order, RadixSort, RadixSortOptions, SortBuffers, StreamStatus, radix_sort,
 };
@@ -113,7 +113,7 @@ fn check(gpu: &Gpu, sort: &RadixSort, keys: &[u64], on_device: bool, what: &str)
 fn every_size_and_pattern_is_as_by_std() {
     with_gpu(|gpu| {
         let mut random = Random(41);
-        for form in FORMS {
+        for form in FORMS.into_iter().chain([Form::Auto]) {
             for (key, values) in [(KeyWidth::Bits32, true), (KeyWidth::Bits64, false)] {
                 let options = RadixSortOptions {
                     form,
@@ -159,32 +159,43 @@ fn barriers_and_invocations(gpu: &Gpu, sort: &RadixSort, count: Count<'_>) -> (u
 fn few_keys_take_one_dispatch() {
     with_gpu(|gpu| {
         let lanes_at_most = u64::from(gpu.caps().max_workgroup_invocations.min(256));
-        let sort = RadixSort::new(gpu, RadixSortOptions::new(KeyWidth::Bits32, false)).unwrap();
-        let limit = sort.one_dispatch_up_to();
-        assert!((256..=2048).contains(&limit), "{limit}");
-        let counts = words(gpu, "count", &[1]);
-        let on_device = Count::Device {
-            view: counts.view(),
-            capacity: limit,
-        };
-        for count in [Count::Host(1), Count::Host(limit), on_device] {
-            let (barriers, invocations) = barriers_and_invocations(gpu, &sort, count);
-            assert!(
-                barriers == 0 && invocations <= lanes_at_most,
-                "{barriers} {invocations}"
-            );
-        }
-        // More keys take three dispatches for each of four or eight digits, and a barrier between any two.
-        for count in [limit + 1, 200_000] {
-            let (barriers, _) = barriers_and_invocations(gpu, &sort, Count::Host(count));
-            assert!([11, 23].contains(&barriers), "{count}: {barriers}");
-        }
-        for form in [Form::Serial, Form::Subgroup] {
+        let with_form = |form| {
             let options = RadixSortOptions {
                 form,
                 ..RadixSortOptions::new(KeyWidth::Bits32, false)
             };
-            assert_eq!(RadixSort::new(gpu, options).unwrap().one_dispatch_up_to(), 0);
+            RadixSort::new(gpu, options).unwrap()
+        };
+        // In shared memory, and in the buffers where that is memory like any other.
+        let of_buffers = if gpu.caps().kind == DeviceKind::Cpu {
+            1 << 14
+        } else {
+            2048
+        };
+        for (form, most) in [(Form::Shared, 2048), (Form::Auto, of_buffers)] {
+            let sort = with_form(form);
+            let limit = sort.one_dispatch_up_to();
+            assert!((256..=most).contains(&limit), "{form:?}: {limit}");
+            let counts = words(gpu, "count", &[1]);
+            let on_device = Count::Device {
+                view: counts.view(),
+                capacity: limit,
+            };
+            for count in [Count::Host(1), Count::Host(limit), on_device] {
+                let (barriers, invocations) = barriers_and_invocations(gpu, &sort, count);
+                assert!(
+                    barriers == 0 && invocations <= lanes_at_most,
+                    "{form:?}: {barriers} {invocations}"
+                );
+            }
+            // More keys take three dispatches for each of four or eight digits, and a barrier between any two.
+            for count in [limit + 1, 200_000] {
+                let (barriers, _) = barriers_and_invocations(gpu, &sort, Count::Host(count));
+                assert!([11, 23].contains(&barriers), "{form:?}, {count}: {barriers}");
+            }
+        }
+        for form in [Form::Serial, Form::Subgroup] {
+            assert_eq!(with_form(form).one_dispatch_up_to(), 0);
         }
     });
 }
@@ -193,14 +204,17 @@ fn few_keys_take_one_dispatch() {
 fn sorts_about_the_limit_of_one_dispatch_are_as_by_std() {
     with_gpu(|gpu| {
         let mut random = Random(49);
-        for (key, values, order) in [
-            (KeyWidth::Bits32, false, Order::Descending),
-            (KeyWidth::Bits32, true, Order::Ascending),
-            (KeyWidth::Bits64, false, Order::Ascending),
-            (KeyWidth::Bits64, true, Order::Descending),
+        for (key, values, order, form) in [
+            (KeyWidth::Bits32, false, Order::Descending, Form::Auto),
+            (KeyWidth::Bits32, true, Order::Ascending, Form::Shared),
+            (KeyWidth::Bits32, true, Order::Descending, Form::Auto),
+            (KeyWidth::Bits64, false, Order::Ascending, Form::Auto),
+            (KeyWidth::Bits64, true, Order::Descending, Form::Shared),
+            (KeyWidth::Bits64, true, Order::Ascending, Form::Auto),
         ] {
             let options = RadixSortOptions {
                 order,
+                form,
                 ..RadixSortOptions::new(key, values)
             };
             let sort = RadixSort::new(gpu, options).unwrap();
@@ -226,7 +240,7 @@ fn bits_and_orders_are_those_asked_for() {
             (KeyWidth::Bits64, 25..41, Order::Descending),
             (KeyWidth::Bits64, 0..63, Order::Ascending),
         ];
-        for form in FORMS {
+        for form in FORMS.into_iter().chain([Form::Auto]) {
             for (key, bits, order) in kinds.clone() {
                 let options = RadixSortOptions {
                     key,
