@@ -2,6 +2,9 @@
 //!
 //! One module a shader, nested as the folders are; structs that blocks are made of go to `types`, and descriptor sets that a GLSL
 //! include names (`// descriptor set 2: SceneSet`) go to `sets`, once, and must be the same in every shader that uses them.
+//!
+//! `x_driver.comp` is `x.comp` by ray queries, for pipelines that the host makes as those of `x`: it must have the same push constants, workgroup
+//! and sets but for that of the index, and no specialization constants that `x` lacks.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -59,7 +62,11 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface], paths: &Paths) -> 
                 .join("::")
                 .trim_start_matches(':')
         );
-        folder.shaders += &shader_module(shader, interface, &module, &named);
+        let ray_query = shaders.iter().zip(interfaces).find(|(other, _)| is_by_ray_queries(shader, other));
+        if let Some((other, by_ray_queries)) = ray_query {
+            check_stands_in(interface, by_ray_queries).map_err(|message| format!("{}: {message}", other.name))?;
+        }
+        folder.shaders += &shader_module(shader, interface, &module, &named, ray_query.is_some());
     }
     let mut text =
         String::from("/// Structs that shader blocks are made of, with the device's offsets.\npub mod types {\n");
@@ -161,7 +168,47 @@ fn collect_type(kind: &Type, types: &mut Types) -> Result<(), String> {
     }
 }
 
-fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &BTreeMap<u32, String>) -> String {
+/// The set of the ray index, which ray queries have otherwise.
+const INDEX_SET: u32 = 1;
+
+/// Whether `other` is the kernel `shader` by ray queries.
+fn is_by_ray_queries(shader: &Shader, other: &Shader) -> bool {
+    let stem = shader.name.strip_suffix(".comp");
+    stem.is_some_and(|stem| other.name.strip_suffix("_driver.comp") == Some(stem))
+}
+
+/// Fails for a module that cannot be given what the host gives another one.
+fn check_stands_in(of: &Interface, by_ray_queries: &Interface) -> Result<(), String> {
+    let constants = |interface: &Interface| -> Vec<_> {
+        let all = interface.spec.iter();
+        all.map(|constant| (constant.id, constant.name.clone(), constant.kind)).collect()
+    };
+    let sets = |interface: &Interface| -> Vec<_> {
+        let all = interface.bindings.iter().filter(|binding| binding.set != INDEX_SET);
+        all.cloned().collect()
+    };
+    let known = constants(of);
+    let differs = if of.push != by_ray_queries.push {
+        "push constants"
+    } else if of.local_size != by_ray_queries.local_size {
+        "workgroup"
+    } else if sets(of) != sets(by_ray_queries) {
+        "sets"
+    } else if !constants(by_ray_queries).iter().all(|constant| known.contains(constant)) {
+        "specialization constants"
+    } else {
+        return Ok(());
+    };
+    Err(format!("its {differs} are not those of the kernel that it stands in for"))
+}
+
+fn shader_module(
+    shader: &Shader,
+    interface: &Interface,
+    module: &str,
+    named: &BTreeMap<u32, String>,
+    has_ray_query: bool,
+) -> String {
     let mut text = String::new();
     for line in &shader.head {
         let _ = writeln!(text, "/// {line}");
@@ -177,7 +224,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         text,
         "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
          spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    fingerprint: {},\n    local_size: [{}],\n    \
-         subgroups: {},\n    capabilities: &[{}],\n    bindings: &[",
+         subgroups: {},\n    capabilities: &[{}],\n    ray_query: {},\n    bindings: &[",
         shader.name,
         interface.stage,
         interface.fingerprint(),
@@ -189,6 +236,11 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
             .map(|name| format!("Capability::{name}"))
             .collect::<Vec<_>>()
             .join(", "),
+        if has_ray_query {
+            format!("Some(&super::{module}_driver::INFO)")
+        } else {
+            "None".into()
+        },
     );
     for binding in &interface.bindings {
         let kind = match &binding.resource {
@@ -197,6 +249,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
             Resource::StorageImage { .. } => "StorageImage",
             Resource::SampledImage => "SampledImage",
             Resource::TexelBuffer => "TexelBuffer",
+            Resource::AccelerationStructure => "AccelerationStructure",
         };
         let (reads, writes) = access(&binding.resource);
         let _ = writeln!(
@@ -362,6 +415,7 @@ fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {
             Resource::StorageImage { .. } => ("&'a Image", "storage image".into()),
             Resource::SampledImage => ("SampledView<'a>", "sampled image".into()),
             Resource::TexelBuffer => ("&'a TexelView", "texel buffer".into()),
+            Resource::AccelerationStructure => ("&'a AccelerationStructure", "acceleration structure".into()),
         };
         let mode = match access(&binding.resource) {
             (true, false) => "read",
@@ -385,6 +439,7 @@ fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {
             Resource::StorageImage { .. } => "StorageImage",
             Resource::SampledImage => "Sampled",
             Resource::TexelBuffer => "Texels",
+            Resource::AccelerationStructure => "Structure",
         };
         let _ = writeln!(
             text,

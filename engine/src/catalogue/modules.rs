@@ -28,6 +28,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::triangle::oracles::ROWS,
     crate::accel::triangle::wald::ROWS,
     crate::accel::wide::ROWS,
+    crate::accel::driver::ROWS,
     crate::accel::yardstick::left_balanced::ROWS,
     crate::accel::yardstick::voxel_volume::ROWS,
     crate::film::accumulate::ROWS,
